@@ -1,0 +1,45 @@
+// A three-axis machine: where the tool really is when the controller says `commanded`.
+// Pose, exact, multiplied from workpiece to tool (Exp = exact rotation of a rotation vector):
+//   axis before the bed:  Rot(Exp theta_a) Trans(p e_a + delta_a)
+//   axis after the bed:   Trans(p e_a + delta_a) Rot(Exp theta_a)
+//   last:                 Trans(tool offset)
+#pragma once
+
+#include <Eigen/Core>
+
+#include "stepdiag/machine/chain.hpp"
+#include "stepdiag/machine/error_map.hpp"
+
+namespace stepdiag {
+
+// Position and orientation of the tool in the machine frame.
+struct Pose {
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  // machine_R_tool
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();      // functional point, tool offset included, mm
+};
+
+// L_a: the lever by which theta_a moves the functional point to first order, e = sum_a (delta_a + theta_a x L_a):
+// tool offset + positions of the axes after a, plus p_a itself where a carries the workpiece.
+Eigen::Vector3d angular_lever(const Chain& chain, const Eigen::Vector3d& tool, Axis axis, const Eigen::Vector3d& commanded);
+
+class Machine {
+public:
+    // `tool` is the offset of the functional point from the tool's origin, mm.
+    Machine(Chain chain, ErrorMap errors, const Eigen::Vector3d& tool = Eigen::Vector3d::Zero());
+
+    Pose pose(const Eigen::Vector3d& commanded) const;
+    // Actual minus nominal functional point, exact / to first order in the errors, mm.
+    Eigen::Vector3d error(const Eigen::Vector3d& commanded) const;
+    Eigen::Vector3d first_order_error(const Eigen::Vector3d& commanded) const;
+
+    const Chain& chain() const { return chain_; }
+    const ErrorMap& errors() const { return errors_; }
+    const Eigen::Vector3d& tool() const { return tool_; }
+
+private:
+    Chain chain_;
+    ErrorMap errors_;
+    Eigen::Vector3d tool_;
+};
+
+}  // namespace stepdiag

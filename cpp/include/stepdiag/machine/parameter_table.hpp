@@ -1,0 +1,47 @@
+// The CSV format that error maps and calibrations share: "parameter,position_mm,value,unit,standard_uncertainty" behind
+// leading "# key=value" lines. Values are kept in native units (mm, rad), and a number written is read back to the same bits.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "stepdiag/machine/parameter.hpp"
+
+namespace stepdiag {
+
+// One error function at its nodes; an uncertainty that is not known is absent.
+struct FunctionTable {
+    std::vector<double> position;  // mm, ascending
+    std::vector<double> value;     // mm or rad
+    std::vector<std::optional<double>> standard_uncertainty;
+};
+
+struct SquarenessValue {
+    double value;  // rad
+    std::optional<double> standard_uncertainty;
+};
+
+struct ParameterTable {
+    std::map<std::string, std::string> header;  // format, chain, volume_mm, tool_mm, ...
+    std::array<std::optional<FunctionTable>, function_count> functions;
+    std::array<std::optional<SquarenessValue>, squareness_count> squarenesses;
+};
+
+// Throws InvalidArgument naming file and line: unreadable or binary file, wrong header, unknown parameter or unit, a
+// number that is none or not finite, positions that do not ascend, a squareness with a position or given twice.
+ParameterTable read_parameter_table(const std::string& path);
+ParameterTable parse_parameter_table(std::string_view text, const std::string& file_name);
+
+// Writes to a temporary file beside `path`, then renames it.
+void write_parameter_table(const ParameterTable& table, const std::string& path);
+std::string format_parameter_table(const ParameterTable& table);
+
+// Three lengths of the leading lines, "800.0 600.0 500.0".
+std::string format_lengths(const Eigen::Vector3d& lengths);
+
+}  // namespace stepdiag

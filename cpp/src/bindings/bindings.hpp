@@ -1,0 +1,69 @@
+// What the parts of the extension share: argument types with honest names in signatures, and their conversion.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stepdiag/core/error.hpp"
+#include "stepdiag/machine/chain.hpp"
+
+namespace py = pybind11;
+
+namespace stepdiag::bindings {
+
+using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+
+// Anything that NumPy makes an array of; the shape is checked here, so that a wrong one is an InvalidArgument.
+class ArrayLike : public py::object {
+    PYBIND11_OBJECT_DEFAULT(ArrayLike, py::object, PyObject_Type)
+};
+class PathLike : public py::object {
+    PYBIND11_OBJECT_DEFAULT(PathLike, py::object, PyObject_Type)
+};
+class XarrayDataset : public py::object {
+    PYBIND11_OBJECT_DEFAULT(XarrayDataset, py::object, PyObject_Type)
+};
+
+Eigen::VectorXd to_vector(const py::handle& array, const char* name);                // any length
+Eigen::Vector3d to_vector3(const py::handle& array, const char* name);
+Eigen::Vector2d to_vector2(const py::handle& array, const char* name);
+Points to_points(const py::handle& array, const char* name);                         // (n, 3)
+std::string to_path(const PathLike& path);
+Axis to_axis(const std::string& name);
+
+DoubleArray to_numpy(const std::vector<double>& values);
+DoubleArray to_numpy(const std::vector<std::optional<double>>& values);  // NaN where there is none
+DoubleArray to_numpy(const Eigen::MatrixXd& matrix);
+DoubleArray to_numpy_vector(const Eigen::VectorXd& vector);
+
+inline ArrayLike zeros(int size) { return py::reinterpret_borrow<ArrayLike>(py::make_tuple(0.0, 0.0, 0.0)[py::slice(0, size, 1)]); }
+
+void bind_machine(py::module_& m);
+void bind_plan(py::module_& m);
+void bind_measurement(py::module_& m);
+void bind_simulation(py::module_& m);
+void bind_evaluation(py::module_& m);
+
+}  // namespace stepdiag::bindings
+
+namespace pybind11::detail {
+template <>
+struct handle_type_name<stepdiag::bindings::ArrayLike> {
+    static constexpr auto name = const_name("numpy.typing.ArrayLike");
+};
+template <>
+struct handle_type_name<stepdiag::bindings::PathLike> {
+    static constexpr auto name = const_name("str | os.PathLike[str]");
+};
+template <>
+struct handle_type_name<stepdiag::bindings::XarrayDataset> {
+    static constexpr auto name = const_name("xarray.Dataset");
+};
+}  // namespace pybind11::detail

@@ -1,0 +1,79 @@
+// stepdiag._core: the C++ library as Python sees it. Each part checks shapes, releases the interpreter lock and calls.
+#include "bindings.hpp"
+#include "stepdiag/version.hpp"
+
+namespace stepdiag::bindings {
+namespace {
+
+DoubleArray to_array(const py::handle& object, const char* name) {
+    DoubleArray array = DoubleArray::ensure(object);
+    if (!array) {
+        PyErr_Clear();
+        throw InvalidArgument(std::string(name) + ": expected an array of numbers, got " + std::string(py::str(py::type::handle_of(object))));
+    }
+    return array;
+}
+
+Eigen::VectorXd to_vector_of(const py::handle& object, const char* name, py::ssize_t size) {
+    const DoubleArray array = to_array(object, name);
+    if (array.ndim() != 1 || array.shape(0) != size)
+        throw InvalidArgument(std::string(name) + ": expected " + std::to_string(size) + " numbers, got shape " + std::string(py::str(py::object(array.attr("shape")))));
+    return Eigen::Map<const Eigen::VectorXd>(array.data(), size);
+}
+
+}  // namespace
+
+Eigen::VectorXd to_vector(const py::handle& object, const char* name) {
+    const DoubleArray array = to_array(object, name);
+    if (array.ndim() != 1) throw InvalidArgument(std::string(name) + ": expected one dimension, got shape " + std::string(py::str(py::object(array.attr("shape")))));
+    return Eigen::Map<const Eigen::VectorXd>(array.data(), array.shape(0));
+}
+
+Eigen::Vector3d to_vector3(const py::handle& object, const char* name) { return to_vector_of(object, name, 3); }
+Eigen::Vector2d to_vector2(const py::handle& object, const char* name) { return to_vector_of(object, name, 2); }
+
+Points to_points(const py::handle& object, const char* name) {
+    const DoubleArray array = to_array(object, name);
+    if (array.ndim() != 2 || array.shape(1) != 3)
+        throw InvalidArgument(std::string(name) + ": expected shape (n, 3), got " + std::string(py::str(py::object(array.attr("shape")))));
+    return Eigen::Map<const Points>(array.data(), array.shape(0), 3);
+}
+
+std::string to_path(const PathLike& path) { return py::module_::import("os").attr("fspath")(path).cast<std::string>(); }
+
+Axis to_axis(const std::string& name) {
+    for (const Axis axis : all_axes)
+        if (name == std::string(1, letter(axis))) return axis;
+    throw InvalidArgument("axis: expected \"X\", \"Y\" or \"Z\", got \"" + name + "\"");
+}
+
+DoubleArray to_numpy(const std::vector<double>& values) { return DoubleArray(py::ssize_t(values.size()), values.data()); }
+
+DoubleArray to_numpy(const std::vector<std::optional<double>>& values) {
+    DoubleArray array(py::ssize_t(values.size()));
+    for (std::size_t i = 0; i < values.size(); ++i) array.mutable_data()[i] = values[i].value_or(std::numeric_limits<double>::quiet_NaN());
+    return array;
+}
+
+DoubleArray to_numpy(const Eigen::MatrixXd& matrix) {
+    DoubleArray array({matrix.rows(), matrix.cols()});
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(array.mutable_data(), matrix.rows(), matrix.cols()) = matrix;
+    return array;
+}
+
+DoubleArray to_numpy_vector(const Eigen::VectorXd& vector) { return DoubleArray(vector.size(), vector.data()); }
+
+}  // namespace stepdiag::bindings
+
+PYBIND11_MODULE(_core, m) {
+    using namespace stepdiag::bindings;
+    m.doc() = "The C++ core of stepdiag. Native units: mm, rad, nm.";
+    m.attr("__version__") = stepdiag::version();
+    py::register_exception<stepdiag::InvalidArgument>(m, "InvalidArgument", PyExc_ValueError).doc() =
+        "Bad input: the message names the argument, file and line, or key, what was expected and what came.";
+    bind_machine(m);
+    bind_plan(m);
+    bind_measurement(m);
+    bind_simulation(m);
+    bind_evaluation(m);
+}

@@ -1,0 +1,93 @@
+#include "stepdiag/head/head.hpp"
+
+#include <cmath>
+
+#include "stepdiag/core/error.hpp"
+#include "stepdiag/core/rotation.hpp"
+#include "stepdiag/optics/path.hpp"
+
+namespace stepdiag {
+namespace {
+
+Eigen::Matrix3d turned(const Eigen::Matrix3d& frame, const Eigen::Vector2d& angles) {
+    return frame * rotation_exp({angles.x(), angles.y(), 0.0});
+}
+
+constexpr int mirror_face = 0;
+constexpr int reference_face = 1;
+
+}  // namespace
+
+std::string name(HeadLayout layout) { return layout == HeadLayout::ideal ? "ideal" : layout == HeadLayout::psd ? "psd" : "multi_beam"; }
+
+HeadLayout parse_head_layout(std::string_view text) {
+    for (const HeadLayout layout : {HeadLayout::ideal, HeadLayout::psd, HeadLayout::multi_beam})
+        if (text == name(layout)) return layout;
+    throw InvalidArgument("layout: expected \"ideal\", \"psd\" or \"multi_beam\", got \"" + std::string(text) + "\"");
+}
+
+void check_head(const Head& head) {
+    const auto require_length = [](double length, const char* key, double lowest) {
+        if (!(std::isfinite(length) && length > lowest))
+            throw InvalidArgument(std::string("head ") + key + ": expected a finite value above " + (lowest == 0.0 ? "0" : "minus the standoff"));
+    };
+    require_length(head.standoff, "standoff", 0.0);
+    require_length(head.wavelength, "wavelength", 0.0);
+    require_length(head.aperture, "aperture", 0.0);
+    if (head.mirror && !(head.mirror->allFinite() && head.mirror->minCoeff() > 0.0))
+        throw InvalidArgument("head mirror: expected two positive lengths in mm, width and height");
+    if (head.layout == HeadLayout::psd) require_length(head.psd_distance, "psd_distance", -head.standoff);
+    if (head.layout == HeadLayout::multi_beam) {
+        for (const auto& offset : head.beam_offsets)
+            if (!offset.allFinite()) throw InvalidArgument("head beam_offsets: expected finite pairs in mm");
+        if (!reduce_beams(Eigen::VectorXd::Constant(Eigen::Index(head.beam_offsets.size()), head.standoff), head.beam_offsets))
+            throw InvalidArgument("head beam_offsets: expected three or more beams that are not on one line, got " + std::to_string(head.beam_offsets.size()) + " beam(s)");
+    }
+}
+
+HeadSetup set_up(const Head& head, const Eigen::Matrix3d& machine_R_line, const Eigen::Vector3d& first_point, const Eigen::Vector2d& mirror, const Misalignment& misalignment) {
+    return {first_point - head.standoff * machine_R_line.col(2), turned(machine_R_line, misalignment.laser), turned(machine_R_line, misalignment.reflector), mirror, misalignment.psd_zero};
+}
+
+std::optional<Reading> trace_reading(const Head& head, const HeadSetup& setup, const Eigen::Vector3d& functional_point, const Eigen::Matrix3d& machine_R_tool, const Medium& ambient) {
+    const Eigen::Vector2d aperture = Eigen::Vector2d::Constant(head.aperture);
+    const Scene scene({make_rectangle(functional_point, machine_R_tool * setup.tool_R_mirror, setup.mirror, Surface::reflecting),
+                       make_rectangle(setup.origin, setup.machine_R_sensor, aperture, Surface::absorbing)});
+    const Path path = trace(scene, ambient, {setup.origin, setup.machine_R_sensor.col(2)});
+    if (path.end != PathEnd::absorbed || path.hits.size() != 2 || path.hits[0].face != mirror_face || path.hits[1].face != reference_face)
+        return std::nullopt;
+    // The normal bisects the two directions: n ~ z - r, so that beta = n_x/n_z and alpha = -n_y/n_z.
+    const Eigen::Vector3d back = setup.machine_R_sensor.transpose() * path.direction;
+    return Reading{path.optical_length / (2.0 * ambient.index), back.y() / (1.0 - back.z()), -back.x() / (1.0 - back.z())};
+}
+
+std::optional<Reading> define_reading(const HeadSetup& setup, const Eigen::Vector3d& functional_point, const Eigen::Matrix3d& machine_R_tool) {
+    const Eigen::Matrix3d sensor_R_machine = setup.machine_R_sensor.transpose();
+    const Eigen::Vector3d normal = machine_R_tool * setup.tool_R_mirror.col(2);
+    return read_mirror(sensor_R_machine * (functional_point - setup.origin), sensor_R_machine * normal);
+}
+
+std::vector<std::string> signal_names(const Head& head) {
+    switch (head.layout) {
+        case HeadLayout::ideal: return {"distance", "alpha", "beta"};
+        case HeadLayout::psd: return {"distance", "spot_x", "spot_y"};
+        case HeadLayout::multi_beam: break;
+    }
+    std::vector<std::string> names;
+    for (std::size_t i = 1; i <= head.beam_offsets.size(); ++i) names.push_back("d" + std::to_string(i));
+    return names;
+}
+
+Eigen::VectorXd signals(const Head& head, const HeadSetup& setup, const Reading& reading) {
+    switch (head.layout) {
+        case HeadLayout::ideal: return Eigen::Vector3d(reading.distance, reading.alpha, reading.beta);
+        case HeadLayout::psd: {
+            const Eigen::Vector2d spot = spot_position(reading, head.psd_distance) + setup.psd_zero;
+            return Eigen::Vector3d(reading.distance, spot.x(), spot.y());
+        }
+        case HeadLayout::multi_beam: break;
+    }
+    return beam_distances(reading, head.beam_offsets);
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,59 @@
+#include "stepdiag/machine/chain.hpp"
+
+#include <algorithm>
+#include <sstream>
+#include <vector>
+
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+namespace {
+
+[[noreturn]] void refuse(std::string_view text, const std::string& why) {
+    throw InvalidArgument("chain \"" + std::string(text) + "\": " + why + "; expected the links w, X, Y, Z, b, t in a form like \"[w X' b Y Z t]\"");
+}
+
+}  // namespace
+
+Chain Chain::parse(std::string_view text) {
+    const auto first = text.find_first_not_of(" \t");
+    const auto last = text.find_last_not_of(" \t");
+    if (first == std::string_view::npos || text[first] != '[' || text[last] != ']' || first == last)
+        refuse(text, "brackets [ ] are missing");
+    std::istringstream links(std::string(text.substr(first + 1, last - first - 1)));
+    std::vector<std::string> names;
+    for (std::string name; links >> name;) names.push_back(name);
+    if (names.size() != 6) refuse(text, "has " + std::to_string(names.size()) + " links, not 6");
+    if (names.front() != "w") refuse(text, "does not begin with w");
+    if (names.back() != "t") refuse(text, "does not end with t");
+
+    const auto bed = std::find(names.begin(), names.end(), "b");
+    if (bed == names.end()) refuse(text, "has no b");
+    std::vector<Axis> order;
+    for (auto link = names.begin() + 1; link != names.end() - 1; ++link) {
+        if (link == bed) continue;
+        const bool primed = link->size() == 2 && (*link)[1] == '\'';
+        const auto axis = std::string_view("XYZ").find((*link)[0]);
+        if (axis == std::string_view::npos || (link->size() != 1 && !primed)) refuse(text, "unknown link " + *link);
+        if (primed && link > bed) refuse(text, *link + " comes after b, so it takes no prime");
+        if (!primed && link < bed) refuse(text, *link + " comes before b, so it needs a prime");
+        if (std::find(order.begin(), order.end(), Axis(axis)) != order.end()) refuse(text, *link + " is given twice");
+        order.push_back(Axis(axis));
+    }
+    return Chain({order[0], order[1], order[2]}, int(bed - names.begin()) - 1);
+}
+
+std::string Chain::name() const {
+    std::string text = "[w";
+    for (int i = 0; i <= 3; ++i) {
+        if (i == axes_before_bed_) text += " b";
+        if (i == 3) break;
+        text += std::string(" ") + letter(order_[i]);
+        if (i < axes_before_bed_) text += '\'';
+    }
+    return text + " t]";
+}
+
+int Chain::rank(Axis axis) const { return int(std::find(order_.begin(), order_.end(), axis) - order_.begin()); }
+
+}  // namespace stepdiag

@@ -1,0 +1,50 @@
+#include "stepdiag/machine/machine.hpp"
+
+#include "stepdiag/core/error.hpp"
+#include "stepdiag/core/rotation.hpp"
+
+namespace stepdiag {
+
+Eigen::Vector3d angular_lever(const Chain& chain, const Eigen::Vector3d& tool, Axis axis, const Eigen::Vector3d& commanded) {
+    Eigen::Vector3d lever = tool;
+    for (const Axis other : all_axes)
+        if (chain.is_after(other, axis) || (other == axis && chain.carries_workpiece(axis)))
+            lever[index(other)] += commanded[index(other)];
+    return lever;
+}
+
+Machine::Machine(Chain chain, ErrorMap errors, const Eigen::Vector3d& tool)
+    : chain_(chain), errors_(std::move(errors)), tool_(tool) {
+    if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
+}
+
+Pose Machine::pose(const Eigen::Vector3d& commanded) const {
+    Pose pose;
+    for (const Axis axis : chain_.order()) {
+        const double p = commanded[index(axis)];
+        const Eigen::Vector3d shift = p * Eigen::Vector3d::Unit(index(axis)) + errors_.delta(axis, p);
+        const Eigen::Matrix3d turn = rotation_exp(errors_.theta(axis, p));
+        if (chain_.carries_workpiece(axis)) {
+            pose.rotation = pose.rotation * turn;
+            pose.position += pose.rotation * shift;
+        } else {
+            pose.position += pose.rotation * shift;
+            pose.rotation = pose.rotation * turn;
+        }
+    }
+    pose.position += pose.rotation * tool_;
+    return pose;
+}
+
+Eigen::Vector3d Machine::error(const Eigen::Vector3d& commanded) const { return pose(commanded).position - commanded - tool_; }
+
+Eigen::Vector3d Machine::first_order_error(const Eigen::Vector3d& commanded) const {
+    Eigen::Vector3d error = Eigen::Vector3d::Zero();
+    for (const Axis axis : all_axes) {
+        const double p = commanded[index(axis)];
+        error += errors_.delta(axis, p) + errors_.theta(axis, p).cross(angular_lever(chain_, tool_, axis, commanded));
+    }
+    return error;
+}
+
+}  // namespace stepdiag

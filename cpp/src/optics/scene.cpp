@@ -1,0 +1,89 @@
+#include "stepdiag/optics/scene.hpp"
+
+#include <embree3/rtcore.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+namespace {
+
+// One device for the process: making one takes milliseconds and starts a thread pool.
+RTCDevice device() {
+    static const RTCDevice device = [] {
+        const RTCDevice made = rtcNewDevice("threads=1,verbose=0");
+        if (!made) throw std::runtime_error("Embree gave no device (error " + std::to_string(rtcGetDeviceError(nullptr)) + ")");
+        return made;
+    }();
+    return device;
+}
+
+void check(const std::vector<Face>& faces) {
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+        const Face& face = faces[i];
+        const std::string name = "face " + std::to_string(i);
+        if (face.outline.size() < 3) throw InvalidArgument(name + ": expected three corners or more, got " + std::to_string(face.outline.size()));
+        if (!face.point.allFinite() || !(std::abs(face.normal.norm() - 1.0) < 1e-9)) throw InvalidArgument(name + ": expected a finite point and a unit normal");
+        for (const auto& corner : face.outline) {
+            const double extent = (corner - face.outline.front()).norm() + 1.0;
+            if (!(std::abs((corner - face.point).dot(face.normal)) < 1e-6 * extent)) throw InvalidArgument(name + ": a corner is not on the face's plane");
+        }
+    }
+}
+
+}  // namespace
+
+Scene::Scene(std::vector<Face> faces) : faces_(std::move(faces)), centre_(Eigen::Vector3d::Zero()), gap_(0.0) {
+    check(faces_);
+    std::size_t corners = 0;
+    for (const Face& face : faces_)
+        for (const auto& corner : face.outline) centre_ += corner, ++corners;
+    if (corners > 0) centre_ /= double(corners);
+
+    embree_ = std::shared_ptr<void>(rtcNewScene(device()), [](void* scene) { rtcReleaseScene(static_cast<RTCScene>(scene)); });
+    const auto scene = static_cast<RTCScene>(embree_.get());
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_LOW);  // a handful of faces needs no better tree
+    double extent = 0.0;
+    for (const Face& face : faces_) {
+        const std::size_t n = face.outline.size();
+        const RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+        auto* vertex = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), n));
+        auto* triangle = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), n - 2));
+        for (const auto& corner : face.outline)
+            for (int c = 0; c < 3; ++c) {
+                *vertex++ = float(corner[c] - centre_[c]);
+                extent = std::max(extent, std::abs(corner[c] - centre_[c]));
+            }
+        for (unsigned i = 2; i < n; ++i) *triangle++ = 0, *triangle++ = i - 1, *triangle++ = i;
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometry(scene, geometry);  // geometry ids count up from 0: the face's index
+        rtcReleaseGeometry(geometry);
+    }
+    rtcCommitScene(scene);
+    gap_ = 1e-6 * extent;  // some ten units of single precision's last place
+}
+
+std::optional<Hit> Scene::first_hit(const Ray& ray) const {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRayHit query{};
+    const Eigen::Vector3f origin = (ray.origin - centre_).cast<float>();
+    const Eigen::Vector3f direction = ray.direction.cast<float>();
+    query.ray.org_x = origin.x(), query.ray.org_y = origin.y(), query.ray.org_z = origin.z();
+    query.ray.dir_x = direction.x(), query.ray.dir_y = direction.y(), query.ray.dir_z = direction.z();
+    query.ray.tnear = float(gap_);
+    query.ray.tfar = std::numeric_limits<float>::infinity();
+    query.ray.mask = ~0u;
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(static_cast<RTCScene>(embree_.get()), &context, &query);
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+    const Face& face = faces_[query.hit.geomID];
+    const double distance = (face.point - ray.origin).dot(face.normal) / ray.direction.dot(face.normal);
+    return Hit{int(query.hit.geomID), distance, ray.origin + distance * ray.direction};
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,91 @@
+#include "stepdiag/plan/plan.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+
+std::array<Axis, 3> parse_order(std::string_view text) {
+    std::string sorted(text);
+    std::sort(sorted.begin(), sorted.end());
+    if (sorted != "XYZ") throw InvalidArgument("order \"" + std::string(text) + "\": expected a permutation of XYZ");
+    std::array<Axis, 3> order;
+    for (int i = 0; i < 3; ++i) order[i] = Axis(text[i] - 'X');
+    return order;
+}
+
+Plan::Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::array<Axis, 3> order, std::vector<Line> scale_lines)
+    : volume_(volume), lines_(std::move(lines)), steps_(steps), order_(order), scale_lines_(std::move(scale_lines)) {
+    if (!volume_.allFinite() || volume_.minCoeff() <= 0.0 || volume_.maxCoeff() > 1e6)
+        throw InvalidArgument("volume: expected three edges in mm, above 0 and up to 1e6");
+    if (steps_ < 1 || steps_ > largest_step_count)
+        throw InvalidArgument("steps: expected 1 to " + std::to_string(largest_step_count) + ", got " + std::to_string(steps_));
+    if (lines_.empty() && scale_lines_.empty()) throw InvalidArgument("lines: expected at least one line");
+    std::vector<std::string> seen;
+    for (const auto* group : {&lines_, &scale_lines_})
+        for (const Line& line : *group) {
+            if (group == &scale_lines_ && line.moved_axes() != 1)
+                throw InvalidArgument("scale_lines: expected single-axis lines such as \"p00\", got \"" + line.name() + "\"");
+            if (std::find(seen.begin(), seen.end(), line.name()) != seen.end())
+                throw InvalidArgument("lines: \"" + line.name() + "\" is given twice (a repeated measurement is another run of the same line)");
+            seen.push_back(line.name());
+        }
+}
+
+bool Plan::is_scale_line(const Line& line) const { return std::find(scale_lines_.begin(), scale_lines_.end(), line) != scale_lines_.end(); }
+
+std::vector<double> Plan::nodes(Axis axis) const {
+    std::vector<double> nodes(steps_ + 1);
+    for (int k = 0; k <= steps_; ++k) nodes[k] = node_position(axis, k);
+    return nodes;
+}
+
+std::vector<PlanPoint> Plan::points(const Line& line) const {
+    const bool scale = is_scale_line(line);
+    if (!scale && std::find(lines_.begin(), lines_.end(), line) == lines_.end())
+        throw InvalidArgument("line \"" + line.name() + "\" is not in the plan");
+    PlanPoint point{Eigen::Vector3d::Zero(), {0, 0, 0}, std::nullopt};
+    const auto place = [&](Axis axis, int node) {
+        point.node[index(axis)] = node;
+        point.commanded[index(axis)] = node_position(axis, node);
+    };
+    for (const Axis axis : all_axes) place(axis, line.sign(axis) < 0 ? steps_ : 0);
+
+    std::vector<PlanPoint> points{point};
+    const int stride = scale ? steps_ : 1;
+    for (int step = 0; step < steps_; step += stride)
+        for (const Axis axis : order_) {
+            if (!line.moves(axis)) continue;
+            place(axis, point.node[index(axis)] + line.sign(axis) * stride);
+            point.moved = axis;
+            points.push_back(point);
+        }
+    return points;
+}
+
+LateralExcursion Plan::lateral_excursion(const Line& line) const {
+    // The travel repeats itself step by step, so the first step shows all of it.
+    const Plan one_step(volume_ / steps_, {line}, 1, order_);
+    const Eigen::Matrix<double, 3, 2> lateral = frame(line).leftCols<2>();
+    LateralExcursion excursion{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
+    const auto points = one_step.points(line);
+    for (const PlanPoint& point : points) {
+        const Eigen::Vector2d offset = lateral.transpose() * (point.commanded - points.front().commanded);
+        excursion.lowest = excursion.lowest.cwiseMin(offset);
+        excursion.highest = excursion.highest.cwiseMax(offset);
+    }
+    return excursion;
+}
+
+Eigen::Vector2d Plan::smallest_mirror() const {
+    Eigen::Vector2d size = Eigen::Vector2d::Zero();
+    for (const Line& line : lines_) {
+        const LateralExcursion excursion = lateral_excursion(line);
+        size = size.cwiseMax(2.0 * excursion.highest).cwiseMax(-2.0 * excursion.lowest);
+    }
+    return size;
+}
+
+}  // namespace stepdiag
