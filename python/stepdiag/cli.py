@@ -1,0 +1,209 @@
+"""The command line: simulate, evaluate, demo, check, init. What is imported inside a command keeps the others fast."""
+
+import sys
+from pathlib import Path
+
+import click
+
+from stepdiag._core import InvalidArgument, __version__
+
+EPILOG = """\b
+A first round trip:
+  stepdiag init -o machine               a commented scenario and a sheet of points
+  stepdiag simulate machine/scenario.toml -o run.csv
+  stepdiag evaluate machine/scenario.toml run.csv -o calibration.csv
+Or watch it all at once: stepdiag demo
+"""
+
+SCENARIO = click.argument("scenario", type=click.Path(path_type=Path))
+
+
+def out_file(meaning: str) -> "click.decorators.FC":  # type: ignore[name-defined]
+    return click.option(
+        "-o", "output", required=True, type=click.Path(path_type=Path), metavar="FILE", help=meaning
+    )
+
+
+@click.group(
+    epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+)
+@click.version_option(__version__, message="stepdiag %(version)s")
+def cli() -> None:
+    """Calibrate three-axis machine tools by the laser step-diagonal method."""
+
+
+@cli.command(epilog="Example: stepdiag simulate scenario.toml -o run.csv")
+@SCENARIO
+@out_file("Measurement file (CSV) to write.")
+def simulate(scenario: Path, output: Path) -> None:
+    """Simulate the run that SCENARIO (TOML) describes.
+
+    The virtual machine moves through the plan with its errors, and the head reads the mirror at every point. Lost
+    readings are empty fields.
+    """
+    from stepdiag.files import check_output
+    from stepdiag.scenario import read_scenario, simulate_scenario
+
+    check_output(output)
+    _keep_apart(output, scenario)
+    simulate_scenario(read_scenario(scenario)).write(output)
+
+
+@cli.command(epilog="Example: stepdiag evaluate scenario.toml run.csv -m enhanced -o calibration.csv")
+@SCENARIO
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option(
+    "-m",
+    "method",
+    type=click.Choice(["conventional", "enhanced"]),
+    default="enhanced",
+    show_default=True,
+    help="conventional uses distances only; enhanced uses the tilts and scale lines too.",
+)
+@out_file("Calibration file (CSV) to write.")
+def evaluate(scenario: Path, run: Path, method: str, output: Path) -> None:
+    """Evaluate the measurement RUN (CSV), made by SCENARIO's plan and head.
+
+    Finds the machine's 21 error parameters with their standard uncertainties, and says what the readings do not
+    determine. Of the scenario only chain, tool, plan, head and uncertainties are used.
+    """
+    from stepdiag import _core
+    from stepdiag.files import check_output
+    from stepdiag.report import evaluation_report
+    from stepdiag.scenario import evaluate_scenario, read_scenario
+
+    check_output(output)
+    _keep_apart(output, scenario, run)
+    plan = read_scenario(scenario)
+    measurement = _core.read_measurement(run)
+    try:
+        calibration = evaluate_scenario(
+            plan, measurement, method="enhanced" if method == "enhanced" else "conventional"
+        )
+    except InvalidArgument as error:
+        raise InvalidArgument(f"{run}: {error}") from None
+    calibration.write(output)
+    for line in evaluation_report(calibration, measurement, plan):
+        click.echo(line)
+
+
+@cli.command(epilog="Example: stepdiag demo -o demo")
+@click.option(
+    "-o",
+    "folder",
+    default="demo",
+    show_default=True,
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Folder to write.",
+)
+def demo(folder: Path) -> None:
+    """Simulate and evaluate the machine of the method's paper, and draw its Figure 5.
+
+    Writes scenarios, truth, runs, calibrations, a table and the figure; go on from them with simulate and evaluate.
+    """
+    from stepdiag.demo import run_demo
+
+    for line in run_demo(folder, progress=lambda text: click.echo(text, err=True)):
+        click.echo(line)
+
+
+@cli.command(epilog="Example: stepdiag check scenario.toml run.csv")
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
+@click.pass_context
+def check(context: click.Context, files: tuple[Path, ...]) -> None:
+    """Tell what kind each FILE is, and whether it is sound.
+
+    Knows scenarios (TOML), measurements, error maps and calibrations (CSV). A scenario is checked together with the
+    error map that it names. Exit code 2 if any file is not sound.
+    """
+    from stepdiag.kinds import examine
+
+    sound = True
+    for file in files:
+        try:
+            finding = examine(file)
+        except InvalidArgument as error:
+            sound = False
+            _complain(str(error))
+            continue
+        click.echo(f"{file}: {finding.kind}: {finding.summary}")
+        for warning in finding.warnings:
+            click.echo(f"{file}: warning: {warning}")
+    if not sound:
+        context.exit(2)
+
+
+@cli.command(epilog="Example: stepdiag init -o machine")
+@click.option(
+    "-o", "folder", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder to write."
+)
+@click.option(
+    "--sheet-for",
+    "scenario",
+    type=click.Path(path_type=Path),
+    metavar="SCENARIO",
+    help="Write only measurement.csv, for the plan and head of this scenario.",
+)
+def init(folder: Path, scenario: Path | None) -> None:
+    """Begin with your own machine: a scenario to edit and a sheet to fill in.
+
+    Writes scenario.toml, with a comment on every key, and measurement.csv with all commanded points and empty fields
+    for the readings of your instrument. Existing files are never overwritten. After changing the plan in the scenario,
+    make a new sheet with --sheet-for.
+    """
+    from stepdiag.files import make_folder, write_whole
+    from stepdiag.scenario import parse_scenario, read_scenario
+    from stepdiag.scenario_text import template
+    from stepdiag.sheet import empty_sheet
+
+    text = template()
+    plan = parse_scenario(text) if scenario is None else read_scenario(scenario)
+    written = (
+        [folder / "measurement.csv"] if scenario else [folder / "scenario.toml", folder / "measurement.csv"]
+    )
+    for path in written:
+        if path.exists() or path.is_symlink():
+            raise InvalidArgument(f"{path}: exists already, and is not overwritten")
+    make_folder(folder)
+    if scenario is None:
+        write_whole(folder / "scenario.toml", text)
+    empty_sheet(plan.plan, plan.head).write(folder / "measurement.csv")
+    for path in written:
+        click.echo(f"wrote {path}")
+
+
+def _keep_apart(output: Path, *inputs: Path) -> None:
+    for path in inputs:
+        if output.exists() and path.exists() and output.samefile(path):
+            raise InvalidArgument(f"{output}: is also an input; give the output another name")
+
+
+def _complain(message: str) -> None:
+    line = " ".join(message.split())
+    click.echo(f"stepdiag: error: {line}", err=True)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs the command line and returns the exit code: 2 for a caller's mistake, 130 when interrupted."""
+    try:
+        result = cli.main(arguments, prog_name="stepdiag", standalone_mode=False)
+        return result if isinstance(result, int) else 0
+    except click.Abort:
+        return 130
+    except click.UsageError as error:
+        hint = (
+            f" (see stepdiag {error.ctx.info_name if error.ctx and error.ctx.parent else ''} --help)".replace(
+                "  ", " "
+            )
+        )
+        _complain(error.format_message() + hint)
+    except (InvalidArgument, click.ClickException) as error:
+        _complain(error.format_message() if isinstance(error, click.ClickException) else str(error))
+    except OSError as error:
+        _complain(str(error))
+    return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

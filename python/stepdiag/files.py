@@ -1,0 +1,89 @@
+"""Reading and writing of small text files: whole or not at all."""
+
+import os
+import stat
+import tempfile
+from pathlib import Path
+
+from stepdiag._core import InvalidArgument
+
+# No scenario is larger; a device that never ends is not read to its end.
+LARGEST_TEXT = 16 * 2**20
+
+
+def read_text(path: Path) -> str:
+    """The file's text. Raises InvalidArgument where it cannot be read, is empty, or is not UTF-8 text."""
+    if path.is_dir():
+        raise InvalidArgument(f"{path}: expected a file, got a folder")
+    try:
+        with open(path, "rb") as file:
+            content = file.read(LARGEST_TEXT + 1)
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        raise InvalidArgument(f"{path}: cannot be read: {reason(error)}") from None
+    if len(content) > LARGEST_TEXT:
+        raise InvalidArgument(f"{path}: larger than {LARGEST_TEXT // 2**20} MiB")
+    if not content.strip():
+        raise InvalidArgument(f"{path}: the file is empty")
+    if b"\0" in content:
+        raise InvalidArgument(f"{path}: expected a text file, got binary data")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise InvalidArgument(f"{path}, line {line}: expected UTF-8 text") from None
+
+
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Writes to a temporary file beside `path` and renames it: `path` is the old file or the whole new one."""
+    check_output(path)
+    try:
+        handle, temporary = tempfile.mkstemp(prefix=f"{path.name}.", dir=path.parent)
+    except OSError as error:
+        raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content.encode() if isinstance(content, str) else content)
+            os.fchmod(handle, 0o666 & ~_umask())
+        os.replace(temporary, path)
+    except BaseException as error:
+        Path(temporary).unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
+        raise
+
+
+def check_output(path: Path) -> None:
+    """Raises InvalidArgument where `path` cannot become a file: before the work, not after it."""
+    folder = path.parent
+    if not folder.is_dir():
+        raise InvalidArgument(f"{path}: cannot be written: the folder {folder} does not exist")
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        mode = None
+    except OSError as error:
+        raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
+    # Renaming over a device such as /dev/null would replace it.
+    if mode is not None and not stat.S_ISREG(mode):
+        what = "a folder" if stat.S_ISDIR(mode) else "not a regular file"
+        raise InvalidArgument(f"{path}: cannot be written: it is {what}")
+    if not os.access(folder, os.W_OK):
+        raise InvalidArgument(f"{path}: cannot be written: no permission to write in {folder}")
+
+
+def make_folder(path: Path) -> None:
+    """Makes the folder, and those above it."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidArgument(f"{path}: the folder cannot be made: {reason(error)}") from None
+
+
+def reason(error: Exception) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

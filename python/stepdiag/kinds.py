@@ -1,0 +1,106 @@
+"""Which of our files is this, and is it sound?"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from stepdiag import _core
+from stepdiag._core import InvalidArgument
+from stepdiag.files import read_text
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a sound file is, in a few words, and what is odd about it all the same."""
+
+    kind: str
+    summary: str
+    warnings: tuple[str, ...] = ()
+
+
+def examine(path: Path) -> Finding:
+    """Reads a file as the kind that its first lines show. Raises InvalidArgument where it is not sound."""
+    text = read_text(path) if path.suffix.lower() == ".toml" else _beginning(path)
+    if path.suffix.lower() == ".toml":
+        return _scenario(path)
+    comments, header = _head_of(text)
+    columns = {column.strip().strip('"') for column in header.split(",")}
+    if {"parameter", "value"} & columns:
+        is_calibration = any(
+            line.replace(" ", "").startswith(("#format=stepdiagcalibration", "#method=")) for line in comments
+        )
+        return _calibration(path) if is_calibration else _error_map(path)
+    if {"line", "point"} & columns:
+        return _measurement(path)
+    if header.lstrip().startswith("[") or "=" in header:
+        return _scenario(path)
+    raise InvalidArgument(
+        f"{path}: expected a scenario (TOML), a measurement, an error map or a calibration (CSV); "
+        f'a CSV file begins with "line,point,..." or "parameter,position_mm,..."'
+    )
+
+
+def _beginning(path: Path) -> str:
+    if path.exists() and not path.is_file() and not path.is_fifo() and not path.is_dir():
+        raise InvalidArgument(f"{path}: expected a file, got a device")
+    return read_text(path)
+
+
+def _head_of(text: str) -> tuple[list[str], str]:
+    comments = []
+    for line in text.splitlines():
+        if line.strip() and not line.startswith("#"):
+            return comments, line
+        comments.append(line)
+    return comments, ""
+
+
+def _scenario(path: Path) -> Finding:
+    from stepdiag.scenario import read_scenario
+
+    scenario = read_scenario(path)
+    plan = scenario.plan
+    summary = f"{scenario.chain.name}, {len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines"
+    return Finding("scenario", summary, tuple(scenario.machine().errors.warnings(plan.volume)))
+
+
+def _measurement(path: Path) -> Finding:
+    measurement = _core.read_measurement(path)
+    channels = measurement.channels
+    lost = (
+        int(np.count_nonzero(np.any([np.isnan(values) for values in channels.values()], axis=0)))
+        if channels
+        else 0
+    )
+    summary = f"{len(measurement)} points on {len(set(measurement.line))} lines, {', '.join(channels)}"
+    return Finding("measurement", summary, (f"{lost} points lack a reading",) if lost else ())
+
+
+def _error_map(path: Path) -> Finding:
+    errors = _core.read_error_map(path)
+    count = len(errors.functions) + len(errors.squareness)
+    return Finding("error map", f"{count} of 21 parameters", tuple(_warnings(errors)))
+
+
+def _calibration(path: Path) -> Finding:
+    calibration = _core.read_calibration(path)
+    count = len(calibration.functions) + len(calibration.squareness)
+    summary = f"{calibration.method}, {calibration.chain.name}, {count} of 21 parameters determined"
+    return Finding("calibration", summary, tuple(calibration.undetermined))
+
+
+def _warnings(errors: _core.ErrorMap) -> Iterator[str]:
+    """Against the volume that the map's header names, else against the ends of its own tables."""
+    try:
+        volume = [float(number) for number in errors.header.get("volume_mm", "").split()]
+    except ValueError:
+        volume = []
+    if len(volume) != 3:
+        ends = {
+            axis: max((p[-1] for name, (p, _) in errors.functions.items() if name[2] == axis), default=1.0)
+            for axis in "XYZ"
+        }
+        volume = [float(ends[axis]) for axis in "XYZ"]
+    yield from errors.warnings(volume)
