@@ -1,5 +1,7 @@
 #include "stepdiag/machine/machine.hpp"
 
+#include <Eigen/Geometry>
+
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/core/rotation.hpp"
 

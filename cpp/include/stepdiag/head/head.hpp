@@ -34,7 +34,9 @@ struct Head {
 
     static constexpr double mirror_margin = 25.0;  // on every side, mm
 
-    HeadCalibration calibration() const { return {psd_distance, beam_offsets}; }
+    HeadCalibration calibration() const {
+        return {layout == HeadLayout::psd ? std::optional(psd_distance) : std::nullopt, beam_offsets};
+    }
 };
 
 // Throws InvalidArgument for lengths that are not positive or finite, and for beams on one line.

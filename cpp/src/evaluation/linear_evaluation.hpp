@@ -1,0 +1,138 @@
+// From a linear map of readings to parameters: values, standard uncertainties, covariance. Internal.
+//
+// A map applies itself to "rows": each reading's length, alpha and beta is a row of numbers, one for each of several sets of
+// readings evaluated at once. One set gives the values. A set that holds the effect of one raw channel alone gives that channel's
+// share of every parameter, and the shares make eq. 6: Cov(x) = sum over raw channels of share share^T.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "evaluation/step_systems.hpp"
+
+namespace stepdiag {
+
+template <int Width>
+using Row = Eigen::Array<double, Width, 1>;
+
+constexpr int values_per_reading = 3;  // length, alpha, beta
+
+// What a map is applied to: `width` sets of readings. Where only one visit's readings differ from zero, or no tilt does, a
+// map may skip the rest.
+template <int Width>
+struct ReadingRows {
+    std::vector<Row<Width>> values;  // values_per_reading a reading
+    int only_visit = -1;             // -1: all
+    bool has_tilts = true;
+};
+
+// The parameters that a map gives: functions by index and node, then squarenesses.
+struct ParameterLayout {
+    int nodes;  // an axis
+    int row(int function, int node) const { return function * nodes + node; }
+    int row(Squareness squareness) const { return function_count * nodes + static_cast<int>(squareness); }
+    int size() const { return function_count * nodes + squareness_count; }
+};
+
+inline std::vector<Row<1>> readings_of(const std::vector<Visit>& visits) {
+    std::vector<Row<1>> values;
+    for (const Visit& visit : visits)
+        for (const VisitPoint& point : visit.points)
+            for (int c = 0; c < values_per_reading; ++c) values.push_back(Row<1>(point.reading[c]));
+    return values;
+}
+
+// One raw channel of one reading.
+struct ChannelShare {
+    int visit;
+    int reading;
+    ChannelEffect effect;
+};
+
+inline std::vector<ChannelShare> channel_shares(const std::vector<Visit>& visits) {
+    // Channels that move no tilt come first in each visit, so that whole blocks can skip the angles.
+    std::vector<ChannelShare> shares;
+    for (std::size_t v = 0; v < visits.size(); ++v)
+        for (const bool tilts : {false, true})
+            for (std::size_t k = 0; k < visits[v].points.size(); ++k)
+                for (const ChannelEffect& effect : visits[v].points[k].effects)
+                    if ((effect.tail<2>().cwiseAbs().maxCoeff() > 0.0) == tilts && effect.cwiseAbs().maxCoeff() > 0.0)
+                        shares.push_back({int(v), visits[v].first_reading + int(k), effect});
+    return shares;
+}
+
+// Calls `take(block, columns)` for the parameters' shares of successive raw channels; `block` holds a row a parameter.
+template <int Width, class Map, class Take>
+void for_each_share(const Map& map, const std::vector<Visit>& visits, Take&& take) {
+    const auto shares = channel_shares(visits);
+    ReadingRows<Width> readings;
+    readings.values.assign(readings_of(visits).size(), Row<Width>::Zero());
+    for (std::size_t begin = 0; begin < shares.size();) {
+        std::size_t end = begin;
+        readings.only_visit = shares[begin].visit;
+        readings.has_tilts = false;
+        for (; end < shares.size() && end - begin < Width && shares[end].visit == readings.only_visit; ++end) {
+            for (int c = 0; c < values_per_reading; ++c) readings.values[values_per_reading * shares[end].reading + c][end - begin] = shares[end].effect[c];
+            readings.has_tilts = readings.has_tilts || shares[end].effect.template tail<2>().cwiseAbs().maxCoeff() > 0.0;
+        }
+        take(map.template apply<Width>(readings), int(end - begin));
+        for (std::size_t s = begin; s < end; ++s)
+            for (int c = 0; c < values_per_reading; ++c) readings.values[values_per_reading * shares[s].reading + c].setZero();
+        begin = end;
+    }
+}
+
+// Fills functions, squarenesses and covariance of the calibration with what `map.is_determined` names.
+template <class Map>
+void evaluate_linear(const Map& map, const std::vector<Visit>& visits, const Plan& plan, bool full_covariance, Calibration& calibration) {
+    constexpr int width = 16;
+    const ParameterLayout layout{plan.steps() + 1};
+    std::vector<int> rows;  // of the parameters that are determined
+    for (int i = 0; i < function_count; ++i)
+        for (int k = 0; map.is_determined(FunctionId::at(i)) && k < layout.nodes; ++k) rows.push_back(layout.row(i, k));
+    for (const Squareness s : all_squarenesses)
+        if (map.is_determined(s)) rows.push_back(layout.row(s));
+
+    const auto values = map.template apply<1>({readings_of(visits), -1, true});
+    std::vector<Row<width>> variance(layout.size(), Row<width>::Zero());
+    Eigen::MatrixXd covariance;
+    if (full_covariance) covariance = Eigen::MatrixXd::Zero(Eigen::Index(rows.size()), Eigen::Index(rows.size()));
+    for_each_share<width>(map, visits, [&](const std::vector<Row<width>>& block, int columns) {
+        for (std::size_t i = 0; i < block.size(); ++i) variance[i] += block[i].square();
+        if (!full_covariance) return;
+        Eigen::MatrixXd shares(rows.size(), columns);
+        for (std::size_t i = 0; i < rows.size(); ++i) shares.row(Eigen::Index(i)) = block[rows[i]].head(columns).transpose();
+        covariance.selfadjointView<Eigen::Lower>().rankUpdate(shares);
+    });
+    if (full_covariance) calibration.covariance = covariance.selfadjointView<Eigen::Lower>();
+
+    for (int i = 0; i < function_count; ++i) {
+        const FunctionId id = FunctionId::at(i);
+        if (!map.is_determined(id)) continue;
+        CalibratedFunction function{plan.nodes(id.axis), {}, {}, map.is_slope_determined(id)};
+        for (int k = 0; k < layout.nodes; ++k) {
+            function.value.push_back(values[layout.row(i, k)][0]);
+            function.standard_uncertainty.push_back(std::sqrt(variance[layout.row(i, k)].sum()));
+        }
+        calibration.functions[i] = std::move(function);
+    }
+    for (const Squareness s : all_squarenesses)
+        if (map.is_determined(s)) calibration.squarenesses[static_cast<int>(s)] = CalibratedSquareness{values[layout.row(s)][0], std::sqrt(variance[layout.row(s)].sum())};
+}
+
+// Sums the solved steps of one axis and component from home: out[0] = 0 ... out[intervals].
+template <int Width>
+void add_up_steps(const AxisSystem& system, int component, const std::vector<Row<Width>>& lengths, const std::vector<Visit>& visits, Row<Width>* out) {
+    out[0].setZero();
+    for (std::size_t i = 0; i < system.intervals.size(); ++i) {
+        const StepSystem& interval = system.intervals[i];
+        out[i + 1] = out[i];
+        for (std::size_t r = 0; r < interval.steps.size(); ++r) {
+            const Step& step = interval.steps[r];
+            const Row<Width>* reading = &lengths[visits[step.visit].first_reading + step.point];
+            out[i + 1] += interval.solution->pseudoinverse(component, Eigen::Index(r)) * step.sign * (reading[1] - reading[0]);
+        }
+    }
+}
+
+}  // namespace stepdiag

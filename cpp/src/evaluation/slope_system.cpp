@@ -1,0 +1,101 @@
+#include "evaluation/slope_system.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace stepdiag {
+namespace {
+
+// A sum of lengths, by reading.
+using Sum = std::map<int, double>;
+
+void add_step(Sum& sum, const std::vector<Visit>& visits, const Step& step, double factor) {
+    const int from = visits[step.visit].first_reading + step.point;
+    sum[from] -= factor * step.sign;
+    sum[from + 1] += factor * step.sign;
+}
+
+// The sum of the increments of one line over the travel of one axis, counted in the axis' direction; empty where it cannot
+// be completed.
+Sum sum_over_travel(const std::vector<Visit>& visits, int visit, const AxisSystem& axis) {
+    Sum sum;
+    const Eigen::RowVector3d direction = visits[visit].direction().transpose();
+    for (const StepSystem& interval : axis.intervals) {
+        const auto own = std::find_if(interval.steps.begin(), interval.steps.end(), [&](const Step& step) { return step.visit == visit; });
+        if (own != interval.steps.end()) {
+            add_step(sum, visits, *own, 1.0);
+            continue;
+        }
+        const Eigen::RowVectorXd prediction = direction * interval.solution->pseudoinverse;
+        Eigen::RowVector3d predicted = Eigen::RowVector3d::Zero();
+        for (std::size_t r = 0; r < interval.steps.size(); ++r) {
+            predicted += prediction[Eigen::Index(r)] * visits[interval.steps[r].visit].direction().transpose();
+            add_step(sum, visits, interval.steps[r], prediction[Eigen::Index(r)]);
+        }
+        if ((predicted - direction).norm() > 1e-9) return {};  // the other lines do not span this one's direction
+    }
+    return sum;
+}
+
+Sum sum_of_scale_line(const Visit& visit) {
+    if (!visit.points.front().has_length || !visit.points.back().has_length) return {};
+    const auto moved = std::find_if(all_axes.begin(), all_axes.end(), [&](Axis axis) { return visit.line.moves(axis); });
+    const double sign = visit.line.sign(*moved);
+    return {{visit.first_reading, -sign}, {visit.first_reading + int(visit.points.size()) - 1, sign}};
+}
+
+}  // namespace
+
+SlopeSystem make_slope_system(const std::vector<Visit>& visits, const Plan& plan, const AxisSystems& lengths, const std::vector<bool>& usable) {
+    std::vector<const Visit*> visit_of_reading;
+    std::vector<double> variance_of_reading;
+    for (const Visit& visit : visits)
+        for (const VisitPoint& point : visit.points) {
+            visit_of_reading.push_back(&visit);
+            variance_of_reading.push_back(point.variance()[0]);
+        }
+
+    SlopeSystem system;
+    std::vector<Eigen::RowVectorXd> equations;
+    std::vector<double> uncertainty;
+    const int unknowns = SlopeSystem::laser_angle(int(visits.size()), 0);
+    for (std::size_t v = 0; v < visits.size(); ++v)
+        for (const Axis axis : all_axes) {
+            if (!usable[v] || !visits[v].line.moves(axis)) continue;
+            const Sum sum = visits[v].is_scale_line ? sum_of_scale_line(visits[v]) : sum_over_travel(visits, int(v), lengths[index(axis)]);
+            if (sum.empty()) continue;
+            Eigen::RowVectorXd equation = Eigen::RowVectorXd::Zero(unknowns);
+            const Eigen::Vector3d direction = visits[v].direction();
+            equation[SlopeSystem::scale(axis)] = direction[index(axis)];
+            for (const Squareness s : all_squarenesses) {
+                const SquarenessTerm term = squareness_term(s);
+                if (term.axis == axis) equation[SlopeSystem::squareness(s)] = term.sign * direction[term.component] * plan.volume()[index(axis)];
+            }
+            double variance = 0.0;
+            system.sums_.emplace_back();
+            for (const auto& [reading, coefficient] : sum) {
+                const Visit& visit = *visit_of_reading[reading];
+                const Eigen::Vector2d lateral = visit.points[reading - visit.first_reading].lateral;
+                const int angles = SlopeSystem::laser_angle(int(&visit - visits.data()), 0);
+                equation[angles] -= coefficient * lateral.y();
+                equation[angles + 1] += coefficient * lateral.x();
+                variance += coefficient * coefficient * variance_of_reading[reading];
+                system.sums_.back().push_back({reading, coefficient});
+            }
+            // Lateral travel that cancels leaves rounding behind, which must not look like a determined angle.
+            for (double& coefficient : equation.tail(unknowns - SlopeSystem::first_laser_angle))
+                if (std::abs(coefficient) < 1e-9 * plan.volume().norm()) coefficient = 0.0;
+            equations.push_back(equation);
+            uncertainty.push_back(std::sqrt(variance));
+        }
+
+    Eigen::MatrixXd matrix(equations.size(), unknowns);
+    for (std::size_t i = 0; i < equations.size(); ++i) matrix.row(Eigen::Index(i)) = equations[i];
+    const LeastSquares solution = solve_least_squares(matrix, Eigen::Map<const Eigen::VectorXd>(uncertainty.data(), Eigen::Index(uncertainty.size())));
+    system.inverse_ = solution.pseudoinverse;
+    system.determined_ = solution.determined;
+    return system;
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,213 @@
+#include "evaluation/visits.hpp"
+
+#include <algorithm>
+#include <map>
+#include <sstream>
+
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+namespace {
+
+constexpr double position_tolerance = 1e-3;  // mm: positions are written with three decimals by many controllers
+
+std::string row_name(const Measurement& measurement, std::size_t row) {
+    const Station& station = measurement.stations()[row];
+    return "measurement row " + std::to_string(row + 1) + " (run " + std::to_string(station.run) + ", line " + station.line.name() + ", point " + std::to_string(station.point) + ")";
+}
+
+// One raw value with its standard uncertainty; none where it was lost.
+struct RawValue {
+    double value;
+    double standard_uncertainty;
+};
+
+std::optional<RawValue> raw_value(const Channel* channel, std::size_t row, double fallback) {
+    if (!channel || !channel->value[row]) return std::nullopt;
+    const auto own = channel->standard_uncertainty.empty() ? std::nullopt : channel->standard_uncertainty[row];
+    return RawValue{*channel->value[row], own.value_or(fallback)};
+}
+
+// Reading and effects of the raw channels on (distance, alpha, beta).
+struct Reduced {
+    Reading reading{0.0, 0.0, 0.0};
+    bool has_distance = false;
+    bool has_tilt = false;
+    std::vector<Eigen::Vector3d> effects;
+
+    void take(const ReducedReading& reduced, const std::vector<double>& standard_uncertainty) {
+        reading = reduced.reading;
+        has_distance = has_tilt = true;
+        for (std::size_t c = 0; c < standard_uncertainty.size(); ++c) effects.push_back(standard_uncertainty[c] * reduced.jacobian.col(Eigen::Index(c)));
+    }
+};
+
+// Reduces the raw channels of one row after another.
+class Reducer {
+public:
+    Reducer(const Measurement& measurement, const HeadCalibration& head, const ReadingUncertainty& uncertainty)
+        : measurement_(measurement), head_(head), uncertainty_(uncertainty), distance_(measurement.find("distance")), alpha_(measurement.find("alpha")),
+          beta_(measurement.find("beta")), spot_x_(measurement.find("spot_x")), spot_y_(measurement.find("spot_y")) {
+        const int beams = measurement.beam_count();
+        if (beams > 0 && beams != int(head.beam_offsets.size()))
+            throw InvalidArgument("measurement: has " + std::to_string(beams) + " beams d1 ... d" + std::to_string(beams) + ", but the head's beam_offsets name " + std::to_string(head.beam_offsets.size()));
+        for (int i = 1; i <= beams; ++i) beams_.push_back(measurement.find("d" + std::to_string(i)));
+        if (spot_x_ && !head.psd_distance) throw InvalidArgument("measurement: has spot readings, but the head has no psd_distance (layout \"psd\")");
+    }
+
+    Reduced reduce(std::size_t row) const { return !beams_.empty() ? reduce_beam_row(row) : spot_x_ ? reduce_spot_row(row) : reduce_ideal_row(row); }
+
+private:
+    [[noreturn]] void refuse(std::size_t row, const std::string& what) const { throw InvalidArgument(row_name(measurement_, row) + ": " + what); }
+
+    Reduced reduce_ideal_row(std::size_t row) const {
+        Reduced result;
+        const auto distance = raw_value(distance_, row, uncertainty_.distance);
+        const auto alpha = raw_value(alpha_, row, uncertainty_.tilt);
+        const auto beta = raw_value(beta_, row, uncertainty_.tilt);
+        if (distance) {
+            result.has_distance = true;
+            result.reading.distance = distance->value;
+            result.effects.push_back({distance->standard_uncertainty, 0.0, 0.0});
+        }
+        if (alpha && beta) {
+            result.has_tilt = true;
+            result.reading.alpha = alpha->value;
+            result.reading.beta = beta->value;
+            if (!(result.reading.tan2_phi() < 1.0)) refuse(row, "expected tilts below 45 degrees");
+            result.effects.push_back({0.0, alpha->standard_uncertainty, 0.0});
+            result.effects.push_back({0.0, 0.0, beta->standard_uncertainty});
+        }
+        return result;
+    }
+
+    Reduced reduce_spot_row(std::size_t row) const {
+        Reduced result;
+        const auto distance = raw_value(distance_, row, uncertainty_.distance);
+        const auto x = raw_value(spot_x_, row, uncertainty_.spot);
+        const auto y = raw_value(spot_y_, row, uncertainty_.spot);
+        if (!distance) return result;  // a spot alone gives no tilt
+        if (!x || !y) {
+            result.has_distance = true;
+            result.reading.distance = distance->value;
+            result.effects.push_back({distance->standard_uncertainty, 0.0, 0.0});
+            return result;
+        }
+        const auto reduced = reduce_spot(distance->value, {x->value, y->value}, *head_.psd_distance);
+        if (!reduced) refuse(row, "no mirror gives this distance and spot with psd_distance " + std::to_string(*head_.psd_distance) + " mm");
+        result.take(*reduced, {distance->standard_uncertainty, x->standard_uncertainty, y->standard_uncertainty});
+        return result;
+    }
+
+    Reduced reduce_beam_row(std::size_t row) const {
+        std::vector<double> distances, standard_uncertainties;
+        std::vector<Eigen::Vector2d> offsets;
+        for (std::size_t i = 0; i < beams_.size(); ++i)
+            if (const auto beam = raw_value(beams_[i], row, uncertainty_.distance)) {
+                distances.push_back(beam->value);
+                standard_uncertainties.push_back(beam->standard_uncertainty);
+                offsets.push_back(head_.beam_offsets[i]);
+            }
+        Reduced result;
+        const auto reduced = reduce_beams(Eigen::Map<const Eigen::VectorXd>(distances.data(), Eigen::Index(distances.size())), offsets);
+        if (reduced) result.take(*reduced, standard_uncertainties);  // else too few beams are left: a lost reading
+        return result;
+    }
+
+    const Measurement& measurement_;
+    const HeadCalibration& head_;
+    const ReadingUncertainty& uncertainty_;
+    const Channel *distance_, *alpha_, *beta_, *spot_x_, *spot_y_;
+    std::vector<const Channel*> beams_;
+};
+
+// Length and tilts of a point from the reduced reading. The length is linear in the parameters only after the product of tilt
+// and lever arm is taken off: L = q_z + beta q_x - alpha q_y with q the vector from beam origin to functional point.
+void fill_point(VisitPoint& point, const Reduced& reduced, double travel, bool is_scale_line, LengthKind kind) {
+    const Reading& reading = reduced.reading;
+    point.has_tilt = reduced.has_tilt;
+    // A scale line runs along its own beam: no lever arm, so that it needs no tilts.
+    point.has_length = reduced.has_distance && (reduced.has_tilt || is_scale_line || kind == LengthKind::distance);
+    Eigen::RowVector3d by_reading(1.0, 0.0, 0.0);  // of the length, by (distance, alpha, beta)
+    double length = reading.distance;
+    if (kind == LengthKind::lever_arm_corrected) {
+        length = reading.beam_length() - reading.beta * point.lateral.x() + reading.alpha * point.lateral.y();
+        by_reading << 1.0 - reading.tan2_phi(), -2.0 * reading.distance * reading.alpha + point.lateral.y(), -2.0 * reading.distance * reading.beta - point.lateral.x();
+    }
+    if (point.has_length) point.reading[0] = length - travel;
+    if (point.has_tilt) point.reading.tail<2>() << reading.alpha, reading.beta;
+    for (Eigen::Vector3d effect : reduced.effects) {
+        effect[0] = point.has_length ? by_reading * effect : 0.0;
+        point.effects.push_back(effect);
+    }
+}
+
+void check_position(const Measurement& measurement, std::size_t row, const Eigen::Vector3d& expected) {
+    const Eigen::Vector3d& commanded = measurement.stations()[row].commanded;
+    if ((commanded - expected).cwiseAbs().maxCoeff() <= position_tolerance) return;
+    std::ostringstream text;
+    text << row_name(measurement, row) << ": the plan has this point at (" << expected.transpose() << ") mm, the row says (" << commanded.transpose() << ") mm";
+    throw InvalidArgument(text.str());
+}
+
+}  // namespace
+
+Eigen::Vector3d VisitPoint::variance() const {
+    Eigen::Vector3d variance = Eigen::Vector3d::Zero();
+    for (const auto& effect : effects) variance += effect.cwiseAbs2();
+    return variance;
+}
+
+std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& plan, const HeadCalibration& head, const ReadingUncertainty& uncertainty, LengthKind kind) {
+    for (const double u : {uncertainty.distance, uncertainty.tilt, uncertainty.spot})
+        if (!(u > 0.0 && std::isfinite(u))) throw InvalidArgument("uncertainty: expected positive finite standard uncertainties");
+    const Reducer reducer(measurement, head, uncertainty);
+    std::map<std::pair<int, std::string>, std::vector<std::size_t>> rows;
+    for (std::size_t i = 0; i < measurement.size(); ++i) rows[{measurement.stations()[i].run, measurement.stations()[i].line.name()}].push_back(i);
+
+    std::vector<Visit> visits;
+    int readings = 0;
+    for (const auto& [key, members] : rows) {
+        const Line line = measurement.stations()[members.front()].line;
+        const auto planned = [&] {
+            try {
+                return plan.points(line);
+            } catch (const InvalidArgument& error) {
+                throw InvalidArgument(row_name(measurement, members.front()) + ": " + error.what());
+            }
+        }();
+        Visit visit{line, plan.is_scale_line(line), plan.frame(line), {}, readings};
+        for (const PlanPoint& point : planned) visit.points.emplace_back().plan = point;
+        const Eigen::Vector3d start = planned.front().commanded;
+        for (const std::size_t row : members) {
+            const Station& station = measurement.stations()[row];
+            if (station.point >= int(planned.size()))
+                throw InvalidArgument(row_name(measurement, row) + ": the line has the points 0 to " + std::to_string(planned.size() - 1));
+            check_position(measurement, row, planned[station.point].commanded);
+            VisitPoint& point = visit.points[station.point];
+            // Positions are the commanded ones: where they were rounded, the machine was sent to the rounded point.
+            const Eigen::Vector3d travel = visit.frame.transpose() * (station.commanded - start);
+            point.lateral = travel.head<2>();
+            fill_point(point, reducer.reduce(row), travel.z(), visit.is_scale_line, kind);
+        }
+        readings += int(visit.points.size());
+        visits.push_back(std::move(visit));
+    }
+    return visits;
+}
+
+std::array<AxisSteps, 3> collect_steps(const std::vector<Visit>& visits, const Plan& plan) {
+    std::array<AxisSteps, 3> steps;
+    for (auto& axis : steps) axis.resize(plan.steps());
+    for (std::size_t v = 0; v < visits.size(); ++v) {
+        if (visits[v].is_scale_line) continue;
+        for (std::size_t k = 0; k + 1 < visits[v].points.size(); ++k) {
+            const PlanPoint &from = visits[v].points[k].plan, &to = visits[v].points[k + 1].plan;
+            const int axis = index(*to.moved);
+            steps[axis][std::min(from.node[axis], to.node[axis])].push_back({int(v), int(k), to.node[axis] > from.node[axis] ? 1.0 : -1.0});
+        }
+    }
+    return steps;
+}
+
+}  // namespace stepdiag
