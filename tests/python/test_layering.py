@@ -72,6 +72,6 @@ def test_public_headers_show_no_private_dependency() -> None:
         f"{file.relative_to(CPP)} includes {include}"
         for file in INCLUDE_DIR.rglob("*.hpp")
         for include in includes(file)
-        if private.match(include) or room_of(include) is not None and not include.startswith("stepdiag/")
+        if private.match(include) or (room_of(include) is not None and not include.startswith("stepdiag/"))
     ]
     assert not offences, "\n".join(offences)
