@@ -1,0 +1,164 @@
+#include "stepdiag/machine/parameter_table.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <random>
+
+#include "refuses.hpp"
+
+namespace {
+
+using stepdiag::FunctionTable;
+using stepdiag::ParameterTable;
+using stepdiag::parse_parameter_table;
+
+std::uint64_t bits(double value) {
+    std::uint64_t word;
+    std::memcpy(&word, &value, sizeof word);
+    return word;
+}
+
+// A table with values of every size that a double can hold.
+ParameterTable extreme_table() {
+    std::mt19937_64 engine(9);
+    const auto any = [&] {
+        for (;;) {
+            const std::uint64_t word = engine();
+            double value;
+            std::memcpy(&value, &word, sizeof value);
+            if (std::isfinite(value)) return value;
+        }
+    };
+    ParameterTable table;
+    table.header = {{"format", "1"}, {"chain", "[w X' b Y Z t]"}};
+    for (int i = 0; i < stepdiag::function_count; ++i) {
+        FunctionTable function;
+        double position = -1e-3 * i;
+        for (const double special :
+             {0.0, -0.0, 5e-324, 1e-300, 1e300, 1.0 / 3.0, -std::numeric_limits<double>::max()}) {
+            for (const double value : {special, any()}) {
+                function.position.push_back(position += 1.0 / 3.0);
+                function.value.push_back(value);
+                function.standard_uncertainty.push_back(i % 2 ? std::optional<double>(std::abs(any())) : std::nullopt);
+            }
+        }
+        if (i != 4) table.functions[i] = function;  // one is missing
+    }
+    table.squarenesses[0] = stepdiag::SquarenessValue{any(), std::nullopt};
+    table.squarenesses[2] = stepdiag::SquarenessValue{-0.0, 1e-300};
+    return table;
+}
+
+void expect_same_bits(const ParameterTable& a, const ParameterTable& b) {
+    EXPECT_EQ(a.header, b.header);
+    const auto same = [](const std::optional<double>& x, const std::optional<double>& y) {
+        return x.has_value() == y.has_value() && (!x || bits(*x) == bits(*y));
+    };
+    for (int i = 0; i < stepdiag::function_count; ++i) {
+        ASSERT_EQ(a.functions[i].has_value(), b.functions[i].has_value()) << i;
+        if (!a.functions[i]) continue;
+        ASSERT_EQ(a.functions[i]->position.size(), b.functions[i]->position.size());
+        for (std::size_t k = 0; k < a.functions[i]->position.size(); ++k) {
+            EXPECT_EQ(bits(a.functions[i]->position[k]), bits(b.functions[i]->position[k]));
+            EXPECT_EQ(bits(a.functions[i]->value[k]), bits(b.functions[i]->value[k]));
+            EXPECT_TRUE(same(a.functions[i]->standard_uncertainty[k], b.functions[i]->standard_uncertainty[k]));
+        }
+    }
+    for (int s = 0; s < stepdiag::squareness_count; ++s) {
+        ASSERT_EQ(a.squarenesses[s].has_value(), b.squarenesses[s].has_value());
+        if (!a.squarenesses[s]) continue;
+        EXPECT_EQ(bits(a.squarenesses[s]->value), bits(b.squarenesses[s]->value));
+        EXPECT_TRUE(same(a.squarenesses[s]->standard_uncertainty, b.squarenesses[s]->standard_uncertainty));
+    }
+}
+
+const std::string header = "parameter,position_mm,value,unit,standard_uncertainty\n";
+
+}  // namespace
+
+TEST(ParameterTable, TextIsReadBackToTheSameBits) {
+    const ParameterTable table = extreme_table();
+    expect_same_bits(parse_parameter_table(format_parameter_table(table), "t.csv"), table);
+}
+
+TEST(ParameterTable, FileIsReadBackToTheSameBits) {
+    const std::string path = (std::filesystem::temp_directory_path() / "stepdiag_parameter_table_test.csv").string();
+    const ParameterTable table = extreme_table();
+    write_parameter_table(table, path);
+    expect_same_bits(stepdiag::read_parameter_table(path), table);
+    std::filesystem::remove(path);
+}
+
+TEST(ParameterTable, ValuesAreInNativeUnits) {
+    const auto table =
+        parse_parameter_table("# chain=[w b X Y Z t]\n# a remark\n" + header +
+                                  "EXX,0,0,um,\nEXX,10.5,2.5,um,0.1\nECZ,3,-7,urad,\nB0Z,,12.5,urad,0.5\n",
+                              "t.csv");
+    EXPECT_EQ(table.header.at("chain"), "[w b X Y Z t]");
+    EXPECT_EQ(table.functions[0]->value, (std::vector<double>{0.0, 2.5e-3}));
+    EXPECT_EQ(table.functions[0]->standard_uncertainty[1], 0.1e-3);
+    EXPECT_EQ(table.functions[17]->value[0], -7e-6);
+    EXPECT_EQ(table.squarenesses[1]->value, 12.5e-6);
+    EXPECT_EQ(table.squarenesses[1]->standard_uncertainty, 0.5e-6);
+    EXPECT_FALSE(table.functions[1] || table.squarenesses[0] || table.squarenesses[2]);
+}
+
+TEST(ParameterTable, ByteOrderMarkAndWindowsLineEndsAreRead) {
+    const auto table = parse_parameter_table(
+        "\xEF\xBB\xBF# a=b\r\nparameter,position_mm,value,unit,standard_uncertainty\r\nEXX,0,1,um,\r\n", "t.csv");
+    EXPECT_EQ(table.functions[0]->value[0], 1e-3);
+}
+
+TEST(ParameterTable, MalformedTextIsRefusedWithFileAndLine) {
+    const struct {
+        std::string text, culprit;
+    } cases[] = {
+        {"", "t.csv"},
+        {"EXX,0,0,um,\n", "line 1"},
+        {"parameter,position_mm,value,unit\nEXX,0,0,um\n", "line 1"},
+        {"parameter,position_um,value,unit,standard_uncertainty\n", "line 1"},
+        {header + "EXX,0,0,um\n", "line 2"},
+        {header + "EXX,0,0,um,,\n", "line 2"},
+        {header + "EXQ,0,0,um,\n", "line 2: parameter"},
+        {header + "exx,0,0,um,\n", "line 2: parameter"},
+        {header + "EXX,0,0,mm,\n", "line 2: unit"},
+        {header + "EXX,0,0,urad,\n", "line 2: unit"},
+        {header + "EAX,0,0,um,\n", "line 2: unit"},
+        {header + "C0Y,,0,um,\n", "line 2: unit"},
+        {header + "EXX,0,0,,\n", "line 2: unit"},
+        {header + "EXX,0,nan,um,\n", "line 2: value"},
+        {header + "EXX,0,inf,um,\n", "line 2: value"},
+        {header + "EXX,0,1e999,um,\n", "line 2: value"},
+        {header + "EXX,0,,um,\n", "line 2: value"},
+        {header + "EXX,0,\"1,5\",um,\n", "line 2: value"},
+        {header + "EXX,,0,um,\n", "line 2: position_mm"},
+        {header + "EXX,zero,0,um,\n", "line 2: position_mm"},
+        {header + "EXX,0,0,um,-1\n", "line 2: standard_uncertainty"},
+        {header + "EXX,0,0,um,x\n", "line 2: standard_uncertainty"},
+        {header + "EXX,0,0,um,\nEXX,0,1,um,\n", "line 3: position_mm"},
+        {header + "EXX,5,0,um,\nEXX,4,1,um,\n", "line 3: position_mm"},
+        {header + "C0Y,0,0,urad,\n", "line 2: position_mm"},
+        {header + "C0Y,,0,urad,\n\nC0Y,,1,urad,\n", "line 4: C0Y"},
+        {header + "EXX,0,\"0,um,\n", "line 2"},
+        {header + "EXX,0,0,um,\nEXX,10,1.", "line 3"},  // truncated
+    };
+    for (const auto& [text, culprit] : cases) {
+        SCOPED_TRACE(text);
+        expect_refused([&, &text = text] { parse_parameter_table(text, "t.csv"); }, "t.csv");
+        expect_refused([&, &text = text] { parse_parameter_table(text, "t.csv"); }, culprit);
+    }
+}
+
+TEST(ParameterTable, WhatIsNotFiniteIsNotWritten) {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    ParameterTable table;
+    table.functions[0] = FunctionTable{{0.0}, {nan}, {std::nullopt}};
+    expect_refused([&] { format_parameter_table(table); }, "EXX");
+    table.functions[0] = FunctionTable{{0.0}, {0.0}, {nan}};
+    expect_refused([&] { format_parameter_table(table); }, "EXX");
+}

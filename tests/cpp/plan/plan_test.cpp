@@ -1,0 +1,136 @@
+#include "stepdiag/plan/plan.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "refuses.hpp"
+
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using stepdiag::Axis;
+using stepdiag::Line;
+using stepdiag::Plan;
+
+const Vector3d volume(800.0, 600.0, 500.0);
+
+std::vector<Line> lines(std::initializer_list<const char*> names) {
+    std::vector<Line> lines;
+    for (const char* name : names) lines.push_back(Line::parse(name));
+    return lines;
+}
+
+std::vector<Vector3d> commanded(const Plan& plan, const char* line) {
+    std::vector<Vector3d> positions;
+    for (const auto& point : plan.points(Line::parse(line))) positions.push_back(point.commanded);
+    return positions;
+}
+
+}  // namespace
+
+TEST(Plan, PointsOfTwoStepsAreThoseWrittenByHand) {
+    const Plan plan({8.0, 6.0, 4.0}, lines({"ppp", "npn", "0pn", "00n", "p00"}), 2, stepdiag::parse_order("YZX"));
+    using List = std::vector<Vector3d>;
+    EXPECT_EQ(commanded(plan, "ppp"),
+              (List{{0, 0, 0}, {0, 3, 0}, {0, 3, 2}, {4, 3, 2}, {4, 6, 2}, {4, 6, 4}, {8, 6, 4}}));
+    EXPECT_EQ(commanded(plan, "npn"),
+              (List{{8, 0, 4}, {8, 3, 4}, {8, 3, 2}, {4, 3, 2}, {4, 6, 2}, {4, 6, 0}, {0, 6, 0}}));
+    EXPECT_EQ(commanded(plan, "0pn"), (List{{0, 0, 4}, {0, 3, 4}, {0, 3, 2}, {0, 6, 2}, {0, 6, 0}}));
+    EXPECT_EQ(commanded(plan, "00n"), (List{{0, 0, 4}, {0, 0, 2}, {0, 0, 0}}));
+    EXPECT_EQ(commanded(plan, "p00"), (List{{0, 0, 0}, {4, 0, 0}, {8, 0, 0}}));
+}
+
+TEST(Plan, NumberOfPointsFollowsTheMovedAxes) {
+    for (const int n : {1, 2, 7, 50}) {
+        const Plan plan(volume, lines({"nnn", "p0n", "0n0"}), n, stepdiag::all_axes, lines({"p00"}));
+        EXPECT_EQ(plan.points(Line::parse("nnn")).size(), 3u * n + 1);
+        EXPECT_EQ(plan.points(Line::parse("p0n")).size(), 2u * n + 1);
+        EXPECT_EQ(plan.points(Line::parse("0n0")).size(), 1u * n + 1);
+        EXPECT_EQ(plan.points(Line::parse("p00")).size(), 2u);
+    }
+}
+
+TEST(Plan, EveryPointSaysWhatMovedAndWhichNodesItIsOn) {
+    const Plan plan(volume, lines({"pnp"}), 5, stepdiag::parse_order("ZXY"));
+    const auto points = plan.points(Line::parse("pnp"));
+    EXPECT_FALSE(points[0].moved);
+    for (std::size_t k = 1; k < points.size(); ++k) {
+        EXPECT_EQ(points[k].moved, plan.order()[(k - 1) % 3]);
+        for (const Axis axis : stepdiag::all_axes) {
+            const int before = points[k - 1].node[index(axis)];
+            const int step = points[k].moved == axis ? Line::parse("pnp").sign(axis) : 0;
+            EXPECT_EQ(points[k].node[index(axis)], before + step);
+            EXPECT_EQ(points[k].commanded[index(axis)], plan.nodes(axis)[points[k].node[index(axis)]]);
+        }
+    }
+    EXPECT_EQ(points.back().commanded, Vector3d(800.0, 0.0, 500.0));
+}
+
+TEST(Plan, ScaleLineHasItsTwoEnds) {
+    const Plan plan(volume, lines({"ppp"}), 50, stepdiag::all_axes, lines({"p00", "0n0"}));
+    EXPECT_EQ(commanded(plan, "p00"), (std::vector<Vector3d>{{0, 0, 0}, {800, 0, 0}}));
+    EXPECT_EQ(commanded(plan, "0n0"), (std::vector<Vector3d>{{0, 600, 0}, {0, 0, 0}}));
+}
+
+TEST(Plan, BeamWandersElevenMillimetresOnTheMirrorForStepsOf16By12By10) {
+    // A 16 x 12 x 10 mm step of the ppp line: 11.2 mm off the diagonal after X, 8.9 mm before Z (to the digits
+    // printed).
+    const Plan plan(volume, lines({"ppp"}), 50);
+    const auto f = plan.frame(Line::parse("ppp"));
+    const auto off = [&](const Vector3d& travel) { return (f.leftCols<2>().transpose() * travel).norm(); };
+    EXPECT_NEAR(off({16.0, 0.0, 0.0}), 11.2, 0.05);
+    EXPECT_NEAR(off({16.0, 12.0, 0.0}), 8.9, 0.05);
+    EXPECT_NEAR(off({16.0, 12.0, 10.0}), 0.0, 1e-14);  // back on the diagonal, to roundings of 20 mm
+
+    const auto excursion = plan.lateral_excursion(Line::parse("ppp"));
+    // Local x: 16 * 0.6 = 9.6 after X, 0 after Y. Local y: 16*0.8*500/1118.03 after X, 20*500/1118.03 after Y.
+    const double D = std::sqrt(1.25e6);
+    EXPECT_LE((excursion.lowest - Vector2d(0.0, 0.0)).norm(), 1e-14);
+    EXPECT_LE((excursion.highest - Vector2d(9.6, 20.0 * 500.0 / D)).norm(), 1e-14);
+    EXPECT_LE((plan.smallest_mirror() - 2.0 * Vector2d(9.6, 20.0 * 500.0 / D)).norm(), 2e-14);
+}
+
+TEST(Plan, SmallestMirrorHoldsTheBeamOnEveryLine) {
+    const auto names = {"ppp", "npp", "pnp", "nnp", "ppn", "nnn", "p0p", "0np", "pp0"};
+    for (const char* order : {"XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"}) {
+        const Plan plan(volume, lines(names), 4, stepdiag::parse_order(order));
+        Vector2d largest = Vector2d::Zero();
+        for (const char* name : names) {
+            const auto positions = commanded(plan, name);
+            const auto f = plan.frame(Line::parse(name));
+            for (const auto& p : positions)
+                largest = largest.cwiseMax((f.leftCols<2>().transpose() * (p - positions.front())).cwiseAbs());
+        }
+        EXPECT_LE((plan.smallest_mirror() - 2.0 * largest).norm(), 1e-11) << order;  // roundings of 1100 mm
+    }
+}
+
+TEST(Plan, SingleAxisLinesNeedNoMirrorToSpeakOf) {
+    EXPECT_LE(Plan(volume, lines({"p00", "00n"}), 10).smallest_mirror().norm(), 1e-14);
+}
+
+TEST(Plan, WhatMakesNoPlanIsRefused) {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    const auto make = [](Vector3d edges, std::vector<Line> l, int steps, std::vector<Line> scale = {}) {
+        Plan(edges, std::move(l), steps, stepdiag::all_axes, std::move(scale));
+    };
+    const auto four = lines({"ppp", "npp", "pnp", "nnp"});
+    expect_refused([&] { make({0.0, 600.0, 500.0}, four, 5); }, "volume");
+    expect_refused([&] { make({800.0, -600.0, 500.0}, four, 5); }, "volume");
+    expect_refused([&] { make({800.0, 600.0, nan}, four, 5); }, "volume");
+    expect_refused([&] { make({INFINITY, 600.0, 500.0}, four, 5); }, "volume");
+    expect_refused([&] { make({800.0, 600.0, 1e-200}, four, 5); }, "volume");  // its square is no longer a number
+    expect_refused([&] { make(volume, four, 0); }, "steps");
+    expect_refused([&] { make(volume, four, -3); }, "steps");
+    expect_refused([&] { make(volume, four, 1'000'000'000); }, "steps");
+    expect_refused([&] { make(volume, {}, 5); }, "lines");
+    expect_refused([&] { make(volume, lines({"ppp", "ppp"}), 5); }, "lines: \"ppp\"");
+    expect_refused([&] { make(volume, lines({"ppp", "p00"}), 5, lines({"p00"})); }, "\"p00\"");
+    expect_refused([&] { make(volume, four, 5, lines({"pp0"})); }, "scale_lines");
+    expect_refused([&] { Plan(volume, four, 5).points(Line::parse("ppn")); }, "\"ppn\"");
+    for (const char* order : {"", "XY", "XYY", "xyz", "XYZX", "ABC"})
+        expect_refused([&] { stepdiag::parse_order(order); }, "order \"" + std::string(order) + "\"");
+}
