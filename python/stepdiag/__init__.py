@@ -7,7 +7,8 @@
     run = sd.simulate(machine, plan, sd.Head())
     calibration = sd.evaluate(run, plan, sd.Head(), machine.chain)
 
-Units are native throughout: length mm, angle rad, wavelength nm. Bad input raises InvalidArgument, a ValueError.
+Units are native throughout: length mm, angle rad, wavelength nm.
+Bad input raises InvalidArgument, a ValueError.
 """
 
 from typing import TYPE_CHECKING, Any

@@ -1,7 +1,12 @@
-"""The command line: simulate, evaluate, demo, check, init. What is imported inside a command keeps the others fast."""
+"""The command line: simulate, evaluate, demo, check, init.
+
+What is imported inside a command keeps the others fast.
+"""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import click
 
@@ -15,31 +20,28 @@ A first round trip:
 Or watch it all at once: stepdiag demo
 """
 
-SCENARIO = click.argument("scenario", type=click.Path(path_type=Path))
+Command = TypeVar("Command", bound=Callable[..., None])
+PATH = click.Path(path_type=Path)
 
 
-def out_file(meaning: str) -> "click.decorators.FC":  # type: ignore[name-defined]
-    return click.option(
-        "-o", "output", required=True, type=click.Path(path_type=Path), metavar="FILE", help=meaning
-    )
+def out_file(meaning: str) -> Callable[[Command], Command]:
+    return click.option("-o", "output", required=True, type=PATH, metavar="FILE", help=meaning)
 
 
-@click.group(
-    epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
-)
+@click.group(epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, message="stepdiag %(version)s")
 def cli() -> None:
     """Calibrate three-axis machine tools by the laser step-diagonal method."""
 
 
 @cli.command(epilog="Example: stepdiag simulate scenario.toml -o run.csv")
-@SCENARIO
+@click.argument("scenario", type=PATH)
 @out_file("Measurement file (CSV) to write.")
 def simulate(scenario: Path, output: Path) -> None:
     """Simulate the run that SCENARIO (TOML) describes.
 
-    The virtual machine moves through the plan with its errors, and the head reads the mirror at every point. Lost
-    readings are empty fields.
+    The virtual machine moves through the plan with its errors, and the head reads the mirror at every point.
+    Lost readings are empty fields.
     """
     from stepdiag.files import check_output
     from stepdiag.scenario import read_scenario, simulate_scenario
@@ -50,8 +52,8 @@ def simulate(scenario: Path, output: Path) -> None:
 
 
 @cli.command(epilog="Example: stepdiag evaluate scenario.toml run.csv -m enhanced -o calibration.csv")
-@SCENARIO
-@click.argument("run", type=click.Path(path_type=Path))
+@click.argument("scenario", type=PATH)
+@click.argument("run", type=PATH)
 @click.option(
     "-m",
     "method",
@@ -64,16 +66,17 @@ def simulate(scenario: Path, output: Path) -> None:
 def evaluate(scenario: Path, run: Path, method: str, output: Path) -> None:
     """Evaluate the measurement RUN (CSV), made by SCENARIO's plan and head.
 
-    Finds the machine's 21 error parameters with their standard uncertainties, and says what the readings do not
-    determine. Of the scenario only chain, tool, plan, head and uncertainties are used.
+    Finds the machine's 21 error parameters with their standard uncertainties, and says what the readings do
+    not determine. Of the scenario only chain, tool, plan, head and uncertainties are used.
     """
     from stepdiag import _core
-    from stepdiag.files import check_output
+    from stepdiag.files import check_input, check_output
     from stepdiag.report import evaluation_report
     from stepdiag.scenario import evaluate_scenario, read_scenario
 
     check_output(output)
     _keep_apart(output, scenario, run)
+    check_input(run)
     plan = read_scenario(scenario)
     measurement = _core.read_measurement(run)
     try:
@@ -93,14 +96,15 @@ def evaluate(scenario: Path, run: Path, method: str, output: Path) -> None:
     "folder",
     default="demo",
     show_default=True,
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="DIR",
     help="Folder to write.",
 )
 def demo(folder: Path) -> None:
     """Simulate and evaluate the machine of the method's paper, and draw its Figure 5.
 
-    Writes scenarios, truth, runs, calibrations, a table and the figure; go on from them with simulate and evaluate.
+    Writes scenarios, truth, runs, calibrations, a table and the figure; go on from them with simulate and
+    evaluate.
     """
     from stepdiag.demo import run_demo
 
@@ -109,13 +113,13 @@ def demo(folder: Path) -> None:
 
 
 @cli.command(epilog="Example: stepdiag check scenario.toml run.csv")
-@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
+@click.argument("files", nargs=-1, required=True, type=PATH, metavar="FILE...")
 @click.pass_context
 def check(context: click.Context, files: tuple[Path, ...]) -> None:
     """Tell what kind each FILE is, and whether it is sound.
 
-    Knows scenarios (TOML), measurements, error maps and calibrations (CSV). A scenario is checked together with the
-    error map that it names. Exit code 2 if any file is not sound.
+    Knows scenarios (TOML), measurements, error maps and calibrations (CSV). A scenario is checked together
+    with the error map that it names. Exit code 2 if any file is not sound.
     """
     from stepdiag.kinds import examine
 
@@ -135,22 +139,20 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
 
 
 @cli.command(epilog="Example: stepdiag init -o machine")
-@click.option(
-    "-o", "folder", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder to write."
-)
+@click.option("-o", "folder", required=True, type=PATH, metavar="DIR", help="Folder to write.")
 @click.option(
     "--sheet-for",
     "scenario",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="SCENARIO",
     help="Write only measurement.csv, for the plan and head of this scenario.",
 )
 def init(folder: Path, scenario: Path | None) -> None:
     """Begin with your own machine: a scenario to edit and a sheet to fill in.
 
-    Writes scenario.toml, with a comment on every key, and measurement.csv with all commanded points and empty fields
-    for the readings of your instrument. Existing files are never overwritten. After changing the plan in the scenario,
-    make a new sheet with --sheet-for.
+    Writes scenario.toml, with a comment on every key, and measurement.csv with all commanded points and empty
+    fields for the readings of your instrument. Existing files are never overwritten. After changing the plan
+    in the scenario, make a new sheet with --sheet-for.
     """
     from stepdiag.files import make_folder, write_whole
     from stepdiag.scenario import parse_scenario, read_scenario
@@ -159,9 +161,7 @@ def init(folder: Path, scenario: Path | None) -> None:
 
     text = template()
     plan = parse_scenario(text) if scenario is None else read_scenario(scenario)
-    written = (
-        [folder / "measurement.csv"] if scenario else [folder / "scenario.toml", folder / "measurement.csv"]
-    )
+    written = [folder / "measurement.csv"] if scenario else [folder / "scenario.toml", folder / "measurement.csv"]
     for path in written:
         if path.exists() or path.is_symlink():
             raise InvalidArgument(f"{path}: exists already, and is not overwritten")
@@ -191,12 +191,11 @@ def main(arguments: list[str] | None = None) -> int:
         return result if isinstance(result, int) else 0
     except click.Abort:
         return 130
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        return 0
     except click.UsageError as error:
-        hint = (
-            f" (see stepdiag {error.ctx.info_name if error.ctx and error.ctx.parent else ''} --help)".replace(
-                "  ", " "
-            )
-        )
+        hint = f' (see "{error.ctx.command_path} --help")' if error.ctx else ""
         _complain(error.format_message() + hint)
     except (InvalidArgument, click.ClickException) as error:
         _complain(error.format_message() if isinstance(error, click.ClickException) else str(error))

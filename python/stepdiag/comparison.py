@@ -13,11 +13,11 @@ KINDS: Final[tuple[Kind, ...]] = ("positioning", "straightness", "angle", "squar
 
 @dataclass(frozen=True)
 class Deviation:
-    """The largest difference calibration - truth of one kind (mm or rad), and where; no position for a squareness."""
+    """The largest difference calibration - truth of one kind (mm or rad), and where."""
 
     value: float
     parameter: str
-    position: float | None
+    position: float | None  # mm; none for a squareness
 
 
 def kind_of(parameter: str) -> Kind:
@@ -30,8 +30,9 @@ def kind_of(parameter: str) -> Kind:
 
 
 def largest_deviations(calibration: Calibration, truth: ErrorMap) -> dict[Kind, Deviation]:
-    """Largest deviations of a calibration from the truth, at the calibration's nodes. A kind of which nothing is
-    determined is absent; so are functions whose slope is not determined."""
+    """Largest deviations of a calibration from the truth, at the calibration's nodes.
+
+    A kind of which nothing is determined is absent; so are functions whose slope is not determined."""
     largest: dict[Kind, Deviation] = {}
 
     def note(parameter: str, value: float, position: float | None) -> None:

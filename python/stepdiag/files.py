@@ -13,11 +13,11 @@ LARGEST_TEXT = 16 * 2**20
 
 def read_text(path: Path) -> str:
     """The file's text. Raises InvalidArgument where it cannot be read, is empty, or is not UTF-8 text."""
-    if path.is_dir():
-        raise InvalidArgument(f"{path}: expected a file, got a folder")
     try:
         with open(path, "rb") as file:
             content = file.read(LARGEST_TEXT + 1)
+    except IsADirectoryError:
+        raise InvalidArgument(f"{path}: expected a file, got a folder") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         raise InvalidArgument(f"{path}: cannot be read: {reason(error)}") from None
     if len(content) > LARGEST_TEXT:
@@ -33,8 +33,14 @@ def read_text(path: Path) -> str:
         raise InvalidArgument(f"{path}, line {line}: expected UTF-8 text") from None
 
 
+def check_input(path: Path) -> None:
+    """Raises InvalidArgument for devices: some never end."""
+    if path.exists() and not (path.is_file() or path.is_dir() or path.is_fifo()):
+        raise InvalidArgument(f"{path}: expected a file, got a device")
+
+
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Writes to a temporary file beside `path` and renames it: `path` is the old file or the whole new one."""
+    """Writes a temporary file beside `path` and renames it: `path` is the old file or the whole new one."""
     check_output(path)
     try:
         handle, temporary = tempfile.mkstemp(prefix=f"{path.name}.", dir=path.parent)

@@ -8,7 +8,7 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.files import read_text
+from stepdiag.files import check_input, read_text
 
 
 @dataclass(frozen=True)
@@ -22,10 +22,10 @@ class Finding:
 
 def examine(path: Path) -> Finding:
     """Reads a file as the kind that its first lines show. Raises InvalidArgument where it is not sound."""
-    text = read_text(path) if path.suffix.lower() == ".toml" else _beginning(path)
+    check_input(path)
     if path.suffix.lower() == ".toml":
         return _scenario(path)
-    comments, header = _head_of(text)
+    comments, header = _head_of(read_text(path))
     columns = {column.strip().strip('"') for column in header.split(",")}
     if {"parameter", "value"} & columns:
         is_calibration = any(
@@ -42,14 +42,8 @@ def examine(path: Path) -> Finding:
     )
 
 
-def _beginning(path: Path) -> str:
-    if path.exists() and not path.is_file() and not path.is_fifo() and not path.is_dir():
-        raise InvalidArgument(f"{path}: expected a file, got a device")
-    return read_text(path)
-
-
 def _head_of(text: str) -> tuple[list[str], str]:
-    comments = []
+    comments: list[str] = []
     for line in text.splitlines():
         if line.strip() and not line.startswith("#"):
             return comments, line
@@ -62,18 +56,15 @@ def _scenario(path: Path) -> Finding:
 
     scenario = read_scenario(path)
     plan = scenario.plan
-    summary = f"{scenario.chain.name}, {len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines"
+    lines = f"{len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines"
+    summary = f"{scenario.chain.name}, {lines}"
     return Finding("scenario", summary, tuple(scenario.machine().errors.warnings(plan.volume)))
 
 
 def _measurement(path: Path) -> Finding:
     measurement = _core.read_measurement(path)
     channels = measurement.channels
-    lost = (
-        int(np.count_nonzero(np.any([np.isnan(values) for values in channels.values()], axis=0)))
-        if channels
-        else 0
-    )
+    lost = int(np.count_nonzero(np.any([np.isnan(values) for values in channels.values()], axis=0))) if channels else 0
     summary = f"{len(measurement)} points on {len(set(measurement.line))} lines, {', '.join(channels)}"
     return Finding("measurement", summary, (f"{lost} points lack a reading",) if lost else ())
 

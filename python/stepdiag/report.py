@@ -18,9 +18,7 @@ def in_report_units(kind: str, value: float) -> float:
     return value * (1e3 if UNIT[kind] == "µm" else MICRO)
 
 
-def evaluation_report(
-    calibration: Calibration, measurement: Measurement, scenario: Scenario
-) -> Iterator[str]:
+def evaluation_report(calibration: Calibration, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
     """Method, largest standard uncertainty of each kind, lost readings, and what is not determined."""
     yield f"method: {calibration.method}, chain {calibration.chain.name}"
     yield f"readings: {len(measurement)} points on {len(set(measurement.line))} lines"
@@ -52,5 +50,5 @@ def _largest_uncertainties(calibration: Calibration) -> Iterator[str]:
         note(name, angle_uncertainty, "")
     for kind in KINDS:
         if kind in largest:
-            uncertainty, where = largest[kind]
-            yield f"  {kind:<13}{in_report_units(kind, uncertainty):9.3g} {UNIT[kind]:<5} ({where})"
+            worst_of_kind, where = largest[kind]
+            yield f"  {kind:<13}{in_report_units(kind, worst_of_kind):9.3g} {UNIT[kind]:<5} ({where})"

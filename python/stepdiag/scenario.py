@@ -1,7 +1,8 @@
 """A scenario: one TOML file that says which machine, plan and head a run is made with.
 
-docs/scenario.md lists every key. An evaluator may ask a scenario for `chain`, `tool`, `plan`, `head` and `uncertainty`
-only; the truth behind a simulated run (`machine()`, `misalignment`, `noise`) is not touched, and need not exist.
+docs/scenario.md lists every key. An evaluator may ask a scenario for `chain`, `tool`, `plan`, `head` and
+`uncertainty` only; the truth behind a simulated run (`machine()`, `misalignment`, `noise`) is not touched, and
+need not exist.
 """
 
 import tomllib
@@ -17,7 +18,7 @@ from pydantic import ValidationError
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.files import read_text
+from stepdiag.files import check_input, read_text
 from stepdiag.scenario_errors import explain, show, suggest
 from stepdiag.scenario_keys import BY_LINE, SECTIONS_BY_LINE, HeadSection, RandomSection, ScenarioKeys
 
@@ -48,7 +49,9 @@ class Scenario:
         machine = self.keys.machine
         if machine.errors is not None:
             with _located(f"{self.path}: machine.errors"):
-                return _core.read_error_map(self.path.parent / machine.errors)
+                path = self.path.parent / machine.errors
+                check_input(path)
+                return _core.read_error_map(path)
         if machine.random is not None:
             with _located(f"{self.path}: machine.random"):
                 return _random_errors(self.keys, machine.random)
@@ -140,9 +143,7 @@ def _build(keys: ScenarioKeys, path: Path) -> Scenario:
     if machine.errors is not None and machine.random is not None:
         raise InvalidArgument(f"{path}: machine: expected errors or [machine.random], got both")
     if machine.errors is not None and "\0" in machine.errors:
-        raise InvalidArgument(
-            f"{path}: machine.errors: expected the path of a file, got {show(machine.errors)}"
-        )
+        raise InvalidArgument(f"{path}: machine.errors: expected the path of a file, got {show(machine.errors)}")
     with _located(f"{path}: machine.chain"):
         chain = _core.Chain(machine.chain)
     with _located(f"{path}: plan"):
@@ -200,9 +201,7 @@ def _misalignment(keys: ScenarioKeys, path: Path) -> dict[str, _core.Misalignmen
     for section in SECTIONS_BY_LINE:
         for line in getattr(keys, section).by_line:
             if line not in lines:
-                raise InvalidArgument(
-                    f"{path}: {section}.{line}: not a line of the plan; {suggest(line, lines)}"
-                )
+                raise InvalidArgument(f"{path}: {section}.{line}: not a line of the plan; {suggest(line, lines)}")
     shared = keys.misalignment.model_dump(exclude={BY_LINE})
     aligned = type(keys.misalignment)().model_dump(exclude={BY_LINE})
     result = {}
@@ -225,7 +224,7 @@ def _scaled(angles: tuple[float, float]) -> tuple[float, float]:
 
 
 def _uncertainty(keys: ScenarioKeys) -> _core.ReadingUncertainty:
-    """[uncertainty], else the positive standard deviations of [noise], else the core's defaults; key by key."""
+    """[uncertainty], else the positive deviations of [noise], else the core's defaults; key by key."""
     weights = {}
     for name, key, unit in (
         ("distance", "distance_um", MICROMETRE),

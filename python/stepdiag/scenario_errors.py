@@ -61,7 +61,7 @@ def model_of(annotation: Any) -> type[BaseModel] | None:
 
 
 def _follow(location: tuple[int | str, ...]) -> tuple[list[str], FieldInfo | None, type[BaseModel]]:
-    """Names of the sections and the key that `location` leads to, without pydantic's own branches and indices."""
+    """Names of the sections and the key that `location` leads to, without pydantic's branches and indices."""
     names: list[str] = []
     section: type[BaseModel] = ScenarioKeys
     parts = list(location)

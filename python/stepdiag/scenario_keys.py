@@ -1,7 +1,7 @@
 """The keys of a scenario file: which there are, what each expects, its default and its meaning.
 
-One home for all of them: what is refused, what the error message says, the table in docs/scenario.md and the comments of
-the file that `stepdiag init` writes are made from the models below.
+One home for all of them: what is refused, what the error message says, the table in docs/scenario.md and the
+comments of the file that `stepdiag init` writes are made from the models below.
 """
 
 from typing import Annotated, Any, Final, Literal
@@ -19,7 +19,7 @@ LARGEST_LENGTH: Final = 1e6
 
 
 def key(expected: str, meaning: str, default: Any = ..., example: Any = None) -> Any:
-    """A key of a section. `expected` completes "expected ..." in messages; `example` stands in the template."""
+    """A key of a section. `expected` completes "expected ..." in messages; `example` is for the template."""
     return Field(default, description=meaning, json_schema_extra={"expected": expected, "example": example})
 
 
@@ -84,7 +84,7 @@ class RandomSection(Section):
 
 
 class MachineSection(Section):
-    """The machine. An evaluation uses only `chain` and `tool_mm`; without `errors` and `random` it is perfect."""
+    """The machine; perfect without `errors` and `random`. An evaluation uses only `chain` and `tool_mm`."""
 
     chain: str = key(
         'a kinematic chain such as "[w X\' b Y Z t]"',
@@ -100,9 +100,7 @@ class MachineSection(Section):
         None,
         "truth.csv",
     )
-    random: RandomSection | None = Field(
-        None, description="See `[machine.random]`; not together with `errors`."
-    )
+    random: RandomSection | None = Field(None, description="See `[machine.random]`; not together with `errors`.")
 
 
 class PlanSection(Section):
@@ -110,7 +108,7 @@ class PlanSection(Section):
 
     lines: tuple[str, ...] = key(
         'a list of lines such as "ppp" (three of p, n, 0)',
-        'Measured lines: body diagonals such as "ppp" or "npp", face diagonals such as "pp0", single axes "p00".',
+        'Measured lines: body diagonals such as "npp", face diagonals such as "pp0", single axes such as "p00".',
         example=["ppp", "npp", "pnp", "nnp"],
     )
     steps: Annotated[int, Field(ge=1, le=LARGEST_STEPS)] = key(
@@ -130,12 +128,10 @@ class HeadSection(Section):
 
     layout: Literal["ideal", "psd", "multi_beam"] = key(
         '"ideal", "psd" or "multi_beam"',
-        "`ideal` reads distance and two tilts, `psd` distance and a spot position, `multi_beam` three or more distances.",
+        "`ideal` reads distance and two tilts, `psd` distance and spot, `multi_beam` three or more distances.",
         example="ideal",
     )
-    standoff_mm: PositiveLength = key(
-        _positive_length, "Distance from head to mirror at a line's first point.", 100.0
-    )
+    standoff_mm: PositiveLength = key(_positive_length, "Distance from head to mirror at a line's first point.", 100.0)
     psd_distance_mm: Length | None = key(
         "a length in mm",
         "Distance from reference plane to position sensing device; required for `psd`.",
@@ -173,7 +169,7 @@ class MisalignmentKeys(Section):
 class MisalignmentSection(MisalignmentKeys):
     """How head and mirror are out of true, for all of `plan.lines`. Used by `simulate` only.
 
-    `[misalignment.LINE]` replaces, for one line, the keys it names. Scale lines are aligned unless named so."""
+    `[misalignment.LINE]` replaces, for one line, the keys it names. Scale lines are aligned unless named."""
 
     by_line: dict[str, MisalignmentKeys] = {}
 
@@ -183,8 +179,8 @@ class EnvironmentSection(Section):
 
     refractive_index: Annotated[float, Field(ge=1.0, le=2.0)] = key(
         "a refractive index from 1 to 2",
-        "Refractive index of the air, constant over a run. Readings are lengths with the index taken off, so it "
-        "changes them by rounding only.",
+        "Refractive index of the air, constant over a run. Readings are lengths with the index taken off, so "
+        "it changes them by rounding only.",
         1.0,
     )
 
@@ -199,7 +195,7 @@ class NoiseSection(Section):
 
 
 class UncertaintySection(Section):
-    """Standard uncertainties of the readings: the weights of an evaluation and the source of its uncertainties.
+    """Standard uncertainties of the readings, for an evaluation's weights and results.
 
     By default the positive standard deviations of `[noise]`, else 0.1 µm, 1 µrad and 1 µm; each key by itself.
     Columns u_... of a measurement file come before these."""
@@ -224,8 +220,9 @@ class AdjustmentKeys(Section):
 
 
 class AdjustmentSection(AdjustmentKeys):
-    """What an adjustment takes each unknown of the set-up for: "free", "fixed" at 0, or 0 with a standard uncertainty.
+    """What an adjustment takes each unknown of the set-up for.
 
+    That is "free", "fixed" at 0, or a number: the standard uncertainty with which it is known to be 0.
     Accepted and checked, but **not used yet**: neither `conventional` nor `enhanced` adjusts the set-up.
     `[adjustment.LINE]` replaces, for one line, the keys it names."""
 

@@ -1,4 +1,4 @@
-"""Text made from the scenario's keys: the table in docs/scenario.md, and the commented file for a new scenario.
+"""Text made from the scenario's keys: the table in docs/scenario.md, and the commented new scenario.
 
 `python -m stepdiag.scenario_text` prints the table."""
 
@@ -31,7 +31,7 @@ def key_table() -> str:
 def template() -> str:
     """A complete scenario with a comment on every key; optional keys are commented out."""
     lines = [
-        "# A scenario for stepdiag: machine, plan and head. Lengths in mm, angles in µrad where the key says so.",
+        "# A scenario for stepdiag: machine, plan and head. The end of a key is its unit.",
         "",
     ]
     for name, section in sections():
@@ -40,9 +40,7 @@ def template() -> str:
         for key, field in keys(section):
             required = active and field.is_required()
             lines += _comment(f"{field.description} Expected: {expectation(field)}.")
-            lines.append(
-                f"{'' if required or _is_offered(name, key) else '# '}{key} = {show_full(_example(field))}"
-            )
+            lines.append(f"{'' if required or _is_offered(name, key) else '# '}{key} = {show_full(_example(field))}")
         lines.append("")
     return "\n".join(lines)
 
@@ -61,9 +59,7 @@ def sections() -> Iterator[tuple[str, type[BaseModel]]]:
 
 
 def keys(section: type[BaseModel]) -> list[tuple[str, FieldInfo]]:
-    return [
-        (name, field) for name, field in section.model_fields.items() if model_of(field.annotation) is None
-    ]
+    return [(name, field) for name, field in section.model_fields.items() if model_of(field.annotation) is None]
 
 
 def show_full(value: Any) -> str:

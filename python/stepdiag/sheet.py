@@ -1,4 +1,4 @@
-"""An empty measurement sheet: every commanded point of a plan, and fields for what an instrument reads there."""
+"""A plan's points: the empty sheet to fill in, and what a run lacks of them."""
 
 import numpy as np
 
@@ -20,14 +20,12 @@ def empty_sheet(plan: Plan, head: Head) -> Measurement:
 
 
 def lost_readings(measurement: Measurement, plan: Plan, head: Head) -> tuple[int, int]:
-    """How many rows lack a reading of the head, and how many points of the plan have no row; all runs together."""
+    """How many rows lack a reading of the head, and how many points of the plan have no row (all runs)."""
     read = [measurement.channels[name] for name in head.signals if name in measurement.channels]
     incomplete = int(np.count_nonzero(np.any(np.isnan(read), axis=0))) if read else 0
     points = {name: len(plan.points(name)) for name in [*plan.lines, *plan.scale_lines]}
     given = set(zip(measurement.run.tolist(), measurement.line, measurement.point.tolist(), strict=True))
     visited = {(run, name) for run, name, _ in given}
-    missing = sum(
-        1 for run, name in visited for k in range(points.get(name, 0)) if (run, name, k) not in given
-    )
+    missing = sum(1 for run, name in visited for k in range(points.get(name, 0)) if (run, name, k) not in given)
     unvisited = sum(count for name, count in points.items() if not any(line == name for _, line in visited))
     return incomplete, missing + unvisited

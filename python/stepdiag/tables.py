@@ -30,8 +30,8 @@ _CHANNEL = {
 def measurement_table(measurement: Measurement) -> xr.Dataset:
     """One row per reading along the dimension `reading`; lost readings are NaN.
 
-    Coordinates: line, point, run, direction, and the commanded position x, y, z (mm). Variables: the channels, and
-    their standard uncertainties as NAME_u where the run gives them."""
+    Coordinates: line, point, run, direction, and the commanded position x, y, z (mm). Variables: the channels,
+    and their standard uncertainties as NAME_u where the run gives them."""
     coordinates: dict[str, Any] = {
         "line": ("reading", np.asarray(measurement.line, dtype=str), {"long_name": "measurement line"}),
         "point": ("reading", measurement.point, {"long_name": "point number on the line"}),
@@ -57,8 +57,9 @@ def measurement_table(measurement: Measurement) -> xr.Dataset:
 def calibration_table(calibration: Calibration) -> xr.Dataset:
     """The determined parameters by name, each with its standard uncertainty as NAME_u.
 
-    Functions lie over the position x, y or z (mm) of their axis; one whose nodes differ from those of its axis has a
-    dimension of its own (x_EXX). Squarenesses are scalars. What is not determined is absent; attributes say what."""
+    Functions lie over the position x, y or z (mm) of their axis; one whose nodes differ from those of its
+    axis has a dimension of its own (x_EXX). Squarenesses are scalars. What is not determined is absent, and the
+    attributes say so."""
     coordinates: dict[str, Any] = {}
     variables: dict[str, Any] = {}
     for name, (position, value, uncertainty) in calibration.functions.items():

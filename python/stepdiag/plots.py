@@ -1,0 +1,145 @@
+"""The picture of the demonstration, after Figure 5 of the paper."""
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from stepdiag.demo import POSITIONING, Result
+
+# One colour per axis, after Okabe and Ito: told apart with any colour vision. One line style per method.
+COLOUR = {"X": "#0072B2", "Y": "#D55E00", "Z": "#009E73"}
+TRUTH: Mapping[str, Any] = {"linewidth": 4.0, "alpha": 0.32, "solid_capstyle": "butt"}
+ENHANCED: Mapping[str, Any] = {"linewidth": 1.0}
+CONVENTIONAL: Mapping[str, Any] = {"linewidth": 1.0, "linestyle": (0, (4, 1.6))}
+METHODS: Mapping[str, Mapping[str, Any]] = {"enhanced": ENHANCED, "conventional": CONVENTIONAL}
+
+STRAIGHTNESS = ("EYX", "EZY", "EXZ")
+ANGLES = ("ECX", "EAY", "EBZ")
+
+STYLE: Any = {
+    "font.size": 8.5,
+    "axes.titlesize": 8.5,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 8.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.6,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "axes.grid": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "svg.hashsalt": "stepdiag",  # the same names inside the file, run after run
+}
+
+# Panel: title, case, functions, methods.
+PANELS: Mapping[str, tuple[str, str, Sequence[str], Sequence[str]]] = {
+    "1a": ("kinematic errors only", "1a", POSITIONING, ("enhanced", "conventional")),
+    "1b": ("reflector 100, 300 µrad", "1b", POSITIONING, ("enhanced", "conventional")),
+    "1c": ("laser 700, 1000 µrad", "1c", POSITIONING, ("enhanced", "conventional")),
+    "1d": ("... and mirror following", "1d", POSITIONING, ("enhanced", "conventional")),
+    "2a": ("as 1a", "1a", STRAIGHTNESS, ("enhanced", "conventional")),
+    "2b": ("as 1b", "1b", STRAIGHTNESS, ("enhanced", "conventional")),
+    "2c": ("as 1c", "1c", STRAIGHTNESS, ("enhanced", "conventional")),
+    "2d": ("as 1d", "1d", STRAIGHTNESS, ("enhanced", "conventional")),
+    "3a": ("PSD zero off by 1.5, 2 mm", "3", POSITIONING, ("enhanced",)),
+    "3b": ("as 3a", "3", ANGLES, ("enhanced",)),
+}
+YLABEL = {
+    "1a": "positioning (µm)",
+    "2a": "straightness (µm)",
+    "3a": "positioning (µm)",
+    "3b": "rotation (µrad)",
+    "4": "ripple, shifted (µm)",
+}
+
+
+def draw_figure(results: Sequence[Result]) -> dict[str, bytes]:
+    """The figure as files: figure.png and figure.svg. Same results, same bytes."""
+    by_name = {result.case.name: result for result in results}
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()  # not the user's own style
+        matplotlib.rcParams.update(STYLE)
+        figure = Figure(figsize=(10.0, 8.0), layout="constrained")
+        panels = figure.subplot_mosaic([["1a", "1b", "1c", "1d"], ["2a", "2b", "2c", "2d"], ["3a", "3b", "4", "4"]])
+        for name, (title, case, functions, methods) in PANELS.items():
+            draw_functions(panels[name], by_name[case], functions, methods)
+            set_title(panels[name], name, title)
+        draw_screw(panels["4"], by_name["4"])
+        set_title(panels["4"], "4", "screw error of 10 mm pitch: right at the nodes, unseen between them")
+        for name, label in YLABEL.items():
+            panels[name].set_ylabel(label)
+        for name in ("3a", "3b", "4"):
+            panels[name].set_xlabel("position (mm)")
+        figure.legend(handles=legend_handles(), loc="outside upper center", ncols=3, handlelength=3.0)
+        return {"figure.png": save(figure, "png", "Software"), "figure.svg": save(figure, "svg", "Date")}
+
+
+def save(figure: Figure, suffix: str, unwanted: str) -> bytes:
+    """The figure in a format, without the metadata that would differ from run to run."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=suffix, dpi=160, metadata={unwanted: None})
+    return buffer.getvalue()
+
+
+def set_title(axes: Axes, name: str, title: str) -> None:
+    axes.set_title(f"$\\bf{{{name}}}$  {title}")
+
+
+def legend_handles() -> list[Any]:
+    styles = {"truth": TRUTH, **METHODS}
+    return [Line2D([], [], color="black", label=name, **style) for name, style in styles.items()]
+
+
+def draw_functions(axes: Axes, result: Result, names: Sequence[str], methods: Sequence[str]) -> None:
+    """Error functions over position: truth broad and pale, the methods on top of it."""
+    for name in names:
+        scale = 1e6 if name[1] in "ABC" else 1e3
+        position, value = result.truth.functions[name]
+        axes.plot(position, value * scale, color=COLOUR[name[2]], **TRUTH)
+        for method in methods:
+            function = result.calibrations[method].functions.get(name)
+            if function is not None:
+                axes.plot(function[0], function[1] * scale, color=COLOUR[name[2]], **METHODS[method])
+    name_functions(axes, names)
+
+
+def name_functions(axes: Axes, names: Sequence[str]) -> None:
+    """Names the functions in their colours, in an empty band above the curves."""
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.14 * (high - low))
+    for k, name in enumerate(names):
+        axes.annotate(
+            name,
+            (0.02 + 0.2 * k, 0.98),
+            xycoords="axes fraction",
+            color=COLOUR[name[2]],
+            verticalalignment="top",
+            weight="bold",
+            size=8,
+        )
+
+
+def draw_screw(axes: Axes, result: Result, end: float = 160.0) -> None:
+    """The beginning of travel, magnified: fine truth, nodes of the enhanced calibration, straight lines between."""
+    calibration = result.calibrations["enhanced"].to_error_map()
+    for k, name in enumerate(POSITIONING):
+        colour = COLOUR[name[2]]
+        level = -12.0 * k  # only the ripple matters here: each function on a level of its own, its trend taken off
+        trend = calibration.function(name, np.array([0.0, end]))
+        for source, style in ((result.truth, TRUTH), (calibration, {**ENHANCED, "marker": "o", "markersize": 3.0})):
+            position = source.functions[name][0]
+            position = position[position <= end]
+            ripple = source.function(name, position) - np.interp(position, (0.0, end), trend)
+            axes.plot(position, ripple * 1e3 + level, color=colour, **style)
+        axes.text(end * 1.015, level, name, color=colour, verticalalignment="center", weight="bold", size=8)
+    axes.set_xlim(-3.0, end * 1.09)
