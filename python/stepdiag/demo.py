@@ -21,7 +21,7 @@ from stepdiag.scenario import Scenario, evaluate_scenario, read_scenario, simula
 VOLUME: Final = (800.0, 600.0, 500.0)
 STEPS: Final = 50
 CHAIN: Final = "[w X' b Y Z t]"
-SEED: Final = 2018
+SEED: Final = 0
 METHODS: Final = ("conventional", "enhanced")
 POSITIONING: Final = ("EXX", "EYY", "EZZ")
 

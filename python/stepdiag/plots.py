@@ -6,11 +6,15 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from stepdiag._core import ErrorMap
 from stepdiag.demo import POSITIONING, Result
+
+FloatArray = npt.NDArray[np.float64]
 
 # One colour per axis, after Okabe and Ito: told apart with any colour vision. One line style per method.
 COLOUR = {"X": "#0072B2", "Y": "#D55E00", "Z": "#009E73"}
@@ -46,7 +50,7 @@ PANELS: Mapping[str, tuple[str, str, Sequence[str], Sequence[str]]] = {
     "1a": ("kinematic errors only", "1a", POSITIONING, ("enhanced", "conventional")),
     "1b": ("reflector 100, 300 µrad", "1b", POSITIONING, ("enhanced", "conventional")),
     "1c": ("laser 700, 1000 µrad", "1c", POSITIONING, ("enhanced", "conventional")),
-    "1d": ("... and mirror following", "1d", POSITIONING, ("enhanced", "conventional")),
+    "1d": ("laser, mirror 700, 1000 µrad", "1d", POSITIONING, ("enhanced", "conventional")),
     "2a": ("as 1a", "1a", STRAIGHTNESS, ("enhanced", "conventional")),
     "2b": ("as 1b", "1b", STRAIGHTNESS, ("enhanced", "conventional")),
     "2c": ("as 1c", "1c", STRAIGHTNESS, ("enhanced", "conventional")),
@@ -132,14 +136,21 @@ def name_functions(axes: Axes, names: Sequence[str]) -> None:
 def draw_screw(axes: Axes, result: Result, end: float = 160.0) -> None:
     """The beginning of travel, magnified: fine truth, nodes of the enhanced calibration, straight lines between."""
     calibration = result.calibrations["enhanced"].to_error_map()
-    for k, name in enumerate(POSITIONING):
+    floor = 0.0  # each function stands below the one before; only the ripple matters here
+    for name in POSITIONING:
         colour = COLOUR[name[2]]
-        level = -12.0 * k  # only the ripple matters here: each function on a level of its own, its trend taken off
         trend = calibration.function(name, np.array([0.0, end]))
-        for source, style in ((result.truth, TRUTH), (calibration, {**ENHANCED, "marker": "o", "markersize": 3.0})):
+
+        def ripple(source: ErrorMap, name: str = name, trend: FloatArray = trend) -> tuple[FloatArray, FloatArray]:
             position = source.functions[name][0]
             position = position[position <= end]
-            ripple = source.function(name, position) - np.interp(position, (0.0, end), trend)
-            axes.plot(position, ripple * 1e3 + level, color=colour, **style)
+            value = source.function(name, position) - np.interp(position, (0.0, end), trend)
+            return position, value * 1e3
+
+        fine, nodes = ripple(result.truth), ripple(calibration)
+        level = floor - 2.0 - max(fine[1])
+        axes.plot(fine[0], fine[1] + level, color=colour, **TRUTH)
+        axes.plot(nodes[0], nodes[1] + level, color=colour, marker="o", markersize=3.0, **ENHANCED)
         axes.text(end * 1.015, level, name, color=colour, verticalalignment="center", weight="bold", size=8)
+        floor = level + min(fine[1])
     axes.set_xlim(-3.0, end * 1.09)
