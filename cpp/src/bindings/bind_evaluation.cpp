@@ -6,9 +6,12 @@
 namespace stepdiag::bindings {
 namespace {
 
-Calibration evaluate(const Measurement& measurement, const Plan& plan, const Head& head, const Chain& chain, const ArrayLike& tool, const std::string& method,
-                     const ReadingUncertainty& uncertainty, bool full_covariance) {
-    const auto evaluator = method == "enhanced" ? &evaluate_enhanced : method == "conventional" ? &evaluate_conventional : nullptr;
+Calibration evaluate(const Measurement& measurement, const Plan& plan, const Head& head, const Chain& chain,
+                     const ArrayLike& tool, const std::string& method, const ReadingUncertainty& uncertainty,
+                     bool full_covariance) {
+    const auto evaluator = method == "enhanced"       ? &evaluate_enhanced
+                           : method == "conventional" ? &evaluate_conventional
+                                                      : nullptr;
     if (!evaluator) throw InvalidArgument("method: expected \"conventional\" or \"enhanced\", got \"" + method + "\"");
     const Eigen::Vector3d offset = to_vector3(tool, "tool");
     py::gil_scoped_release release;
@@ -28,49 +31,88 @@ std::vector<std::pair<std::string, std::optional<double>>> covariance_labels(con
 }  // namespace
 
 void bind_evaluation(py::module_& m) {
-    py::class_<ReadingUncertainty>(m, "ReadingUncertainty", "Standard uncertainty of a reading where the run gives none: distance (mm; also d1 ...), tilt (rad), spot (mm).")
-        .def(py::init([](double distance, double tilt, double spot) { return ReadingUncertainty{distance, tilt, spot}; }), py::arg("distance") = ReadingUncertainty{}.distance,
-             py::arg("tilt") = ReadingUncertainty{}.tilt, py::arg("spot") = ReadingUncertainty{}.spot)
+    py::class_<ReadingUncertainty>(m, "ReadingUncertainty",
+                                   "Standard uncertainty of a reading where the run gives none: distance (mm; also d1 "
+                                   "...), tilt (rad), spot (mm).")
+        .def(py::init([](double distance, double tilt, double spot) {
+                 return ReadingUncertainty{distance, tilt, spot};
+             }),
+             py::arg("distance") = ReadingUncertainty{}.distance, py::arg("tilt") = ReadingUncertainty{}.tilt,
+             py::arg("spot") = ReadingUncertainty{}.spot)
         .def_readonly("distance", &ReadingUncertainty::distance)
         .def_readonly("tilt", &ReadingUncertainty::tilt)
         .def_readonly("spot", &ReadingUncertainty::spot);
 
-    py::class_<Calibration>(m, "Calibration", "The 21 parameters as far as the readings determine them, with standard uncertainties; native units (mm, rad).")
+    py::class_<Calibration>(
+        m, "Calibration",
+        "The 21 parameters as far as the readings determine them, with standard uncertainties; native units (mm, rad).")
         .def_readonly("method", &Calibration::method)
         .def_readonly("chain", &Calibration::chain)
         .def_property_readonly("volume", [](const Calibration& c) { return to_numpy_vector(c.volume); })
         .def_property_readonly("tool", [](const Calibration& c) { return to_numpy_vector(c.tool); })
-        .def_property_readonly("functions", [](const Calibration& c) {
-            std::map<std::string, std::tuple<DoubleArray, DoubleArray, DoubleArray>> functions;
-            for (int i = 0; i < function_count; ++i)
-                if (const auto& f = c.functions[i]) functions[FunctionId::at(i).name()] = {to_numpy(f->position), to_numpy(f->value), to_numpy(f->standard_uncertainty)};
-            return functions;
-        }, "name -> (position, value, standard uncertainty); what is not determined is absent.")
-        .def_property_readonly("squareness", [](const Calibration& c) {
-            std::map<std::string, std::pair<double, double>> values;
-            for (const Squareness s : all_squarenesses)
-                if (const auto& entry = c.squarenesses[static_cast<int>(s)]) values[name(s)] = {entry->value, entry->standard_uncertainty};
-            return values;
-        }, "name -> (value, standard uncertainty), rad.")
-        .def_property_readonly("undetermined_slopes", [](const Calibration& c) {
-            std::vector<std::string> names;
-            for (int i = 0; i < function_count; ++i)
-                if (c.functions[i] && !c.functions[i]->slope_determined) names.push_back(FunctionId::at(i).name());
-            return names;
-        }, "Functions of which only the shape is known; their values are 0 at both ends.")
-        .def_readonly("undetermined", &Calibration::undetermined, "What the readings do not determine, why, and what would help; one sentence each.")
-        .def_property_readonly("covariance", [](const Calibration& c) { return c.covariance.size() > 0 ? std::optional(to_numpy(c.covariance)) : std::nullopt; },
-                               "(n, n) in the order of covariance_labels, native units; None unless evaluated with full_covariance.")
-        .def_property_readonly("covariance_labels", &covariance_labels, "(parameter, position in mm or None) of each row.")
-        .def("write", [](const Calibration& c, const PathLike& path) { write_calibration(c, to_path(path)); }, py::arg("path"),
-             "Writes the calibration CSV (the covariance is not kept). Raises InvalidArgument when it cannot be written.")
-        .def("to_error_map", [](const Calibration& c) { return ErrorMap(to_parameter_table(c)); }, "The calibration as a machine's errors; what is undetermined is 0 there.")
-        .def("to_xarray", [](const py::object& self) { return py::reinterpret_steal<XarrayDataset>(py::module_::import("stepdiag.tables").attr("calibration_table")(self).release()); },
-             "The calibration as a labelled table.");
-    m.def("read_calibration", [](const PathLike& path) { return read_calibration(to_path(path)); }, py::arg("path"), "Reads a calibration CSV. Raises InvalidArgument naming file and line.");
-    m.def("evaluate", &evaluate, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"), py::arg("tool") = zeros(3), py::kw_only(), py::arg("method") = "enhanced",
+        .def_property_readonly(
+            "functions",
+            [](const Calibration& c) {
+                std::map<std::string, std::tuple<DoubleArray, DoubleArray, DoubleArray>> functions;
+                for (int i = 0; i < function_count; ++i)
+                    if (const auto& f = c.functions[i])
+                        functions[FunctionId::at(i).name()] = {to_numpy(f->position), to_numpy(f->value),
+                                                               to_numpy(f->standard_uncertainty)};
+                return functions;
+            },
+            "name -> (position, value, standard uncertainty); what is not determined is absent.")
+        .def_property_readonly(
+            "squareness",
+            [](const Calibration& c) {
+                std::map<std::string, std::pair<double, double>> values;
+                for (const Squareness s : all_squarenesses)
+                    if (const auto& entry = c.squarenesses[static_cast<int>(s)])
+                        values[name(s)] = {entry->value, entry->standard_uncertainty};
+                return values;
+            },
+            "name -> (value, standard uncertainty), rad.")
+        .def_property_readonly(
+            "undetermined_slopes",
+            [](const Calibration& c) {
+                std::vector<std::string> names;
+                for (int i = 0; i < function_count; ++i)
+                    if (c.functions[i] && !c.functions[i]->slope_determined) names.push_back(FunctionId::at(i).name());
+                return names;
+            },
+            "Functions of which only the shape is known; their values are 0 at both ends.")
+        .def_readonly("undetermined", &Calibration::undetermined,
+                      "What the readings do not determine, why, and what would help; one sentence each.")
+        .def_property_readonly(
+            "covariance",
+            [](const Calibration& c) {
+                return c.covariance.size() > 0 ? std::optional(to_numpy(c.covariance)) : std::nullopt;
+            },
+            "(n, n) in the order of covariance_labels, native units; None unless evaluated with full_covariance.")
+        .def_property_readonly("covariance_labels", &covariance_labels,
+                               "(parameter, position in mm or None) of each row.")
+        .def(
+            "write", [](const Calibration& c, const PathLike& path) { write_calibration(c, to_path(path)); },
+            py::arg("path"),
+            "Writes the calibration CSV (the covariance is not kept). Raises InvalidArgument when it cannot be "
+            "written.")
+        .def(
+            "to_error_map", [](const Calibration& c) { return ErrorMap(to_parameter_table(c)); },
+            "The calibration as a machine's errors; what is undetermined is 0 there.")
+        .def(
+            "to_xarray",
+            [](const py::object& self) {
+                return py::reinterpret_steal<XarrayDataset>(
+                    py::module_::import("stepdiag.tables").attr("calibration_table")(self).release());
+            },
+            "The calibration as a labelled table.");
+    m.def(
+        "read_calibration", [](const PathLike& path) { return read_calibration(to_path(path)); }, py::arg("path"),
+        "Reads a calibration CSV. Raises InvalidArgument naming file and line.");
+    m.def("evaluate", &evaluate, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
+          py::arg("tool") = zeros(3), py::kw_only(), py::arg("method") = "enhanced",
           py::arg("uncertainty") = ReadingUncertainty{}, py::arg("full_covariance") = false,
-          "Calibration from a run. Of the head only psd_distance and beam_offsets are used, of the machine only chain and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan.");
+          "Calibration from a run. Of the head only psd_distance and beam_offsets are used, of the machine only chain "
+          "and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan.");
 }
 
 }  // namespace stepdiag::bindings

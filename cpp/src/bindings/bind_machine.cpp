@@ -13,7 +13,9 @@ ErrorMap make_error_map(const FunctionArrays& functions, const std::map<std::str
         if (!id) throw InvalidArgument("functions: expected names EXX ... ECZ, got \"" + name + "\"");
         const Eigen::VectorXd position = to_vector(arrays.first, (name + " position").c_str());
         const Eigen::VectorXd value = to_vector(arrays.second, (name + " value").c_str());
-        table.functions[id->index()] = FunctionTable{{position.begin(), position.end()}, {value.begin(), value.end()}, std::vector<std::optional<double>>(position.size())};
+        table.functions[id->index()] = FunctionTable{{position.begin(), position.end()},
+                                                     {value.begin(), value.end()},
+                                                     std::vector<std::optional<double>>(position.size())};
     }
     for (const auto& [text, value] : squareness) {
         const auto id = parse_squareness(text);
@@ -28,92 +30,149 @@ DoubleArray map_points(const Points& commanded, Map&& map) {
     DoubleArray result({commanded.rows(), Eigen::Index(3)});
     double* out = result.mutable_data();
     py::gil_scoped_release release;
-    for (Eigen::Index i = 0; i < commanded.rows(); ++i) Eigen::Map<Eigen::Vector3d>(out + 3 * i) = map(commanded.row(i).transpose());
+    for (Eigen::Index i = 0; i < commanded.rows(); ++i)
+        Eigen::Map<Eigen::Vector3d>(out + 3 * i) = map(commanded.row(i).transpose());
     return result;
 }
 
 }  // namespace
 
 void bind_machine(py::module_& m) {
-    py::class_<Chain>(m, "Chain", "Kinematic chain in ISO 10791 style, workpiece to tool, such as \"[w X' b Y Z t]\"; a prime marks an axis before the bed.")
-        .def(py::init(&Chain::parse), py::arg("text"), "Raises InvalidArgument when a link is missing, doubled, or primed on the wrong side of b.")
+    py::class_<Chain>(m, "Chain",
+                      "Kinematic chain in ISO 10791 style, workpiece to tool, such as \"[w X' b Y Z t]\"; a prime "
+                      "marks an axis before the bed.")
+        .def(py::init(&Chain::parse), py::arg("text"),
+             "Raises InvalidArgument when a link is missing, doubled, or primed on the wrong side of b.")
         .def_property_readonly("name", &Chain::name)
-        .def("carries_workpiece", [](const Chain& chain, const std::string& axis) { return chain.carries_workpiece(to_axis(axis)); }, py::arg("axis"),
-             "Whether the axis \"X\", \"Y\" or \"Z\" stands before the bed.")
-        .def("__eq__", [](const Chain& a, const Chain& b) { return a == b; }, py::is_operator())
+        .def(
+            "carries_workpiece",
+            [](const Chain& chain, const std::string& axis) { return chain.carries_workpiece(to_axis(axis)); },
+            py::arg("axis"), "Whether the axis \"X\", \"Y\" or \"Z\" stands before the bed.")
+        .def(
+            "__eq__", [](const Chain& a, const Chain& b) { return a == b; }, py::is_operator())
         .def("__hash__", [](const Chain& chain) { return py::hash(py::str(chain.name())); })
         .def("__str__", &Chain::name)
         .def("__repr__", [](const Chain& chain) { return "Chain(\"" + chain.name() + "\")"; });
     py::implicitly_convertible<py::str, Chain>();
 
-    py::class_<ErrorMap>(m, "ErrorMap", "The 21 geometric errors as tables (ISO 230-1 names): functions in mm or rad over positions in mm, linear between nodes, end values held outside; squarenesses in rad. A missing parameter is 0.")
-        .def(py::init(&make_error_map), py::arg("functions") = FunctionArrays{}, py::arg("squareness") = std::map<std::string, double>{},
-             "functions: name -> (position, value), one-dimensional and of one length, positions ascending. Raises InvalidArgument.")
-        .def_property_readonly("functions", [](const ErrorMap& map) {
-            std::map<std::string, std::pair<DoubleArray, DoubleArray>> functions;
-            for (int i = 0; i < function_count; ++i)
-                if (const auto& table = map.table().functions[i]) functions[FunctionId::at(i).name()] = {to_numpy(table->position), to_numpy(table->value)};
-            return functions;
-        })
-        .def_property_readonly("squareness", [](const ErrorMap& map) {
-            std::map<std::string, double> values;
-            for (const Squareness s : all_squarenesses)
-                if (map.table().squarenesses[static_cast<int>(s)]) values[name(s)] = map.squareness(s);
-            return values;
-        })
-        .def_property_readonly("header", [](const ErrorMap& map) { return map.table().header; }, "The leading \"# key=value\" lines of the file it came from.")
-        .def("function", [](const ErrorMap& map, const std::string& name, const ArrayLike& position) {
-            const auto id = FunctionId::parse(name);
-            if (!id) throw InvalidArgument("name: expected EXX ... ECZ, got \"" + name + "\"");
-            Eigen::VectorXd value = to_vector(position, "position");
-            for (double& p : value) p = map.function(*id, p);
-            return to_numpy_vector(value);
-        }, py::arg("name"), py::arg("position"), "Values (mm or rad) of one error function at positions (mm), shape (n,).")
-        .def("warnings", [](const ErrorMap& map, const ArrayLike& volume) { return map.warnings(to_vector3(volume, "volume")); }, py::arg("volume"),
-             "Where the map breaks the frame choice (0 at home, straightness 0 at both ends of travel); one sentence each.")
-        .def("write", [](const ErrorMap& map, const PathLike& path, const std::optional<Chain>& chain, const std::optional<ArrayLike>& volume, const std::optional<ArrayLike>& tool) {
-            ParameterTable table = map.table();
-            table.header["format"] = "stepdiag error map 1";
-            if (chain) table.header["chain"] = chain->name();
-            if (volume) table.header["volume_mm"] = format_lengths(to_vector3(*volume, "volume"));
-            if (tool) table.header["tool_mm"] = format_lengths(to_vector3(*tool, "tool"));
-            write_parameter_table(table, to_path(path));
-        }, py::arg("path"), py::kw_only(), py::arg("chain") = std::nullopt, py::arg("volume") = std::nullopt, py::arg("tool") = std::nullopt,
-             "Writes the error-map CSV; numbers are read back to the same bits. Raises InvalidArgument when it cannot be written.");
-    m.def("read_error_map", [](const PathLike& path) { return read_error_map(to_path(path)); }, py::arg("path"),
-          "Reads an error map or calibration CSV. Raises InvalidArgument naming file and line.");
-    m.def("random_error_map", [](const ArrayLike& volume, std::uint64_t seed, double translation, double rotation, double squareness, int intervals, double screw_pitch, double screw_amplitude) {
-        return make_random_error_map(to_vector3(volume, "volume"), {seed, translation, rotation, squareness, intervals, screw_pitch, screw_amplitude});
-    }, py::arg("volume"), py::kw_only(), py::arg("seed"), py::arg("translation") = 0.02, py::arg("rotation") = 60e-6, py::arg("squareness") = 60e-6,
-          py::arg("intervals") = 50, py::arg("screw_pitch") = 0.0, py::arg("screw_amplitude") = 0.0,
-          "A random machine with peaks of `translation` mm and `rotation` rad at equidistant nodes, squarenesses uniform within +-`squareness` rad, in the frame choice of the conventions. Same arguments, same bits.");
+    py::class_<ErrorMap>(
+        m, "ErrorMap",
+        "The 21 geometric errors as tables (ISO 230-1 names): functions in mm or rad over positions in mm, linear "
+        "between nodes, end values held outside; squarenesses in rad. A missing parameter is 0.")
+        .def(py::init(&make_error_map), py::arg("functions") = FunctionArrays{},
+             py::arg("squareness") = std::map<std::string, double>{},
+             "functions: name -> (position, value), one-dimensional and of one length, positions ascending. Raises "
+             "InvalidArgument.")
+        .def_property_readonly(
+            "functions",
+            [](const ErrorMap& map) {
+                std::map<std::string, std::pair<DoubleArray, DoubleArray>> functions;
+                for (int i = 0; i < function_count; ++i)
+                    if (const auto& table = map.table().functions[i])
+                        functions[FunctionId::at(i).name()] = {to_numpy(table->position), to_numpy(table->value)};
+                return functions;
+            })
+        .def_property_readonly("squareness",
+                               [](const ErrorMap& map) {
+                                   std::map<std::string, double> values;
+                                   for (const Squareness s : all_squarenesses)
+                                       if (map.table().squarenesses[static_cast<int>(s)])
+                                           values[name(s)] = map.squareness(s);
+                                   return values;
+                               })
+        .def_property_readonly(
+            "header", [](const ErrorMap& map) { return map.table().header; },
+            "The leading \"# key=value\" lines of the file it came from.")
+        .def(
+            "function",
+            [](const ErrorMap& map, const std::string& name, const ArrayLike& position) {
+                const auto id = FunctionId::parse(name);
+                if (!id) throw InvalidArgument("name: expected EXX ... ECZ, got \"" + name + "\"");
+                Eigen::VectorXd value = to_vector(position, "position");
+                for (double& p : value) p = map.function(*id, p);
+                return to_numpy_vector(value);
+            },
+            py::arg("name"), py::arg("position"),
+            "Values (mm or rad) of one error function at positions (mm), shape (n,).")
+        .def(
+            "warnings",
+            [](const ErrorMap& map, const ArrayLike& volume) { return map.warnings(to_vector3(volume, "volume")); },
+            py::arg("volume"),
+            "Where the map breaks the frame choice (0 at home, straightness 0 at both ends of travel); one sentence "
+            "each.")
+        .def(
+            "write",
+            [](const ErrorMap& map, const PathLike& path, const std::optional<Chain>& chain,
+               const std::optional<ArrayLike>& volume, const std::optional<ArrayLike>& tool) {
+                ParameterTable table = map.table();
+                table.header["format"] = "stepdiag error map 1";
+                if (chain) table.header["chain"] = chain->name();
+                if (volume) table.header["volume_mm"] = format_lengths(to_vector3(*volume, "volume"));
+                if (tool) table.header["tool_mm"] = format_lengths(to_vector3(*tool, "tool"));
+                write_parameter_table(table, to_path(path));
+            },
+            py::arg("path"), py::kw_only(), py::arg("chain") = std::nullopt, py::arg("volume") = std::nullopt,
+            py::arg("tool") = std::nullopt,
+            "Writes the error-map CSV; numbers are read back to the same bits. Raises InvalidArgument when it cannot "
+            "be written.");
+    m.def(
+        "read_error_map", [](const PathLike& path) { return read_error_map(to_path(path)); }, py::arg("path"),
+        "Reads an error map or calibration CSV. Raises InvalidArgument naming file and line.");
+    m.def(
+        "random_error_map",
+        [](const ArrayLike& volume, std::uint64_t seed, double translation, double rotation, double squareness,
+           int intervals, double screw_pitch, double screw_amplitude) {
+            return make_random_error_map(to_vector3(volume, "volume"), {seed, translation, rotation, squareness,
+                                                                        intervals, screw_pitch, screw_amplitude});
+        },
+        py::arg("volume"), py::kw_only(), py::arg("seed"), py::arg("translation") = 0.02, py::arg("rotation") = 60e-6,
+        py::arg("squareness") = 60e-6, py::arg("intervals") = 50, py::arg("screw_pitch") = 0.0,
+        py::arg("screw_amplitude") = 0.0,
+        "A random machine with peaks of `translation` mm and `rotation` rad at equidistant nodes, squarenesses uniform "
+        "within +-`squareness` rad, in the frame choice of the conventions. Same arguments, same bits.");
 
     py::class_<Machine>(m, "Machine", "A three-axis machine: chain, the 21 errors, tool offset (mm).")
-        .def(py::init([](const Chain& chain, const ErrorMap& errors, const ArrayLike& tool) { return Machine(chain, errors, to_vector3(tool, "tool")); }),
+        .def(py::init([](const Chain& chain, const ErrorMap& errors, const ArrayLike& tool) {
+                 return Machine(chain, errors, to_vector3(tool, "tool"));
+             }),
              py::arg("chain"), py::arg("errors") = ErrorMap(), py::arg("tool") = zeros(3))
         .def_property_readonly("chain", &Machine::chain)
         .def_property_readonly("errors", &Machine::errors)
         .def_property_readonly("tool", [](const Machine& machine) { return to_numpy_vector(machine.tool()); })
-        .def("pose", [](const Machine& machine, const ArrayLike& commanded) {
-            const Points points = to_points(commanded, "commanded");
-            DoubleArray rotation({points.rows(), Eigen::Index(3), Eigen::Index(3)}), position({points.rows(), Eigen::Index(3)});
-            double *r = rotation.mutable_data(), *p = position.mutable_data();
-            {
-                py::gil_scoped_release release;
-                for (Eigen::Index i = 0; i < points.rows(); ++i) {
-                    const Pose pose = machine.pose(points.row(i).transpose());
-                    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r + 9 * i) = pose.rotation;
-                    Eigen::Map<Eigen::Vector3d>(p + 3 * i) = pose.position;
+        .def(
+            "pose",
+            [](const Machine& machine, const ArrayLike& commanded) {
+                const Points points = to_points(commanded, "commanded");
+                DoubleArray rotation({points.rows(), Eigen::Index(3), Eigen::Index(3)}),
+                    position({points.rows(), Eigen::Index(3)});
+                double *r = rotation.mutable_data(), *p = position.mutable_data();
+                {
+                    py::gil_scoped_release release;
+                    for (Eigen::Index i = 0; i < points.rows(); ++i) {
+                        const Pose pose = machine.pose(points.row(i).transpose());
+                        Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r + 9 * i) = pose.rotation;
+                        Eigen::Map<Eigen::Vector3d>(p + 3 * i) = pose.position;
+                    }
                 }
-            }
-            return std::make_pair(rotation, position);
-        }, py::arg("commanded"), "Exact pose of the tool in the machine frame: (rotation (n, 3, 3), functional point (n, 3), mm) at commanded positions (n, 3), mm.")
-        .def("error", [](const Machine& machine, const ArrayLike& commanded) {
-            return map_points(to_points(commanded, "commanded"), [&](const Eigen::Vector3d& p) { return machine.error(p); });
-        }, py::arg("commanded"), "Actual minus nominal functional point (n, 3), mm, exact.")
-        .def("first_order_error", [](const Machine& machine, const ArrayLike& commanded) {
-            return map_points(to_points(commanded, "commanded"), [&](const Eigen::Vector3d& p) { return machine.first_order_error(p); });
-        }, py::arg("commanded"), "The same to first order in the errors: sum over axes of delta + theta x L.");
+                return std::make_pair(rotation, position);
+            },
+            py::arg("commanded"),
+            "Exact pose of the tool in the machine frame: (rotation (n, 3, 3), functional point (n, 3), mm) at "
+            "commanded positions (n, 3), mm.")
+        .def(
+            "error",
+            [](const Machine& machine, const ArrayLike& commanded) {
+                return map_points(to_points(commanded, "commanded"),
+                                  [&](const Eigen::Vector3d& p) { return machine.error(p); });
+            },
+            py::arg("commanded"), "Actual minus nominal functional point (n, 3), mm, exact.")
+        .def(
+            "first_order_error",
+            [](const Machine& machine, const ArrayLike& commanded) {
+                return map_points(to_points(commanded, "commanded"),
+                                  [&](const Eigen::Vector3d& p) { return machine.first_order_error(p); });
+            },
+            py::arg("commanded"), "The same to first order in the errors: sum over axes of delta + theta x L.");
 }
 
 }  // namespace stepdiag::bindings

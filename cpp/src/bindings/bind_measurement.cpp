@@ -16,11 +16,16 @@ std::vector<std::optional<double>> to_fields(const ArrayLike& array, const std::
     return fields;
 }
 
-Measurement make_measurement(const std::vector<std::string>& line, const std::vector<int>& point, const ArrayLike& position, const py::dict& channels,
-                             const std::optional<std::vector<int>>& run, const std::optional<std::vector<std::string>>& direction, const ChannelArrays& standard_uncertainty) {
+Measurement make_measurement(const std::vector<std::string>& line, const std::vector<int>& point,
+                             const ArrayLike& position, const py::dict& channels,
+                             const std::optional<std::vector<int>>& run,
+                             const std::optional<std::vector<std::string>>& direction,
+                             const ChannelArrays& standard_uncertainty) {
     const Points positions = to_points(position, "position");
     const auto check_size = [&](std::size_t size, const char* name) {
-        if (size != line.size()) throw InvalidArgument(std::string(name) + ": expected " + std::to_string(line.size()) + " entries, one a row, got " + std::to_string(size));
+        if (size != line.size())
+            throw InvalidArgument(std::string(name) + ": expected " + std::to_string(line.size()) +
+                                  " entries, one a row, got " + std::to_string(size));
     };
     check_size(point.size(), "point");
     check_size(std::size_t(positions.rows()), "position");
@@ -28,9 +33,12 @@ Measurement make_measurement(const std::vector<std::string>& line, const std::ve
     if (direction) check_size(direction->size(), "direction");
     std::vector<Station> stations;
     for (std::size_t i = 0; i < line.size(); ++i) {
-        Station station{run ? (*run)[i] : 0, Line::parse(line[i]), point[i], Direction::forward, positions.row(Eigen::Index(i)).transpose()};
+        Station station{run ? (*run)[i] : 0, Line::parse(line[i]), point[i], Direction::forward,
+                        positions.row(Eigen::Index(i)).transpose()};
         if (direction) {
-            if ((*direction)[i] != "forward" && (*direction)[i] != "backward") throw InvalidArgument("direction: expected \"forward\" or \"backward\", got \"" + (*direction)[i] + "\"");
+            if ((*direction)[i] != "forward" && (*direction)[i] != "backward")
+                throw InvalidArgument("direction: expected \"forward\" or \"backward\", got \"" + (*direction)[i] +
+                                      "\"");
             if ((*direction)[i] == "backward") station.direction = Direction::backward;
         }
         stations.push_back(station);
@@ -41,7 +49,8 @@ Measurement make_measurement(const std::vector<std::string>& line, const std::ve
         list.push_back({name, to_fields(py::reinterpret_borrow<ArrayLike>(value), name), {}});
     }
     for (const auto& [name, array] : standard_uncertainty) {
-        const auto channel = std::find_if(list.begin(), list.end(), [&name = name](const Channel& c) { return c.name == name; });
+        const auto channel =
+            std::find_if(list.begin(), list.end(), [&name = name](const Channel& c) { return c.name == name; });
         if (channel == list.end()) throw InvalidArgument("standard_uncertainty: there is no channel \"" + name + "\"");
         channel->standard_uncertainty = to_fields(array, "standard_uncertainty of " + name);
     }
@@ -51,52 +60,80 @@ Measurement make_measurement(const std::vector<std::string>& line, const std::ve
 }  // namespace
 
 void bind_measurement(py::module_& m) {
-    py::class_<Measurement>(m, "Measurement", "A run's readings, row by row: line, point, run, direction, commanded position (mm), and channels in native units (mm, rad; NaN where a reading was lost).")
-        .def(py::init(&make_measurement), py::arg("line"), py::arg("point"), py::arg("position"), py::arg("channels"), py::kw_only(), py::arg("run") = std::nullopt,
-             py::arg("direction") = std::nullopt, py::arg("standard_uncertainty") = ChannelArrays{},
-             "channels: name -> (n,) with names distance, alpha, beta, spot_x, spot_y, d1 ..., time, temperature. Raises InvalidArgument.")
+    py::class_<Measurement>(m, "Measurement",
+                            "A run's readings, row by row: line, point, run, direction, commanded position (mm), and "
+                            "channels in native units (mm, rad; NaN where a reading was lost).")
+        .def(py::init(&make_measurement), py::arg("line"), py::arg("point"), py::arg("position"), py::arg("channels"),
+             py::kw_only(), py::arg("run") = std::nullopt, py::arg("direction") = std::nullopt,
+             py::arg("standard_uncertainty") = ChannelArrays{},
+             "channels: name -> (n,) with names distance, alpha, beta, spot_x, spot_y, d1 ..., time, temperature. "
+             "Raises InvalidArgument.")
         .def("__len__", &Measurement::size)
-        .def_property_readonly("line", [](const Measurement& run) {
-            std::vector<std::string> names;
-            for (const Station& s : run.stations()) names.push_back(s.line.name());
-            return names;
-        })
-        .def_property_readonly("point", [](const Measurement& run) {
-            py::array_t<int> points(py::ssize_t(run.size()));
-            for (std::size_t i = 0; i < run.size(); ++i) points.mutable_data()[i] = run.stations()[i].point;
-            return points;
-        })
-        .def_property_readonly("run", [](const Measurement& run) {
-            py::array_t<int> runs(py::ssize_t(run.size()));
-            for (std::size_t i = 0; i < run.size(); ++i) runs.mutable_data()[i] = run.stations()[i].run;
-            return runs;
-        })
-        .def_property_readonly("direction", [](const Measurement& run) {
-            std::vector<std::string> names;
-            for (const Station& s : run.stations()) names.push_back(s.direction == Direction::forward ? "forward" : "backward");
-            return names;
-        })
-        .def_property_readonly("position", [](const Measurement& run) {
-            Eigen::MatrixXd positions(run.size(), 3);
-            for (std::size_t i = 0; i < run.size(); ++i) positions.row(i) = run.stations()[i].commanded.transpose();
-            return to_numpy(positions);
-        })
-        .def_property_readonly("channels", [](const Measurement& run) {
-            py::typing::Dict<py::str, DoubleArray> channels;
-            for (const Channel& channel : run.channels()) channels[py::str(channel.name)] = to_numpy(channel.value);
-            return channels;
-        })
-        .def_property_readonly("standard_uncertainty", [](const Measurement& run) {
-            py::typing::Dict<py::str, DoubleArray> uncertainties;
-            for (const Channel& channel : run.channels())
-                if (!channel.standard_uncertainty.empty()) uncertainties[py::str(channel.name)] = to_numpy(channel.standard_uncertainty);
-            return uncertainties;
-        })
-        .def("write", [](const Measurement& run, const PathLike& path) { write_measurement(run, to_path(path)); }, py::arg("path"),
-             "Writes the measurement CSV; numbers are read back to the same bits. Raises InvalidArgument when it cannot be written.")
-        .def("to_xarray", [](const py::object& self) { return py::reinterpret_steal<XarrayDataset>(py::module_::import("stepdiag.tables").attr("measurement_table")(self).release()); },
-             "The run as a labelled table.");
-    m.def("read_measurement", [](const PathLike& path) { return read_measurement(to_path(path)); }, py::arg("path"), "Reads a measurement CSV. Raises InvalidArgument naming file and line.");
+        .def_property_readonly("line",
+                               [](const Measurement& run) {
+                                   std::vector<std::string> names;
+                                   for (const Station& s : run.stations()) names.push_back(s.line.name());
+                                   return names;
+                               })
+        .def_property_readonly("point",
+                               [](const Measurement& run) {
+                                   py::array_t<int> points(py::ssize_t(run.size()));
+                                   for (std::size_t i = 0; i < run.size(); ++i)
+                                       points.mutable_data()[i] = run.stations()[i].point;
+                                   return points;
+                               })
+        .def_property_readonly("run",
+                               [](const Measurement& run) {
+                                   py::array_t<int> runs(py::ssize_t(run.size()));
+                                   for (std::size_t i = 0; i < run.size(); ++i)
+                                       runs.mutable_data()[i] = run.stations()[i].run;
+                                   return runs;
+                               })
+        .def_property_readonly("direction",
+                               [](const Measurement& run) {
+                                   std::vector<std::string> names;
+                                   for (const Station& s : run.stations())
+                                       names.push_back(s.direction == Direction::forward ? "forward" : "backward");
+                                   return names;
+                               })
+        .def_property_readonly("position",
+                               [](const Measurement& run) {
+                                   Eigen::MatrixXd positions(run.size(), 3);
+                                   for (std::size_t i = 0; i < run.size(); ++i)
+                                       positions.row(i) = run.stations()[i].commanded.transpose();
+                                   return to_numpy(positions);
+                               })
+        .def_property_readonly("channels",
+                               [](const Measurement& run) {
+                                   py::typing::Dict<py::str, DoubleArray> channels;
+                                   for (const Channel& channel : run.channels())
+                                       channels[py::str(channel.name)] = to_numpy(channel.value);
+                                   return channels;
+                               })
+        .def_property_readonly("standard_uncertainty",
+                               [](const Measurement& run) {
+                                   py::typing::Dict<py::str, DoubleArray> uncertainties;
+                                   for (const Channel& channel : run.channels())
+                                       if (!channel.standard_uncertainty.empty())
+                                           uncertainties[py::str(channel.name)] =
+                                               to_numpy(channel.standard_uncertainty);
+                                   return uncertainties;
+                               })
+        .def(
+            "write", [](const Measurement& run, const PathLike& path) { write_measurement(run, to_path(path)); },
+            py::arg("path"),
+            "Writes the measurement CSV; numbers are read back to the same bits. Raises InvalidArgument when it cannot "
+            "be written.")
+        .def(
+            "to_xarray",
+            [](const py::object& self) {
+                return py::reinterpret_steal<XarrayDataset>(
+                    py::module_::import("stepdiag.tables").attr("measurement_table")(self).release());
+            },
+            "The run as a labelled table.");
+    m.def(
+        "read_measurement", [](const PathLike& path) { return read_measurement(to_path(path)); }, py::arg("path"),
+        "Reads a measurement CSV. Raises InvalidArgument naming file and line.");
 }
 
 }  // namespace stepdiag::bindings

@@ -21,40 +21,65 @@ std::vector<std::string> line_names(const std::vector<Line>& lines) {
 }  // namespace
 
 void bind_plan(py::module_& m) {
-    py::class_<Plan>(m, "Plan", "The lines measured through a volume, in single-axis steps. Lines are named by the travel signs of X, Y, Z: three of p n 0.")
-        .def(py::init([](const ArrayLike& volume, const std::vector<std::string>& lines, std::int64_t steps, const std::string& order, const std::vector<std::string>& scale_lines) {
+    py::class_<Plan>(m, "Plan",
+                     "The lines measured through a volume, in single-axis steps. Lines are named by the travel signs "
+                     "of X, Y, Z: three of p n 0.")
+        .def(py::init([](const ArrayLike& volume, const std::vector<std::string>& lines, std::int64_t steps,
+                         const std::string& order, const std::vector<std::string>& scale_lines) {
                  const int bounded = int(std::clamp<std::int64_t>(steps, -1, Plan::largest_step_count + 1));
-                 if (bounded != steps) throw InvalidArgument("steps: expected 1 to " + std::to_string(Plan::largest_step_count) + ", got " + std::to_string(steps));
-                 return Plan(to_vector3(volume, "volume"), parse_lines(lines), bounded, parse_order(order), parse_lines(scale_lines));
+                 if (bounded != steps)
+                     throw InvalidArgument("steps: expected 1 to " + std::to_string(Plan::largest_step_count) +
+                                           ", got " + std::to_string(steps));
+                 return Plan(to_vector3(volume, "volume"), parse_lines(lines), bounded, parse_order(order),
+                             parse_lines(scale_lines));
              }),
-             py::arg("volume"), py::arg("lines"), py::arg("steps"), py::arg("order") = "XYZ", py::arg("scale_lines") = std::vector<std::string>{},
-             "volume: edges in mm. steps: per axis. Raises InvalidArgument for an unknown or doubled line, a volume without extent, steps outside 1 .. 100000.")
+             py::arg("volume"), py::arg("lines"), py::arg("steps"), py::arg("order") = "XYZ",
+             py::arg("scale_lines") = std::vector<std::string>{},
+             "volume: edges in mm. steps: per axis. Raises InvalidArgument for an unknown or doubled line, a volume "
+             "without extent, steps outside 1 .. 10000.")
         .def_property_readonly("volume", [](const Plan& plan) { return to_numpy_vector(plan.volume()); })
         .def_property_readonly("lines", [](const Plan& plan) { return line_names(plan.lines()); })
         .def_property_readonly("scale_lines", [](const Plan& plan) { return line_names(plan.scale_lines()); })
         .def_property_readonly("steps", &Plan::steps)
-        .def_property_readonly("order", [](const Plan& plan) {
-            std::string text;
-            for (const Axis axis : plan.order()) text += letter(axis);
-            return text;
-        })
-        .def("points", [](const Plan& plan, const std::string& line) {
-            const auto points = plan.points(Line::parse(line));
-            Eigen::MatrixXd positions(points.size(), 3);
-            for (std::size_t k = 0; k < points.size(); ++k) positions.row(k) = points[k].commanded.transpose();
-            return to_numpy(positions);
-        }, py::arg("line"), "Commanded points of a line of this plan, (n, 3), mm.")
-        .def("nodes", [](const Plan& plan, const std::string& axis) { return to_numpy(plan.nodes(to_axis(axis))); }, py::arg("axis"), "Node positions of axis \"X\", \"Y\" or \"Z\", (steps + 1,), mm.")
-        .def("frame", [](const Plan& plan, const std::string& line) { return to_numpy(Eigen::MatrixXd(plan.frame(Line::parse(line)))); }, py::arg("line"),
-             "Local frame of a line in machine coordinates, (3, 3), columns local x, y, z (eq. 2 of the paper).")
-        .def("lateral_excursion", [](const Plan& plan, const std::string& line) {
-            const LateralExcursion excursion = plan.lateral_excursion(Line::parse(line));
-            Eigen::MatrixXd rows(2, 2);
-            rows << excursion.lowest.transpose(), excursion.highest.transpose();
-            return to_numpy(rows);
-        }, py::arg("line"), "How far a step leads beside the line in local x and y, mm: rows lowest and highest, (2, 2).")
-        .def("smallest_mirror", [](const Plan& plan) { return to_numpy_vector(plan.smallest_mirror()); },
-             "Width and height (local x and y) of the smallest mirror, centred on the functional point, (2,), mm; a beam of finite diameter needs that much more.");
+        .def_property_readonly("order",
+                               [](const Plan& plan) {
+                                   std::string text;
+                                   for (const Axis axis : plan.order()) text += letter(axis);
+                                   return text;
+                               })
+        .def(
+            "points",
+            [](const Plan& plan, const std::string& line) {
+                const auto points = plan.points(Line::parse(line));
+                Eigen::MatrixXd positions(points.size(), 3);
+                for (std::size_t k = 0; k < points.size(); ++k) positions.row(k) = points[k].commanded.transpose();
+                return to_numpy(positions);
+            },
+            py::arg("line"), "Commanded points of a line of this plan, (n, 3), mm.")
+        .def(
+            "nodes", [](const Plan& plan, const std::string& axis) { return to_numpy(plan.nodes(to_axis(axis))); },
+            py::arg("axis"), "Node positions of axis \"X\", \"Y\" or \"Z\", (steps + 1,), mm.")
+        .def(
+            "frame",
+            [](const Plan& plan, const std::string& line) {
+                return to_numpy(Eigen::MatrixXd(plan.frame(Line::parse(line))));
+            },
+            py::arg("line"),
+            "Local frame of a line in machine coordinates, (3, 3), columns local x, y, z (eq. 2 of the paper).")
+        .def(
+            "lateral_excursion",
+            [](const Plan& plan, const std::string& line) {
+                const LateralExcursion excursion = plan.lateral_excursion(Line::parse(line));
+                Eigen::MatrixXd rows(2, 2);
+                rows << excursion.lowest.transpose(), excursion.highest.transpose();
+                return to_numpy(rows);
+            },
+            py::arg("line"),
+            "How far a step leads beside the line in local x and y, mm: rows lowest and highest, (2, 2).")
+        .def(
+            "smallest_mirror", [](const Plan& plan) { return to_numpy_vector(plan.smallest_mirror()); },
+            "Width and height (local x and y) of the smallest mirror, centred on the functional point, (2,), mm; a "
+            "beam of finite diameter needs that much more.");
 }
 
 }  // namespace stepdiag::bindings

@@ -4,54 +4,78 @@
 namespace stepdiag::bindings {
 
 void bind_simulation(py::module_& m) {
-    py::class_<Head>(m, "Head", "A laser head: layout \"ideal\" (ray-traced), \"psd\" or \"multi_beam\"; lengths in mm, wavelength in nm.")
-        .def(py::init([](const std::string& layout, double standoff, double psd_distance, const std::vector<ArrayLike>& beam_offsets, double wavelength, double aperture, const std::optional<ArrayLike>& mirror) {
+    py::class_<Head>(
+        m, "Head",
+        "A laser head: layout \"ideal\" (ray-traced), \"psd\" or \"multi_beam\"; lengths in mm, wavelength in nm.")
+        .def(py::init([](const std::string& layout, double standoff, double psd_distance,
+                         const std::vector<ArrayLike>& beam_offsets, double wavelength, double aperture,
+                         const std::optional<ArrayLike>& mirror) {
                  Head head{parse_head_layout(layout), standoff, psd_distance, {}, wavelength, aperture, std::nullopt};
-                 for (const auto& offset : beam_offsets) head.beam_offsets.push_back(to_vector2(offset, "beam_offsets"));
+                 for (const auto& offset : beam_offsets)
+                     head.beam_offsets.push_back(to_vector2(offset, "beam_offsets"));
                  if (mirror) head.mirror = to_vector2(*mirror, "mirror");
                  check_head(head);
                  return head;
              }),
-             py::arg("layout") = "ideal", py::kw_only(), py::arg("standoff") = 100.0, py::arg("psd_distance") = 0.0, py::arg("beam_offsets") = std::vector<ArrayLike>{},
-             py::arg("wavelength") = 1530.0, py::arg("aperture") = 50.0, py::arg("mirror") = std::nullopt,
-             "mirror: (width, height); none: as large as the plan needs. Raises InvalidArgument for lengths that are not positive and for beams on one line.")
+             py::arg("layout") = "ideal", py::kw_only(), py::arg("standoff") = 100.0, py::arg("psd_distance") = 0.0,
+             py::arg("beam_offsets") = std::vector<ArrayLike>{}, py::arg("wavelength") = 1530.0,
+             py::arg("aperture") = 50.0, py::arg("mirror") = std::nullopt,
+             "mirror: (width, height); none: as large as the plan needs. Raises InvalidArgument for lengths that are "
+             "not positive and for beams on one line.")
         .def_property_readonly("layout", [](const Head& head) { return name(head.layout); })
         .def_readonly("standoff", &Head::standoff)
         .def_readonly("psd_distance", &Head::psd_distance)
-        .def_property_readonly("beam_offsets", [](const Head& head) {
-            Eigen::MatrixXd offsets(head.beam_offsets.size(), 2);
-            for (std::size_t i = 0; i < head.beam_offsets.size(); ++i) offsets.row(i) = head.beam_offsets[i].transpose();
-            return to_numpy(offsets);
-        })
+        .def_property_readonly("beam_offsets",
+                               [](const Head& head) {
+                                   Eigen::MatrixXd offsets(head.beam_offsets.size(), 2);
+                                   for (std::size_t i = 0; i < head.beam_offsets.size(); ++i)
+                                       offsets.row(i) = head.beam_offsets[i].transpose();
+                                   return to_numpy(offsets);
+                               })
         .def_readonly("wavelength", &Head::wavelength)
         .def_readonly("aperture", &Head::aperture)
-        .def_property_readonly("mirror", [](const Head& head) { return head.mirror ? std::optional(to_numpy_vector(*head.mirror)) : std::nullopt; })
+        .def_property_readonly(
+            "mirror",
+            [](const Head& head) { return head.mirror ? std::optional(to_numpy_vector(*head.mirror)) : std::nullopt; })
         .def_property_readonly("signals", &signal_names, "Names of the channels that the head reads.");
 
-    py::class_<Misalignment>(m, "Misalignment", "How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm.")
+    py::class_<Misalignment>(
+        m, "Misalignment",
+        "How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm.")
         .def(py::init([](const ArrayLike& reflector, const ArrayLike& laser, const ArrayLike& psd_zero) {
-                 return Misalignment{to_vector2(reflector, "reflector"), to_vector2(laser, "laser"), to_vector2(psd_zero, "psd_zero")};
+                 return Misalignment{to_vector2(reflector, "reflector"), to_vector2(laser, "laser"),
+                                     to_vector2(psd_zero, "psd_zero")};
              }),
              py::arg("reflector") = zeros(2), py::arg("laser") = zeros(2), py::arg("psd_zero") = zeros(2))
         .def_property_readonly("reflector", [](const Misalignment& m) { return to_numpy_vector(m.reflector); })
         .def_property_readonly("laser", [](const Misalignment& m) { return to_numpy_vector(m.laser); })
         .def_property_readonly("psd_zero", [](const Misalignment& m) { return to_numpy_vector(m.psd_zero); });
 
-    py::class_<Noise>(m, "Noise", "Standard deviations of an independent Gaussian per reading: distance (mm; also d1 ...), tilt (rad), spot (mm).")
-        .def(py::init([](double distance, double tilt, double spot, std::uint64_t seed) { return Noise{distance, tilt, spot, seed}; }), py::arg("distance") = 0.0, py::arg("tilt") = 0.0,
-             py::arg("spot") = 0.0, py::arg("seed") = 0)
+    py::class_<Noise>(m, "Noise",
+                      "Standard deviations of an independent Gaussian per reading: distance (mm; also d1 ...), tilt "
+                      "(rad), spot (mm).")
+        .def(py::init([](double distance, double tilt, double spot, std::uint64_t seed) {
+                 return Noise{distance, tilt, spot, seed};
+             }),
+             py::arg("distance") = 0.0, py::arg("tilt") = 0.0, py::arg("spot") = 0.0, py::arg("seed") = 0)
         .def_readonly("distance", &Noise::distance)
         .def_readonly("tilt", &Noise::tilt)
         .def_readonly("spot", &Noise::spot)
         .def_readonly("seed", &Noise::seed);
 
-    m.def("simulate", [](const Machine& machine, const Plan& plan, const Head& head, const std::map<std::string, Misalignment>& misalignment, const Noise& noise, double refractive_index) {
-        py::gil_scoped_release release;
-        return simulate(machine, plan, head, {misalignment, noise, Medium{refractive_index}});
-    }, py::arg("machine"), py::arg("plan"), py::arg("head"), py::kw_only(), py::arg("misalignment") = std::map<std::string, Misalignment>{}, py::arg("noise") = Noise{},
-          py::arg("refractive_index") = 1.0,
-          "A run on the virtual machine: lines of the plan, then its scale lines. misalignment: by line name; a line without an entry is aligned. "
-          "Readings whose beam misses the mirror or does not come back are lost (NaN). Raises InvalidArgument.");
+    m.def(
+        "simulate",
+        [](const Machine& machine, const Plan& plan, const Head& head,
+           const std::map<std::string, Misalignment>& misalignment, const Noise& noise, double refractive_index) {
+            py::gil_scoped_release release;
+            return simulate(machine, plan, head, {misalignment, noise, Medium{refractive_index}});
+        },
+        py::arg("machine"), py::arg("plan"), py::arg("head"), py::kw_only(),
+        py::arg("misalignment") = std::map<std::string, Misalignment>{}, py::arg("noise") = Noise{},
+        py::arg("refractive_index") = 1.0,
+        "A run on the virtual machine: lines of the plan, then its scale lines. misalignment: by line name; a line "
+        "without an entry is aligned. "
+        "Readings whose beam misses the mirror or does not come back are lost (NaN). Raises InvalidArgument.");
 }
 
 }  // namespace stepdiag::bindings

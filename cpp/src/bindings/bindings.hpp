@@ -31,10 +31,10 @@ class XarrayDataset : public py::object {
     PYBIND11_OBJECT_DEFAULT(XarrayDataset, py::object, PyObject_Type)
 };
 
-Eigen::VectorXd to_vector(const py::handle& array, const char* name);                // any length
+Eigen::VectorXd to_vector(const py::handle& array, const char* name);  // any length
 Eigen::Vector3d to_vector3(const py::handle& array, const char* name);
 Eigen::Vector2d to_vector2(const py::handle& array, const char* name);
-Points to_points(const py::handle& array, const char* name);                         // (n, 3)
+Points to_points(const py::handle& array, const char* name);  // (n, 3)
 std::string to_path(const PathLike& path);
 Axis to_axis(const std::string& name);
 
@@ -43,7 +43,9 @@ DoubleArray to_numpy(const std::vector<std::optional<double>>& values);  // NaN 
 DoubleArray to_numpy(const Eigen::MatrixXd& matrix);
 DoubleArray to_numpy_vector(const Eigen::VectorXd& vector);
 
-inline ArrayLike zeros(int size) { return py::reinterpret_borrow<ArrayLike>(py::make_tuple(0.0, 0.0, 0.0)[py::slice(0, size, 1)]); }
+inline ArrayLike zeros(int size) {
+    return py::reinterpret_borrow<ArrayLike>(py::make_tuple(0.0, 0.0, 0.0)[py::slice(0, size, 1)]);
+}
 
 void bind_machine(py::module_& m);
 void bind_plan(py::module_& m);

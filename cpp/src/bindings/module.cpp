@@ -9,7 +9,8 @@ DoubleArray to_array(const py::handle& object, const char* name) {
     DoubleArray array = DoubleArray::ensure(object);
     if (!array) {
         PyErr_Clear();
-        throw InvalidArgument(std::string(name) + ": expected an array of numbers, got " + std::string(py::str(py::type::handle_of(object))));
+        throw InvalidArgument(std::string(name) + ": expected an array of numbers, got " +
+                              std::string(py::str(py::type::handle_of(object))));
     }
     return array;
 }
@@ -17,7 +18,8 @@ DoubleArray to_array(const py::handle& object, const char* name) {
 Eigen::VectorXd to_vector_of(const py::handle& object, const char* name, py::ssize_t size) {
     const DoubleArray array = to_array(object, name);
     if (array.ndim() != 1 || array.shape(0) != size)
-        throw InvalidArgument(std::string(name) + ": expected " + std::to_string(size) + " numbers, got shape " + std::string(py::str(py::object(array.attr("shape")))));
+        throw InvalidArgument(std::string(name) + ": expected " + std::to_string(size) + " numbers, got shape " +
+                              std::string(py::str(py::object(array.attr("shape")))));
     return Eigen::Map<const Eigen::VectorXd>(array.data(), size);
 }
 
@@ -25,7 +27,9 @@ Eigen::VectorXd to_vector_of(const py::handle& object, const char* name, py::ssi
 
 Eigen::VectorXd to_vector(const py::handle& object, const char* name) {
     const DoubleArray array = to_array(object, name);
-    if (array.ndim() != 1) throw InvalidArgument(std::string(name) + ": expected one dimension, got shape " + std::string(py::str(py::object(array.attr("shape")))));
+    if (array.ndim() != 1)
+        throw InvalidArgument(std::string(name) + ": expected one dimension, got shape " +
+                              std::string(py::str(py::object(array.attr("shape")))));
     return Eigen::Map<const Eigen::VectorXd>(array.data(), array.shape(0));
 }
 
@@ -35,7 +39,8 @@ Eigen::Vector2d to_vector2(const py::handle& object, const char* name) { return 
 Points to_points(const py::handle& object, const char* name) {
     const DoubleArray array = to_array(object, name);
     if (array.ndim() != 2 || array.shape(1) != 3)
-        throw InvalidArgument(std::string(name) + ": expected shape (n, 3), got " + std::string(py::str(py::object(array.attr("shape")))));
+        throw InvalidArgument(std::string(name) + ": expected shape (n, 3), got " +
+                              std::string(py::str(py::object(array.attr("shape")))));
     return Eigen::Map<const Points>(array.data(), array.shape(0), 3);
 }
 
@@ -47,17 +52,21 @@ Axis to_axis(const std::string& name) {
     throw InvalidArgument("axis: expected \"X\", \"Y\" or \"Z\", got \"" + name + "\"");
 }
 
-DoubleArray to_numpy(const std::vector<double>& values) { return DoubleArray(py::ssize_t(values.size()), values.data()); }
+DoubleArray to_numpy(const std::vector<double>& values) {
+    return DoubleArray(py::ssize_t(values.size()), values.data());
+}
 
 DoubleArray to_numpy(const std::vector<std::optional<double>>& values) {
     DoubleArray array(py::ssize_t(values.size()));
-    for (std::size_t i = 0; i < values.size(); ++i) array.mutable_data()[i] = values[i].value_or(std::numeric_limits<double>::quiet_NaN());
+    for (std::size_t i = 0; i < values.size(); ++i)
+        array.mutable_data()[i] = values[i].value_or(std::numeric_limits<double>::quiet_NaN());
     return array;
 }
 
 DoubleArray to_numpy(const Eigen::MatrixXd& matrix) {
     DoubleArray array({matrix.rows(), matrix.cols()});
-    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(array.mutable_data(), matrix.rows(), matrix.cols()) = matrix;
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+        array.mutable_data(), matrix.rows(), matrix.cols()) = matrix;
     return array;
 }
 

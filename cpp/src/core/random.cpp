@@ -8,7 +8,8 @@ namespace stepdiag {
 
 std::array<double, 2> uniform_pair(std::uint64_t seed, RandomStream stream, std::uint64_t counter) {
     const r123::Philox4x32::key_type key = {{std::uint32_t(seed), std::uint32_t(seed >> 32)}};
-    const r123::Philox4x32::ctr_type block = {{std::uint32_t(counter), std::uint32_t(counter >> 32), 0, std::uint32_t(stream)}};
+    const r123::Philox4x32::ctr_type block = {
+        {std::uint32_t(counter), std::uint32_t(counter >> 32), 0, std::uint32_t(stream)}};
     const auto bits = r123::Philox4x32{}(block, key);
     const auto to_unit = [](std::uint32_t low, std::uint32_t high) {
         const std::uint64_t word = (std::uint64_t(high) << 32) | low;

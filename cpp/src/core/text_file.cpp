@@ -5,18 +5,19 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <charconv>
-#include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <sstream>
 
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
 namespace {
 
-// The header of the file is the row that names its columns; a spreadsheet may put a byte order mark before it.
+constexpr std::size_t largest_file = std::size_t(1) << 30;
+// A spreadsheet may put it before the header.
 constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 
 std::vector<std::string> parse_record(std::string_view line, const std::string& where) {
@@ -33,43 +34,85 @@ std::vector<std::string> parse_record(std::string_view line, const std::string& 
     return fields;
 }
 
+bool write_all(int file, std::string_view text) {
+    while (!text.empty()) {
+        const auto count = ::write(file, text.data(), text.size());
+        if (count <= 0) return false;
+        text.remove_prefix(std::size_t(count));
+    }
+    return true;
+}
+
+// A whole number with an optional sign; clamped, because a decimal exponent beyond this is 0 or infinite anyway.
+std::optional<int> parse_exponent(std::string_view text) {
+    constexpr int limit = 100'000;
+    const bool negative = !text.empty() && text.front() == '-';
+    if (!text.empty() && (text.front() == '-' || text.front() == '+')) text.remove_prefix(1);
+    if (text.empty() || text.find_first_not_of("0123456789") != std::string_view::npos) return std::nullopt;
+    int value = 0;
+    for (const char digit : text) value = std::min(limit, 10 * value + (digit - '0'));
+    return negative ? -value : value;
+}
+
+// Whether a decimal mantissa (no sign) times 10^exponent is below 1.
+bool is_small(std::string_view mantissa, int exponent) {
+    const auto first = mantissa.find_first_of("123456789");
+    const auto point = std::min(mantissa.find('.'), mantissa.size());
+    if (first == std::string_view::npos) return true;
+    return int(point) - int(first) + exponent <= 0;
+}
+
 }  // namespace
 
 std::string read_text_file(const std::string& path) {
     struct stat status {};
     if (::stat(path.c_str(), &status) != 0) throw InvalidArgument(path + ": cannot be read: " + std::strerror(errno));
-    if (S_ISDIR(status.st_mode)) throw InvalidArgument(path + ": expected a file, got a folder");
-    if (status.st_size > (off_t(1) << 30)) throw InvalidArgument(path + ": larger than 1 GiB, which no file of ours is");
+    if (!S_ISREG(status.st_mode) && !S_ISFIFO(status.st_mode))
+        throw InvalidArgument(path + ": expected a file, got a folder or a device");
     std::ifstream stream(path, std::ios::binary);
-    std::ostringstream content;
-    content << stream.rdbuf();
-    if (!stream) throw InvalidArgument(path + ": cannot be read: " + std::strerror(errno));
-    std::string text = content.str();
+    std::string text;
+    std::vector<char> chunk(1 << 16);
+    while (stream.read(chunk.data(), std::streamsize(chunk.size())) || stream.gcount() > 0) {
+        text.append(chunk.data(), std::size_t(stream.gcount()));
+        if (text.size() > largest_file) throw InvalidArgument(path + ": larger than 1 GiB, which no file of ours is");
+    }
+    if (!stream.eof()) throw InvalidArgument(path + ": cannot be read: " + std::strerror(errno));
     if (text.empty()) throw InvalidArgument(path + ": the file is empty");
     if (text.find('\0') != std::string::npos) throw InvalidArgument(path + ": expected a text file, got binary data");
     return text;
 }
 
 void write_text_file(const std::string& path, std::string_view text) {
-    std::string temporary = path + ".XXXXXX";
     const auto fail = [&](const std::string& what) {
-        const std::string why = std::strerror(errno);
-        ::unlink(temporary.c_str());
-        throw InvalidArgument(path + ": " + what + ": " + why);
+        throw InvalidArgument(path + ": " + what + ": " + std::strerror(errno));
     };
+    struct stat status {};
+    const bool exists = ::stat(path.c_str(), &status) == 0;
+    if (exists && S_ISDIR(status.st_mode)) throw InvalidArgument(path + ": cannot be written: it is a folder");
+    if (exists && !S_ISREG(status.st_mode)) {  // a pipe or a device is written to, not replaced
+        const int file = ::open(path.c_str(), O_WRONLY);
+        const bool written = file >= 0 && write_all(file, text);
+        if (file < 0 || ::close(file) != 0 || !written) fail("cannot be written");
+        return;
+    }
+    std::string target = path;
+    if (exists)  // the file behind a symbolic link is replaced, not the link
+        if (char* real = ::realpath(path.c_str(), nullptr)) {
+            target = real;
+            ::free(real);
+        }
+    std::string temporary = target + ".XXXXXX";
     const int file = ::mkstemp(temporary.data());
     if (file < 0) fail("cannot be written");
-    bool written = true;
-    for (std::size_t done = 0; written && done < text.size();) {
-        const auto count = ::write(file, text.data() + done, text.size() - done);
-        written = count > 0;
-        if (written) done += std::size_t(count);
-    }
     const mode_t mask = ::umask(0);
     ::umask(mask);
-    written = written && ::fchmod(file, 0666 & ~mask) == 0 && ::fsync(file) == 0;
-    if (::close(file) != 0 || !written) fail("cannot be written");
-    if (::rename(temporary.c_str(), path.c_str()) != 0) fail("cannot be replaced");
+    const bool written = write_all(file, text) && ::fchmod(file, exists ? status.st_mode & 07777 : 0666 & ~mask) == 0 &&
+                         ::fsync(file) == 0;
+    if (::close(file) == 0 && written && ::rename(temporary.c_str(), target.c_str()) == 0) return;
+    const int error = errno;
+    ::unlink(temporary.c_str());
+    errno = error;
+    fail("cannot be written");
 }
 
 CsvFile parse_csv(std::string_view text, const std::string& file_name) {
@@ -94,7 +137,8 @@ CsvFile parse_csv(std::string_view text, const std::string& file_name) {
             continue;
         }
         if (row.fields.size() != file.header.fields.size())
-            throw InvalidArgument(where + ": expected " + std::to_string(file.header.fields.size()) + " fields, got " + std::to_string(row.fields.size()));
+            throw InvalidArgument(where + ": expected " + std::to_string(file.header.fields.size()) + " fields, got " +
+                                  std::to_string(row.fields.size()));
         file.rows.push_back(std::move(row));
     }
     if (file.header.fields.empty()) throw InvalidArgument(file_name + ": has no header row");
@@ -110,23 +154,20 @@ std::string csv_field(std::string_view text) {
 
 std::optional<double> parse_decimal(std::string_view text, int exponent_shift) {
     // Digits and dots only: from_chars alone would take "inf" and "nan" as well.
-    if (text.empty() || text.find_first_not_of("0123456789+-.eE") != std::string_view::npos) return std::nullopt;
-    if (text.front() == '+') text.remove_prefix(1);
+    const bool negative = !text.empty() && text.front() == '-';
+    if (!text.empty() && (text.front() == '-' || text.front() == '+')) text.remove_prefix(1);
     const auto e = text.find_first_of("eE");
-    int exponent = 0;
-    if (e != std::string_view::npos) {
-        std::string_view digits = text.substr(e + 1);
-        if (!digits.empty() && digits.front() == '+') digits.remove_prefix(1);
-        const auto [stop, error] = std::from_chars(digits.data(), digits.data() + digits.size(), exponent);
-        if (error != std::errc() || stop != digits.data() + digits.size()) return std::nullopt;
-    }
-    const std::string shifted = std::string(text.substr(0, e)) + "e" + std::to_string(exponent + exponent_shift);
+    const auto exponent = e == std::string_view::npos ? std::optional(0) : parse_exponent(text.substr(e + 1));
+    const std::string_view mantissa = text.substr(0, e);
+    if (!exponent || mantissa.find_first_not_of("0123456789.") != std::string_view::npos) return std::nullopt;
+
+    const std::string shifted = std::string(mantissa) + "e" + std::to_string(*exponent + exponent_shift);
     double value = 0.0;
     const auto [stop, error] = std::from_chars(shifted.data(), shifted.data() + shifted.size(), value);
     if (stop != shifted.data() + shifted.size()) return std::nullopt;
-    if (error == std::errc::result_out_of_range && exponent < 0) return 0.0;  // too small for a double
-    if (error != std::errc() || !std::isfinite(value)) return std::nullopt;
-    return value;
+    if (error == std::errc::result_out_of_range && is_small(mantissa, *exponent + exponent_shift)) value = 0.0;
+    else if (error != std::errc()) return std::nullopt;
+    return negative ? -value : value;
 }
 
 std::string format_decimal(double value, int exponent_shift) {

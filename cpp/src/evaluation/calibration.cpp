@@ -1,7 +1,8 @@
 #include "stepdiag/evaluation/calibration.hpp"
 
 #include <algorithm>
-#include <sstream>
+#include <cmath>
+#include <limits>
 
 #include "core/text_file.hpp"
 #include "stepdiag/core/error.hpp"
@@ -11,6 +12,9 @@ namespace {
 
 constexpr const char* format = "stepdiag calibration 1";
 constexpr std::string_view sentence_break = " | ";
+
+// An uncertainty that a file did not give is NaN in a Calibration.
+std::optional<double> if_known(double u) { return std::isnan(u) ? std::nullopt : std::optional(u); }
 
 std::string join(const std::vector<std::string>& parts, std::string_view separator) {
     std::string text;
@@ -30,7 +34,9 @@ std::vector<std::string> split(std::string_view text, std::string_view separator
 
 std::string header_value(const ParameterTable& table, const std::string& key, const std::string& path) {
     const auto entry = table.header.find(key);
-    if (entry == table.header.end()) throw InvalidArgument(path + ": the leading line \"# " + key + "=...\" is missing; a calibration carries its chain, volume_mm and tool_mm");
+    if (entry == table.header.end())
+        throw InvalidArgument(path + ": the leading line \"# " + key +
+                              "=...\" is missing; a calibration carries its chain, volume_mm and tool_mm");
     return entry->second;
 }
 
@@ -40,7 +46,9 @@ Eigen::Vector3d parse_lengths(const ParameterTable& table, const std::string& ke
     Eigen::Vector3d lengths;
     for (int i = 0; i < 3; ++i) {
         const auto value = parts.size() == 3 ? parse_decimal(parts[i], 0) : std::nullopt;
-        if (!value) throw InvalidArgument(path + ": " + key + ": expected three numbers with a space between, got \"" + text + "\"");
+        if (!value)
+            throw InvalidArgument(path + ": " + key + ": expected three numbers with a space between, got \"" + text +
+                                  "\"");
         lengths[i] = *value;
     }
     return lengths;
@@ -56,28 +64,40 @@ Chain parse_chain(const ParameterTable& table, const std::string& path) {
 
 }  // namespace
 
+bool is_anything_determined(const Calibration& calibration) {
+    const auto known = [](const auto& parameter) { return parameter.has_value(); };
+    return std::any_of(calibration.functions.begin(), calibration.functions.end(), known) ||
+           std::any_of(calibration.squarenesses.begin(), calibration.squarenesses.end(), known);
+}
+
 ParameterTable to_parameter_table(const Calibration& calibration) {
     ParameterTable table;
     std::vector<std::string> slopes;
     for (int i = 0; i < function_count; ++i) {
         if (!calibration.functions[i]) continue;
         const CalibratedFunction& function = *calibration.functions[i];
-        table.functions[i] = FunctionTable{function.position, function.value, {function.standard_uncertainty.begin(), function.standard_uncertainty.end()}};
+        table.functions[i] = FunctionTable{function.position, function.value, {}};
+        for (const double u : function.standard_uncertainty)
+            table.functions[i]->standard_uncertainty.push_back(if_known(u));
         if (!function.slope_determined) slopes.push_back(FunctionId::at(i).name());
     }
     for (int i = 0; i < squareness_count; ++i)
-        if (const auto& entry = calibration.squarenesses[i]) table.squarenesses[i] = SquarenessValue{entry->value, entry->standard_uncertainty};
+        if (const auto& entry = calibration.squarenesses[i])
+            table.squarenesses[i] = SquarenessValue{entry->value, if_known(entry->standard_uncertainty)};
     table.header = {{"format", format},
                     {"method", calibration.method},
                     {"chain", calibration.chain.name()},
                     {"volume_mm", format_lengths(calibration.volume)},
                     {"tool_mm", format_lengths(calibration.tool)}};
     if (!slopes.empty()) table.header["undetermined_slopes"] = join(slopes, " ");
-    if (!calibration.undetermined.empty()) table.header["undetermined"] = join(calibration.undetermined, sentence_break);
+    if (!calibration.undetermined.empty())
+        table.header["undetermined"] = join(calibration.undetermined, sentence_break);
     return table;
 }
 
-void write_calibration(const Calibration& calibration, const std::string& path) { write_parameter_table(to_parameter_table(calibration), path); }
+void write_calibration(const Calibration& calibration, const std::string& path) {
+    write_parameter_table(to_parameter_table(calibration), path);
+}
 
 Calibration read_calibration(const std::string& path) {
     const ParameterTable table = ErrorMap(read_parameter_table(path)).table();
@@ -85,11 +105,19 @@ Calibration read_calibration(const std::string& path) {
         const auto entry = table.header.find(key);
         return entry == table.header.end() ? std::string() : entry->second;
     };
-    Calibration calibration{optional_value("method"), parse_chain(table, path), parse_lengths(table, "volume_mm", path), parse_lengths(table, "tool_mm", path), {}, {},
-                            split(optional_value("undetermined"), sentence_break), {}};
+    Calibration calibration{optional_value("method"),
+                            parse_chain(table, path),
+                            parse_lengths(table, "volume_mm", path),
+                            parse_lengths(table, "tool_mm", path),
+                            {},
+                            {},
+                            split(optional_value("undetermined"), sentence_break),
+                            {}};
     const auto slopes = split(optional_value("undetermined_slopes"), " ");
     for (const auto& slope : slopes)
-        if (!FunctionId::parse(slope)) throw InvalidArgument(path + ": undetermined_slopes: expected names of error functions, got \"" + slope + "\"");
+        if (!FunctionId::parse(slope))
+            throw InvalidArgument(path + ": undetermined_slopes: expected names of error functions, got \"" + slope +
+                                  "\"");
     constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
     for (int i = 0; i < function_count; ++i) {
         if (!table.functions[i]) continue;
@@ -100,7 +128,9 @@ Calibration read_calibration(const std::string& path) {
         calibration.functions[i] = std::move(function);
     }
     for (int i = 0; i < squareness_count; ++i)
-        if (const auto& entry = table.squarenesses[i]) calibration.squarenesses[i] = CalibratedSquareness{entry->value, entry->standard_uncertainty.value_or(unknown)};
+        if (const auto& entry = table.squarenesses[i])
+            calibration.squarenesses[i] =
+                CalibratedSquareness{entry->value, entry->standard_uncertainty.value_or(unknown)};
     return calibration;
 }
 

@@ -12,9 +12,14 @@ namespace {
 class ConventionalMap {
 public:
     ConventionalMap(const std::vector<Visit>& visits, const Plan& plan, const std::vector<bool>& usable)
-        : visits_(visits), volume_(plan.volume()), layout_{plan.steps() + 1}, systems_(make_length_systems(visits, collect_steps(visits, plan), plan, usable)) {}
+        : visits_(visits),
+          volume_(plan.volume()),
+          layout_{plan.steps() + 1},
+          systems_(make_length_systems(visits, collect_steps(visits, plan), plan, usable)) {}
 
-    bool is_determined(FunctionId id) const { return !id.is_rotation() && systems_[index(id.axis)].determined[static_cast<int>(id.component)]; }
+    bool is_determined(FunctionId id) const {
+        return !id.is_rotation() && systems_[index(id.axis)].determined[static_cast<int>(id.component)];
+    }
     bool is_slope_determined(FunctionId) const { return true; }
     bool is_determined(Squareness s) const {
         const auto [axis, component, sign] = squareness_term(s);
@@ -28,15 +33,16 @@ public:
         for (std::size_t i = 0; i < lengths.size(); ++i) lengths[i] = readings.values[values_per_reading * i];
         std::vector<Row<Width>> out(layout_.size(), Row<Width>::Zero());
         Row<Width> slope[3][3];  // of component c over axis a
-        for (int a = 0; a < 3; ++a)
+        for (const Axis axis : all_axes) {
+            const int a = index(axis);
+            const auto functions = functions_of<Width>(out, layout_, axis, Component::X);
+            add_up_steps<Width>(systems_[a], lengths, visits_, readings.only_visit, functions);
             for (int c = 0; c < 3; ++c) {
-                Row<Width>* function = &out[layout_.row(FunctionId{Axis(a), Component(c)}.index(), 0)];
-                add_up_steps<Width>(systems_[a], c, lengths, visits_, function);
-                slope[a][c] = function[layout_.nodes - 1] / volume_[a];
-                if (a == c) continue;  // positioning keeps its slope
-                const Row<Width> end = function[layout_.nodes - 1];
-                for (int k = 0; k < layout_.nodes; ++k) function[k] -= double(k) / (layout_.nodes - 1) * end;
+                const Row<Width> end = functions[c][layout_.nodes - 1];
+                slope[a][c] = end / volume_[a];
+                if (c != a) take_off_trend<Width>(functions[c], layout_.nodes, end);  // positioning keeps its slope
             }
+        }
         // A squareness is the angle between two axes: what their two straightness slopes have together.
         for (const Squareness s : all_squarenesses) {
             const auto [axis, component, sign] = squareness_term(s);
@@ -54,19 +60,28 @@ private:
 
 }  // namespace
 
-Calibration evaluate_conventional(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool, const HeadCalibration& head, const EvaluationOptions& options) {
+Calibration evaluate_conventional(const Measurement& measurement, const Plan& plan, const Chain& chain,
+                                  const Eigen::Vector3d& tool, const HeadCalibration& head,
+                                  const EvaluationOptions& options) {
     const auto visits = collect_visits(measurement, plan, head, options.uncertainty, LengthKind::distance);
     std::vector<bool> usable;
     for (const Visit& visit : visits) usable.push_back(visit.line.is_body_diagonal());
     const auto diagonals = std::count(usable.begin(), usable.end(), true);
-    if (diagonals < 3) throw InvalidArgument("conventional evaluation: expected three or four body diagonals, the measurement has " + std::to_string(diagonals));
+    if (diagonals < 3)
+        throw InvalidArgument("conventional evaluation: expected three or four body diagonals, the measurement has " +
+                              std::to_string(diagonals));
 
     const ConventionalMap map(visits, plan, usable);
     Calibration calibration{"conventional", chain, plan.volume(), tool, {}, {}, {}, {}};
     evaluate_linear(map, visits, plan, options.full_covariance, calibration);
     for (const Axis axis : all_axes)
         if (!map.gap(axis).empty())
-            calibration.undetermined.push_back(std::string("translations of ") + letter(axis) + ": " + map.gap(axis) + "; three body diagonals of different direction are needed at every step");
+            calibration.undetermined.push_back(
+                std::string("translations of ") + letter(axis) + ": " + map.gap(axis) +
+                "; three body diagonals of different direction are needed at every step");
+    if (!is_anything_determined(calibration))
+        throw InvalidArgument("conventional evaluation: nothing can be determined. " +
+                              calibration.undetermined.front());
     calibration.undetermined.push_back("rotations: the conventional evaluation uses distances only");
     return calibration;
 }

@@ -1,11 +1,10 @@
 #include "stepdiag/evaluation/enhanced.hpp"
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cmath>
 
-#include "evaluation/slope_system.hpp"
 #include "evaluation/linear_evaluation.hpp"
+#include "evaluation/slope_system.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/machine/machine.hpp"
 
@@ -15,7 +14,9 @@ namespace {
 class EnhancedMap {
 public:
     EnhancedMap(const std::vector<Visit>& visits, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool)
-        : visits_(visits), layout_{plan.steps() + 1}, angles_(make_angle_systems(visits, collect_steps(visits, plan), plan)) {
+        : visits_(visits),
+          layout_{plan.steps() + 1},
+          angles_(make_angle_systems(visits, collect_steps(visits, plan), plan)) {
         find_angular_contributions(chain, tool, plan);
         lengths_ = make_length_systems(visits, collect_steps(visits, plan), plan, usable_);
         slopes_ = make_slope_system(visits, plan, lengths_, usable_);
@@ -26,7 +27,8 @@ public:
 
     bool is_determined(FunctionId id) const {
         const int component = static_cast<int>(id.component);
-        return id.is_rotation() ? angles_[index(id.axis)].determined[component - 3] : lengths_[index(id.axis)].determined[component];
+        return id.is_rotation() ? angles_[index(id.axis)].determined[component - 3]
+                                : lengths_[index(id.axis)].determined[component];
     }
     bool is_slope_determined(FunctionId id) const { return !id.is_positioning() || slopes_.determines_scale(id.axis); }
     bool is_determined(Squareness s) const { return slopes_.determines(s); }
@@ -49,8 +51,8 @@ private:
         double coefficient;
     };
 
-    // n . (theta_a x L_a) = theta_a . (L_a x n), for every reading. A visit whose lengths hang on rotations that nobody knows is
-    // not usable.
+    // n . (theta_a x L_a) = theta_a . (L_a x n), for every reading. A visit whose lengths hang on rotations that nobody
+    // knows is not usable.
     void find_angular_contributions(const Chain& chain, const Eigen::Vector3d& tool, const Plan& plan) {
         const double negligible = 1e-12 * (plan.volume().norm() + tool.norm());
         for (const Visit& visit : visits_) {
@@ -59,11 +61,13 @@ private:
                 contributions_.emplace_back();
                 for (const Axis axis : all_axes) {
                     const int node = point.plan.node[index(axis)];
-                    const Eigen::Vector3d lever = angular_lever(chain, tool, axis, point.plan.commanded).cross(visit.direction());
+                    const Eigen::Vector3d lever =
+                        angular_lever(chain, tool, axis, point.plan.commanded).cross(visit.direction());
                     for (int c = 0; node > 0 && c < 3; ++c) {
                         if (std::abs(lever[c]) <= negligible) continue;
                         usable = usable && angles_[index(axis)].determined[c];
-                        contributions_.back().push_back({layout_.row(FunctionId{axis, Component(c + 3)}.index(), node), lever[c]});
+                        contributions_.back().push_back(
+                            {layout_.row(FunctionId{axis, Component(c + 3)}.index(), node), lever[c]});
                     }
                 }
             }
@@ -74,26 +78,29 @@ private:
     template <int Width>
     void solve_angles(const ReadingRows<Width>& readings, std::vector<Row<Width>>& out) const {
         for (const Axis axis : all_axes) {
-            Row<Width>* theta[3];
-            for (int c = 0; c < 3; ++c) theta[c] = &out[layout_.row(FunctionId{axis, Component(c + 3)}.index(), 0)];
+            const auto theta = functions_of<Width>(out, layout_, axis, Component::A);
             const auto& intervals = angles_[index(axis)].intervals;
             for (std::size_t i = 0; i < intervals.size(); ++i) {
                 for (int c = 0; c < 3; ++c) theta[c][i + 1] = theta[c][i];
                 for (std::size_t s = 0; s < intervals[i].steps.size(); ++s) {
                     const Step& step = intervals[i].steps[s];
                     if (readings.only_visit >= 0 && readings.only_visit != step.visit) continue;
-                    const Row<Width>* from = &readings.values[values_per_reading * (visits_[step.visit].first_reading + step.point)];
+                    const Row<Width>* from =
+                        &readings.values[values_per_reading * (visits_[step.visit].first_reading + step.point)];
                     const Row<Width>* to = from + values_per_reading;
                     const Row<Width> alpha = step.sign * (to[1] - from[1]), beta = step.sign * (to[2] - from[2]);
                     const auto& inverse = intervals[i].solution->pseudoinverse;
-                    for (int c = 0; c < 3; ++c) theta[c][i + 1] += inverse(c, Eigen::Index(2 * s)) * alpha + inverse(c, Eigen::Index(2 * s + 1)) * beta;
+                    for (int c = 0; c < 3; ++c)
+                        theta[c][i + 1] +=
+                            inverse(c, Eigen::Index(2 * s)) * alpha + inverse(c, Eigen::Index(2 * s + 1)) * beta;
                 }
             }
         }
     }
 
     template <int Width>
-    std::vector<Row<Width>> corrected_lengths(const ReadingRows<Width>& readings, const std::vector<Row<Width>>& theta) const {
+    std::vector<Row<Width>> corrected_lengths(const ReadingRows<Width>& readings,
+                                              const std::vector<Row<Width>>& theta) const {
         std::vector<Row<Width>> lengths(contributions_.size());
         for (std::size_t i = 0; i < lengths.size(); ++i) {
             lengths[i] = readings.values[values_per_reading * i];
@@ -105,17 +112,17 @@ private:
 
     // Shapes from the steps, slopes from the slope system; straightness ends at 0 by the choice of frame.
     template <int Width>
-    void solve_lengths(const std::vector<Row<Width>>& lengths, const std::vector<Row<Width>>& slopes, std::vector<Row<Width>>& out) const {
-        for (const Axis axis : all_axes)
+    void solve_lengths(const std::vector<Row<Width>>& lengths, const std::vector<Row<Width>>& slopes,
+                       std::vector<Row<Width>>& out) const {
+        for (const Axis axis : all_axes) {
+            const auto functions = functions_of<Width>(out, layout_, axis, Component::X);
+            add_up_steps<Width>(lengths_[index(axis)], lengths, visits_, -1, functions);
             for (int c = 0; c < 3; ++c) {
-                const FunctionId id{axis, Component(c)};
-                if (!is_determined(id)) continue;
-                Row<Width>* function = &out[layout_.row(id.index(), 0)];
-                add_up_steps<Width>(lengths_[index(axis)], c, lengths, visits_, function);
-                Row<Width> trend = function[layout_.nodes - 1];
-                if (id.is_positioning() && slopes_.determines_scale(axis)) trend -= slopes[SlopeSystem::scale(axis)];
-                for (int k = 0; k < layout_.nodes; ++k) function[k] -= double(k) / (layout_.nodes - 1) * trend;
+                Row<Width> trend = functions[c][layout_.nodes - 1];
+                if (c == index(axis) && slopes_.determines_scale(axis)) trend -= slopes[SlopeSystem::scale(axis)];
+                take_off_trend<Width>(functions[c], layout_.nodes, trend);
             }
+        }
         for (const Squareness s : all_squarenesses) out[layout_.row(s)] = slopes[SlopeSystem::squareness(s)];
     }
 
@@ -131,7 +138,8 @@ private:
 std::string names(Axis axis, int first_component, const std::array<bool, 3>& determined) {
     std::string text;
     for (int c = 0; c < 3; ++c)
-        if (!determined[c]) text += (text.empty() ? "" : ", ") + FunctionId{axis, Component(first_component + c)}.name();
+        if (!determined[c])
+            text += (text.empty() ? "" : ", ") + FunctionId{axis, Component(first_component + c)}.name();
     return text;
 }
 
@@ -139,30 +147,36 @@ std::vector<std::string> explain(const EnhancedMap& map) {
     std::vector<std::string> sentences;
     for (const Axis axis : all_axes) {
         if (!map.angles(axis).gap.empty())
-            sentences.push_back(names(axis, 3, map.angles(axis).determined) + ": " + map.angles(axis).gap + " with tilts; two lines of different direction are needed at every step");
+            sentences.push_back(names(axis, 3, map.angles(axis).determined) + ": " + map.angles(axis).gap +
+                                " with tilts; two lines of different direction are needed at every step");
         if (!map.lengths(axis).gap.empty())
-            sentences.push_back(names(axis, 0, map.lengths(axis).determined) + ": " + map.lengths(axis).gap + " with distance, tilts and known angles; three lines of different direction are needed at every step");
+            sentences.push_back(
+                names(axis, 0, map.lengths(axis).determined) + ": " + map.lengths(axis).gap +
+                " with distance, tilts and known angles; three lines of different direction are needed at every step");
     }
     for (const Axis axis : all_axes) {
         const FunctionId id{axis, Component(index(axis))};
         if (!map.is_slope_determined(id))
-            sentences.push_back("slope of " + id.name() + " (scale of " + letter(axis) + "): add the scale line " + std::array<const char*, 3>{"p00", "0p0", "00p"}[index(axis)]);
+            sentences.push_back("slope of " + id.name() + " (scale of " + letter(axis) + "): add the scale line " +
+                                std::array<const char*, 3>{"p00", "0p0", "00p"}[index(axis)]);
     }
     for (const Squareness s : all_squarenesses)
-        if (!map.is_determined(s)) sentences.push_back(name(s) + ": add body diagonals, or the two face diagonals of its plane");
+        if (!map.is_determined(s))
+            sentences.push_back(name(s) + ": add body diagonals, or the two face diagonals of its plane");
     return sentences;
 }
 
 }  // namespace
 
-Calibration evaluate_enhanced(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool, const HeadCalibration& head, const EvaluationOptions& options) {
+Calibration evaluate_enhanced(const Measurement& measurement, const Plan& plan, const Chain& chain,
+                              const Eigen::Vector3d& tool, const HeadCalibration& head,
+                              const EvaluationOptions& options) {
     if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
     const auto visits = collect_visits(measurement, plan, head, options.uncertainty, LengthKind::lever_arm_corrected);
     const EnhancedMap map(visits, plan, chain, tool);
     Calibration calibration{"enhanced", chain, plan.volume(), tool, {}, {}, explain(map), {}};
     evaluate_linear(map, visits, plan, options.full_covariance, calibration);
-    const auto known = [](const auto& parameter) { return parameter.has_value(); };
-    if (std::none_of(calibration.functions.begin(), calibration.functions.end(), known) && std::none_of(calibration.squarenesses.begin(), calibration.squarenesses.end(), known))
+    if (!is_anything_determined(calibration))
         throw InvalidArgument("enhanced evaluation: nothing can be determined. " + calibration.undetermined.front());
     return calibration;
 }

@@ -1,8 +1,9 @@
 // From a linear map of readings to parameters: values, standard uncertainties, covariance. Internal.
 //
-// A map applies itself to "rows": each reading's length, alpha and beta is a row of numbers, one for each of several sets of
-// readings evaluated at once. One set gives the values. A set that holds the effect of one raw channel alone gives that channel's
-// share of every parameter, and the shares make eq. 6: Cov(x) = sum over raw channels of share share^T.
+// A map applies itself to "rows": each reading's length, alpha and beta is a row of numbers, one for each of several
+// sets of readings evaluated at once. One set gives the values. A set that holds the effect of one raw channel alone
+// gives that channel's share of every parameter, and the shares make eq. 6: Cov(x) = sum over raw channels of share
+// share^T.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,8 +18,8 @@ using Row = Eigen::Array<double, Width, 1>;
 
 constexpr int values_per_reading = 3;  // length, alpha, beta
 
-// What a map is applied to: `width` sets of readings. Where only one visit's readings differ from zero, or no tilt does, a
-// map may skip the rest.
+// What a map is applied to: `width` sets of readings. Where only one visit's readings differ from zero, or no tilt
+// does, a map may skip the rest.
 template <int Width>
 struct ReadingRows {
     std::vector<Row<Width>> values;  // values_per_reading a reading
@@ -33,6 +34,22 @@ struct ParameterLayout {
     int row(Squareness squareness) const { return function_count * nodes + static_cast<int>(squareness); }
     int size() const { return function_count * nodes + squareness_count; }
 };
+
+// Where the three translations / rotations of an axis begin in the parameters.
+template <int Width>
+std::array<Row<Width>*, 3> functions_of(std::vector<Row<Width>>& parameters, const ParameterLayout& layout, Axis axis,
+                                        Component first) {
+    const auto begin = [&](int c) {
+        return &parameters[layout.row(FunctionId{axis, Component(static_cast<int>(first) + c)}.index(), 0)];
+    };
+    return {begin(0), begin(1), begin(2)};
+}
+
+// Takes a straight line off a function: 0 at home, `end` at the last node.
+template <int Width>
+void take_off_trend(Row<Width>* function, int nodes, const Row<Width>& end) {
+    for (int k = 1; k < nodes; ++k) function[k] -= double(k) / (nodes - 1) * end;
+}
 
 inline std::vector<Row<1>> readings_of(const std::vector<Visit>& visits) {
     std::vector<Row<1>> values;
@@ -72,19 +89,23 @@ void for_each_share(const Map& map, const std::vector<Visit>& visits, Take&& tak
         readings.only_visit = shares[begin].visit;
         readings.has_tilts = false;
         for (; end < shares.size() && end - begin < Width && shares[end].visit == readings.only_visit; ++end) {
-            for (int c = 0; c < values_per_reading; ++c) readings.values[values_per_reading * shares[end].reading + c][end - begin] = shares[end].effect[c];
-            readings.has_tilts = readings.has_tilts || shares[end].effect.template tail<2>().cwiseAbs().maxCoeff() > 0.0;
+            for (int c = 0; c < values_per_reading; ++c)
+                readings.values[values_per_reading * shares[end].reading + c][end - begin] = shares[end].effect[c];
+            readings.has_tilts =
+                readings.has_tilts || shares[end].effect.template tail<2>().cwiseAbs().maxCoeff() > 0.0;
         }
         take(map.template apply<Width>(readings), int(end - begin));
         for (std::size_t s = begin; s < end; ++s)
-            for (int c = 0; c < values_per_reading; ++c) readings.values[values_per_reading * shares[s].reading + c].setZero();
+            for (int c = 0; c < values_per_reading; ++c)
+                readings.values[values_per_reading * shares[s].reading + c].setZero();
         begin = end;
     }
 }
 
 // Fills functions, squarenesses and covariance of the calibration with what `map.is_determined` names.
 template <class Map>
-void evaluate_linear(const Map& map, const std::vector<Visit>& visits, const Plan& plan, bool full_covariance, Calibration& calibration) {
+void evaluate_linear(const Map& map, const std::vector<Visit>& visits, const Plan& plan, bool full_covariance,
+                     Calibration& calibration) {
     constexpr int width = 16;
     const ParameterLayout layout{plan.steps() + 1};
     std::vector<int> rows;  // of the parameters that are determined
@@ -101,7 +122,8 @@ void evaluate_linear(const Map& map, const std::vector<Visit>& visits, const Pla
         for (std::size_t i = 0; i < block.size(); ++i) variance[i] += block[i].square();
         if (!full_covariance) return;
         Eigen::MatrixXd shares(rows.size(), columns);
-        for (std::size_t i = 0; i < rows.size(); ++i) shares.row(Eigen::Index(i)) = block[rows[i]].head(columns).transpose();
+        for (std::size_t i = 0; i < rows.size(); ++i)
+            shares.row(Eigen::Index(i)) = block[rows[i]].head(columns).transpose();
         covariance.selfadjointView<Eigen::Lower>().rankUpdate(shares);
     });
     if (full_covariance) calibration.covariance = covariance.selfadjointView<Eigen::Lower>();
@@ -117,20 +139,27 @@ void evaluate_linear(const Map& map, const std::vector<Visit>& visits, const Pla
         calibration.functions[i] = std::move(function);
     }
     for (const Squareness s : all_squarenesses)
-        if (map.is_determined(s)) calibration.squarenesses[static_cast<int>(s)] = CalibratedSquareness{values[layout.row(s)][0], std::sqrt(variance[layout.row(s)].sum())};
+        if (map.is_determined(s))
+            calibration.squarenesses[static_cast<int>(s)] =
+                CalibratedSquareness{values[layout.row(s)][0], std::sqrt(variance[layout.row(s)].sum())};
 }
 
-// Sums the solved steps of one axis and component from home: out[0] = 0 ... out[intervals].
+// Sums the solved steps of one axis from home: component c goes to out[c][0] = 0 ... out[c][intervals]. With
+// `only_visit` the lengths of all other visits are known to be 0.
 template <int Width>
-void add_up_steps(const AxisSystem& system, int component, const std::vector<Row<Width>>& lengths, const std::vector<Visit>& visits, Row<Width>* out) {
-    out[0].setZero();
+void add_up_steps(const AxisSystem& system, const std::vector<Row<Width>>& lengths, const std::vector<Visit>& visits,
+                  int only_visit, const std::array<Row<Width>*, 3>& out) {
+    for (Row<Width>* component : out) component[0].setZero();
     for (std::size_t i = 0; i < system.intervals.size(); ++i) {
         const StepSystem& interval = system.intervals[i];
-        out[i + 1] = out[i];
+        for (Row<Width>* component : out) component[i + 1] = component[i];
         for (std::size_t r = 0; r < interval.steps.size(); ++r) {
             const Step& step = interval.steps[r];
+            if (only_visit >= 0 && only_visit != step.visit) continue;
             const Row<Width>* reading = &lengths[visits[step.visit].first_reading + step.point];
-            out[i + 1] += interval.solution->pseudoinverse(component, Eigen::Index(r)) * step.sign * (reading[1] - reading[0]);
+            const Row<Width> increment = reading[1] - reading[0];
+            for (int c = 0; c < 3; ++c)
+                out[c][i + 1] += step.sign * interval.solution->pseudoinverse(c, Eigen::Index(r)) * increment;
         }
     }
 }

@@ -16,13 +16,14 @@ void add_step(Sum& sum, const std::vector<Visit>& visits, const Step& step, doub
     sum[from + 1] += factor * step.sign;
 }
 
-// The sum of the increments of one line over the travel of one axis, counted in the axis' direction; empty where it cannot
-// be completed.
+// The sum of the increments of one line over the travel of one axis, counted in the axis' direction; empty where it
+// cannot be completed.
 Sum sum_over_travel(const std::vector<Visit>& visits, int visit, const AxisSystem& axis) {
     Sum sum;
     const Eigen::RowVector3d direction = visits[visit].direction().transpose();
     for (const StepSystem& interval : axis.intervals) {
-        const auto own = std::find_if(interval.steps.begin(), interval.steps.end(), [&](const Step& step) { return step.visit == visit; });
+        const auto own = std::find_if(interval.steps.begin(), interval.steps.end(),
+                                      [&](const Step& step) { return step.visit == visit; });
         if (own != interval.steps.end()) {
             add_step(sum, visits, *own, 1.0);
             continue;
@@ -40,14 +41,16 @@ Sum sum_over_travel(const std::vector<Visit>& visits, int visit, const AxisSyste
 
 Sum sum_of_scale_line(const Visit& visit) {
     if (!visit.points.front().has_length || !visit.points.back().has_length) return {};
-    const auto moved = std::find_if(all_axes.begin(), all_axes.end(), [&](Axis axis) { return visit.line.moves(axis); });
+    const auto moved =
+        std::find_if(all_axes.begin(), all_axes.end(), [&](Axis axis) { return visit.line.moves(axis); });
     const double sign = visit.line.sign(*moved);
     return {{visit.first_reading, -sign}, {visit.first_reading + int(visit.points.size()) - 1, sign}};
 }
 
 }  // namespace
 
-SlopeSystem make_slope_system(const std::vector<Visit>& visits, const Plan& plan, const AxisSystems& lengths, const std::vector<bool>& usable) {
+SlopeSystem make_slope_system(const std::vector<Visit>& visits, const Plan& plan, const AxisSystems& lengths,
+                              const std::vector<bool>& usable) {
     std::vector<const Visit*> visit_of_reading;
     std::vector<double> variance_of_reading;
     for (const Visit& visit : visits)
@@ -63,14 +66,17 @@ SlopeSystem make_slope_system(const std::vector<Visit>& visits, const Plan& plan
     for (std::size_t v = 0; v < visits.size(); ++v)
         for (const Axis axis : all_axes) {
             if (!usable[v] || !visits[v].line.moves(axis)) continue;
-            const Sum sum = visits[v].is_scale_line ? sum_of_scale_line(visits[v]) : sum_over_travel(visits, int(v), lengths[index(axis)]);
+            const Sum sum = visits[v].is_scale_line ? sum_of_scale_line(visits[v])
+                                                    : sum_over_travel(visits, int(v), lengths[index(axis)]);
             if (sum.empty()) continue;
             Eigen::RowVectorXd equation = Eigen::RowVectorXd::Zero(unknowns);
             const Eigen::Vector3d direction = visits[v].direction();
             equation[SlopeSystem::scale(axis)] = direction[index(axis)];
             for (const Squareness s : all_squarenesses) {
                 const SquarenessTerm term = squareness_term(s);
-                if (term.axis == axis) equation[SlopeSystem::squareness(s)] = term.sign * direction[term.component] * plan.volume()[index(axis)];
+                if (term.axis == axis)
+                    equation[SlopeSystem::squareness(s)] =
+                        term.sign * direction[term.component] * plan.volume()[index(axis)];
             }
             double variance = 0.0;
             system.sums_.emplace_back();
@@ -92,7 +98,8 @@ SlopeSystem make_slope_system(const std::vector<Visit>& visits, const Plan& plan
 
     Eigen::MatrixXd matrix(equations.size(), unknowns);
     for (std::size_t i = 0; i < equations.size(); ++i) matrix.row(Eigen::Index(i)) = equations[i];
-    const LeastSquares solution = solve_least_squares(matrix, Eigen::Map<const Eigen::VectorXd>(uncertainty.data(), Eigen::Index(uncertainty.size())));
+    const LeastSquares solution = solve_least_squares(
+        matrix, Eigen::Map<const Eigen::VectorXd>(uncertainty.data(), Eigen::Index(uncertainty.size())));
     system.inverse_ = solution.pseudoinverse;
     system.determined_ = solution.determined;
     return system;

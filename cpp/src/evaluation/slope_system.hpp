@@ -1,8 +1,9 @@
-// The linear trends of a run: what the sums of length increments over an axis' travel say of scales, squarenesses and laser
-// angles. To first order the length of line d at a point with lateral travel (x, y) and axis positions p changes by
+// The linear trends of a run: what the sums of length increments over an axis' travel say of scales, squarenesses and
+// laser angles. To first order the length of line d at a point with lateral travel (x, y) and axis positions p changes
+// by
 //   n_d . sum_a delta_a(p_a)  -  a_d y + b_d x,      (a_d, b_d) the line's laser angles,
-// with delta_X(end) = (EXX, 0, 0), delta_Y(end) = (-C0Y Y, EYY, 0), delta_Z(end) = (B0Z Z, -A0Z Z, EZZ): the three slopes that
-// are 0 are the choice of frame. One equation for each line and axis, one for each scale line. Internal.
+// with delta_X(end) = (EXX, 0, 0), delta_Y(end) = (-C0Y Y, EYY, 0), delta_Z(end) = (B0Z Z, -A0Z Z, EZZ): the three
+// slopes that are 0 are the choice of frame. One equation for each line and axis, one for each scale line. Internal.
 #pragma once
 
 #include <vector>
@@ -14,8 +15,8 @@ namespace stepdiag {
 class SlopeSystem {
 public:
     static constexpr int first_laser_angle = 6;
-    static int scale(Axis axis) { return index(axis); }                            // EXX(X), EYY(Y), EZZ(Z)
-    static int squareness(Squareness s) { return 3 + static_cast<int>(s); }        // C0Y, B0Z, A0Z
+    static int scale(Axis axis) { return index(axis); }                      // EXX(X), EYY(Y), EZZ(Z)
+    static int squareness(Squareness s) { return 3 + static_cast<int>(s); }  // C0Y, B0Z, A0Z
     static int laser_angle(int visit, int which) { return first_laser_angle + 2 * visit + which; }
 
     bool determines_scale(Axis axis) const { return determined_[scale(axis)]; }
@@ -33,16 +34,19 @@ public:
     }
 
     template <int Width>
-    void correct_for_laser_angles(const std::vector<Row<Width>>& slopes, const std::vector<Visit>& visits, std::vector<Row<Width>>& lengths) const {
+    void correct_for_laser_angles(const std::vector<Row<Width>>& slopes, const std::vector<Visit>& visits,
+                                  std::vector<Row<Width>>& lengths) const {
         for (std::size_t v = 0; v < visits.size(); ++v)
             for (std::size_t k = 0; k < visits[v].points.size(); ++k) {
                 const Eigen::Vector2d lateral = visits[v].points[k].lateral;
-                lengths[visits[v].first_reading + k] += lateral.y() * slopes[laser_angle(int(v), 0)] - lateral.x() * slopes[laser_angle(int(v), 1)];
+                lengths[visits[v].first_reading + k] +=
+                    lateral.y() * slopes[laser_angle(int(v), 0)] - lateral.x() * slopes[laser_angle(int(v), 1)];
             }
     }
 
 private:
-    friend SlopeSystem make_slope_system(const std::vector<Visit>&, const Plan&, const AxisSystems&, const std::vector<bool>&);
+    friend SlopeSystem make_slope_system(const std::vector<Visit>&, const Plan&, const AxisSystems&,
+                                         const std::vector<bool>&);
 
     struct Term {
         int reading;
@@ -53,7 +57,9 @@ private:
     std::vector<bool> determined_;
 };
 
-// A step that a line has lost is taken from the other lines' solution of it; a sum that cannot be completed makes no equation.
-SlopeSystem make_slope_system(const std::vector<Visit>& visits, const Plan& plan, const AxisSystems& lengths, const std::vector<bool>& usable);
+// A step that a line has lost is taken from the other lines' solution of it; a sum that cannot be completed makes no
+// equation.
+SlopeSystem make_slope_system(const std::vector<Visit>& visits, const Plan& plan, const AxisSystems& lengths,
+                              const std::vector<bool>& usable);
 
 }  // namespace stepdiag

@@ -11,7 +11,8 @@
 
 namespace stepdiag {
 
-// One interval of one axis: the steps that were read at both ends, and the pseudoinverse that makes three components of them.
+// One interval of one axis: the steps that were read at both ends, and the pseudoinverse that makes three components of
+// them.
 struct StepSystem {
     std::vector<Step> steps;
     std::shared_ptr<const LeastSquares> solution;  // 3 unknowns; one equation a step (length) or two (alpha, beta)
@@ -26,9 +27,11 @@ struct AxisSystem {
 using AxisSystems = std::array<AxisSystem, 3>;
 
 // Angles: increments of (alpha, beta) are the first two rows of machine_R_line^T times the increment of theta.
-AxisSystems make_angle_systems(const std::vector<Visit>& visits, const std::array<AxisSteps, 3>& steps, const Plan& plan);
+AxisSystems make_angle_systems(const std::vector<Visit>& visits, const std::array<AxisSteps, 3>& steps,
+                               const Plan& plan);
 
 // Lengths: increments are the line's direction times the increment of delta. Visits that are not `usable` are left out.
-AxisSystems make_length_systems(const std::vector<Visit>& visits, const std::array<AxisSteps, 3>& steps, const Plan& plan, const std::vector<bool>& usable);
+AxisSystems make_length_systems(const std::vector<Visit>& visits, const std::array<AxisSteps, 3>& steps,
+                                const Plan& plan, const std::vector<bool>& usable);
 
 }  // namespace stepdiag

@@ -13,7 +13,8 @@ constexpr double position_tolerance = 1e-3;  // mm: positions are written with t
 
 std::string row_name(const Measurement& measurement, std::size_t row) {
     const Station& station = measurement.stations()[row];
-    return "measurement row " + std::to_string(row + 1) + " (run " + std::to_string(station.run) + ", line " + station.line.name() + ", point " + std::to_string(station.point) + ")";
+    return "measurement row " + std::to_string(row + 1) + " (run " + std::to_string(station.run) + ", line " +
+           station.line.name() + ", point " + std::to_string(station.point) + ")";
 }
 
 // One raw value with its standard uncertainty; none where it was lost.
@@ -38,7 +39,8 @@ struct Reduced {
     void take(const ReducedReading& reduced, const std::vector<double>& standard_uncertainty) {
         reading = reduced.reading;
         has_distance = has_tilt = true;
-        for (std::size_t c = 0; c < standard_uncertainty.size(); ++c) effects.push_back(standard_uncertainty[c] * reduced.jacobian.col(Eigen::Index(c)));
+        for (std::size_t c = 0; c < standard_uncertainty.size(); ++c)
+            effects.push_back(standard_uncertainty[c] * reduced.jacobian.col(Eigen::Index(c)));
     }
 };
 
@@ -46,19 +48,32 @@ struct Reduced {
 class Reducer {
 public:
     Reducer(const Measurement& measurement, const HeadCalibration& head, const ReadingUncertainty& uncertainty)
-        : measurement_(measurement), head_(head), uncertainty_(uncertainty), distance_(measurement.find("distance")), alpha_(measurement.find("alpha")),
-          beta_(measurement.find("beta")), spot_x_(measurement.find("spot_x")), spot_y_(measurement.find("spot_y")) {
+        : measurement_(measurement),
+          head_(head),
+          uncertainty_(uncertainty),
+          distance_(measurement.find("distance")),
+          alpha_(measurement.find("alpha")),
+          beta_(measurement.find("beta")),
+          spot_x_(measurement.find("spot_x")),
+          spot_y_(measurement.find("spot_y")) {
         const int beams = measurement.beam_count();
         if (beams > 0 && beams != int(head.beam_offsets.size()))
-            throw InvalidArgument("measurement: has " + std::to_string(beams) + " beams d1 ... d" + std::to_string(beams) + ", but the head's beam_offsets name " + std::to_string(head.beam_offsets.size()));
+            throw InvalidArgument("measurement: has " + std::to_string(beams) + " beams d1 ... d" +
+                                  std::to_string(beams) + ", but the head's beam_offsets name " +
+                                  std::to_string(head.beam_offsets.size()));
         for (int i = 1; i <= beams; ++i) beams_.push_back(measurement.find("d" + std::to_string(i)));
-        if (spot_x_ && !head.psd_distance) throw InvalidArgument("measurement: has spot readings, but the head has no psd_distance (layout \"psd\")");
+        if (spot_x_ && !head.psd_distance)
+            throw InvalidArgument("measurement: has spot readings, but the head has no psd_distance (layout \"psd\")");
     }
 
-    Reduced reduce(std::size_t row) const { return !beams_.empty() ? reduce_beam_row(row) : spot_x_ ? reduce_spot_row(row) : reduce_ideal_row(row); }
+    Reduced reduce(std::size_t row) const {
+        return !beams_.empty() ? reduce_beam_row(row) : spot_x_ ? reduce_spot_row(row) : reduce_ideal_row(row);
+    }
 
 private:
-    [[noreturn]] void refuse(std::size_t row, const std::string& what) const { throw InvalidArgument(row_name(measurement_, row) + ": " + what); }
+    [[noreturn]] void refuse(std::size_t row, const std::string& what) const {
+        throw InvalidArgument(row_name(measurement_, row) + ": " + what);
+    }
 
     Reduced reduce_ideal_row(std::size_t row) const {
         Reduced result;
@@ -94,7 +109,9 @@ private:
             return result;
         }
         const auto reduced = reduce_spot(distance->value, {x->value, y->value}, *head_.psd_distance);
-        if (!reduced) refuse(row, "no mirror gives this distance and spot with psd_distance " + std::to_string(*head_.psd_distance) + " mm");
+        if (!reduced)
+            refuse(row, "no mirror gives this distance and spot with psd_distance " +
+                            std::to_string(*head_.psd_distance) + " mm");
         result.take(*reduced, {distance->standard_uncertainty, x->standard_uncertainty, y->standard_uncertainty});
         return result;
     }
@@ -109,7 +126,8 @@ private:
                 offsets.push_back(head_.beam_offsets[i]);
             }
         Reduced result;
-        const auto reduced = reduce_beams(Eigen::Map<const Eigen::VectorXd>(distances.data(), Eigen::Index(distances.size())), offsets);
+        const auto reduced =
+            reduce_beams(Eigen::Map<const Eigen::VectorXd>(distances.data(), Eigen::Index(distances.size())), offsets);
         if (reduced) result.take(*reduced, standard_uncertainties);  // else too few beams are left: a lost reading
         return result;
     }
@@ -121,8 +139,9 @@ private:
     std::vector<const Channel*> beams_;
 };
 
-// Length and tilts of a point from the reduced reading. The length is linear in the parameters only after the product of tilt
-// and lever arm is taken off: L = q_z + beta q_x - alpha q_y with q the vector from beam origin to functional point.
+// Length and tilts of a point from the reduced reading. The length is linear in the parameters only after the product
+// of tilt and lever arm is taken off: L = q_z + beta q_x - alpha q_y with q the vector from beam origin to functional
+// point.
 void fill_point(VisitPoint& point, const Reduced& reduced, double travel, bool is_scale_line, LengthKind kind) {
     const Reading& reading = reduced.reading;
     point.has_tilt = reduced.has_tilt;
@@ -132,7 +151,8 @@ void fill_point(VisitPoint& point, const Reduced& reduced, double travel, bool i
     double length = reading.distance;
     if (kind == LengthKind::lever_arm_corrected) {
         length = reading.beam_length() - reading.beta * point.lateral.x() + reading.alpha * point.lateral.y();
-        by_reading << 1.0 - reading.tan2_phi(), -2.0 * reading.distance * reading.alpha + point.lateral.y(), -2.0 * reading.distance * reading.beta - point.lateral.x();
+        by_reading << 1.0 - reading.tan2_phi(), -2.0 * reading.distance * reading.alpha + point.lateral.y(),
+            -2.0 * reading.distance * reading.beta - point.lateral.x();
     }
     if (point.has_length) point.reading[0] = length - travel;
     if (point.has_tilt) point.reading.tail<2>() << reading.alpha, reading.beta;
@@ -146,7 +166,8 @@ void check_position(const Measurement& measurement, std::size_t row, const Eigen
     const Eigen::Vector3d& commanded = measurement.stations()[row].commanded;
     if ((commanded - expected).cwiseAbs().maxCoeff() <= position_tolerance) return;
     std::ostringstream text;
-    text << row_name(measurement, row) << ": the plan has this point at (" << expected.transpose() << ") mm, the row says (" << commanded.transpose() << ") mm";
+    text << row_name(measurement, row) << ": the plan has this point at (" << expected.transpose()
+         << ") mm, the row says (" << commanded.transpose() << ") mm";
     throw InvalidArgument(text.str());
 }
 
@@ -158,12 +179,15 @@ Eigen::Vector3d VisitPoint::variance() const {
     return variance;
 }
 
-std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& plan, const HeadCalibration& head, const ReadingUncertainty& uncertainty, LengthKind kind) {
+std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& plan, const HeadCalibration& head,
+                                  const ReadingUncertainty& uncertainty, LengthKind kind) {
     for (const double u : {uncertainty.distance, uncertainty.tilt, uncertainty.spot})
-        if (!(u > 0.0 && std::isfinite(u))) throw InvalidArgument("uncertainty: expected positive finite standard uncertainties");
+        if (!(u > 0.0 && std::isfinite(u)))
+            throw InvalidArgument("uncertainty: expected positive finite standard uncertainties");
     const Reducer reducer(measurement, head, uncertainty);
     std::map<std::pair<int, std::string>, std::vector<std::size_t>> rows;
-    for (std::size_t i = 0; i < measurement.size(); ++i) rows[{measurement.stations()[i].run, measurement.stations()[i].line.name()}].push_back(i);
+    for (std::size_t i = 0; i < measurement.size(); ++i)
+        rows[{measurement.stations()[i].run, measurement.stations()[i].line.name()}].push_back(i);
 
     std::vector<Visit> visits;
     int readings = 0;
@@ -182,7 +206,8 @@ std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& pl
         for (const std::size_t row : members) {
             const Station& station = measurement.stations()[row];
             if (station.point >= int(planned.size()))
-                throw InvalidArgument(row_name(measurement, row) + ": the line has the points 0 to " + std::to_string(planned.size() - 1));
+                throw InvalidArgument(row_name(measurement, row) + ": the line has the points 0 to " +
+                                      std::to_string(planned.size() - 1));
             check_position(measurement, row, planned[station.point].commanded);
             VisitPoint& point = visit.points[station.point];
             // Positions are the commanded ones: where they were rounded, the machine was sent to the rounded point.
@@ -204,7 +229,8 @@ std::array<AxisSteps, 3> collect_steps(const std::vector<Visit>& visits, const P
         for (std::size_t k = 0; k + 1 < visits[v].points.size(); ++k) {
             const PlanPoint &from = visits[v].points[k].plan, &to = visits[v].points[k + 1].plan;
             const int axis = index(*to.moved);
-            steps[axis][std::min(from.node[axis], to.node[axis])].push_back({int(v), int(k), to.node[axis] > from.node[axis] ? 1.0 : -1.0});
+            steps[axis][std::min(from.node[axis], to.node[axis])].push_back(
+                {int(v), int(k), to.node[axis] > from.node[axis] ? 1.0 : -1.0});
         }
     }
     return steps;

@@ -1,5 +1,5 @@
-// A run as the linear evaluations see it: each measured line is a visit to its points, each reading reduced to a length and two
-// tilts that the parameters enter linearly. Internal: not installed.
+// A run as the linear evaluations see it: each measured line is a visit to its points, each reading reduced to a length
+// and two tilts that the parameters enter linearly. Internal: not installed.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,7 +16,8 @@ using ChannelEffect = Eigen::Vector3d;
 
 struct VisitPoint {
     PlanPoint plan;
-    Eigen::Vector2d lateral = Eigen::Vector2d::Zero();  // commanded travel from the line's first point, in local x and y, mm
+    Eigen::Vector2d lateral =
+        Eigen::Vector2d::Zero();  // commanded travel from the line's first point, in local x and y, mm
     bool has_length = false;
     bool has_tilt = false;
     Eigen::Vector3d reading = Eigen::Vector3d::Zero();  // length less the commanded travel (mm), alpha, beta (rad)
@@ -40,9 +41,10 @@ enum class LengthKind {
     lever_arm_corrected,  // beam length L less commanded travel and lever arm times tilts; needs both tilts
 };
 
-// Throws InvalidArgument naming the row for a line or point that is not the plan's, a commanded position more than 1 um off
-// the plan's, channels that do not fit the head, or readings that no mirror gives.
-std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& plan, const HeadCalibration& head, const ReadingUncertainty& uncertainty, LengthKind kind);
+// Throws InvalidArgument naming the row for a line or point that is not the plan's, a commanded position more than 1 um
+// off the plan's, channels that do not fit the head, or readings that no mirror gives.
+std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& plan, const HeadCalibration& head,
+                                  const ReadingUncertainty& uncertainty, LengthKind kind);
 
 // A step of one axis over one of its intervals, as one visit made it; scale lines make none.
 struct Step {

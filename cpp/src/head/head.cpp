@@ -18,7 +18,9 @@ constexpr int reference_face = 1;
 
 }  // namespace
 
-std::string name(HeadLayout layout) { return layout == HeadLayout::ideal ? "ideal" : layout == HeadLayout::psd ? "psd" : "multi_beam"; }
+std::string name(HeadLayout layout) {
+    return layout == HeadLayout::ideal ? "ideal" : layout == HeadLayout::psd ? "psd" : "multi_beam";
+}
 
 HeadLayout parse_head_layout(std::string_view text) {
     for (const HeadLayout layout : {HeadLayout::ideal, HeadLayout::psd, HeadLayout::multi_beam})
@@ -29,7 +31,8 @@ HeadLayout parse_head_layout(std::string_view text) {
 void check_head(const Head& head) {
     const auto require_length = [](double length, const char* key, double lowest) {
         if (!(std::isfinite(length) && length > lowest))
-            throw InvalidArgument(std::string("head ") + key + ": expected a finite value above " + (lowest == 0.0 ? "0" : "minus the standoff"));
+            throw InvalidArgument(std::string("head ") + key + ": expected a finite value above " +
+                                  (lowest == 0.0 ? "0" : "minus the standoff"));
     };
     require_length(head.standoff, "standoff", 0.0);
     require_length(head.wavelength, "wavelength", 0.0);
@@ -40,28 +43,37 @@ void check_head(const Head& head) {
     if (head.layout == HeadLayout::multi_beam) {
         for (const auto& offset : head.beam_offsets)
             if (!offset.allFinite()) throw InvalidArgument("head beam_offsets: expected finite pairs in mm");
-        if (!reduce_beams(Eigen::VectorXd::Constant(Eigen::Index(head.beam_offsets.size()), head.standoff), head.beam_offsets))
-            throw InvalidArgument("head beam_offsets: expected three or more beams that are not on one line, got " + std::to_string(head.beam_offsets.size()) + " beam(s)");
+        if (!reduce_beams(Eigen::VectorXd::Constant(Eigen::Index(head.beam_offsets.size()), head.standoff),
+                          head.beam_offsets))
+            throw InvalidArgument("head beam_offsets: expected three or more beams that are not on one line, got " +
+                                  std::to_string(head.beam_offsets.size()) + " beam(s)");
     }
 }
 
-HeadSetup set_up(const Head& head, const Eigen::Matrix3d& machine_R_line, const Eigen::Vector3d& first_point, const Eigen::Vector2d& mirror, const Misalignment& misalignment) {
-    return {first_point - head.standoff * machine_R_line.col(2), turned(machine_R_line, misalignment.laser), turned(machine_R_line, misalignment.reflector), mirror, misalignment.psd_zero};
+HeadSetup set_up(const Head& head, const Eigen::Matrix3d& machine_R_line, const Eigen::Vector3d& first_point,
+                 const Eigen::Vector2d& mirror, const Misalignment& misalignment) {
+    return {first_point - head.standoff * machine_R_line.col(2), turned(machine_R_line, misalignment.laser),
+            turned(machine_R_line, misalignment.reflector), mirror, misalignment.psd_zero};
 }
 
-std::optional<Reading> trace_reading(const Head& head, const HeadSetup& setup, const Eigen::Vector3d& functional_point, const Eigen::Matrix3d& machine_R_tool, const Medium& ambient) {
+std::optional<Reading> trace_reading(const Head& head, const HeadSetup& setup, const Eigen::Vector3d& functional_point,
+                                     const Eigen::Matrix3d& machine_R_tool, const Medium& ambient) {
     const Eigen::Vector2d aperture = Eigen::Vector2d::Constant(head.aperture);
-    const Scene scene({make_rectangle(functional_point, machine_R_tool * setup.tool_R_mirror, setup.mirror, Surface::reflecting),
-                       make_rectangle(setup.origin, setup.machine_R_sensor, aperture, Surface::absorbing)});
+    const Scene scene(
+        {make_rectangle(functional_point, machine_R_tool * setup.tool_R_mirror, setup.mirror, Surface::reflecting),
+         make_rectangle(setup.origin, setup.machine_R_sensor, aperture, Surface::absorbing)});
     const Path path = trace(scene, ambient, {setup.origin, setup.machine_R_sensor.col(2)});
-    if (path.end != PathEnd::absorbed || path.hits.size() != 2 || path.hits[0].face != mirror_face || path.hits[1].face != reference_face)
+    if (path.end != PathEnd::absorbed || path.hits.size() != 2 || path.hits[0].face != mirror_face ||
+        path.hits[1].face != reference_face)
         return std::nullopt;
     // The normal bisects the two directions: n ~ z - r, so that beta = n_x/n_z and alpha = -n_y/n_z.
     const Eigen::Vector3d back = setup.machine_R_sensor.transpose() * path.direction;
-    return Reading{path.optical_length / (2.0 * ambient.index), back.y() / (1.0 - back.z()), -back.x() / (1.0 - back.z())};
+    return Reading{path.optical_length / (2.0 * ambient.index), back.y() / (1.0 - back.z()),
+                   -back.x() / (1.0 - back.z())};
 }
 
-std::optional<Reading> define_reading(const HeadSetup& setup, const Eigen::Vector3d& functional_point, const Eigen::Matrix3d& machine_R_tool) {
+std::optional<Reading> define_reading(const HeadSetup& setup, const Eigen::Vector3d& functional_point,
+                                      const Eigen::Matrix3d& machine_R_tool) {
     const Eigen::Matrix3d sensor_R_machine = setup.machine_R_sensor.transpose();
     const Eigen::Vector3d normal = machine_R_tool * setup.tool_R_mirror.col(2);
     return read_mirror(sensor_R_machine * (functional_point - setup.origin), sensor_R_machine * normal);

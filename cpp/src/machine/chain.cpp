@@ -10,7 +10,8 @@ namespace stepdiag {
 namespace {
 
 [[noreturn]] void refuse(std::string_view text, const std::string& why) {
-    throw InvalidArgument("chain \"" + std::string(text) + "\": " + why + "; expected the links w, X, Y, Z, b, t in a form like \"[w X' b Y Z t]\"");
+    throw InvalidArgument("chain \"" + std::string(text) + "\": " + why +
+                          "; expected the links w, X, Y, Z, b, t in a form like \"[w X' b Y Z t]\"");
 }
 
 }  // namespace

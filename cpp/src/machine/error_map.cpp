@@ -26,6 +26,9 @@ void check_function(const FunctionTable& table, const std::string& name) {
     for (std::size_t i = 0; i < size; ++i) {
         if (!std::isfinite(table.position[i]) || !std::isfinite(table.value[i]))
             throw InvalidArgument(name + ": position and value of node " + std::to_string(i) + " must be finite");
+        if (const auto& u = table.standard_uncertainty[i]; u && !(std::isfinite(*u) && *u >= 0.0))
+            throw InvalidArgument(name + ": standard uncertainty of node " + std::to_string(i) +
+                                  " must be finite and at least 0");
         if (i > 0 && !(table.position[i] > table.position[i - 1]))
             throw InvalidArgument(name + ": positions must ascend, but node " + std::to_string(i) + " does not");
     }
@@ -92,7 +95,10 @@ std::vector<std::string> ErrorMap::warnings(const Eigen::Vector3d& volume) const
     for (int i = 0; i < function_count; ++i) {
         if (!table_.functions[i]) continue;
         const FunctionId id = FunctionId::at(i);
-        const double peak = Eigen::Map<const Eigen::VectorXd>(table_.functions[i]->value.data(), table_.functions[i]->value.size()).cwiseAbs().maxCoeff();
+        const double peak =
+            Eigen::Map<const Eigen::VectorXd>(table_.functions[i]->value.data(), table_.functions[i]->value.size())
+                .cwiseAbs()
+                .maxCoeff();
         const double tolerance = 1e-9 * peak;  // a table rounded to nine digits still counts as zero there
         const auto report = [&](double position, const char* where) {
             if (std::abs(function(id, position)) <= tolerance) return;
@@ -114,10 +120,14 @@ ErrorMap make_random_error_map(const Eigen::Vector3d& volume, const RandomErrorM
         if (!ok) throw InvalidArgument("random error map: " + what);
     };
     require(volume.allFinite() && volume.minCoeff() > 0.0, "volume: expected three positive lengths in mm");
-    require(options.intervals >= 2 && options.intervals <= 1'000'000, "intervals: expected 2 to 1000000, got " + std::to_string(options.intervals));
-    for (const double amplitude : {options.translation, options.rotation, options.squareness, options.screw_pitch, options.screw_amplitude})
-        require(std::isfinite(amplitude) && amplitude >= 0.0, "amplitudes and screw_pitch: expected finite values, at least 0");
-    require(options.screw_amplitude == 0.0 || options.screw_pitch > 0.0, "screw_pitch: expected a positive length in mm with a screw_amplitude");
+    require(options.intervals >= 2 && options.intervals <= 1'000'000,
+            "intervals: expected 2 to 1000000, got " + std::to_string(options.intervals));
+    for (const double amplitude :
+         {options.translation, options.rotation, options.squareness, options.screw_pitch, options.screw_amplitude})
+        require(std::isfinite(amplitude) && amplitude >= 0.0,
+                "amplitudes and screw_pitch: expected finite values, at least 0");
+    require(options.screw_amplitude == 0.0 || options.screw_pitch > 0.0,
+            "screw_pitch: expected a positive length in mm with a screw_amplitude");
 
     ParameterTable table;
     for (int i = 0; i < function_count; ++i) {
@@ -125,16 +135,19 @@ ErrorMap make_random_error_map(const Eigen::Vector3d& volume, const RandomErrorM
         FunctionTable function;
         for (int k = 0; k <= options.intervals; ++k)
             function.position.push_back(k * volume[index(id.axis)] / options.intervals);
-        function.value = random_shape(options.seed, i, options.intervals, !id.is_straightness(), id.is_rotation() ? options.rotation : options.translation);
+        function.value = random_shape(options.seed, i, options.intervals, !id.is_straightness(),
+                                      id.is_rotation() ? options.rotation : options.translation);
         if (id.is_positioning() && options.screw_amplitude > 0.0)
             for (int k = 0; k <= options.intervals; ++k)
-                function.value[k] += options.screw_amplitude * std::sin(2.0 * 3.14159265358979323846 * function.position[k] / options.screw_pitch);
+                function.value[k] += options.screw_amplitude * std::sin(2.0 * 3.14159265358979323846 *
+                                                                        function.position[k] / options.screw_pitch);
         function.standard_uncertainty.resize(function.position.size());
         table.functions[i] = std::move(function);
     }
     for (const Squareness s : all_squarenesses) {
         const double unit = uniform_pair(options.seed, RandomStream::error_map, 1'000'000 + std::uint64_t(s))[0];
-        table.squarenesses[static_cast<int>(s)] = SquarenessValue{(2.0 * unit - 1.0) * options.squareness, std::nullopt};
+        table.squarenesses[static_cast<int>(s)] =
+            SquarenessValue{(2.0 * unit - 1.0) * options.squareness, std::nullopt};
     }
     return ErrorMap(std::move(table));
 }

@@ -7,7 +7,8 @@
 
 namespace stepdiag {
 
-Eigen::Vector3d angular_lever(const Chain& chain, const Eigen::Vector3d& tool, Axis axis, const Eigen::Vector3d& commanded) {
+Eigen::Vector3d angular_lever(const Chain& chain, const Eigen::Vector3d& tool, Axis axis,
+                              const Eigen::Vector3d& commanded) {
     Eigen::Vector3d lever = tool;
     for (const Axis other : all_axes)
         if (chain.is_after(other, axis) || (other == axis && chain.carries_workpiece(axis)))
@@ -38,7 +39,9 @@ Pose Machine::pose(const Eigen::Vector3d& commanded) const {
     return pose;
 }
 
-Eigen::Vector3d Machine::error(const Eigen::Vector3d& commanded) const { return pose(commanded).position - commanded - tool_; }
+Eigen::Vector3d Machine::error(const Eigen::Vector3d& commanded) const {
+    return pose(commanded).position - commanded - tool_;
+}
 
 Eigen::Vector3d Machine::first_order_error(const Eigen::Vector3d& commanded) const {
     Eigen::Vector3d error = Eigen::Vector3d::Zero();

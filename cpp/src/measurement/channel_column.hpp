@@ -14,7 +14,7 @@ struct ChannelColumn {
     int uncertainty_shift;
 };
 
-bool is_beam_channel(std::string_view name);                           // d1, d2, ...
+bool is_beam_channel(std::string_view name);                            // d1, d2, ...
 std::optional<ChannelColumn> channel_column(std::string_view channel);  // none for an unknown channel
 
 }  // namespace stepdiag

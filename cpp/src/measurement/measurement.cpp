@@ -16,8 +16,10 @@ void check_names(const std::vector<Channel>& channels) {
     int beams = 0;
     for (const Channel& channel : channels) {
         if (!channel_column(channel.name))
-            throw InvalidArgument("channel \"" + channel.name + "\": expected distance, alpha, beta, spot_x, spot_y, d1 ... dn, time or temperature");
-        if (!names.insert(channel.name).second) throw InvalidArgument("channel \"" + channel.name + "\" is given twice");
+            throw InvalidArgument("channel \"" + channel.name +
+                                  "\": expected distance, alpha, beta, spot_x, spot_y, d1 ... dn, time or temperature");
+        if (!names.insert(channel.name).second)
+            throw InvalidArgument("channel \"" + channel.name + "\" is given twice");
         beams += is_beam_channel(channel.name);
     }
     const auto has = [&](const char* name) { return names.count(name) > 0; };
@@ -31,11 +33,14 @@ void check_names(const std::vector<Channel>& channels) {
         valid = has("distance") && !(tilt && spot) && has("alpha") == has("beta") && has("spot_x") == has("spot_y");
     }
     if (!valid)
-        throw InvalidArgument("channels: expected distance alone, distance with alpha and beta, distance with spot_x and spot_y, or d1 ... dn (n >= 3)");
+        throw InvalidArgument(
+            "channels: expected distance alone, distance with alpha and beta, distance with spot_x and spot_y, or d1 "
+            "... dn (n >= 3)");
 }
 
 std::string row_name(const Station& station, std::size_t row) {
-    return "row " + std::to_string(row + 1) + " (run " + std::to_string(station.run) + ", line " + station.line.name() + ", point " + std::to_string(station.point) + ")";
+    return "row " + std::to_string(row + 1) + " (run " + std::to_string(station.run) + ", line " + station.line.name() +
+           ", point " + std::to_string(station.point) + ")";
 }
 
 }  // namespace
@@ -47,7 +52,8 @@ Measurement::Measurement(std::vector<Station> stations, std::vector<Channel> cha
     for (std::size_t i = 0; i < stations_.size(); ++i) {
         const Station& station = stations_[i];
         if (station.point < 0) throw InvalidArgument(row_name(station, i) + ": expected a point number of at least 0");
-        if (!station.commanded.allFinite()) throw InvalidArgument(row_name(station, i) + ": the commanded position must be finite");
+        if (!station.commanded.allFinite())
+            throw InvalidArgument(row_name(station, i) + ": the commanded position must be finite");
         if (!keys.insert({station.run, station.line.name(), station.point}).second)
             throw InvalidArgument(row_name(station, i) + " is given twice; (run, line, point) must be unique");
     }
@@ -55,23 +61,29 @@ Measurement::Measurement(std::vector<Station> stations, std::vector<Channel> cha
     for (const Channel& channel : channels_) {
         const bool weighted = !channel.standard_uncertainty.empty();
         if (channel.value.size() != size() || (weighted && channel.standard_uncertainty.size() != size()))
-            throw InvalidArgument("channel \"" + channel.name + "\": expected " + std::to_string(size()) + " values, one a row");
+            throw InvalidArgument("channel \"" + channel.name + "\": expected " + std::to_string(size()) +
+                                  " values, one a row");
         for (std::size_t i = 0; i < size(); ++i) {
             if (channel.value[i] && !std::isfinite(*channel.value[i]))
-                throw InvalidArgument(row_name(stations_[i], i) + ": " + channel.name + " must be finite, or absent where it was lost");
-            if (weighted && channel.standard_uncertainty[i] && !(*channel.standard_uncertainty[i] > 0.0 && std::isfinite(*channel.standard_uncertainty[i])))
-                throw InvalidArgument(row_name(stations_[i], i) + ": standard uncertainty of " + channel.name + " must be positive and finite");
+                throw InvalidArgument(row_name(stations_[i], i) + ": " + channel.name +
+                                      " must be finite, or absent where it was lost");
+            if (weighted && channel.standard_uncertainty[i] &&
+                !(*channel.standard_uncertainty[i] > 0.0 && std::isfinite(*channel.standard_uncertainty[i])))
+                throw InvalidArgument(row_name(stations_[i], i) + ": standard uncertainty of " + channel.name +
+                                      " must be positive and finite");
         }
     }
 }
 
 const Channel* Measurement::find(std::string_view name) const {
-    const auto found = std::find_if(channels_.begin(), channels_.end(), [&](const Channel& c) { return c.name == name; });
+    const auto found =
+        std::find_if(channels_.begin(), channels_.end(), [&](const Channel& c) { return c.name == name; });
     return found == channels_.end() ? nullptr : &*found;
 }
 
 int Measurement::beam_count() const {
-    return int(std::count_if(channels_.begin(), channels_.end(), [](const Channel& c) { return is_beam_channel(c.name); }));
+    return int(
+        std::count_if(channels_.begin(), channels_.end(), [](const Channel& c) { return is_beam_channel(c.name); }));
 }
 
 }  // namespace stepdiag

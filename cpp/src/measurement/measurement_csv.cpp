@@ -24,7 +24,8 @@ std::string uncertainty_column_name(const Channel& channel) {
 
 class Reader {
 public:
-    Reader(std::string_view text, const std::string& file_name) : file_name_(file_name), csv_(parse_csv(text, file_name)) {}
+    Reader(std::string_view text, const std::string& file_name)
+        : file_name_(file_name), csv_(parse_csv(text, file_name)) {}
 
     Measurement read() {
         find_columns();
@@ -77,14 +78,20 @@ private:
         direction_ = find("direction");
         const auto& names = csv_.header.fields;
         for (std::size_t i = 0; i < names.size(); ++i) {
-            if (std::count(names.begin(), names.end(), names[i]) > 1) fail(csv_.header.line, "the column \"" + names[i] + "\" is given twice");
-            if (i == line_ || i == point_ || i == run_ || i == direction_ || std::count(position_.begin(), position_.end(), i)) continue;
+            if (std::count(names.begin(), names.end(), names[i]) > 1)
+                fail(csv_.header.line, "the column \"" + names[i] + "\" is given twice");
+            if (i == line_ || i == point_ || i == run_ || i == direction_ ||
+                std::count(position_.begin(), position_.end(), i))
+                continue;
             const auto unit = names[i].rfind('_');
             const std::string name = names[i].substr(0, unit);
             const bool uncertainty = name.substr(0, 2) == "u_";
             const auto column = channel_column(uncertainty ? name.substr(2) : name);
-            if (!column || unit == std::string::npos || names[i].substr(unit + 1) != (uncertainty ? column->uncertainty_unit : column->unit))
-                fail(csv_.header.line, "unknown column \"" + names[i] + "\"; columns carry their unit, such as distance_mm, alpha_urad, spot_x_mm, d1_mm, u_distance_um");
+            if (!column || unit == std::string::npos ||
+                names[i].substr(unit + 1) != (uncertainty ? column->uncertainty_unit : column->unit))
+                fail(csv_.header.line, "unknown column \"" + names[i] +
+                                           "\"; columns carry their unit, such as distance_mm, alpha_urad, spot_x_mm, "
+                                           "d1_mm, u_distance_um");
             if (!uncertainty) {
                 channel_columns_.push_back({i, channels_.size(), false});
                 channels_.push_back({name, {}, {}});
@@ -94,7 +101,8 @@ private:
             for (std::size_t c = 0; c < channels_.size(); ++c)
                 if (names[i] == uncertainty_column_name(channels_[c])) channel_columns_.push_back({i, c, true});
         for (std::size_t i = 0; i < names.size(); ++i)
-            if (names[i].substr(0, 2) == "u_" && std::none_of(channel_columns_.begin(), channel_columns_.end(), [&](const Column& c) { return c.field == i; }))
+            if (names[i].substr(0, 2) == "u_" && std::none_of(channel_columns_.begin(), channel_columns_.end(),
+                                                              [&](const Column& c) { return c.field == i; }))
                 fail(csv_.header.line, "the column \"" + names[i] + "\" has no column of readings beside it");
     }
 
@@ -109,7 +117,8 @@ private:
         Station station{0, line, 0, Direction::forward, Eigen::Vector3d::Zero()};
         const auto integer = [&](std::size_t field, int lowest) {
             const auto value = parse_integer(row.fields[field]);
-            if (!value || *value < lowest) fail(row, field, "a whole number" + std::string(lowest == 0 ? " of at least 0" : ""));
+            if (!value || *value < lowest)
+                fail(row, field, "a whole number" + std::string(lowest == 0 ? " of at least 0" : ""));
             return *value;
         };
         station.point = integer(point_, 0);
@@ -135,7 +144,9 @@ private:
         if (!text.empty()) {
             value = parse_decimal(text, column.uncertainty ? format.uncertainty_shift : format.exponent_shift);
             if (!value || (column.uncertainty && *value <= 0.0))
-                fail(row, column.field, column.uncertainty ? "a positive decimal number or an empty field" : "a finite decimal number, or an empty field for a lost reading");
+                fail(row, column.field,
+                     column.uncertainty ? "a positive decimal number or an empty field"
+                                        : "a finite decimal number, or an empty field for a lost reading");
         }
         (column.uncertainty ? channel.standard_uncertainty : channel.value).push_back(value);
     }
@@ -143,13 +154,17 @@ private:
     void reject_repeated_keys(const std::vector<Station>& stations) const {
         std::vector<std::size_t> order(stations.size());
         for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-        const auto key = [&](std::size_t i) { return std::make_tuple(stations[i].run, stations[i].line.name(), stations[i].point); };
+        const auto key = [&](std::size_t i) {
+            return std::make_tuple(stations[i].run, stations[i].line.name(), stations[i].point);
+        };
         std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return key(a) < key(b); });
         for (std::size_t i = 1; i < order.size(); ++i)
             if (key(order[i]) == key(order[i - 1])) {
                 const Station& station = stations[order[i]];
-                fail(csv_.rows[order[i]].line, "run " + std::to_string(station.run) + ", line " + station.line.name() + ", point " + std::to_string(station.point) +
-                                                   " was given already in line " + std::to_string(csv_.rows[order[i - 1]].line));
+                fail(csv_.rows[order[i]].line, "run " + std::to_string(station.run) + ", line " + station.line.name() +
+                                                   ", point " + std::to_string(station.point) +
+                                                   " was given already in line " +
+                                                   std::to_string(csv_.rows[order[i - 1]].line));
             }
     }
 
@@ -165,38 +180,47 @@ private:
 }  // namespace
 
 bool is_beam_channel(std::string_view name) {
-    return name.size() >= 2 && name[0] == 'd' && name[1] != '0' && name.find_first_not_of("0123456789", 1) == std::string_view::npos;
+    return name.size() >= 2 && name[0] == 'd' && name[1] != '0' &&
+           name.find_first_not_of("0123456789", 1) == std::string_view::npos;
 }
 
 std::optional<ChannelColumn> channel_column(std::string_view channel) {
     if (channel == "alpha" || channel == "beta") return ChannelColumn{"urad", -6, "urad", -6};
-    if (channel == "distance" || channel == "spot_x" || channel == "spot_y" || is_beam_channel(channel)) return ChannelColumn{"mm", 0, "um", -3};
+    if (channel == "distance" || channel == "spot_x" || channel == "spot_y" || is_beam_channel(channel))
+        return ChannelColumn{"mm", 0, "um", -3};
     if (channel == "time") return ChannelColumn{"s", 0, "", 0};
     if (channel == "temperature") return ChannelColumn{"c", 0, "", 0};
     return std::nullopt;
 }
 
-Measurement parse_measurement(std::string_view text, const std::string& file_name) { return Reader(text, file_name).read(); }
+Measurement parse_measurement(std::string_view text, const std::string& file_name) {
+    return Reader(text, file_name).read();
+}
 
 Measurement read_measurement(const std::string& path) { return parse_measurement(read_text_file(path), path); }
 
 std::string format_measurement(const Measurement& measurement) {
     const auto& stations = measurement.stations();
     const bool runs = std::any_of(stations.begin(), stations.end(), [](const Station& s) { return s.run != 0; });
-    const bool directions = std::any_of(stations.begin(), stations.end(), [](const Station& s) { return s.direction == Direction::backward; });
+    const bool directions = std::any_of(stations.begin(), stations.end(),
+                                        [](const Station& s) { return s.direction == Direction::backward; });
     std::string text = "line,point,x_mm,y_mm,z_mm";
     for (const Channel& channel : measurement.channels()) text += "," + column_name(channel);
     for (const Channel& channel : measurement.channels())
         if (!channel.standard_uncertainty.empty()) text += "," + uncertainty_column_name(channel);
     text += std::string(runs ? ",run" : "") + (directions ? ",direction" : "") + "\n";
 
-    const auto field = [](std::optional<double> value, int shift) { return "," + (value ? format_decimal(*value, -shift) : ""); };
+    const auto field = [](std::optional<double> value, int shift) {
+        return "," + (value ? format_decimal(*value, -shift) : "");
+    };
     for (std::size_t i = 0; i < stations.size(); ++i) {
         text += stations[i].line.name() + "," + std::to_string(stations[i].point);
         for (int a = 0; a < 3; ++a) text += "," + format_decimal(stations[i].commanded[a], 0);
-        for (const Channel& channel : measurement.channels()) text += field(channel.value[i], channel_column(channel.name)->exponent_shift);
         for (const Channel& channel : measurement.channels())
-            if (!channel.standard_uncertainty.empty()) text += field(channel.standard_uncertainty[i], channel_column(channel.name)->uncertainty_shift);
+            text += field(channel.value[i], channel_column(channel.name)->exponent_shift);
+        for (const Channel& channel : measurement.channels())
+            if (!channel.standard_uncertainty.empty())
+                text += field(channel.standard_uncertainty[i], channel_column(channel.name)->uncertainty_shift);
         if (runs) text += "," + std::to_string(stations[i].run);
         if (directions) text += stations[i].direction == Direction::forward ? ",forward" : ",backward";
         text += "\n";
@@ -204,6 +228,8 @@ std::string format_measurement(const Measurement& measurement) {
     return text;
 }
 
-void write_measurement(const Measurement& measurement, const std::string& path) { write_text_file(path, format_measurement(measurement)); }
+void write_measurement(const Measurement& measurement, const std::string& path) {
+    write_text_file(path, format_measurement(measurement));
+}
 
 }  // namespace stepdiag

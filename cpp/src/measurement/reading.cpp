@@ -17,8 +17,8 @@ std::optional<Reading> read_mirror(const Eigen::Vector3d& point, const Eigen::Ve
 Eigen::VectorXd beam_distances(const Reading& reading, const std::vector<Eigen::Vector2d>& beam_offsets) {
     Eigen::VectorXd distances(beam_offsets.size());
     for (std::size_t i = 0; i < beam_offsets.size(); ++i)
-        distances[i] = reading.distance +
-                       (reading.alpha * beam_offsets[i].y() - reading.beta * beam_offsets[i].x()) / (1.0 - reading.tan2_phi());
+        distances[i] = reading.distance + (reading.alpha * beam_offsets[i].y() - reading.beta * beam_offsets[i].x()) /
+                                              (1.0 - reading.tan2_phi());
     return distances;
 }
 
@@ -51,7 +51,8 @@ std::optional<ReducedReading> reduce_spot(double distance, const Eigen::Vector2d
     const double gain_by_tau = 4.0 * psd_distance * tau / (w * w);
     const double tau_by_distance = -2.0 * tau / slope;
     const double gain_by_distance = 2.0 + gain_by_tau * tau_by_distance;
-    const Eigen::Vector2d gain_by_spot = s > 0.0 ? Eigen::Vector2d(gain_by_tau / slope * spot / s) : Eigen::Vector2d::Zero();
+    const Eigen::Vector2d gain_by_spot =
+        s > 0.0 ? Eigen::Vector2d(gain_by_tau / slope * spot / s) : Eigen::Vector2d::Zero();
     const Eigen::Vector2d tilt = spot / gain;  // (-beta, alpha)
     Eigen::Matrix<double, 2, 3> by_channel;    // of tilt, by (distance, spot)
     by_channel.col(0) = -tilt / gain * gain_by_distance;
@@ -62,7 +63,8 @@ std::optional<ReducedReading> reduce_spot(double distance, const Eigen::Vector2d
     return reduced;
 }
 
-std::optional<ReducedReading> reduce_beams(const Eigen::VectorXd& distances, const std::vector<Eigen::Vector2d>& beam_offsets) {
+std::optional<ReducedReading> reduce_beams(const Eigen::VectorXd& distances,
+                                           const std::vector<Eigen::Vector2d>& beam_offsets) {
     // d_i = distance - b u_i + a v_i is linear in (distance, a, b), where alpha = a (1 - t) and beta = b (1 - t).
     const Eigen::Index n = distances.size();
     Eigen::Matrix<double, Eigen::Dynamic, 3> design(n, 3);
@@ -79,7 +81,8 @@ std::optional<ReducedReading> reduce_beams(const Eigen::VectorXd& distances, con
     const double w = 2.0 / (1.0 + root);
     const double w_by_m = -w * w / root;
     ReducedReading reduced{{solution[0], w * solution[1], w * solution[2]}, inverse};
-    const Eigen::Matrix2d tilt_by_slope = w * Eigen::Matrix2d::Identity() + 2.0 * w_by_m * solution.tail<2>() * solution.tail<2>().transpose();
+    const Eigen::Matrix2d tilt_by_slope =
+        w * Eigen::Matrix2d::Identity() + 2.0 * w_by_m * solution.tail<2>() * solution.tail<2>().transpose();
     reduced.jacobian.bottomRows<2>() = tilt_by_slope * inverse.bottomRows<2>();
     return reduced;
 }

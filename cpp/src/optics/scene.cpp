@@ -15,7 +15,9 @@ namespace {
 RTCDevice device() {
     static const RTCDevice device = [] {
         const RTCDevice made = rtcNewDevice("threads=1,verbose=0");
-        if (!made) throw std::runtime_error("Embree gave no device (error " + std::to_string(rtcGetDeviceError(nullptr)) + ")");
+        if (!made)
+            throw std::runtime_error("Embree gave no device (error " + std::to_string(rtcGetDeviceError(nullptr)) +
+                                     ")");
         return made;
     }();
     return device;
@@ -25,11 +27,15 @@ void check(const std::vector<Face>& faces) {
     for (std::size_t i = 0; i < faces.size(); ++i) {
         const Face& face = faces[i];
         const std::string name = "face " + std::to_string(i);
-        if (face.outline.size() < 3) throw InvalidArgument(name + ": expected three corners or more, got " + std::to_string(face.outline.size()));
-        if (!face.point.allFinite() || !(std::abs(face.normal.norm() - 1.0) < 1e-9)) throw InvalidArgument(name + ": expected a finite point and a unit normal");
+        if (face.outline.size() < 3)
+            throw InvalidArgument(name + ": expected three corners or more, got " +
+                                  std::to_string(face.outline.size()));
+        if (!face.point.allFinite() || !(std::abs(face.normal.norm() - 1.0) < 1e-9))
+            throw InvalidArgument(name + ": expected a finite point and a unit normal");
         for (const auto& corner : face.outline) {
             const double extent = (corner - face.outline.front()).norm() + 1.0;
-            if (!(std::abs((corner - face.point).dot(face.normal)) < 1e-6 * extent)) throw InvalidArgument(name + ": a corner is not on the face's plane");
+            if (!(std::abs((corner - face.point).dot(face.normal)) < 1e-6 * extent))
+                throw InvalidArgument(name + ": a corner is not on the face's plane");
         }
     }
 }
@@ -43,7 +49,8 @@ Scene::Scene(std::vector<Face> faces) : faces_(std::move(faces)), centre_(Eigen:
         for (const auto& corner : face.outline) centre_ += corner, ++corners;
     if (corners > 0) centre_ /= double(corners);
 
-    embree_ = std::shared_ptr<void>(rtcNewScene(device()), [](void* scene) { rtcReleaseScene(static_cast<RTCScene>(scene)); });
+    embree_ = std::shared_ptr<void>(rtcNewScene(device()),
+                                    [](void* scene) { rtcReleaseScene(static_cast<RTCScene>(scene)); });
     const auto scene = static_cast<RTCScene>(embree_.get());
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
     rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_LOW);  // a handful of faces needs no better tree
@@ -51,8 +58,10 @@ Scene::Scene(std::vector<Face> faces) : faces_(std::move(faces)), centre_(Eigen:
     for (const Face& face : faces_) {
         const std::size_t n = face.outline.size();
         const RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
-        auto* vertex = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), n));
-        auto* triangle = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), n - 2));
+        auto* vertex = static_cast<float*>(
+            rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), n));
+        auto* triangle = static_cast<unsigned*>(
+            rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), n - 2));
         for (const auto& corner : face.outline)
             for (int c = 0; c < 3; ++c) {
                 *vertex++ = float(corner[c] - centre_[c]);

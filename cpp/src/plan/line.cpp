@@ -14,7 +14,9 @@ Line Line::parse(std::string_view name) {
         sign[i] = name[i] == 'p' ? 1 : name[i] == 'n' ? -1 : 0;
     }
     if (!valid)
-        throw InvalidArgument("line \"" + std::string(name) + "\": expected three of p, n, 0 (travel signs of X, Y, Z) with at least one axis moved, such as \"ppp\" or \"p0n\"");
+        throw InvalidArgument("line \"" + std::string(name) +
+                              "\": expected three of p, n, 0 (travel signs of X, Y, Z) with at least one axis moved, "
+                              "such as \"ppp\" or \"p0n\"");
     return Line(sign);
 }
 

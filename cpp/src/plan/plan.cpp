@@ -16,25 +16,31 @@ std::array<Axis, 3> parse_order(std::string_view text) {
     return order;
 }
 
-Plan::Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::array<Axis, 3> order, std::vector<Line> scale_lines)
+Plan::Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::array<Axis, 3> order,
+           std::vector<Line> scale_lines)
     : volume_(volume), lines_(std::move(lines)), steps_(steps), order_(order), scale_lines_(std::move(scale_lines)) {
-    if (!volume_.allFinite() || volume_.minCoeff() <= 0.0 || volume_.maxCoeff() > 1e6)
-        throw InvalidArgument("volume: expected three edges in mm, above 0 and up to 1e6");
+    if (!volume_.allFinite() || volume_.minCoeff() < 1e-3 || volume_.maxCoeff() > 1e6)
+        throw InvalidArgument("volume: expected three edges in mm, each from 0.001 to 1e6");
     if (steps_ < 1 || steps_ > largest_step_count)
-        throw InvalidArgument("steps: expected 1 to " + std::to_string(largest_step_count) + ", got " + std::to_string(steps_));
+        throw InvalidArgument("steps: expected 1 to " + std::to_string(largest_step_count) + ", got " +
+                              std::to_string(steps_));
     if (lines_.empty() && scale_lines_.empty()) throw InvalidArgument("lines: expected at least one line");
     std::vector<std::string> seen;
     for (const auto* group : {&lines_, &scale_lines_})
         for (const Line& line : *group) {
             if (group == &scale_lines_ && line.moved_axes() != 1)
-                throw InvalidArgument("scale_lines: expected single-axis lines such as \"p00\", got \"" + line.name() + "\"");
+                throw InvalidArgument("scale_lines: expected single-axis lines such as \"p00\", got \"" + line.name() +
+                                      "\"");
             if (std::find(seen.begin(), seen.end(), line.name()) != seen.end())
-                throw InvalidArgument("lines: \"" + line.name() + "\" is given twice (a repeated measurement is another run of the same line)");
+                throw InvalidArgument("lines: \"" + line.name() +
+                                      "\" is given twice (a repeated measurement is another run of the same line)");
             seen.push_back(line.name());
         }
 }
 
-bool Plan::is_scale_line(const Line& line) const { return std::find(scale_lines_.begin(), scale_lines_.end(), line) != scale_lines_.end(); }
+bool Plan::is_scale_line(const Line& line) const {
+    return std::find(scale_lines_.begin(), scale_lines_.end(), line) != scale_lines_.end();
+}
 
 std::vector<double> Plan::nodes(Axis axis) const {
     std::vector<double> nodes(steps_ + 1);

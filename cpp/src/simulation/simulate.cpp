@@ -12,12 +12,15 @@ namespace {
 void check_options(const Plan& plan, const SimulationOptions& options) {
     for (const auto& [line, misalignment] : options.misalignment) {
         plan.points(Line::parse(line));  // throws where the plan has no such line
-        const double largest_angle = std::max(misalignment.reflector.cwiseAbs().maxCoeff(), misalignment.laser.cwiseAbs().maxCoeff());
-        if (!(largest_angle < 0.1) || !misalignment.psd_zero.allFinite())
+        const auto small = [](const Eigen::Vector2d& angles) {
+            return angles.allFinite() && angles.cwiseAbs().maxCoeff() < 0.1;
+        };
+        if (!small(misalignment.reflector) || !small(misalignment.laser) || !misalignment.psd_zero.allFinite())
             throw InvalidArgument("misalignment of " + line + ": expected angles below 0.1 rad and finite lengths");
     }
     for (const double deviation : {options.noise.distance, options.noise.tilt, options.noise.spot})
-        if (!(std::isfinite(deviation) && deviation >= 0.0)) throw InvalidArgument("noise: expected finite standard deviations, at least 0");
+        if (!(std::isfinite(deviation) && deviation >= 0.0))
+            throw InvalidArgument("noise: expected finite standard deviations, at least 0");
     if (!(std::isfinite(options.ambient.index) && options.ambient.index >= 1.0))
         throw InvalidArgument("refractive_index: expected a finite value of at least 1");
 }
@@ -27,8 +30,8 @@ Eigen::Vector2d mirror_size(const Head& head, const Plan& plan) {
     if (!head.mirror) return smallest + Eigen::Vector2d::Constant(2.0 * Head::mirror_margin);
     if ((*head.mirror - smallest).minCoeff() < 0.0) {
         std::ostringstream text;
-        text << "head mirror: too small for this plan: expected at least " << smallest.x() << " x " << smallest.y() << " mm, got "
-             << head.mirror->x() << " x " << head.mirror->y() << " mm";
+        text << "head mirror: too small for this plan: expected at least " << smallest.x() << " x " << smallest.y()
+             << " mm, got " << head.mirror->x() << " x " << head.mirror->y() << " mm";
         throw InvalidArgument(text.str());
     }
     return *head.mirror;
@@ -55,8 +58,9 @@ Measurement simulate(const Machine& machine, const Plan& plan, const Head& head,
     for (const Line& line : lines) {
         const auto points = plan.points(line);
         const auto misalignment = options.misalignment.find(line.name());
-        const HeadSetup setup = set_up(head, plan.frame(line), points.front().commanded + machine.tool(), mirror,
-                                       misalignment == options.misalignment.end() ? Misalignment{} : misalignment->second);
+        const HeadSetup setup =
+            set_up(head, plan.frame(line), points.front().commanded + machine.tool(), mirror,
+                   misalignment == options.misalignment.end() ? Misalignment{} : misalignment->second);
         for (std::size_t k = 0; k < points.size(); ++k) {
             const Pose pose = machine.pose(points[k].commanded);
             const auto reading = head.layout == HeadLayout::ideal
@@ -71,7 +75,8 @@ Measurement simulate(const Machine& machine, const Plan& plan, const Head& head,
                 if (reading) {
                     value = values[Eigen::Index(c)];
                     if (const double sigma = deviation(options.noise, channels[c].name); sigma > 0.0)
-                        *value += sigma * normal_pair(options.noise.seed, RandomStream::reading_noise, (row << 16) | c)[0];
+                        *value +=
+                            sigma * normal_pair(options.noise.seed, RandomStream::reading_noise, (row << 16) | c)[0];
                 }
                 channels[c].value.push_back(value);
             }

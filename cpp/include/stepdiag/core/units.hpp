@@ -1,4 +1,5 @@
-// Native units of the library: length mm, angle rad, vacuum wavelength nm. A name carries a unit only where it is another.
+// Native units of the library: length mm, angle rad, vacuum wavelength nm. A name carries a unit only where it is
+// another.
 #pragma once
 
 namespace stepdiag {

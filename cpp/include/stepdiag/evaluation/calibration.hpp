@@ -1,5 +1,6 @@
 // What an evaluation found out about a machine: the 21 parameters as far as they could be determined, with uncertainty.
-// Frame choice and signs as in machine/error_map.hpp. What the readings do not determine is absent and said, never invented.
+// Frame choice and signs as in machine/error_map.hpp. What the readings do not determine is absent and said, never
+// invented.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,8 +17,9 @@ namespace stepdiag {
 struct CalibratedFunction {
     std::vector<double> position;              // mm
     std::vector<double> value;                 // mm or rad
-    std::vector<double> standard_uncertainty;  // mm or rad
-    // False: only the shape is known. The values are then those with both ends at 0; any multiple of the position may be added.
+    std::vector<double> standard_uncertainty;  // mm or rad; NaN where a file that was read does not give it
+    // False: only the shape is known. The values are then those with both ends at 0; any multiple of the position may
+    // be added.
     bool slope_determined = true;
 };
 
@@ -36,15 +38,17 @@ struct Calibration {
     std::array<std::optional<CalibratedSquareness>, squareness_count> squarenesses;
     std::vector<std::string> undetermined;  // one sentence each: what is missing, why, and what would help
 
-    // Of all values in the order of the tables (functions by FunctionId::index, nodes ascending, then C0Y, B0Z, A0Z); native
-    // units. Empty unless asked for.
+    // Of all values in the order of the tables (functions by FunctionId::index, nodes ascending, then C0Y, B0Z, A0Z);
+    // native units. Empty unless asked for.
     Eigen::MatrixXd covariance;
 };
 
+bool is_anything_determined(const Calibration& calibration);
 ParameterTable to_parameter_table(const Calibration& calibration);
 
 // CSV with format, chain, volume_mm, tool_mm, method, undetermined_slopes and undetermined in the leading lines; the
-// covariance is not kept. Reading throws InvalidArgument naming file and line, also where chain, volume or tool is missing.
+// covariance is not kept. Reading throws InvalidArgument naming file and line, also where chain, volume or tool is
+// missing.
 void write_calibration(const Calibration& calibration, const std::string& path);
 Calibration read_calibration(const std::string& path);
 

@@ -1,7 +1,8 @@
 // The classic evaluation of a step-diagonal run (C. Wang, Rev. Sci. Instrum. 71 (2000) 3933): distances only.
-// Each step of axis a over interval i changes the distance of line d by s_d n_d . (delta_a(i+1) - delta_a(i)), n_d the line's
-// direction. Three or four body diagonals give three or four such equations for the three components of the step:
-// solved by pseudoinverse and summed from home. Angular errors and misalignment are taken for errors of translation.
+// Each step of axis a over interval i changes the distance of line d by s_d n_d . (delta_a(i+1) - delta_a(i)), n_d the
+// line's direction. Three or four body diagonals give three or four such equations for the three components of the
+// step: solved by pseudoinverse and summed from home. Angular errors and misalignment are taken for errors of
+// translation.
 #pragma once
 
 #include "stepdiag/evaluation/evaluation.hpp"
@@ -10,7 +11,8 @@ namespace stepdiag {
 
 // Throws InvalidArgument for fewer than three body diagonals, or readings that do not belong to the plan.
 // Rotations are absent from the result. Scale lines and other lines are not used.
-Calibration evaluate_conventional(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
-                                  const HeadCalibration& head, const EvaluationOptions& options = {});
+Calibration evaluate_conventional(const Measurement& measurement, const Plan& plan, const Chain& chain,
+                                  const Eigen::Vector3d& tool, const HeadCalibration& head,
+                                  const EvaluationOptions& options = {});
 
 }  // namespace stepdiag

@@ -4,12 +4,13 @@
 //  2. Lengths: each distance becomes the beam's length L = q_z + beta q_x - alpha q_y, exact in the sensor frame with
 //     q the vector from beam origin to functional point. Taken off are the commanded travel, the lever arm times the
 //     tilts (its lateral part, "effective lever arm"), and the angular contribution n . sum_a theta_a x L_a.
-//  3. Trends: what is left of a step is n_d . (delta_a(i+1) - delta_a(i)) plus, to first order, the lateral travel times the
+//  3. Trends: what is left of a step is n_d . (delta_a(i+1) - delta_a(i)) plus, to first order, the lateral travel
+//  times the
 //     unknown laser angles of the line. Sums over an axis' travel and the scale lines make the slope system for scales,
 //     squarenesses and laser angles; its rank says which are determined.
 //  4. Steps: corrected for the laser angles, solved by pseudoinverse, summed; straightness slopes are the frame choice.
-// Covariance by eq. 6 from the raw channels, so that neighbouring increments share a reading. Left are second-order terms:
-// nanometres, but 0.7 to 1.9 um at 1 mrad of laser misalignment.
+// Covariance by eq. 6 from the raw channels, so that neighbouring increments share a reading. Left are second-order
+// terms: nanometres, but 0.7 to 1.9 um at 1 mrad of laser misalignment.
 #pragma once
 
 #include "stepdiag/evaluation/evaluation.hpp"
@@ -17,7 +18,8 @@
 namespace stepdiag {
 
 // Throws InvalidArgument for readings that do not belong to the plan, or where nothing at all can be determined.
-Calibration evaluate_enhanced(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
-                              const HeadCalibration& head, const EvaluationOptions& options = {});
+Calibration evaluate_enhanced(const Measurement& measurement, const Plan& plan, const Chain& chain,
+                              const Eigen::Vector3d& tool, const HeadCalibration& head,
+                              const EvaluationOptions& options = {});
 
 }  // namespace stepdiag

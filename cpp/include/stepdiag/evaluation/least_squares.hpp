@@ -8,14 +8,15 @@
 namespace stepdiag {
 
 struct LeastSquares {
-    Eigen::MatrixXd pseudoinverse;  // A+, unknowns x equations; of minimum norm (columns scaled to 1) where rank is lacking
+    Eigen::MatrixXd
+        pseudoinverse;  // A+, unknowns x equations; of minimum norm (columns scaled to 1) where rank is lacking
     int rank;
     // Unknown j is determined where e_j lies in the row space of A: no solution of A x = 0 has a part in it.
     std::vector<bool> determined;
 };
 
-// `standard_uncertainty`: one positive value an equation. Rank is decided on the weighted equations with columns scaled to
-// length 1: pivots below 1e-9 of the largest count as zero.
+// `standard_uncertainty`: one positive value an equation. Rank is decided on the weighted equations with columns scaled
+// to length 1: pivots below 1e-9 of the largest count as zero.
 LeastSquares solve_least_squares(const Eigen::MatrixXd& equations, const Eigen::VectorXd& standard_uncertainty);
 
 }  // namespace stepdiag

@@ -2,8 +2,8 @@
 //   ideal       one interferometer beam that also senses the mirror's two tilts; ray-traced
 //   psd         layout b: interferometer and position sensing device (by the closed definition of its readings)
 //   multi_beam  layout a: three or more parallel interferometer beams (by the closed definition of their readings)
-// The head is fixed in the machine frame, the mirror on the tool. Its reference plane holds the beam's origin o and is normal to
-// the beam; o lies `standoff` before the line's first commanded functional point.
+// The head is fixed in the machine frame, the mirror on the tool. Its reference plane holds the beam's origin o and is
+// normal to the beam; o lies `standoff` before the line's first commanded functional point.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,8 +29,8 @@ struct Head {
     double psd_distance = 0.0;                  // layout psd, mm
     std::vector<Eigen::Vector2d> beam_offsets;  // layout multi_beam, mm
     double wavelength = 1530.0;                 // vacuum, nm
-    double aperture = 50.0;                     // edge of the square in the reference plane that takes the beam back, mm
-    std::optional<Eigen::Vector2d> mirror;      // width and height, mm; none: as large as the plan needs, and mirror_margin
+    double aperture = 50.0;                 // edge of the square in the reference plane that takes the beam back, mm
+    std::optional<Eigen::Vector2d> mirror;  // width and height, mm; none: as large as the plan needs, and mirror_margin
 
     static constexpr double mirror_margin = 25.0;  // on every side, mm
 
@@ -51,22 +51,25 @@ struct Misalignment {
 
 // A head and its mirror set up on one line.
 struct HeadSetup {
-    Eigen::Vector3d origin;             // o, machine frame, mm
-    Eigen::Matrix3d machine_R_sensor;   // F Exp(laser)
-    Eigen::Matrix3d tool_R_mirror;      // F Exp(reflector)
-    Eigen::Vector2d mirror;             // width and height, mm
-    Eigen::Vector2d psd_zero;           // mm
+    Eigen::Vector3d origin;            // o, machine frame, mm
+    Eigen::Matrix3d machine_R_sensor;  // F Exp(laser)
+    Eigen::Matrix3d tool_R_mirror;     // F Exp(reflector)
+    Eigen::Vector2d mirror;            // width and height, mm
+    Eigen::Vector2d psd_zero;          // mm
 };
 
-// `machine_R_line`: the line's frame F; `first_point`: its first commanded functional point P0 (tool offset included), mm.
+// `machine_R_line`: the line's frame F; `first_point`: its first commanded functional point P0 (tool offset included),
+// mm.
 HeadSetup set_up(const Head& head, const Eigen::Matrix3d& machine_R_line, const Eigen::Vector3d& first_point,
                  const Eigen::Vector2d& mirror, const Misalignment& misalignment);
 
 // The mirror's reading with its centre at the functional point and the tool turned by `machine_R_tool`:
-// by ray tracing (none where the beam misses the mirror or does not come back to the head), or by the closed definition.
+// by ray tracing (none where the beam misses the mirror or does not come back to the head), or by the closed
+// definition.
 std::optional<Reading> trace_reading(const Head& head, const HeadSetup& setup, const Eigen::Vector3d& functional_point,
                                      const Eigen::Matrix3d& machine_R_tool, const Medium& ambient);
-std::optional<Reading> define_reading(const HeadSetup& setup, const Eigen::Vector3d& functional_point, const Eigen::Matrix3d& machine_R_tool);
+std::optional<Reading> define_reading(const HeadSetup& setup, const Eigen::Vector3d& functional_point,
+                                      const Eigen::Matrix3d& machine_R_tool);
 
 // Names of the signals a head gives (channels of a Measurement), and their values for a reading.
 std::vector<std::string> signal_names(const Head& head);

@@ -16,7 +16,8 @@ inline constexpr char letter(Axis axis) { return "XYZ"[index(axis)]; }
 
 class Chain {
 public:
-    // Parses "[w X' b Y Z t]". Throws InvalidArgument when a link is missing, doubled, or primed on the wrong side of b.
+    // Parses "[w X' b Y Z t]". Throws InvalidArgument when a link is missing, doubled, or primed on the wrong side of
+    // b.
     static Chain parse(std::string_view text);
 
     const std::array<Axis, 3>& order() const { return order_; }  // from w to t

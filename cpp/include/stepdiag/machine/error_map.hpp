@@ -1,5 +1,6 @@
-// The 21 geometric errors of a machine as tables: per axis a the translation delta_a(p) (with the squareness terms) and the
-// rotation vector theta_a(p). Linear between nodes; outside the table the end value holds, the squareness terms go on.
+// The 21 geometric errors of a machine as tables: per axis a the translation delta_a(p) (with the squareness terms) and
+// the rotation vector theta_a(p). Linear between nodes; outside the table the end value holds, the squareness terms go
+// on.
 //   delta_Y.x = EXY(y) - C0Y y,  delta_Z.x = EXZ(z) + B0Z z,  delta_Z.y = EYZ(z) - A0Z z
 // Frame choice (CONVENTIONS): functions are 0 at home, straightnesses 0 at both ends of travel.
 #pragma once
@@ -16,8 +17,8 @@ namespace stepdiag {
 
 class ErrorMap {
 public:
-    ErrorMap() = default;                       // no errors
-    explicit ErrorMap(ParameterTable table);    // a missing parameter is 0; checks nodes and finiteness
+    ErrorMap() = default;                     // no errors
+    explicit ErrorMap(ParameterTable table);  // a missing parameter is 0; checks nodes and finiteness
 
     Eigen::Vector3d delta(Axis axis, double position) const;  // mm
     Eigen::Vector3d theta(Axis axis, double position) const;  // rad
@@ -25,8 +26,8 @@ public:
     double squareness(Squareness squareness) const;
     const ParameterTable& table() const { return table_; }
 
-    // Where the map breaks the frame choice (a function not 0 at home, a straightness not 0 at the end of travel `volume`):
-    // one sentence each. Such a map is used as given.
+    // Where the map breaks the frame choice (a function not 0 at home, a straightness not 0 at the end of travel
+    // `volume`): one sentence each. Such a map is used as given.
     std::vector<std::string> warnings(const Eigen::Vector3d& volume) const;
 
 private:

@@ -20,7 +20,8 @@ struct Pose {
 
 // L_a: the lever by which theta_a moves the functional point to first order, e = sum_a (delta_a + theta_a x L_a):
 // tool offset + positions of the axes after a, plus p_a itself where a carries the workpiece.
-Eigen::Vector3d angular_lever(const Chain& chain, const Eigen::Vector3d& tool, Axis axis, const Eigen::Vector3d& commanded);
+Eigen::Vector3d angular_lever(const Chain& chain, const Eigen::Vector3d& tool, Axis axis,
+                              const Eigen::Vector3d& commanded);
 
 class Machine {
 public:

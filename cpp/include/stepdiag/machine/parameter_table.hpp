@@ -1,5 +1,6 @@
 // The CSV format that error maps and calibrations share: "parameter,position_mm,value,unit,standard_uncertainty" behind
-// leading "# key=value" lines. Values are kept in native units (mm, rad), and a number written is read back to the same bits.
+// leading "# key=value" lines. Values are kept in native units (mm, rad), and a number written is read back to the same
+// bits.
 #pragma once
 
 #include <Eigen/Core>

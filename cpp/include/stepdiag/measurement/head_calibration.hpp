@@ -8,8 +8,8 @@
 namespace stepdiag {
 
 struct HeadCalibration {
-    std::optional<double> psd_distance;         // unfolded plane of the position sensing device behind the reference plane, mm
-    std::vector<Eigen::Vector2d> beam_offsets; // (u, v) of the beams d1 ... dn in the sensor frame, mm
+    std::optional<double> psd_distance;  // unfolded plane of the position sensing device behind the reference plane, mm
+    std::vector<Eigen::Vector2d> beam_offsets;  // (u, v) of the beams d1 ... dn in the sensor frame, mm
 };
 
 }  // namespace stepdiag

@@ -1,7 +1,7 @@
 // A run's readings: what a head said at each commanded point. The only thing that simulators and evaluators share.
-// CSV: header "line,point,x_mm,y_mm,z_mm,distance_mm,alpha_urad,beta_urad"; spot_x_mm,spot_y_mm may stand for alpha and beta,
-// d1_mm,d2_mm,d3_mm[,...] for all three; optional run, direction, time_s, temperature_c and u_<field>, the standard
-// uncertainty of a field. An empty field is a lost reading, a missing row a lost point: data, not an error.
+// CSV: header "line,point,x_mm,y_mm,z_mm,distance_mm,alpha_urad,beta_urad"; spot_x_mm,spot_y_mm may stand for alpha and
+// beta, d1_mm,d2_mm,d3_mm[,...] for all three; optional run, direction, time_s, temperature_c and u_<field>, the
+// standard uncertainty of a field. An empty field is a lost reading, a missing row a lost point: data, not an error.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,8 +26,9 @@ struct Station {
     Eigen::Vector3d commanded;  // mm
 };
 
-// One quantity of all rows, native units; `name` without unit: distance, alpha, beta, spot_x, spot_y, d1, d2, ..., time,
-// temperature. A lost reading is empty; `standard_uncertainty` is empty as a whole where the run does not give it.
+// One quantity of all rows, native units; `name` without unit: distance, alpha, beta, spot_x, spot_y, d1, d2, ...,
+// time, temperature. A lost reading is empty; `standard_uncertainty` is empty as a whole where the run does not give
+// it.
 struct Channel {
     std::string name;
     std::vector<std::optional<double>> value;
@@ -36,9 +37,10 @@ struct Channel {
 
 class Measurement {
 public:
-    // Throws InvalidArgument naming row or channel: lengths that differ, a key given twice, a point below 0, positions or
-    // readings that are not finite, an uncertainty that is not positive, a channel unknown or given twice, or channels
-    // that make no head's readings (distance, distance+alpha+beta, distance+spot_x+spot_y, d1..dn with n >= 3).
+    // Throws InvalidArgument naming row or channel: lengths that differ, a key given twice, a point below 0, positions
+    // or readings that are not finite, an uncertainty that is not positive, a channel unknown or given twice, or
+    // channels that make no head's readings (distance, distance+alpha+beta, distance+spot_x+spot_y, d1..dn with n >=
+    // 3).
     Measurement(std::vector<Station> stations, std::vector<Channel> channels);
 
     const std::vector<Station>& stations() const { return stations_; }

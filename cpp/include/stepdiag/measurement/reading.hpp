@@ -43,6 +43,7 @@ struct ReducedReading {
 std::optional<ReducedReading> reduce_spot(double distance, const Eigen::Vector2d& spot, double psd_distance);
 // From beams d_i at (u_i, v_i), least squares where there are more than three: channels (d_1 ... d_n). None where the
 // beams stand on one line, so that a tilt is not determined.
-std::optional<ReducedReading> reduce_beams(const Eigen::VectorXd& distances, const std::vector<Eigen::Vector2d>& beam_offsets);
+std::optional<ReducedReading> reduce_beams(const Eigen::VectorXd& distances,
+                                           const std::vector<Eigen::Vector2d>& beam_offsets);
 
 }  // namespace stepdiag

@@ -13,7 +13,8 @@ namespace stepdiag {
 
 class Line {
 public:
-    static Line parse(std::string_view name);  // throws InvalidArgument for anything but three of p n 0 with one moved axis
+    static Line parse(
+        std::string_view name);  // throws InvalidArgument for anything but three of p n 0 with one moved axis
 
     std::string name() const;
     int sign(Axis axis) const { return sign_[index(axis)]; }

@@ -13,13 +13,13 @@ namespace stepdiag {
 
 // One point of a line. Axis nodes are counted from home: node k of an axis stands at k * travel / steps.
 struct PlanPoint {
-    Eigen::Vector3d commanded;        // mm, machine frame
-    std::array<int, 3> node;          // per axis
-    std::optional<Axis> moved;        // the axis that moved to get here; none for a line's first point
+    Eigen::Vector3d commanded;  // mm, machine frame
+    std::array<int, 3> node;    // per axis
+    std::optional<Axis> moved;  // the axis that moved to get here; none for a line's first point
 };
 
-// The mirror must hold the beam wherever a step takes it: the mirror rides on the tool, the beam stays, so that the beam
-// wanders over the mirror by the lateral part of the travel, in local x and y of the line, mm.
+// The mirror must hold the beam wherever a step takes it: the mirror rides on the tool, the beam stays, so that the
+// beam wanders over the mirror by the lateral part of the travel, in local x and y of the line, mm.
 struct LateralExcursion {
     Eigen::Vector2d lowest;
     Eigen::Vector2d highest;
@@ -27,12 +27,13 @@ struct LateralExcursion {
 
 class Plan {
 public:
-    static constexpr int largest_step_count = 100'000;
+    static constexpr int largest_step_count = 10'000;
 
-    // `volume`: edges X, Y, Z, mm. `order`: the axes in the order in which a step moves them. Scale lines are single-axis
-    // lines of two points. Throws InvalidArgument for an empty or doubled line, a volume without extent, steps outside
-    // 1 .. largest_step_count, a scale line that moves more than one axis.
-    Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::array<Axis, 3> order = all_axes, std::vector<Line> scale_lines = {});
+    // `volume`: edges X, Y, Z, mm. `order`: the axes in the order in which a step moves them. Scale lines are
+    // single-axis lines of two points. Throws InvalidArgument for an empty or doubled line, a volume without extent,
+    // steps outside 1 .. largest_step_count, a scale line that moves more than one axis.
+    Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::array<Axis, 3> order = all_axes,
+         std::vector<Line> scale_lines = {});
 
     const Eigen::Vector3d& volume() const { return volume_; }
     const std::vector<Line>& lines() const { return lines_; }
@@ -45,8 +46,8 @@ public:
     std::vector<double> nodes(Axis axis) const;
     Eigen::Matrix3d frame(const Line& line) const { return line_frame(line, volume_); }
 
-    // The points of a line of this plan, from 0; 3N+1 on a body diagonal, 2N+1 on a face diagonal, N+1 on a single axis,
-    // 2 on a scale line.
+    // The points of a line of this plan, from 0; 3N+1 on a body diagonal, 2N+1 on a face diagonal, N+1 on a single
+    // axis, 2 on a scale line.
     std::vector<PlanPoint> points(const Line& line) const;
 
     LateralExcursion lateral_excursion(const Line& line) const;

@@ -14,8 +14,8 @@
 
 namespace stepdiag {
 
-// Standard deviations of an independent Gaussian per field. The noise of a field depends on the seed, its row and its channel
-// only, not on what else is simulated.
+// Standard deviations of an independent Gaussian per field. The noise of a field depends on the seed, its row and its
+// channel only, not on what else is simulated.
 struct Noise {
     double distance = 0.0;  // mm; also of d1 ... dn
     double tilt = 0.0;      // rad
@@ -30,8 +30,8 @@ struct SimulationOptions {
 };
 
 // Rows: the plan's lines in their order, then its scale lines, points ascending. Lost readings are empty fields. Throws
-// InvalidArgument for a head that makes no sense, a mirror smaller than the plan's smallest, misalignments of 0.1 rad or
-// more or of lines that are not in the plan, negative noise, an index below 1.
+// InvalidArgument for a head that makes no sense, a mirror smaller than the plan's smallest, misalignments of 0.1 rad
+// or more or of lines that are not in the plan, negative noise, an index below 1.
 Measurement simulate(const Machine& machine, const Plan& plan, const Head& head, const SimulationOptions& options = {});
 
 }  // namespace stepdiag
