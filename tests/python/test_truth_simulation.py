@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import reference
-import stepdiag as sd
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+import stepdiag as sd
 
 RUNS = Path(__file__).parents[1] / "data" / "runs"
 CASES = sorted(path.parent.name for path in RUNS.glob("*/scenario.toml"))
