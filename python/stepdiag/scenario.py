@@ -5,6 +5,7 @@ docs/scenario.md lists every key. An evaluator may ask a scenario for `chain`, `
 need not exist.
 """
 
+import math
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -116,9 +117,11 @@ def _parse_toml(text: str, file: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except RecursionError:
         raise InvalidArgument(f"{file}: not valid TOML: nested too deeply") from None
-    except ValueError as error:  # also numbers with thousands of digits
+    except tomllib.TOMLDecodeError as error:
         message = str(error)
         raise InvalidArgument(f"{file}: not valid TOML: {message[:1].lower()}{message[1:]}") from None
+    except ValueError:  # Python reads integers of up to 4300 digits
+        raise InvalidArgument(f"{file}: not valid TOML: a number has too many digits") from None
 
 
 def _by_line(name: str, section: Any, file: str) -> Any:
@@ -180,9 +183,9 @@ def _head(keys: HeadSection, plan: _core.Plan, path: Path) -> _core.Head:
         raise InvalidArgument(f'{path}: head.beam_offsets_mm: missing; the layout "multi_beam" needs it')
     smallest = plan.smallest_mirror()
     if keys.mirror_mm is not None and (keys.mirror_mm[0] < smallest[0] or keys.mirror_mm[1] < smallest[1]):
+        least = [math.ceil(10.0 * edge) / 10.0 for edge in smallest]  # so that what is named will do
         raise InvalidArgument(
-            f"{path}: head.mirror_mm: too small for this plan: "
-            f"expected at least [{smallest[0]:.1f}, {smallest[1]:.1f}], got {show(keys.mirror_mm)}"
+            f"{path}: head.mirror_mm: too small for this plan: expected at least {least}, got {show(keys.mirror_mm)}"
         )
     with _located(f"{path}: head"):
         return _core.Head(

@@ -15,7 +15,8 @@ from stepdiag.scenario_keys import BY_LINE, ScenarioKeys
 def explain(error: ValidationError, content: Mapping[str, Any], file: str) -> InvalidArgument:
     """The first thing wrong; unknown keys come first, for a misspelt key is also a missing one."""
     details = sorted(error.errors(include_url=False), key=lambda detail: detail["type"] != "extra_forbidden")
-    more = "" if len(details) == 1 else f" (and {len(details) - 1} more)"
+    others = len({place_of(_follow(detail["loc"])[0]) for detail in details}) - 1
+    more = "" if others == 0 else f" (and {others} more)"
     return InvalidArgument(f"{file}: {_sentence(details[0], content)}{more}")
 
 
@@ -33,18 +34,23 @@ def show(value: Any, longest: int = 60) -> str:
 
 def _sentence(detail: ErrorDetails, content: Mapping[str, Any]) -> str:
     names, field, section = _follow(detail["loc"])
-    place = ".".join(name for name in names if name != BY_LINE)
+    place = place_of(names)
     if detail["type"] == "extra_forbidden":
         known = [name for name in section.model_fields if name != BY_LINE]
         what = "key" if len(names) > 1 else "section"
         return f"{place}: unknown {what}; {suggest(names[-1], known)}"
     expected = expectation(field) if field is not None else f"a section [{place}]"
-    if detail["type"] == "missing":
-        return f"{place}: missing; expected {expected}"
     value: Any = content
     for name in names:
+        if name not in value:
+            return f"{place}: missing; expected {expected}"
         value = value[name]
     return f"{place}: expected {expected}, got {show(value)}"
+
+
+def place_of(names: Sequence[str]) -> str:
+    """The key as the file has it: plan.steps, misalignment.ppp.laser_urad."""
+    return ".".join(name for level, name in enumerate(names) if (level, name) != (1, BY_LINE))
 
 
 def expectation(field: FieldInfo) -> str:

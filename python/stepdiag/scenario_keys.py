@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 # Limits that the core checks as well; here they keep numbers inside the integer types behind the bindings.
-LARGEST_STEPS: Final = 100_000
+LARGEST_STEPS: Final = 10_000
 LARGEST_EDGE: Final = 1e6
 LARGEST_INTERVALS: Final = 1_000_000
 LARGEST_SEED: Final = 2**64 - 1
@@ -150,7 +150,7 @@ class HeadSection(Section):
         "two positive lengths in mm",
         "Width and height of the mirror; by default as large as the plan needs.",
         None,
-        [80.0, 80.0],
+        [120.0, 120.0],
     )
 
 
