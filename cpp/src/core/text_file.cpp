@@ -145,13 +145,6 @@ CsvFile parse_csv(std::string_view text, const std::string& file_name) {
     return file;
 }
 
-std::string csv_field(std::string_view text) {
-    if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
-    std::string quoted(csv_write2(nullptr, 0, text.data(), text.size(), '"'), '\0');
-    csv_write2(quoted.data(), quoted.size(), text.data(), text.size(), '"');
-    return quoted;
-}
-
 std::optional<double> parse_decimal(std::string_view text, int exponent_shift) {
     // Digits and dots only: from_chars alone would take "inf" and "nan" as well.
     const bool negative = !text.empty() && text.front() == '-';

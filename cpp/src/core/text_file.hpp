@@ -29,9 +29,6 @@ struct CsvFile {
 // Throws InvalidArgument naming `file_name` and line.
 CsvFile parse_csv(std::string_view text, const std::string& file_name);
 
-// A field in quotes where RFC 4180 asks for them.
-std::string csv_field(std::string_view text);
-
 // Decimal text <-> double with a power of ten between them, exact to the last bit in both directions:
 // parse_decimal("2.5", -6) is the double nearest to 2.5e-6, format_decimal(2.5e-6, 6) is "2.5", the shortest text that
 // parses back. (Multiplying by 1e6 would round twice.)
