@@ -20,6 +20,7 @@ public:
         find_angular_contributions(chain, tool, plan);
         lengths_ = make_length_systems(visits, collect_steps(visits, plan), plan, usable_);
         slopes_ = make_slope_system(visits, plan, lengths_, usable_);
+        find_shapes_that_hang_on_laser_angles(plan);
     }
 
     const AxisSystem& angles(Axis axis) const { return angles_[index(axis)]; }
@@ -28,10 +29,15 @@ public:
     bool is_determined(FunctionId id) const {
         const int component = static_cast<int>(id.component);
         return id.is_rotation() ? angles_[index(id.axis)].determined[component - 3]
-                                : lengths_[index(id.axis)].determined[component];
+                                : lengths_[index(id.axis)].determined[component] && !is_bent(id);
     }
     bool is_slope_determined(FunctionId id) const { return !id.is_positioning() || slopes_.determines_scale(id.axis); }
     bool is_determined(Squareness s) const { return slopes_.determines(s); }
+
+    // Whether a translation is known at every step, but lost readings left laser angles open that its shape hangs on.
+    bool is_bent(FunctionId id) const {
+        return !id.is_rotation() && bent_[index(id.axis)][static_cast<int>(id.component)];
+    }
 
     template <int Width>
     std::vector<Row<Width>> apply(const ReadingRows<Width>& readings) const {
@@ -72,6 +78,27 @@ private:
                 }
             }
             usable_.push_back(usable);
+        }
+    }
+
+    // Laser angles that stay open bend a straight line into each axis and component. It is taken off with the trend,
+    // unless a line was lost on some of the intervals: then the shape is not known either.
+    void find_shapes_that_hang_on_laser_angles(const Plan& plan) {
+        const double negligible = 1e-9 * plan.volume().norm();
+        for (Eigen::Index j = 0; j < slopes_.null_space().cols(); ++j) {
+            std::vector<Row<1>> slopes, lengths(contributions_.size(), Row<1>::Zero());
+            for (const double unknown : slopes_.null_space().col(j)) slopes.push_back(Row<1>(unknown));
+            slopes_.correct_for_laser_angles<1>(slopes, visits_, lengths);
+            std::vector<Row<1>> out(layout_.size(), Row<1>::Zero());
+            for (const Axis axis : all_axes) {
+                const auto functions = functions_of<1>(out, layout_, axis, Component::X);
+                add_up_steps<1>(lengths_[index(axis)], lengths, visits_, -1, functions);
+                for (int c = 0; c < 3; ++c) {
+                    take_off_trend<1>(functions[c], layout_.nodes, functions[c][layout_.nodes - 1]);
+                    for (int k = 0; k < layout_.nodes; ++k)
+                        if (std::abs(functions[c][k][0]) > negligible) bent_[index(axis)][c] = true;
+                }
+            }
         }
     }
 
@@ -133,6 +160,7 @@ private:
     std::vector<std::vector<AngularContribution>> contributions_;  // by reading
     std::vector<bool> usable_;                                     // by visit: its lengths
     SlopeSystem slopes_;
+    std::array<std::array<bool, 3>, 3> bent_{};  // by axis and component of translation
 };
 
 std::string names(Axis axis, int first_component, const std::array<bool, 3>& determined) {
@@ -153,6 +181,13 @@ std::vector<std::string> explain(const EnhancedMap& map) {
             sentences.push_back(
                 names(axis, 0, map.lengths(axis).determined) + ": " + map.lengths(axis).gap +
                 " with distance, tilts and known angles; three lines of different direction are needed at every step");
+    }
+    for (int i = 0; i < function_count; ++i) {
+        const FunctionId id = FunctionId::at(i);
+        if (map.is_bent(id))
+            sentences.push_back(id.name() +
+                                ": readings were lost, and the laser angles of the lines that bridge them are not "
+                                "determined; measure the lost points again");
     }
     for (const Axis axis : all_axes) {
         const FunctionId id{axis, Component(index(axis))};

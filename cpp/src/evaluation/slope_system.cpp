@@ -102,6 +102,11 @@ SlopeSystem make_slope_system(const std::vector<Visit>& visits, const Plan& plan
         matrix, Eigen::Map<const Eigen::VectorXd>(uncertainty.data(), Eigen::Index(uncertainty.size())));
     system.inverse_ = solution.pseudoinverse;
     system.determined_ = solution.determined;
+    const Eigen::MatrixXd projector = Eigen::MatrixXd::Identity(unknowns, unknowns) - solution.pseudoinverse * matrix;
+    const auto open = std::count(solution.determined.begin(), solution.determined.end(), false);
+    system.null_space_.resize(unknowns, open);
+    for (Eigen::Index j = 0, column = 0; j < unknowns; ++j)
+        if (!solution.determined[j]) system.null_space_.col(column++) = projector.col(j);
     return system;
 }
 

@@ -22,6 +22,9 @@ public:
     bool determines_scale(Axis axis) const { return determined_[scale(axis)]; }
     bool determines(Squareness s) const { return determined_[squareness(s)]; }
 
+    // Unknowns that the equations leave free: each column solves them with 0 on the right.
+    const Eigen::MatrixXd& null_space() const { return null_space_; }
+
     template <int Width>
     std::vector<Row<Width>> solve(const std::vector<Row<Width>>& lengths) const {
         std::vector<Row<Width>> sums(sums_.size(), Row<Width>::Zero());
@@ -54,6 +57,7 @@ private:
     };
     std::vector<std::vector<Term>> sums_;  // an equation each: a sum of lengths
     Eigen::MatrixXd inverse_;
+    Eigen::MatrixXd null_space_;
     std::vector<bool> determined_;
 };
 
