@@ -2,6 +2,7 @@
 
 #include <embree3/rtcore.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -32,10 +33,17 @@ void check(const std::vector<Face>& faces) {
                                   std::to_string(face.outline.size()));
         if (!face.point.allFinite() || !(std::abs(face.normal.norm() - 1.0) < 1e-9))
             throw InvalidArgument(name + ": expected a finite point and a unit normal");
-        for (const auto& corner : face.outline) {
-            const double extent = (corner - face.outline.front()).norm() + 1.0;
-            if (!(std::abs((corner - face.point).dot(face.normal)) < 1e-6 * extent))
-                throw InvalidArgument(name + ": a corner is not on the face's plane");
+        const std::size_t n = face.outline.size();
+        double turned = 0.0;  // +1 or -1: which way the corners run around the normal
+        for (std::size_t k = 0; k < n; ++k) {
+            const Eigen::Vector3d edge = face.outline[(k + 1) % n] - face.outline[k];
+            const Eigen::Vector3d next = face.outline[(k + 2) % n] - face.outline[(k + 1) % n];
+            if (!(std::abs((face.outline[k] - face.point).dot(face.normal)) < 1e-6 * (edge.norm() + 1.0)))
+                throw InvalidArgument(name + ": corner " + std::to_string(k) + " is not on the face's plane");
+            const double turn = edge.cross(next).dot(face.normal);
+            if (turn == 0.0 || turn * turned < 0.0)
+                throw InvalidArgument(name + ": the outline is not convex, or has three corners in line");
+            turned = turn > 0.0 ? 1.0 : -1.0;
         }
     }
 }

@@ -6,13 +6,9 @@
 #include <string>
 #include <string_view>
 
+#include "stepdiag/core/axis.hpp"
+
 namespace stepdiag {
-
-enum class Axis { X = 0, Y = 1, Z = 2 };
-
-inline constexpr std::array<Axis, 3> all_axes = {Axis::X, Axis::Y, Axis::Z};
-inline constexpr int index(Axis axis) { return static_cast<int>(axis); }
-inline constexpr char letter(Axis axis) { return "XYZ"[index(axis)]; }
 
 class Chain {
 public:

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "stepdiag/machine/chain.hpp"
+#include "stepdiag/core/axis.hpp"
 
 namespace stepdiag {
 

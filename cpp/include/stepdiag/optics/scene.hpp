@@ -23,7 +23,8 @@ struct Hit {
 
 class Scene {
 public:
-    // Throws InvalidArgument for a face with fewer than three corners, a corner off its plane, or values not finite.
+    // Throws InvalidArgument for a face with fewer than three corners, a corner off its plane, an outline that is not
+    // convex, or values not finite.
     explicit Scene(std::vector<Face> faces);
 
     const std::vector<Face>& faces() const { return faces_; }

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "stepdiag/machine/chain.hpp"
+#include "stepdiag/core/axis.hpp"
 
 namespace stepdiag {
 
