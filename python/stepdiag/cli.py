@@ -13,12 +13,23 @@ import click
 from stepdiag._core import InvalidArgument, __version__
 
 EPILOG = """\b
-A first round trip:
-  stepdiag init -o machine               a commented scenario and a sheet of points
+See it all at once:
+  stepdiag demo
+A first round trip (uncomment [machine.random] in the scenario for a machine with errors):
+  stepdiag init -o machine
   stepdiag simulate machine/scenario.toml -o run.csv
   stepdiag evaluate machine/scenario.toml run.csv -o calibration.csv
-Or watch it all at once: stepdiag demo
+Your own measurement: fill in machine/measurement.csv, then evaluate it in place of run.csv.
 """
+
+# In the order in which somebody new needs them.
+SHORT = {
+    "demo": "Show the method on the machine of its paper.",
+    "init": "Begin with your own machine: scenario and sheet.",
+    "simulate": "Simulate the run of a scenario.",
+    "evaluate": "Calibrate the machine from a run.",
+    "check": "Tell what a file is, and whether it is sound.",
+}
 
 Command = TypeVar("Command", bound=Callable[..., None])
 PATH = click.Path(path_type=Path)
@@ -28,13 +39,22 @@ def out_file(meaning: str) -> Callable[[Command], Command]:
     return click.option("-o", "output", required=True, type=PATH, metavar="FILE", help=meaning)
 
 
-@click.group(epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+class InOrder(click.Group):
+    """Lists the commands in the order above, not by the alphabet."""
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        return list(SHORT)
+
+
+@click.group(
+    cls=InOrder, epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+)
 @click.version_option(__version__, message="stepdiag %(version)s")
 def cli() -> None:
     """Calibrate three-axis machine tools by the laser step-diagonal method."""
 
 
-@cli.command(epilog="Example: stepdiag simulate scenario.toml -o run.csv")
+@cli.command(short_help=SHORT["simulate"], epilog="\b\nExample: stepdiag simulate scenario.toml -o run.csv")
 @click.argument("scenario", type=PATH)
 @out_file("Measurement file (CSV) to write.")
 def simulate(scenario: Path, output: Path) -> None:
@@ -51,7 +71,10 @@ def simulate(scenario: Path, output: Path) -> None:
     simulate_scenario(read_scenario(scenario)).write(output)
 
 
-@cli.command(epilog="Example: stepdiag evaluate scenario.toml run.csv -m enhanced -o calibration.csv")
+@cli.command(
+    short_help=SHORT["evaluate"],
+    epilog="\b\nExample: stepdiag evaluate scenario.toml run.csv -m enhanced -o calibration.csv",
+)
 @click.argument("scenario", type=PATH)
 @click.argument("run", type=PATH)
 @click.option(
@@ -90,7 +113,7 @@ def evaluate(scenario: Path, run: Path, method: str, output: Path) -> None:
         click.echo(line)
 
 
-@cli.command(epilog="Example: stepdiag demo -o demo")
+@cli.command(short_help=SHORT["demo"], epilog="\b\nExample: stepdiag demo -o demo")
 @click.option(
     "-o",
     "folder",
@@ -112,7 +135,7 @@ def demo(folder: Path) -> None:
         click.echo(line)
 
 
-@cli.command(epilog="Example: stepdiag check scenario.toml run.csv")
+@cli.command(short_help=SHORT["check"], epilog="\b\nExample: stepdiag check scenario.toml run.csv")
 @click.argument("files", nargs=-1, required=True, type=PATH, metavar="FILE...")
 @click.pass_context
 def check(context: click.Context, files: tuple[Path, ...]) -> None:
@@ -138,7 +161,7 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
         context.exit(2)
 
 
-@cli.command(epilog="Example: stepdiag init -o machine")
+@cli.command(short_help=SHORT["init"], epilog="\b\nExample: stepdiag init -o machine")
 @click.option("-o", "folder", required=True, type=PATH, metavar="DIR", help="Folder to write.")
 @click.option(
     "--sheet-for",

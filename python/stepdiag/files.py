@@ -13,13 +13,7 @@ LARGEST_TEXT = 16 * 2**20
 
 def read_text(path: Path) -> str:
     """The file's text. Raises InvalidArgument where it cannot be read, is empty, or is not UTF-8 text."""
-    try:
-        with open(path, "rb") as file:
-            content = file.read(LARGEST_TEXT + 1)
-    except IsADirectoryError:
-        raise InvalidArgument(f"{path}: expected a file, got a folder") from None
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
-        raise InvalidArgument(f"{path}: cannot be read: {reason(error)}") from None
+    content = _read(path, LARGEST_TEXT + 1)
     if len(content) > LARGEST_TEXT:
         raise InvalidArgument(f"{path}: larger than {LARGEST_TEXT // 2**20} MiB")
     if not content.strip():
@@ -31,6 +25,21 @@ def read_text(path: Path) -> str:
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InvalidArgument(f"{path}, line {line}: expected UTF-8 text") from None
+
+
+def read_beginning(path: Path) -> str:
+    """Enough of the file to tell what it is; what is no text comes as it may."""
+    return _read(path, 2**16).decode("utf-8-sig", errors="replace")
+
+
+def _read(path: Path, size: int) -> bytes:
+    try:
+        with open(path, "rb") as file:
+            return file.read(size)
+    except IsADirectoryError:
+        raise InvalidArgument(f"{path}: expected a file, got a folder") from None
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        raise InvalidArgument(f"{path}: cannot be read: {reason(error)}") from None
 
 
 def check_input(path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.files import check_input, read_text
+from stepdiag.files import check_input, read_beginning
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ def examine(path: Path) -> Finding:
     check_input(path)
     if path.suffix.lower() == ".toml":
         return _scenario(path)
-    comments, header = _head_of(read_text(path))
+    comments, header = _head_of(read_beginning(path))
     columns = {column.strip().strip('"') for column in header.split(",")}
     if {"parameter", "value"} & columns:
         is_calibration = any(
@@ -36,6 +36,8 @@ def examine(path: Path) -> Finding:
         return _measurement(path)
     if header.lstrip().startswith("[") or "=" in header:
         return _scenario(path)
+    if not header.strip():
+        raise InvalidArgument(f"{path}: the file is empty, or has only comments")
     raise InvalidArgument(
         f"{path}: expected a scenario (TOML), a measurement, an error map or a calibration (CSV); "
         f'a CSV file begins with "line,point,..." or "parameter,position_mm,..."'

@@ -24,7 +24,7 @@ def evaluation_report(calibration: Calibration, measurement: Measurement, scenar
     yield f"readings: {len(measurement)} points on {len(set(measurement.line))} lines"
     incomplete, missing = lost_readings(measurement, scenario.plan, scenario.head)
     if incomplete or missing:
-        yield f"lost: {incomplete} points without a complete reading, {missing} points of the plan missing"
+        yield f"lost: {incomplete} rows without a complete reading, {missing} points of the plan without a row"
     yield "largest standard uncertainties:"
     yield from _largest_uncertainties(calibration)
     for name in calibration.undetermined_slopes:

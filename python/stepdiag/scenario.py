@@ -27,7 +27,7 @@ MICROMETRE = 1e-3  # mm
 MICRORADIAN = 1e-6  # rad
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scenario:
     """What a scenario file says, checked and in native units (mm, rad, nm). Make one with `read_scenario`."""
 

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 import stepdiag as sd
 from stepdiag.scenario import parse_scenario
-from stepdiag.scenario_keys import LARGEST_STEPS
 
 GOOD = """
 [volume]
@@ -298,9 +297,3 @@ def test_whatever_stands_at_a_key_is_read_or_refused(path: tuple[str, ...], valu
     said = refusal(tomlkit.dumps(content))
     assert said == "" or said.startswith("s.toml: ")
     assert "\n" not in said
-
-
-def test_limits_of_the_keys_are_those_of_the_core() -> None:
-    sd.Plan((800, 600, 500), ["ppp"], LARGEST_STEPS)
-    with pytest.raises(sd.InvalidArgument):
-        sd.Plan((800, 600, 500), ["ppp"], LARGEST_STEPS + 1)

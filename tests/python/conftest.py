@@ -1,0 +1,38 @@
+"""What several files of tests share."""
+
+from pathlib import Path
+
+import pytest
+
+from stepdiag.cli import main
+
+SCENARIO = """
+[volume]
+x_mm = 80.0
+y_mm = 60.0
+z_mm = 50.0
+[machine]
+chain = "[w X' b Y Z t]"
+[machine.random]
+seed = 7
+[plan]
+lines = ["ppp", "npp", "pnp", "nnp"]
+steps = 5
+scale_lines = ["p00", "0p0", "00p"]
+[head]
+layout = "ideal"
+[misalignment]
+reflector_urad = [100.0, 300.0]
+[noise]
+distance_um = 0.1
+seed = 3
+"""
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a scenario and its run, which is also the working folder."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scenario.toml").write_text(SCENARIO)
+    assert main(["simulate", "scenario.toml", "-o", "run.csv"]) == 0
+    return tmp_path
