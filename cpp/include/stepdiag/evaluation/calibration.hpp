@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "stepdiag/machine/chain.hpp"
 #include "stepdiag/machine/error_map.hpp"
 
 namespace stepdiag {
