@@ -3,6 +3,7 @@
 What is imported inside a command keeps the others fast.
 """
 
+import io
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -209,6 +210,9 @@ def _complain(message: str) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command line and returns the exit code: 2 for a caller's mistake, 130 when interrupted."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without µ still gets the rest of the line
     try:
         result = cli.main(arguments, prog_name="stepdiag", standalone_mode=False)
         return result if isinstance(result, int) else 0

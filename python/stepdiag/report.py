@@ -27,10 +27,10 @@ def evaluation_report(calibration: Calibration, measurement: Measurement, scenar
         yield f"lost: {incomplete} rows without a complete reading, {missing} points of the plan without a row"
     yield "largest standard uncertainties:"
     yield from _largest_uncertainties(calibration)
-    for name in calibration.undetermined_slopes:
-        yield f"undetermined: slope of {name}; its shape is given with both ends at 0"
     for sentence in calibration.undetermined:
         yield f"undetermined: {sentence}"
+    if calibration.undetermined_slopes:
+        yield "note: a function of undetermined slope is given by its shape, with both ends at 0"
     if scenario.keys.adjustment.model_fields_set:
         yield f"note: [adjustment] is not used by the method {calibration.method}"
 

@@ -1,5 +1,6 @@
 """The command line: files in, files out, exit codes, and one clear line for a caller's mistake."""
 
+import os
 import resource
 import shutil
 import subprocess
@@ -179,6 +180,14 @@ def test_interruption_gives_130(here: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr("stepdiag.scenario.read_scenario", interrupted)
     assert run("simulate", "scenario.toml", "-o", "out.csv") == 130
     assert not Path("out.csv").exists()
+
+
+def test_terminal_without_the_micro_sign_gets_its_report(here: Path) -> None:
+    command = [sys.executable, "-m", "stepdiag.cli", "evaluate", "scenario.toml", "run.csv", "-o", "calibration.csv"]
+    environment = {**os.environ, "PYTHONIOENCODING": "iso8859-5"}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=here, env=environment)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "?m " in done.stdout
 
 
 # --- whole or not at all ---------------------------------------------------------------------------------------------
