@@ -1,0 +1,316 @@
+"""Malformed arguments: each public function refuses them and names the culprit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from truth import CHAIN, DIAGONALS, VOLUME, Setup, changed
+
+import stepdiag as sd
+
+NAN, INF = float("nan"), float("inf")
+SETUP = Setup(steps=4)
+ERRORS = SETUP.errors(1)
+RUN = SETUP.simulate(ERRORS)
+ONES = np.ones(len(RUN))
+
+
+def refused(call: Callable[..., Any], *arguments: Any, names: str, **options: Any) -> None:
+    with pytest.raises(sd.InvalidArgument) as refusal:
+        call(*arguments, **options)
+    assert isinstance(refusal.value, ValueError)
+    assert names in str(refusal.value), f"{refusal.value} does not name {names}"
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "[]", "X Y Z", "[w X b Y Z t]", "[w X' b Y' Z t]", "[w X' Y' b t]", "[w X' b Y Y t]", "[w X' b Y Z A t]",
+     "[t X' b Y Z w]", "[w X' b Y Z t", "[w x' b y z t]", "[w b b X Y t]", "[w X' b Y Z t] [w X' b Y Z t]", "\n", "é"],
+)  # fmt: skip
+def test_what_is_no_chain_is_refused(text: str) -> None:
+    refused(sd.Chain, text, names="chain")
+    refused(sd.Machine, text, names="chain")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names"),
+    [
+        (((0.0, 600.0, 500.0), DIAGONALS, 5), "volume"),
+        (((800.0, -600.0, 500.0), DIAGONALS, 5), "volume"),
+        (((800.0, 600.0, NAN), DIAGONALS, 5), "volume"),
+        (((INF, 600.0, 500.0), DIAGONALS, 5), "volume"),
+        (((800.0, 600.0), DIAGONALS, 5), "volume"),
+        (((800.0, 600.0, 1e-250), DIAGONALS, 5), "volume"),
+        (("wide", DIAGONALS, 5), "volume"),
+        ((None, DIAGONALS, 5), "volume"),
+        (([[800.0, 600.0, 500.0]], DIAGONALS, 5), "volume"),
+        ((VOLUME, [], 5), "lines"),
+        ((VOLUME, ["ppp", "ppp"], 5), "ppp"),
+        ((VOLUME, ["000"], 5), "000"),
+        ((VOLUME, ["pp"], 5), "pp"),
+        ((VOLUME, ["PPP"], 5), "PPP"),
+        ((VOLUME, DIAGONALS, 0), "steps"),
+        ((VOLUME, DIAGONALS, -4), "steps"),
+        ((VOLUME, DIAGONALS, 10**9), "steps"),
+        ((VOLUME, DIAGONALS, 2**40), "steps"),
+        ((VOLUME, DIAGONALS, 5, "XY"), "order"),
+        ((VOLUME, DIAGONALS, 5, "XYX"), "order"),
+        ((VOLUME, DIAGONALS, 5, "XYZ", ["pp0"]), "scale_lines"),
+        ((VOLUME, DIAGONALS, 5, "XYZ", ["p00", "p00"]), "p00"),
+        ((VOLUME, ["p00"], 5, "XYZ", ["p00"]), "p00"),
+    ],
+)
+def test_what_makes_no_plan_is_refused(arguments: tuple[Any, ...], names: str) -> None:
+    refused(sd.Plan, *arguments, names=names)
+
+
+def test_plan_is_not_asked_for_what_it_does_not_hold() -> None:
+    plan = SETUP.plan
+    refused(plan.points, "ppn", names="ppn")
+    refused(plan.points, "what", names="what")
+    refused(plan.frame, "000", names="000")
+    refused(plan.lateral_excursion, "", names="line")
+    refused(plan.nodes, "W", names="W")
+    refused(plan.nodes, "", names="axis")
+
+
+@pytest.mark.parametrize(
+    ("options", "names"),
+    [
+        ({"layout": "laser"}, "layout"),
+        ({"layout": ""}, "layout"),
+        ({"standoff": 0.0}, "standoff"),
+        ({"standoff": NAN}, "standoff"),
+        ({"standoff": -INF}, "standoff"),
+        ({"wavelength": -1.0}, "wavelength"),
+        ({"aperture": 0.0}, "aperture"),
+        ({"mirror": (0.0, 50.0)}, "mirror"),
+        ({"mirror": (50.0, NAN)}, "mirror"),
+        ({"mirror": 50.0}, "mirror"),
+        ({"mirror": (50.0, 50.0, 50.0)}, "mirror"),
+        ({"layout": "psd", "psd_distance": NAN}, "psd_distance"),
+        ({"layout": "psd", "psd_distance": -100.0}, "psd_distance"),
+        ({"layout": "multi_beam"}, "beam_offsets"),
+        ({"layout": "multi_beam", "beam_offsets": [(0, 0), (1, 0)]}, "beam_offsets"),
+        ({"layout": "multi_beam", "beam_offsets": [(0, 0), (1, 1), (2, 2)]}, "beam_offsets"),
+        ({"layout": "multi_beam", "beam_offsets": [(0, 0), (1, 0), (0, INF)]}, "beam_offsets"),
+        ({"layout": "multi_beam", "beam_offsets": [(0, 0), (1, 0), (0, 1, 2)]}, "beam_offsets"),
+        ({"layout": "multi_beam", "beam_offsets": ["a", "b", "c"]}, "beam_offsets"),
+    ],
+)
+def test_what_makes_no_head_is_refused(options: dict[str, Any], names: str) -> None:
+    refused(sd.Head, names=names, **options)
+
+
+@pytest.mark.parametrize(
+    ("functions", "squareness", "names"),
+    [
+        ({"EXQ": ([0, 1], [0, 1])}, {}, "EXQ"),
+        ({"C0Y": ([0, 1], [0, 1])}, {}, "C0Y"),
+        ({"EXX": ([], [])}, {}, "EXX"),
+        ({"EXX": ([0, 1], [0])}, {}, "EXX"),
+        ({"EXX": ([0, 0], [0, 1])}, {}, "EXX"),
+        ({"EXX": ([1, 0], [0, 1])}, {}, "EXX"),
+        ({"EXX": ([0, NAN], [0, 1])}, {}, "EXX"),
+        ({"EXX": ([0, 1], [0, INF])}, {}, "EXX"),
+        ({"EXX": ([[0, 1]], [[0, 1]])}, {}, "EXX"),
+        ({"EXX": ("ab", [0, 1])}, {}, "EXX"),
+        ({}, {"EXX": 1.0}, "EXX"),
+        ({}, {"A0Z": NAN}, "A0Z"),
+        ({}, {"B0Z": -INF}, "B0Z"),
+    ],
+)
+def test_what_makes_no_error_map_is_refused(functions: Any, squareness: Any, names: str) -> None:
+    refused(sd.ErrorMap, functions, squareness, names=names)
+
+
+def test_error_map_is_not_asked_for_what_makes_no_sense() -> None:
+    refused(ERRORS.function, "EXQ", [0.0], names="EXQ")
+    refused(ERRORS.function, "EXX", [[0.0]], names="position")
+    refused(ERRORS.function, "EXX", "far", names="position")
+    refused(ERRORS.warnings, (1.0, 2.0), names="volume")
+
+
+@pytest.mark.parametrize(
+    ("volume", "options", "names"),
+    [
+        ((0.0, 1.0, 1.0), {}, "volume"),
+        ((1.0, 1.0), {}, "volume"),
+        ((1.0, 1.0, NAN), {}, "volume"),
+        (VOLUME, {"intervals": 1}, "intervals"),
+        (VOLUME, {"intervals": -1}, "intervals"),
+        (VOLUME, {"intervals": 10**9}, "intervals"),
+        (VOLUME, {"translation": -1e-3}, "translation"),
+        (VOLUME, {"rotation": NAN}, "rotation"),
+        (VOLUME, {"squareness": INF}, "squareness"),
+        (VOLUME, {"screw_pitch": -1.0}, "screw_pitch"),
+        (VOLUME, {"screw_amplitude": 1e-3}, "screw_pitch"),
+    ],
+)
+def test_random_error_map_of_nonsense_is_refused(volume: Any, options: dict[str, Any], names: str) -> None:
+    refused(sd.random_error_map, volume, seed=1, names=names, **options)
+
+
+def test_machine_refuses_tools_and_positions_that_make_no_sense() -> None:
+    for tool in [(0.0, 0.0), (0.0, NAN, 0.0), (0.0, 0.0, INF), "long", [[0.0, 0.0, 0.0]], None, 5.0, ()]:
+        refused(sd.Machine, CHAIN, ERRORS, tool, names="tool")
+    machine = sd.Machine(CHAIN, ERRORS)
+    for method in (machine.pose, machine.error, machine.first_order_error):
+        for commanded in [5.0, "here", (1.0, 2.0), [[1.0, 2.0]], [[[1.0, 2.0, 3.0]]], None, [[1.0, 2.0, 3.0, 4.0]]]:
+            refused(method, commanded, names="commanded")
+        for commanded in [[[0.0, NAN, 0.0]], [[INF, 0.0, 0.0]]]:
+            refused(method, commanded, names="commanded")
+
+
+@pytest.mark.parametrize(
+    ("change", "names"),
+    [
+        ({"point": RUN.point[:-1]}, "point"),
+        ({"position": RUN.position[:-1]}, "position"),
+        ({"position": RUN.position[:, :2]}, "position"),
+        ({"position": np.full_like(RUN.position, NAN)}, "row 1"),
+        ({"position": "everywhere"}, "position"),
+        ({"line": ["ppp"] * len(RUN)}, "row"),
+        ({"line": ["diagonal"] * len(RUN)}, "diagonal"),
+        ({"line": [], "point": [], "position": np.zeros((0, 3)), "channels": {"distance": []}}, "measurement"),
+        ({"point": -np.ones(len(RUN), dtype=int)}, "row 1"),
+        ({"channels": {}}, "channels"),
+        ({"channels": {"distance": ONES[:-1]}}, "distance"),
+        ({"channels": {"distance": [ONES]}}, "distance"),
+        ({"channels": {"distance": "far"}}, "distance"),
+        ({"channels": {"distance": ONES * INF}}, "row 1"),
+        ({"channels": {"length": ONES}}, "length"),
+        ({"channels": {"alpha": ONES, "beta": ONES}}, "channels"),
+        ({"channels": {"distance": ONES, "alpha": ONES}}, "channels"),
+        ({"channels": {"distance": ONES, "d1": ONES, "d2": ONES, "d3": ONES}}, "channels"),
+        ({"channels": {"d1": ONES, "d2": ONES}}, "channels"),
+        ({"run": [0]}, "run"),
+        ({"direction": ["forward"]}, "direction"),
+        ({"direction": ["up"] * len(RUN)}, "direction"),
+        ({"standard_uncertainty": {"gamma": ONES}}, "gamma"),
+        ({"standard_uncertainty": {"distance": ONES[:-1]}}, "distance"),
+        ({"standard_uncertainty": {"distance": 0 * ONES}}, "row 1"),
+        ({"standard_uncertainty": {"alpha": -ONES}}, "row 1"),
+        ({"standard_uncertainty": {"alpha": INF * ONES}}, "row 1"),
+    ],
+)
+def test_what_makes_no_measurement_is_refused(change: dict[str, Any], names: str) -> None:
+    good = {"line": RUN.line, "point": RUN.point, "position": RUN.position, "channels": RUN.channels}
+    refused(sd.Measurement, names=names, **{**good, **change})
+
+
+@pytest.mark.parametrize(
+    ("options", "names"),
+    [
+        ({"misalignment": {"ppn": sd.Misalignment()}}, "ppn"),
+        ({"misalignment": {"": sd.Misalignment()}}, "line"),
+        ({"misalignment": {"ppp": sd.Misalignment(reflector=(0.1, 0.0))}}, "ppp"),
+        ({"misalignment": {"ppp": sd.Misalignment(laser=(0.0, -0.5))}}, "ppp"),
+        ({"noise": sd.Noise(distance=-1.0)}, "noise"),
+        ({"noise": sd.Noise(tilt=NAN)}, "noise"),
+        ({"noise": sd.Noise(spot=INF)}, "noise"),
+        ({"refractive_index": 0.5}, "refractive_index"),
+        ({"refractive_index": NAN}, "refractive_index"),
+        ({"refractive_index": INF}, "refractive_index"),
+    ],
+)
+def test_simulation_of_nonsense_is_refused(options: dict[str, Any], names: str) -> None:
+    refused(sd.simulate, sd.Machine(CHAIN, ERRORS), SETUP.plan, sd.Head(), names=names, **options)
+
+
+@pytest.mark.parametrize("pair", [(NAN, NAN), (NAN, 0.0), (0.0, NAN), (INF, 0.0), (0.0,), (0.0, 0.0, 0.0), "ab", 1.0])
+@pytest.mark.parametrize("key", ["reflector", "laser", "psd_zero"])
+def test_misalignment_that_is_no_pair_of_numbers_is_refused(key: str, pair: Any) -> None:
+    def simulate() -> None:
+        misalignment = {"ppp": sd.Misalignment(**{key: pair})}
+        sd.simulate(sd.Machine(CHAIN, ERRORS), SETUP.plan, sd.Head("psd", psd_distance=50.0), misalignment=misalignment)
+
+    refused(simulate, names="ppp" if isinstance(pair, tuple) and len(pair) == 2 else key)
+
+
+@pytest.mark.parametrize("mirror", [(10.0, 500.0), (500.0, 10.0), (1e-9, 1e-9)])
+def test_mirror_too_small_for_the_plan_is_refused(mirror: tuple[float, float]) -> None:
+    head = sd.Head(mirror=mirror)
+    refused(sd.simulate, sd.Machine(CHAIN, ERRORS), SETUP.plan, head, names="mirror")
+
+
+def alien(**change: Any) -> sd.Measurement:
+    good: dict[str, Any] = {"line": RUN.line, "point": RUN.point, "position": RUN.position, "channels": RUN.channels}
+    return sd.Measurement(**{**good, **change})
+
+
+BEAMS = {f"d{i}": 100.0 * ONES for i in (1, 2, 3)}
+
+
+@pytest.mark.parametrize(
+    ("run", "options", "names"),
+    [
+        (RUN, {"method": "exact"}, "method"),
+        (RUN, {"method": ""}, "method"),
+        (RUN, {"tool": (0.0, 0.0)}, "tool"),
+        (RUN, {"tool": (0.0, 0.0, NAN)}, "tool"),
+        (RUN, {"chain": "[w X Y Z t]"}, "chain"),
+        (RUN, {"uncertainty": sd.ReadingUncertainty(distance=0.0)}, "distance"),
+        (RUN, {"uncertainty": sd.ReadingUncertainty(tilt=-1.0)}, "tilt"),
+        (RUN, {"uncertainty": sd.ReadingUncertainty(distance=NAN)}, "distance"),
+        (RUN, {"uncertainty": sd.ReadingUncertainty(tilt=INF)}, "tilt"),
+        (RUN, {"plan": sd.Plan(VOLUME, DIAGONALS, 5)}, "row"),
+        (RUN, {"plan": sd.Plan(VOLUME, DIAGONALS[:2], 4)}, "row"),
+        (RUN, {"plan": sd.Plan((801.0, 600.0, 500.0), DIAGONALS, 4, scale_lines=SETUP.scale_lines)}, "row"),
+        (alien(position=RUN.position + 0.01), {}, "row"),
+        (alien(point=RUN.point + 1), {}, "row"),
+        (alien(channels=BEAMS), {}, "d1"),
+        (alien(channels={"distance": ONES, "spot_x": ONES, "spot_y": ONES}), {}, "psd_distance"),
+        (
+            alien(channels={"distance": -100.0 * ONES, "spot_x": ONES, "spot_y": ONES}),
+            {"head": sd.Head("psd", psd_distance=50.0)},
+            "row",
+        ),
+        (alien(channels={"distance": 100.0 * ONES, "alpha": 2.0 * ONES, "beta": 0 * ONES}), {}, "row"),
+        (alien(channels={"distance": NAN * ONES, "alpha": NAN * ONES, "beta": NAN * ONES}), {}, "determined"),
+        (changed(RUN, rows=[0]), {}, "determined"),
+    ],
+)
+def test_evaluation_of_nonsense_is_refused(run: sd.Measurement, options: dict[str, Any], names: str) -> None:
+    def evaluate() -> None:
+        given = {"plan": SETUP.plan, "head": sd.Head(), "chain": CHAIN, "tool": (0.0, 0.0, 0.0), **options}
+        sd.evaluate(run, **given)
+
+    refused(evaluate, names=names)
+
+
+@pytest.mark.parametrize("lines", [["ppp"], ["ppp", "nnp"], ["pp0", "np0", "p0p"], ["p00", "0p0", "00p"]])
+def test_conventional_evaluation_of_too_few_diagonals_is_refused(lines: list[str]) -> None:
+    setup = Setup(steps=4, lines=lines, scale_lines=[])
+    refused(setup.evaluate, setup.simulate(ERRORS), method="conventional", names="body diagonals")
+
+
+def test_enhanced_evaluation_without_tilts_is_refused() -> None:
+    refused(SETUP.evaluate, alien(channels={"distance": RUN.channels["distance"]}), names="determined")
+
+
+def test_beams_of_another_head_are_refused() -> None:
+    head = sd.Head("multi_beam", beam_offsets=[[0, 0], [20, 0], [0, 20], [9, 9]])
+    refused(sd.evaluate, alien(channels=BEAMS), SETUP.plan, head, CHAIN, names="beam")
+
+
+@pytest.mark.parametrize(
+    ("call", "arguments"),
+    [
+        (sd.Chain, (5,)),
+        (sd.Plan, (VOLUME, DIAGONALS, 2.5)),
+        (sd.Plan, (VOLUME, DIAGONALS, "five")),
+        (sd.Plan, (VOLUME, DIAGONALS, 10**30)),
+        (sd.Plan, (VOLUME, 5, 5)),
+        (sd.Machine, (CHAIN, "errors")),
+        (sd.simulate, (1, 2, 3)),
+        (sd.evaluate, (RUN, None, None, None)),
+        (sd.read_measurement, (5,)),
+    ],
+)
+def test_wrong_types_are_a_type_error_or_refused(call: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+    with pytest.raises((TypeError, ValueError)):
+        call(*arguments)
