@@ -1,0 +1,102 @@
+// From one Embree query to a traced reading, and the closed definition of the same reading beside it.
+#include <benchmark/benchmark.h>
+
+#include <vector>
+
+#include "expect.hpp"
+#include "stepdiag/core/rotation.hpp"
+#include "stepdiag/head/head.hpp"
+#include "stepdiag/optics/path.hpp"
+#include "stepdiag/plan/line.hpp"
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using stepdiag::Surface;
+
+constexpr int poses = 64;
+
+// A head on the body diagonal of 800 x 600 x 500 mm, misaligned as in the paper, and a tool at some poses along it.
+struct Bench {
+    stepdiag::Head head;
+    Matrix3d frame = stepdiag::line_frame(stepdiag::Line::parse("ppp"), {800.0, 600.0, 500.0});
+    stepdiag::HeadSetup setup =
+        set_up(head, frame, Vector3d::Zero(), {80.0, 80.0}, {{100e-6, 300e-6}, {700e-6, 1000e-6}, {0.0, 0.0}});
+    stepdiag::Medium air{1.000268};
+    std::vector<Vector3d> point;
+    std::vector<Matrix3d> rotation;
+
+    Bench() {
+        for (int i = 0; i < poses; ++i) {
+            point.push_back(frame * Vector3d(9.6 * (i % 3) / 2.0, 8.9 * (i % 2), 1118.0 * i / poses));
+            rotation.push_back(stepdiag::rotation_exp({1e-6 * i, -60e-6, 30e-6}));
+        }
+    }
+
+    stepdiag::Scene scene(int i) const {
+        return stepdiag::Scene(
+            {make_rectangle(point[i], rotation[i] * setup.tool_R_mirror, setup.mirror, Surface::reflecting),
+             make_rectangle(setup.origin, setup.machine_R_sensor, {50.0, 50.0}, Surface::absorbing)});
+    }
+    stepdiag::Ray beam() const { return {setup.origin, setup.machine_R_sensor.col(2)}; }
+    stepdiag::Reading closed(int i) const { return *define_reading(setup, point[i], rotation[i]); }
+};
+
+void embree_query(benchmark::State& state) {
+    const Bench bench;
+    std::vector<stepdiag::Scene> scenes;
+    for (int i = 0; i < poses; ++i) scenes.push_back(bench.scene(i));
+    for (int i = 0; i < poses; ++i)
+        expect_near(scenes[i].first_hit(bench.beam())->distance, bench.closed(i).beam_length(), 5e-12, "beam length");
+    int i = 0;
+    for (auto _ : state) benchmark::DoNotOptimize(scenes[i++ % poses].first_hit(bench.beam()));
+}
+
+void scene_of_two_faces(benchmark::State& state) {
+    const Bench bench;
+    int i = 0;
+    for (auto _ : state) benchmark::DoNotOptimize(bench.scene(i++ % poses));
+}
+
+void path_through_a_scene(benchmark::State& state) {
+    const Bench bench;
+    std::vector<stepdiag::Scene> scenes;
+    for (int i = 0; i < poses; ++i) scenes.push_back(bench.scene(i));
+    for (int i = 0; i < poses; ++i)
+        expect_near(trace(scenes[i], bench.air, bench.beam()).geometric_length, 2.0 * bench.closed(i).distance, 1e-11,
+                    "round trip");
+    int i = 0;
+    for (auto _ : state) benchmark::DoNotOptimize(trace(scenes[i++ % poses], bench.air, bench.beam()));
+}
+
+void traced_reading_with_its_scene(benchmark::State& state) {
+    const Bench bench;
+    for (int i = 0; i < poses; ++i) {
+        const auto traced = trace_reading(bench.head, bench.setup, bench.point[i], bench.rotation[i], bench.air);
+        const auto closed = bench.closed(i);
+        expect_near(traced->distance, closed.distance, 5e-12, "distance");
+        expect_near(traced->alpha, closed.alpha, 1e-14, "alpha");
+        expect_near(traced->beta, closed.beta, 1e-14, "beta");
+    }
+    int i = 0;
+    for (auto _ : state) {
+        benchmark::DoNotOptimize(
+            trace_reading(bench.head, bench.setup, bench.point[i % poses], bench.rotation[i % poses], bench.air));
+        ++i;
+    }
+}
+
+void closed_definition_of_a_reading(benchmark::State& state) {
+    const Bench bench;
+    int i = 0;
+    for (auto _ : state) benchmark::DoNotOptimize(bench.closed(i++ % poses));
+}
+
+BENCHMARK(embree_query);
+BENCHMARK(scene_of_two_faces);
+BENCHMARK(path_through_a_scene);
+BENCHMARK(traced_reading_with_its_scene);
+BENCHMARK(closed_definition_of_a_reading);
+
+}  // namespace
