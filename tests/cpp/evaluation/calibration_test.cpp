@@ -1,0 +1,96 @@
+#include "stepdiag/evaluation/calibration.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+
+#include "refuses.hpp"
+
+namespace {
+
+using stepdiag::Calibration;
+
+bool same_bits(const std::vector<double>& a, const std::vector<double>& b) {
+    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
+}
+
+Calibration sample() {
+    Calibration calibration{
+        "enhanced", stepdiag::Chain::parse("[w Y' b X Z t]"), {800.0, 1.0 / 3.0, 1e3}, {-0.1, 0.0, 1e-7}, {}, {}, {},
+        {}};
+    calibration.functions[0] =
+        stepdiag::CalibratedFunction{{0.0, 1.0 / 3.0, 800.0}, {-0.0, 5e-324, 1e300}, {0.0, 1e-300, 0.1}, false};
+    calibration.functions[17] = stepdiag::CalibratedFunction{{0.0, 500.0}, {0.0, 1.0 / 7.0 * 1e-6}, {0.0, 3e-7}, true};
+    calibration.squarenesses[1] = stepdiag::CalibratedSquareness{-1e-5 / 3.0, 1e-6 / 3.0};
+    calibration.undetermined = {"slope of EXX: add the scale line p00", "C0Y: \"add\" body diagonals, or faces"};
+    return calibration;
+}
+
+const std::filesystem::path folder = std::filesystem::temp_directory_path();
+
+void expect_file_refused(const std::string& text, const std::string& culprit) {
+    const auto path = (folder / "stepdiag_bad_calibration.csv").string();
+    std::ofstream(path, std::ios::binary) << text;
+    expect_refused([&] { stepdiag::read_calibration(path); }, path);
+    expect_refused([&] { stepdiag::read_calibration(path); }, culprit);
+    std::filesystem::remove(path);
+}
+
+}  // namespace
+
+TEST(Calibration, FileIsReadBackToTheSameBits) {
+    const auto path = (folder / "stepdiag_calibration_test.csv").string();
+    const Calibration a = sample();
+    write_calibration(a, path);
+    const Calibration b = stepdiag::read_calibration(path);
+    EXPECT_EQ(b.method, a.method);
+    EXPECT_EQ(b.chain, a.chain);
+    EXPECT_EQ(b.volume, a.volume);
+    EXPECT_EQ(b.tool, a.tool);
+    EXPECT_EQ(b.undetermined, a.undetermined);
+    for (int i = 0; i < stepdiag::function_count; ++i) {
+        ASSERT_EQ(b.functions[i].has_value(), a.functions[i].has_value()) << i;
+        if (!a.functions[i]) continue;
+        EXPECT_TRUE(same_bits(a.functions[i]->position, b.functions[i]->position));
+        EXPECT_TRUE(same_bits(a.functions[i]->value, b.functions[i]->value));
+        EXPECT_TRUE(same_bits(a.functions[i]->standard_uncertainty, b.functions[i]->standard_uncertainty));
+        EXPECT_EQ(b.functions[i]->slope_determined, a.functions[i]->slope_determined);
+    }
+    for (int s = 0; s < stepdiag::squareness_count; ++s) {
+        ASSERT_EQ(b.squarenesses[s].has_value(), a.squarenesses[s].has_value());
+        if (a.squarenesses[s]) {
+            EXPECT_EQ(b.squarenesses[s]->value, a.squarenesses[s]->value);
+            EXPECT_EQ(b.squarenesses[s]->standard_uncertainty, a.squarenesses[s]->standard_uncertainty);
+        }
+    }
+    std::filesystem::remove(path);
+}
+
+TEST(Calibration, FileIsAnErrorMapToo) {
+    const auto path = (folder / "stepdiag_calibration_as_map_test.csv").string();
+    write_calibration(sample(), path);
+    const auto map = stepdiag::read_error_map(path);
+    EXPECT_EQ(map.squareness(stepdiag::Squareness::B0Z), -1e-5 / 3.0);
+    EXPECT_EQ(map.function(stepdiag::FunctionId::at(17), 500.0), 1.0 / 7.0 * 1e-6);
+    EXPECT_EQ(map.function(stepdiag::FunctionId::at(3), 500.0), 0.0);  // undetermined is 0 in a map
+    std::filesystem::remove(path);
+}
+
+TEST(Calibration, HeaderThatMakesNoSenseIsRefused) {
+    const std::string table = "parameter,position_mm,value,unit,standard_uncertainty\nEXX,0,0,um,\n";
+    const std::string chain = "# chain=[w X' b Y Z t]\n", size = "# volume_mm=800 600 500\n",
+                      tool = "# tool_mm=0 0 0\n";
+    expect_file_refused(table, "chain");
+    expect_file_refused(size + tool + table, "chain");
+    expect_file_refused(chain + tool + table, "volume_mm");
+    expect_file_refused(chain + size + table, "tool_mm");
+    expect_file_refused("# chain=[w X b Y Z t]\n" + size + tool + table, "chain");
+    expect_file_refused(chain + "# volume_mm=800 600\n" + tool + table, "volume_mm");
+    expect_file_refused(chain + "# volume_mm=800 600 x\n" + tool + table, "volume_mm");
+    expect_file_refused(chain + "# volume_mm=800 0 500\n" + tool + table, "volume_mm");
+    expect_file_refused(chain + size + "# tool_mm=0 inf 0\n" + table, "tool_mm");
+    expect_file_refused(chain + size + tool + "# undetermined_slopes=EXQ\n" + table, "EXQ");
+}
