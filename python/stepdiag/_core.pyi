@@ -52,7 +52,7 @@ class ErrorMap:
         """
         Where the map breaks the frame choice (0 at home, straightness 0 at both ends of travel); one sentence each.
         """
-    def write(self, path: str | os.PathLike[str], *, chain: Chain | None = None, volume: numpy.typing.ArrayLike | None = None, tool: numpy.typing.ArrayLike | None = None) -> None:
+    def write(self, path: str | os.PathLike[str], *, chain: Chain | str | None = None, volume: numpy.typing.ArrayLike | None = None, tool: numpy.typing.ArrayLike | None = None) -> None:
         """
         Writes the error-map CSV; numbers are read back to the same bits. Raises InvalidArgument when it cannot be written.
         """
@@ -71,7 +71,7 @@ class Machine:
     """
     A three-axis machine: chain, the 21 errors, tool offset (mm).
     """
-    def __init__(self, chain: Chain, errors: ErrorMap = ..., tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0)) -> None:
+    def __init__(self, chain: Chain | str, errors: ErrorMap = ..., tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0)) -> None:
         ...
     def error(self, commanded: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -98,9 +98,10 @@ class Plan:
     """
     The lines measured through a volume, in single-axis steps. Lines are named by the travel signs of X, Y, Z: three of p n 0.
     """
+    largest_step_count: typing.ClassVar[int] = 10000
     def __init__(self, volume: numpy.typing.ArrayLike, lines: collections.abc.Sequence[str], steps: typing.SupportsInt | typing.SupportsIndex, order: str = 'XYZ', scale_lines: collections.abc.Sequence[str] = []) -> None:
         """
-        volume: edges in mm. steps: per axis. Raises InvalidArgument for an unknown or doubled line, a volume without extent, steps outside 1 .. 100000.
+        volume: edges in mm. steps: per axis. Raises InvalidArgument for an unknown or doubled line, a volume without extent, steps outside 1 .. 10000.
         """
     def frame(self, line: str) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -141,7 +142,7 @@ class Measurement:
     """
     A run's readings, row by row: line, point, run, direction, commanded position (mm), and channels in native units (mm, rad; NaN where a reading was lost).
     """
-    def __init__(self, line: collections.abc.Sequence[str], point: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], position: numpy.typing.ArrayLike, channels: dict, *, run: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, direction: collections.abc.Sequence[str] | None = None, standard_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}) -> None:
+    def __init__(self, line: collections.abc.Sequence[str], point: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], position: numpy.typing.ArrayLike, channels: dict[str, numpy.typing.ArrayLike], *, run: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, direction: collections.abc.Sequence[str] | None = None, standard_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}) -> None:
         """
         channels: name -> (n,) with names distance, alpha, beta, spot_x, spot_y, d1 ..., time, temperature. Raises InvalidArgument.
         """
@@ -316,7 +317,7 @@ class Calibration:
     @property
     def volume(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
-def evaluate(measurement: Measurement, plan: Plan, head: Head, chain: Chain, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'enhanced', uncertainty: ReadingUncertainty = ..., full_covariance: bool = False) -> Calibration:
+def evaluate(measurement: Measurement, plan: Plan, head: Head, chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'enhanced', uncertainty: ReadingUncertainty = ..., full_covariance: bool = False) -> Calibration:
     """
     Calibration from a run. Of the head only psd_distance and beam_offsets are used, of the machine only chain and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan.
     """

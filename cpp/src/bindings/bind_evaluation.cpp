@@ -6,7 +6,7 @@
 namespace stepdiag::bindings {
 namespace {
 
-Calibration evaluate(const Measurement& measurement, const Plan& plan, const Head& head, const Chain& chain,
+Calibration evaluate(const Measurement& measurement, const Plan& plan, const Head& head, const ChainLike& chain,
                      const ArrayLike& tool, const std::string& method, const ReadingUncertainty& uncertainty,
                      bool full_covariance) {
     const auto evaluator = method == "enhanced"       ? &evaluate_enhanced
@@ -14,8 +14,9 @@ Calibration evaluate(const Measurement& measurement, const Plan& plan, const Hea
                                                       : nullptr;
     if (!evaluator) throw InvalidArgument("method: expected \"conventional\" or \"enhanced\", got \"" + method + "\"");
     const Eigen::Vector3d offset = to_vector3(tool, "tool");
+    const Chain kinematics = to_chain(chain);
     py::gil_scoped_release release;
-    return evaluator(measurement, plan, chain, offset, head.calibration(), {uncertainty, full_covariance});
+    return evaluator(measurement, plan, kinematics, offset, head.calibration(), {uncertainty, full_covariance});
 }
 
 std::vector<std::pair<std::string, std::optional<double>>> covariance_labels(const Calibration& calibration) {
@@ -34,9 +35,8 @@ void bind_evaluation(py::module_& m) {
     py::class_<ReadingUncertainty>(m, "ReadingUncertainty",
                                    "Standard uncertainty of a reading where the run gives none: distance (mm; also d1 "
                                    "...), tilt (rad), spot (mm).")
-        .def(py::init([](double distance, double tilt, double spot) {
-                 return ReadingUncertainty{distance, tilt, spot};
-             }),
+        .def(py::init(
+                 [](double distance, double tilt, double spot) { return ReadingUncertainty{distance, tilt, spot}; }),
              py::arg("distance") = ReadingUncertainty{}.distance, py::arg("tilt") = ReadingUncertainty{}.tilt,
              py::arg("spot") = ReadingUncertainty{}.spot)
         .def_readonly("distance", &ReadingUncertainty::distance)

@@ -25,6 +25,12 @@ ErrorMap make_error_map(const FunctionArrays& functions, const std::map<std::str
     return ErrorMap(std::move(table));
 }
 
+Points to_commanded(const ArrayLike& array) {
+    const Points points = to_points(array, "commanded");
+    if (!points.allFinite()) throw InvalidArgument("commanded: expected finite positions in mm");
+    return points;
+}
+
 template <class Map>
 DoubleArray map_points(const Points& commanded, Map&& map) {
     DoubleArray result({commanded.rows(), Eigen::Index(3)});
@@ -53,7 +59,6 @@ void bind_machine(py::module_& m) {
         .def("__hash__", [](const Chain& chain) { return py::hash(py::str(chain.name())); })
         .def("__str__", &Chain::name)
         .def("__repr__", [](const Chain& chain) { return "Chain(\"" + chain.name() + "\")"; });
-    py::implicitly_convertible<py::str, Chain>();
 
     py::class_<ErrorMap>(
         m, "ErrorMap",
@@ -63,15 +68,15 @@ void bind_machine(py::module_& m) {
              py::arg("squareness") = std::map<std::string, double>{},
              "functions: name -> (position, value), one-dimensional and of one length, positions ascending. Raises "
              "InvalidArgument.")
-        .def_property_readonly(
-            "functions",
-            [](const ErrorMap& map) {
-                std::map<std::string, std::pair<DoubleArray, DoubleArray>> functions;
-                for (int i = 0; i < function_count; ++i)
-                    if (const auto& table = map.table().functions[i])
-                        functions[FunctionId::at(i).name()] = {to_numpy(table->position), to_numpy(table->value)};
-                return functions;
-            })
+        .def_property_readonly("functions",
+                               [](const ErrorMap& map) {
+                                   std::map<std::string, std::pair<DoubleArray, DoubleArray>> functions;
+                                   for (int i = 0; i < function_count; ++i)
+                                       if (const auto& table = map.table().functions[i])
+                                           functions[FunctionId::at(i).name()] = {to_numpy(table->position),
+                                                                                  to_numpy(table->value)};
+                                   return functions;
+                               })
         .def_property_readonly("squareness",
                                [](const ErrorMap& map) {
                                    std::map<std::string, double> values;
@@ -102,11 +107,11 @@ void bind_machine(py::module_& m) {
             "each.")
         .def(
             "write",
-            [](const ErrorMap& map, const PathLike& path, const std::optional<Chain>& chain,
+            [](const ErrorMap& map, const PathLike& path, const std::optional<ChainLike>& chain,
                const std::optional<ArrayLike>& volume, const std::optional<ArrayLike>& tool) {
                 ParameterTable table = map.table();
                 table.header["format"] = "stepdiag error map 1";
-                if (chain) table.header["chain"] = chain->name();
+                if (chain) table.header["chain"] = to_chain(*chain).name();
                 if (volume) table.header["volume_mm"] = format_lengths(to_vector3(*volume, "volume"));
                 if (tool) table.header["tool_mm"] = format_lengths(to_vector3(*tool, "tool"));
                 write_parameter_table(table, to_path(path));
@@ -132,8 +137,8 @@ void bind_machine(py::module_& m) {
         "within +-`squareness` rad, in the frame choice of the conventions. Same arguments, same bits.");
 
     py::class_<Machine>(m, "Machine", "A three-axis machine: chain, the 21 errors, tool offset (mm).")
-        .def(py::init([](const Chain& chain, const ErrorMap& errors, const ArrayLike& tool) {
-                 return Machine(chain, errors, to_vector3(tool, "tool"));
+        .def(py::init([](const ChainLike& chain, const ErrorMap& errors, const ArrayLike& tool) {
+                 return Machine(to_chain(chain), errors, to_vector3(tool, "tool"));
              }),
              py::arg("chain"), py::arg("errors") = ErrorMap(), py::arg("tool") = zeros(3))
         .def_property_readonly("chain", &Machine::chain)
@@ -142,7 +147,7 @@ void bind_machine(py::module_& m) {
         .def(
             "pose",
             [](const Machine& machine, const ArrayLike& commanded) {
-                const Points points = to_points(commanded, "commanded");
+                const Points points = to_commanded(commanded);
                 DoubleArray rotation({points.rows(), Eigen::Index(3), Eigen::Index(3)}),
                     position({points.rows(), Eigen::Index(3)});
                 double *r = rotation.mutable_data(), *p = position.mutable_data();
@@ -162,14 +167,13 @@ void bind_machine(py::module_& m) {
         .def(
             "error",
             [](const Machine& machine, const ArrayLike& commanded) {
-                return map_points(to_points(commanded, "commanded"),
-                                  [&](const Eigen::Vector3d& p) { return machine.error(p); });
+                return map_points(to_commanded(commanded), [&](const Eigen::Vector3d& p) { return machine.error(p); });
             },
             py::arg("commanded"), "Actual minus nominal functional point (n, 3), mm, exact.")
         .def(
             "first_order_error",
             [](const Machine& machine, const ArrayLike& commanded) {
-                return map_points(to_points(commanded, "commanded"),
+                return map_points(to_commanded(commanded),
                                   [&](const Eigen::Vector3d& p) { return machine.first_order_error(p); });
             },
             py::arg("commanded"), "The same to first order in the errors: sum over axes of delta + theta x L.");

@@ -17,7 +17,7 @@ std::vector<std::optional<double>> to_fields(const ArrayLike& array, const std::
 }
 
 Measurement make_measurement(const std::vector<std::string>& line, const std::vector<int>& point,
-                             const ArrayLike& position, const py::dict& channels,
+                             const ArrayLike& position, const py::typing::Dict<py::str, ArrayLike>& channels,
                              const std::optional<std::vector<int>>& run,
                              const std::optional<std::vector<std::string>>& direction,
                              const ChannelArrays& standard_uncertainty) {

@@ -37,6 +37,7 @@ void bind_plan(py::module_& m) {
              py::arg("scale_lines") = std::vector<std::string>{},
              "volume: edges in mm. steps: per axis. Raises InvalidArgument for an unknown or doubled line, a volume "
              "without extent, steps outside 1 .. 10000.")
+        .def_property_readonly_static("largest_step_count", [](const py::object&) { return Plan::largest_step_count; })
         .def_property_readonly("volume", [](const Plan& plan) { return to_numpy_vector(plan.volume()); })
         .def_property_readonly("lines", [](const Plan& plan) { return line_names(plan.lines()); })
         .def_property_readonly("scale_lines", [](const Plan& plan) { return line_names(plan.scale_lines()); })

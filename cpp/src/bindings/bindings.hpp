@@ -24,6 +24,9 @@ using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 class ArrayLike : public py::object {
     PYBIND11_OBJECT_DEFAULT(ArrayLike, py::object, PyObject_Type)
 };
+class ChainLike : public py::object {
+    PYBIND11_OBJECT_DEFAULT(ChainLike, py::object, PyObject_Type)
+};
 class PathLike : public py::object {
     PYBIND11_OBJECT_DEFAULT(PathLike, py::object, PyObject_Type)
 };
@@ -36,6 +39,7 @@ Eigen::Vector3d to_vector3(const py::handle& array, const char* name);
 Eigen::Vector2d to_vector2(const py::handle& array, const char* name);
 Points to_points(const py::handle& array, const char* name);  // (n, 3)
 std::string to_path(const PathLike& path);
+Chain to_chain(const ChainLike& chain);  // a Chain, or its text
 Axis to_axis(const std::string& name);
 
 DoubleArray to_numpy(const std::vector<double>& values);
@@ -59,6 +63,10 @@ namespace pybind11::detail {
 template <>
 struct handle_type_name<stepdiag::bindings::ArrayLike> {
     static constexpr auto name = const_name("numpy.typing.ArrayLike");
+};
+template <>
+struct handle_type_name<stepdiag::bindings::ChainLike> {
+    static constexpr auto name = const_name("Chain | str");
 };
 template <>
 struct handle_type_name<stepdiag::bindings::PathLike> {

@@ -44,7 +44,16 @@ Points to_points(const py::handle& object, const char* name) {
     return Eigen::Map<const Points>(array.data(), array.shape(0), 3);
 }
 
-std::string to_path(const PathLike& path) { return py::module_::import("os").attr("fspath")(path).cast<std::string>(); }
+std::string to_path(const PathLike& path) {
+    return py::module_::import("os").attr("fsencode")(path).cast<std::string>();  // any bytes may name a file
+}
+
+Chain to_chain(const ChainLike& chain) {
+    if (py::isinstance<Chain>(chain)) return chain.cast<Chain>();
+    if (py::isinstance<py::str>(chain)) return Chain::parse(chain.cast<std::string>());
+    throw InvalidArgument("chain: expected a Chain or its text, got " +
+                          std::string(py::str(py::type::handle_of(chain))));
+}
 
 Axis to_axis(const std::string& name) {
     for (const Axis axis : all_axes)
@@ -72,14 +81,29 @@ DoubleArray to_numpy(const Eigen::MatrixXd& matrix) {
 
 DoubleArray to_numpy_vector(const Eigen::VectorXd& vector) { return DoubleArray(vector.size(), vector.data()); }
 
+// The message may quote a file's path, which need not be UTF-8.
+void bind_exception(py::module_& m) {
+    static py::exception<InvalidArgument> type(m, "InvalidArgument", PyExc_ValueError);
+    type.doc() = "Bad input: the message names the argument, file and line, or key, what was expected and what came.";
+    py::register_exception_translator([](std::exception_ptr thrown) {
+        try {
+            if (thrown) std::rethrow_exception(thrown);
+        } catch (const InvalidArgument& error) {
+            const std::string_view text = error.what();
+            const auto message = py::reinterpret_steal<py::object>(
+                PyUnicode_DecodeUTF8(text.data(), py::ssize_t(text.size()), "surrogateescape"));
+            PyErr_SetObject(type.ptr(), message.ptr());
+        }
+    });
+}
+
 }  // namespace stepdiag::bindings
 
 PYBIND11_MODULE(_core, m) {
     using namespace stepdiag::bindings;
     m.doc() = "The C++ core of stepdiag. Native units: mm, rad, nm.";
     m.attr("__version__") = stepdiag::version();
-    py::register_exception<stepdiag::InvalidArgument>(m, "InvalidArgument", PyExc_ValueError).doc() =
-        "Bad input: the message names the argument, file and line, or key, what was expected and what came.";
+    bind_exception(m);
     bind_machine(m);
     bind_plan(m);
     bind_measurement(m);

@@ -62,10 +62,28 @@ bool is_small(std::string_view mantissa, int exponent) {
     return int(point) - int(first) + exponent <= 0;
 }
 
+// Where UTF-8 breaks off, counted in bytes; npos where it does not. Overlong forms and surrogates pass: nothing is
+// decoded.
+std::size_t first_broken_character(std::string_view text) {
+    for (std::size_t i = 0; i < text.size();) {
+        const auto lead = static_cast<unsigned char>(text[i]);
+        const std::size_t length = lead < 0x80         ? 1
+                                   : lead >> 5 == 0x6  ? 2
+                                   : lead >> 4 == 0xE  ? 3
+                                   : lead >> 3 == 0x1E ? 4
+                                                       : 0;
+        if (length == 0 || i + length > text.size()) return i;
+        for (std::size_t k = 1; k < length; ++k)
+            if ((static_cast<unsigned char>(text[i + k]) & 0xC0) != 0x80) return i;
+        i += length;
+    }
+    return std::string_view::npos;
+}
+
 }  // namespace
 
 std::string read_text_file(const std::string& path) {
-    struct stat status {};
+    struct stat status{};
     if (::stat(path.c_str(), &status) != 0) throw InvalidArgument(path + ": cannot be read: " + std::strerror(errno));
     if (!S_ISREG(status.st_mode) && !S_ISFIFO(status.st_mode))
         throw InvalidArgument(path + ": expected a file, got a folder or a device");
@@ -79,6 +97,10 @@ std::string read_text_file(const std::string& path) {
     if (!stream.eof()) throw InvalidArgument(path + ": cannot be read: " + std::strerror(errno));
     if (text.empty()) throw InvalidArgument(path + ": the file is empty");
     if (text.find('\0') != std::string::npos) throw InvalidArgument(path + ": expected a text file, got binary data");
+    if (const auto broken = first_broken_character(text); broken != std::string::npos) {
+        const auto line = 1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(broken), '\n');
+        throw InvalidArgument(path + ", line " + std::to_string(line) + ": expected UTF-8 text");
+    }
     return text;
 }
 
@@ -86,7 +108,7 @@ void write_text_file(const std::string& path, std::string_view text) {
     const auto fail = [&](const std::string& what) {
         throw InvalidArgument(path + ": " + what + ": " + std::strerror(errno));
     };
-    struct stat status {};
+    struct stat status{};
     const bool exists = ::stat(path.c_str(), &status) == 0;
     if (exists && S_ISDIR(status.st_mode)) throw InvalidArgument(path + ": cannot be written: it is a folder");
     if (exists && !S_ISREG(status.st_mode)) {  // a pipe or a device is written to, not replaced

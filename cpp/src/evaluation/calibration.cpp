@@ -55,8 +55,9 @@ Eigen::Vector3d parse_lengths(const ParameterTable& table, const std::string& ke
 }
 
 Chain parse_chain(const ParameterTable& table, const std::string& path) {
+    const std::string text = header_value(table, "chain", path);
     try {
-        return Chain::parse(header_value(table, "chain", path));
+        return Chain::parse(text);
     } catch (const InvalidArgument& error) {
         throw InvalidArgument(path + ": " + error.what());
     }
@@ -131,6 +132,8 @@ Calibration read_calibration(const std::string& path) {
         if (const auto& entry = table.squarenesses[i])
             calibration.squarenesses[i] =
                 CalibratedSquareness{entry->value, entry->standard_uncertainty.value_or(unknown)};
+    if (!(calibration.volume.minCoeff() > 0.0))
+        throw InvalidArgument(path + ": volume_mm: expected three positive edges");
     return calibration;
 }
 

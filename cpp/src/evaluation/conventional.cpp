@@ -63,6 +63,7 @@ private:
 Calibration evaluate_conventional(const Measurement& measurement, const Plan& plan, const Chain& chain,
                                   const Eigen::Vector3d& tool, const HeadCalibration& head,
                                   const EvaluationOptions& options) {
+    if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
     const auto visits = collect_visits(measurement, plan, head, options.uncertainty, LengthKind::distance);
     std::vector<bool> usable;
     for (const Visit& visit : visits) usable.push_back(visit.line.is_body_diagonal());

@@ -11,7 +11,7 @@ LeastSquares solve_least_squares(const Eigen::MatrixXd& equations, const Eigen::
     constexpr double rank_threshold = 1e-9;
     constexpr double in_row_space = 1e-6;  // of the projector's diagonal, which is 1 or clearly less
     if (standard_uncertainty.size() != equations.rows() || !equations.allFinite() ||
-        !(standard_uncertainty.array() > 0.0).all())
+        !standard_uncertainty.allFinite() || !(standard_uncertainty.array() > 0.0).all())
         throw InvalidArgument(
             "least squares: expected finite equations and one positive standard uncertainty for each");
     const Eigen::Index unknowns = equations.cols();

@@ -181,9 +181,11 @@ Eigen::Vector3d VisitPoint::variance() const {
 
 std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& plan, const HeadCalibration& head,
                                   const ReadingUncertainty& uncertainty, LengthKind kind) {
-    for (const double u : {uncertainty.distance, uncertainty.tilt, uncertainty.spot})
+    for (const auto& [key, u] : {std::pair("distance", uncertainty.distance), std::pair("tilt", uncertainty.tilt),
+                                 std::pair("spot", uncertainty.spot)})
         if (!(u > 0.0 && std::isfinite(u)))
-            throw InvalidArgument("uncertainty: expected positive finite standard uncertainties");
+            throw InvalidArgument(std::string("uncertainty.") + key +
+                                  ": expected a positive finite standard uncertainty");
     const Reducer reducer(measurement, head, uncertainty);
     std::map<std::pair<int, std::string>, std::vector<std::size_t>> rows;
     for (std::size_t i = 0; i < measurement.size(); ++i)

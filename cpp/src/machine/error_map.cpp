@@ -122,10 +122,11 @@ ErrorMap make_random_error_map(const Eigen::Vector3d& volume, const RandomErrorM
     require(volume.allFinite() && volume.minCoeff() > 0.0, "volume: expected three positive lengths in mm");
     require(options.intervals >= 2 && options.intervals <= 1'000'000,
             "intervals: expected 2 to 1000000, got " + std::to_string(options.intervals));
-    for (const double amplitude :
-         {options.translation, options.rotation, options.squareness, options.screw_pitch, options.screw_amplitude})
-        require(std::isfinite(amplitude) && amplitude >= 0.0,
-                "amplitudes and screw_pitch: expected finite values, at least 0");
+    for (const auto& [key, value] :
+         {std::pair("translation", options.translation), std::pair("rotation", options.rotation),
+          std::pair("squareness", options.squareness), std::pair("screw_pitch", options.screw_pitch),
+          std::pair("screw_amplitude", options.screw_amplitude)})
+        require(std::isfinite(value) && value >= 0.0, std::string(key) + ": expected a finite value of at least 0");
     require(options.screw_amplitude == 0.0 || options.screw_pitch > 0.0,
             "screw_pitch: expected a positive length in mm with a screw_amplitude");
 

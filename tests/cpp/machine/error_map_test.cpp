@@ -158,8 +158,8 @@ TEST(ErrorMap, RandomMapOfNonsenseIsRefused) {
     expect_refused([&] { make(volume, [](auto& o) { o.intervals = 0; }); }, "intervals");
     expect_refused([&] { make(volume, [](auto& o) { o.intervals = -5; }); }, "intervals");
     expect_refused([&] { make(volume, [](auto& o) { o.intervals = 1'000'000'000; }); }, "intervals");
-    expect_refused([&] { make(volume, [](auto& o) { o.translation = -1.0; }); }, "amplitude");
-    expect_refused([&] { make(volume, [](auto& o) { o.rotation = not_a_number; }); }, "amplitude");
-    expect_refused([&] { make(volume, [](auto& o) { o.squareness = infinite; }); }, "amplitude");
+    expect_refused([&] { make(volume, [](auto& o) { o.translation = -1.0; }); }, "translation");
+    expect_refused([&] { make(volume, [](auto& o) { o.rotation = not_a_number; }); }, "rotation");
+    expect_refused([&] { make(volume, [](auto& o) { o.squareness = infinite; }); }, "squareness");
     expect_refused([&] { make(volume, [](auto& o) { o.screw_amplitude = 1e-3; }); }, "screw_pitch");
 }
