@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth import DIAGONALS, SCALE_LINES, Setup, changed
+from truth import DIAGONALS, FACES, SCALE_LINES, Setup, changed, without
 
 import stepdiag as sd
 
@@ -43,18 +43,23 @@ def repeated(setup: Setup, run: sd.Measurement, method: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("layout", "method", "lines"),
+    ("layout", "method", "lines", "lost"),
     [
-        ("ideal", "enhanced", DIAGONALS),
-        ("ideal", "enhanced", ["ppp", "nnp", "npp"]),
-        ("ideal", "conventional", DIAGONALS),
-        ("psd", "enhanced", DIAGONALS),  # u(tilt) = u(spot) / 2(L + psd_distance) is not constant
-        ("multi_beam", "enhanced", DIAGONALS),  # distance and tilts are correlated
+        ("ideal", "enhanced", DIAGONALS, []),
+        ("ideal", "enhanced", ["ppp", "nnp", "npp"], []),
+        ("ideal", "enhanced", DIAGONALS, [("ppp", 4), ("npp", 9), ("nnp", 0)]),  # bridged
+        ("ideal", "enhanced", [*FACES, "nnn"], []),
+        ("ideal", "conventional", DIAGONALS, []),
+        ("psd", "enhanced", DIAGONALS, []),  # u(tilt) = u(spot) / 2(L + psd_distance) is not constant
+        ("multi_beam", "enhanced", DIAGONALS, []),  # distance and tilts are correlated
     ],
 )
-def test_covariance_is_that_of_noisy_repetitions(layout: str, method: str, lines: list[str]) -> None:
+def test_covariance_is_that_of_noisy_repetitions(
+    layout: str, method: str, lines: list[str], lost: list[tuple[str, int]]
+) -> None:
     setup = Setup(steps=6, lines=lines, scale_lines=SCALE_LINES, head=HEADS[layout])
     run = setup.simulate(setup.errors(3), sd.Misalignment(reflector=(1e-4, 3e-4), laser=(2e-4, -1e-4)))
+    run = without(run, lost)
     calibration = setup.evaluate(run, method=method, uncertainty=UNCERTAINTY, full_covariance=True)
     samples = repeated(setup, run, method)
     covariance = calibration.covariance
