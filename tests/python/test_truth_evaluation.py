@@ -229,3 +229,23 @@ def test_order_of_rows_does_not_matter() -> None:
         # Sums in another order: roundings of 1 m, 45 of them.
         assert np.max(np.abs(after.functions[name][1] - value)) <= 1e-11
         assert np.allclose(after.functions[name][2], u, rtol=1e-9)
+
+
+def test_readings_count_where_the_file_says_they_were_taken() -> None:
+    """A controller that takes three decimals goes to 114.286 mm for 800/7 mm; the file says so."""
+    setup = Setup(steps=7)
+    truth = setup.errors(6)
+    functions = {name: (list(p), list(v)) for name, (p, v) in truth.functions.items()}
+    table = reference.ErrorTable(functions, dict(truth.squareness))
+    scenario = reference.Scenario(setup.volume, setup.chain, setup.lines, setup.steps, scale_lines=setup.scale_lines)
+    plan_run = setup.simulate(truth)
+    position = np.round(plan_run.position, 3)
+    rows = [reference.readings(scenario, table, line, p) for line, p in zip(plan_run.line, position, strict=True)]
+    channels = {name: np.array([row[name] for row in rows]) for name in ("distance", "alpha", "beta")}
+    run = sd.Measurement(plan_run.line, plan_run.point, position, channels)
+    error = worst(setup.evaluate(run), truth)
+    # The nodes are off by 0.5 um at most: with slopes of 200 um/m that is 0.1 nm.
+    assert error.position <= CLEAN[0]
+    assert error.angle <= 2 * CLEAN[1]
+    with pytest.raises(sd.InvalidArgument, match="row"):
+        setup.evaluate(sd.Measurement(plan_run.line, plan_run.point, position + 0.01, channels))
