@@ -10,6 +10,7 @@
 #include <random>
 
 #include "refuses.hpp"
+#include "spoil.hpp"
 
 namespace {
 
@@ -152,6 +153,22 @@ TEST(ParameterTable, MalformedTextIsRefusedWithFileAndLine) {
         expect_refused([&, &text = text] { parse_parameter_table(text, "t.csv"); }, "t.csv");
         expect_refused([&, &text = text] { parse_parameter_table(text, "t.csv"); }, culprit);
     }
+}
+
+TEST(ParameterTable, SpoiledTextIsReadOrRefused) {
+    const std::string good = format_parameter_table(extreme_table());
+    Spoiler spoil(4);
+    int read = 0;
+    for (int i = 0; i < 3000; ++i) {
+        const std::string text = spoil(good);
+        try {
+            parse_parameter_table(text, "t.csv");
+            ++read;
+        } catch (const stepdiag::InvalidArgument& refusal) {
+            EXPECT_EQ(std::string(refusal.what()).rfind("t.csv", 0), 0u) << refusal.what();
+        }
+    }
+    EXPECT_GT(read, 0);  // some changes do no harm
 }
 
 TEST(ParameterTable, WhatIsNotFiniteIsNotWritten) {

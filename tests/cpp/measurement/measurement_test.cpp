@@ -10,6 +10,7 @@
 #include <random>
 
 #include "refuses.hpp"
+#include "spoil.hpp"
 
 namespace {
 
@@ -209,6 +210,21 @@ TEST(Measurement, MalformedTextIsRefusedWithFileAndLine) {
         expect_refused([&, &text = text] { parse_measurement(text, "run.csv"); }, "run.csv");
         expect_refused([&, &text = text] { parse_measurement(text, "run.csv"); }, culprit);
     }
+}
+
+TEST(Measurement, SpoiledTextIsReadOrRefused) {
+    const std::string good = format_measurement(random_measurement({"distance", "spot_x", "spot_y"}, true, true));
+    Spoiler spoil(4);
+    int read = 0;
+    for (int i = 0; i < 3000; ++i) {
+        const std::string text = spoil(good);
+        try {
+            read += parse_measurement(text, "run.csv").size() > 0;
+        } catch (const stepdiag::InvalidArgument& refusal) {
+            EXPECT_EQ(std::string(refusal.what()).rfind("run.csv", 0), 0u) << refusal.what();
+        }
+    }
+    EXPECT_GT(read, 0);  // some changes do no harm
 }
 
 TEST(Measurement, ArraysThatMakeNoMeasurementAreRefused) {
