@@ -130,9 +130,10 @@ private:
                                               const std::vector<Row<Width>>& theta) const {
         std::vector<Row<Width>> lengths(contributions_.size());
         for (std::size_t i = 0; i < lengths.size(); ++i) {
-            lengths[i] = readings.values[values_per_reading * i];
-            if (!readings.has_tilts) continue;
-            for (const auto& [row, coefficient] : contributions_[i]) lengths[i] -= coefficient * theta[row];
+            Row<Width> length = readings.values[values_per_reading * i];
+            if (readings.has_tilts)
+                for (const auto& [row, coefficient] : contributions_[i]) length -= coefficient * theta[row];
+            lengths[i] = length;
         }
         return lengths;
     }

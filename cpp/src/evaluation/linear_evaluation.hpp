@@ -106,7 +106,7 @@ void for_each_share(const Map& map, const std::vector<Visit>& visits, Take&& tak
 template <class Map>
 void evaluate_linear(const Map& map, const std::vector<Visit>& visits, const Plan& plan, bool full_covariance,
                      Calibration& calibration) {
-    constexpr int width = 16;
+    constexpr int width = 8;  // the rows of a step's sum stay in registers
     const ParameterLayout layout{plan.steps() + 1};
     std::vector<int> rows;  // of the parameters that are determined
     for (int i = 0; i < function_count; ++i)
@@ -149,18 +149,23 @@ void evaluate_linear(const Map& map, const std::vector<Visit>& visits, const Pla
 template <int Width>
 void add_up_steps(const AxisSystem& system, const std::vector<Row<Width>>& lengths, const std::vector<Visit>& visits,
                   int only_visit, const std::array<Row<Width>*, 3>& out) {
-    for (Row<Width>* component : out) component[0].setZero();
+    Row<Width> x = Row<Width>::Zero(), y = x, z = x;
+    out[0][0] = out[1][0] = out[2][0] = x;
     for (std::size_t i = 0; i < system.intervals.size(); ++i) {
         const StepSystem& interval = system.intervals[i];
-        for (Row<Width>* component : out) component[i + 1] = component[i];
         for (std::size_t r = 0; r < interval.steps.size(); ++r) {
             const Step& step = interval.steps[r];
             if (only_visit >= 0 && only_visit != step.visit) continue;
             const Row<Width>* reading = &lengths[visits[step.visit].first_reading + step.point];
-            const Row<Width> increment = reading[1] - reading[0];
-            for (int c = 0; c < 3; ++c)
-                out[c][i + 1] += step.sign * interval.solution->pseudoinverse(c, Eigen::Index(r)) * increment;
+            const Row<Width> increment = step.sign * (reading[1] - reading[0]);
+            const auto share = interval.solution->pseudoinverse.col(Eigen::Index(r));
+            x += share[0] * increment;
+            y += share[1] * increment;
+            z += share[2] * increment;
         }
+        out[0][i + 1] = x;
+        out[1][i + 1] = y;
+        out[2][i + 1] = z;
     }
 }
 

@@ -27,9 +27,12 @@ public:
 
     template <int Width>
     std::vector<Row<Width>> solve(const std::vector<Row<Width>>& lengths) const {
-        std::vector<Row<Width>> sums(sums_.size(), Row<Width>::Zero());
-        for (std::size_t i = 0; i < sums_.size(); ++i)
-            for (const auto& [reading, coefficient] : sums_[i]) sums[i] += coefficient * lengths[reading];
+        std::vector<Row<Width>> sums;
+        for (const auto& terms : sums_) {
+            Row<Width> sum = Row<Width>::Zero();
+            for (const auto& [reading, coefficient] : terms) sum += coefficient * lengths[reading];
+            sums.push_back(sum);
+        }
         std::vector<Row<Width>> slopes(inverse_.rows(), Row<Width>::Zero());
         for (Eigen::Index j = 0; j < inverse_.rows(); ++j)
             for (Eigen::Index i = 0; i < inverse_.cols(); ++i) slopes[j] += inverse_(j, i) * sums[i];

@@ -9,12 +9,13 @@ namespace {
 
 using Equations = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
-// Most intervals have the same equations as the one before: solved once.
+// Most intervals have the same equations as the one before: solved once. Weights that differ by a hundredth of a
+// percent count as the same; that moves no estimate by more than that share of its uncertainty.
 class StepSolver {
 public:
     std::shared_ptr<const LeastSquares> solve(const Equations& equations, const Eigen::VectorXd& uncertainty) {
-        const bool repeated =
-            last_ && equations.rows() == equations_.rows() && equations == equations_ && uncertainty == uncertainty_;
+        const bool repeated = last_ && equations.rows() == equations_.rows() && equations == equations_ &&
+                              ((uncertainty - uncertainty_).array().abs() <= 1e-4 * uncertainty_.array()).all();
         if (!repeated) {
             equations_ = equations;
             uncertainty_ = uncertainty;

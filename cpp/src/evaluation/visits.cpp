@@ -193,7 +193,8 @@ std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& pl
 
     std::vector<Visit> visits;
     int readings = 0;
-    for (const auto& [key, members] : rows) {
+    for (const auto& entry : rows) {
+        const std::vector<std::size_t>& members = entry.second;
         const Line line = measurement.stations()[members.front()].line;
         const auto planned = [&] {
             try {
