@@ -35,8 +35,9 @@ void bind_evaluation(py::module_& m) {
     py::class_<ReadingUncertainty>(m, "ReadingUncertainty",
                                    "Standard uncertainty of a reading where the run gives none: distance (mm; also d1 "
                                    "...), tilt (rad), spot (mm).")
-        .def(py::init(
-                 [](double distance, double tilt, double spot) { return ReadingUncertainty{distance, tilt, spot}; }),
+        .def(py::init([](double distance, double tilt, double spot) {
+                 return ReadingUncertainty{distance, tilt, spot};
+             }),
              py::arg("distance") = ReadingUncertainty{}.distance, py::arg("tilt") = ReadingUncertainty{}.tilt,
              py::arg("spot") = ReadingUncertainty{}.spot)
         .def_readonly("distance", &ReadingUncertainty::distance)

@@ -68,15 +68,15 @@ void bind_machine(py::module_& m) {
              py::arg("squareness") = std::map<std::string, double>{},
              "functions: name -> (position, value), one-dimensional and of one length, positions ascending. Raises "
              "InvalidArgument.")
-        .def_property_readonly("functions",
-                               [](const ErrorMap& map) {
-                                   std::map<std::string, std::pair<DoubleArray, DoubleArray>> functions;
-                                   for (int i = 0; i < function_count; ++i)
-                                       if (const auto& table = map.table().functions[i])
-                                           functions[FunctionId::at(i).name()] = {to_numpy(table->position),
-                                                                                  to_numpy(table->value)};
-                                   return functions;
-                               })
+        .def_property_readonly(
+            "functions",
+            [](const ErrorMap& map) {
+                std::map<std::string, std::pair<DoubleArray, DoubleArray>> functions;
+                for (int i = 0; i < function_count; ++i)
+                    if (const auto& table = map.table().functions[i])
+                        functions[FunctionId::at(i).name()] = {to_numpy(table->position), to_numpy(table->value)};
+                return functions;
+            })
         .def_property_readonly("squareness",
                                [](const ErrorMap& map) {
                                    std::map<std::string, double> values;

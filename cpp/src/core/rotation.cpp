@@ -4,7 +4,8 @@
 
 namespace stepdiag {
 
-Eigen::Matrix3d rotation_exp(const Eigen::Vector3d& v) {
+Eigen::Matrix3d rotation_exp(const Eigen::Vector3d& rotation_vector) {
+    const Eigen::Vector3d& v = rotation_vector;
     const double angle2 = v.squaredNorm();
     double sinc = 1.0 - angle2 / 6.0;      // error angle^4/120 < 1e-18 below 1e-4 rad
     double versine = 0.5 - angle2 / 24.0;  // (1 - cos)/angle^2

@@ -83,7 +83,7 @@ std::size_t first_broken_character(std::string_view text) {
 }  // namespace
 
 std::string read_text_file(const std::string& path) {
-    struct stat status{};
+    struct stat status {};
     if (::stat(path.c_str(), &status) != 0) throw InvalidArgument(path + ": cannot be read: " + std::strerror(errno));
     if (!S_ISREG(status.st_mode) && !S_ISFIFO(status.st_mode))
         throw InvalidArgument(path + ": expected a file, got a folder or a device");
@@ -108,7 +108,7 @@ void write_text_file(const std::string& path, std::string_view text) {
     const auto fail = [&](const std::string& what) {
         throw InvalidArgument(path + ": " + what + ": " + std::strerror(errno));
     };
-    struct stat status{};
+    struct stat status {};
     const bool exists = ::stat(path.c_str(), &status) == 0;
     if (exists && S_ISDIR(status.st_mode)) throw InvalidArgument(path + ": cannot be written: it is a folder");
     if (exists && !S_ISREG(status.st_mode)) {  // a pipe or a device is written to, not replaced

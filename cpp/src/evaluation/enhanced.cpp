@@ -14,11 +14,11 @@ namespace {
 class EnhancedMap {
 public:
     EnhancedMap(const std::vector<Visit>& visits, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool)
-        : visits_(visits),
-          layout_{plan.steps() + 1},
-          angles_(make_angle_systems(visits, collect_steps(visits, plan), plan)) {
+        : visits_(visits), layout_{plan.steps() + 1} {
+        const auto steps = collect_steps(visits, plan);
+        angles_ = make_angle_systems(visits, steps, plan);
         find_angular_contributions(chain, tool, plan);
-        lengths_ = make_length_systems(visits, collect_steps(visits, plan), plan, usable_);
+        lengths_ = make_length_systems(visits, steps, plan, usable_);
         slopes_ = make_slope_system(visits, plan, lengths_, usable_);
         find_shapes_that_hang_on_laser_angles(plan);
     }

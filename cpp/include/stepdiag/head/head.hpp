@@ -21,7 +21,7 @@ namespace stepdiag {
 enum class HeadLayout { ideal, psd, multi_beam };
 
 std::string name(HeadLayout layout);
-HeadLayout parse_head_layout(std::string_view name);
+HeadLayout parse_head_layout(std::string_view text);
 
 struct Head {
     HeadLayout layout = HeadLayout::ideal;

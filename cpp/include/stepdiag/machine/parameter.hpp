@@ -34,7 +34,7 @@ struct FunctionId {
 };
 
 std::string name(Squareness squareness);
-std::optional<Squareness> parse_squareness(std::string_view name);
+std::optional<Squareness> parse_squareness(std::string_view text);
 
 // The axis whose translation a squareness belongs to, the component it acts on, and its sign:
 // delta_Y.x = EXY - C0Y y, delta_Z.x = EXZ + B0Z z, delta_Z.y = EYZ - A0Z z.
