@@ -1,6 +1,10 @@
 #include "stepdiag/optics/scene.hpp"
 
+#if STEPDIAG_EMBREE_MAJOR >= 4
+#include <embree4/rtcore.h>
+#else
 #include <embree3/rtcore.h>
+#endif
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -22,6 +26,16 @@ RTCDevice device() {
         return made;
     }();
     return device;
+}
+
+void intersect(RTCScene scene, RTCRayHit& query) {
+#if STEPDIAG_EMBREE_MAJOR >= 4
+    rtcIntersect1(scene, &query);
+#else
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcIntersect1(scene, &context, &query);
+#endif
 }
 
 void check(const std::vector<Face>& faces) {
@@ -85,8 +99,6 @@ Scene::Scene(std::vector<Face> faces) : faces_(std::move(faces)), centre_(Eigen:
 }
 
 std::optional<Hit> Scene::first_hit(const Ray& ray) const {
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
     RTCRayHit query{};
     const Eigen::Vector3f origin = (ray.origin - centre_).cast<float>();
     const Eigen::Vector3f direction = ray.direction.cast<float>();
@@ -96,7 +108,7 @@ std::optional<Hit> Scene::first_hit(const Ray& ray) const {
     query.ray.tfar = std::numeric_limits<float>::infinity();
     query.ray.mask = ~0u;
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(static_cast<RTCScene>(embree_.get()), &context, &query);
+    intersect(static_cast<RTCScene>(embree_.get()), query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
     const Face& face = faces_[query.hit.geomID];
     const double distance = (face.point - ray.origin).dot(face.normal) / ray.direction.dot(face.normal);
