@@ -1,11 +1,50 @@
-// What light travels through.
+// What light travels through: vacuum, a constant index, air, optical glass. Wavelengths are vacuum wavelengths in nm.
 #pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
 
 namespace stepdiag {
 
-// A medium of constant refractive index.
+// A medium of constant refractive index, as a trace at one wavelength sees it.
 struct Medium {
     double index = 1.0;
 };
+
+// State of the air. Carbon dioxide counts for Ciddor only.
+struct Air {
+    double temperature = 20.0;       // degrees Celsius, -40 to 100
+    double pressure = 101325.0;      // Pa, 10 000 to 140 000
+    double relative_humidity = 0.5;  // 0 to 1
+    double carbon_dioxide = 450.0;   // ppm by volume, 0 to 2000
+};
+
+enum class AirEquation {
+    ciddor,          // P. E. Ciddor, Appl. Opt. 35 (1996) 1566, with the IAPWS vapour pressure
+    modified_edlen,  // K. P. Birch, M. J. Downs, Metrologia 30 (1993) 155 and 31 (1994) 315, water term as NIST gives
+                     // it
+    edlen_1966,      // B. Edlen, Metrologia 2 (1966) 71: the dispersion of that paper, density and water as above
+};
+
+AirEquation parse_air_equation(std::string_view text);  // "ciddor", "modified_edlen", "edlen_1966"
+
+// Phase refractive index at 300 to 1700 nm. Throws InvalidArgument outside the ranges above.
+double refractive_index(const Air& air, double wavelength, AirEquation equation = AirEquation::ciddor);
+
+// Optical glass by its Sellmeier equation, n^2 - 1 = sum B_i L / (L - C_i) with L = (wavelength/um)^2.
+struct Glass {
+    std::string name;
+    double B[3];
+    double C[3];  // um^2
+};
+
+// SCHOTT's N-BK7, K7, N-SK4, F2 and N-SF11 (catalogue constants, relative to air of 20 degrees Celsius and 101325 Pa,
+// as catalogues are) and fused silica (I. H. Malitson, J. Opt. Soc. Am. 55 (1965) 1205).
+const std::vector<Glass>& glasses();
+const Glass& find_glass(std::string_view name);  // throws InvalidArgument naming those there are
+
+// At 334 to 2325 nm, where all these constants hold. Throws InvalidArgument outside.
+double refractive_index(const Glass& glass, double wavelength);
 
 }  // namespace stepdiag
