@@ -11,15 +11,20 @@ namespace stepdiag {
 
 enum class PathEnd { absorbed, missed, too_many_hits };
 
+// What happened to the light where it met a face.
+enum class Event { reflected, refracted, totally_reflected, absorbed };
+
 struct Path {
     std::vector<Hit> hits;
+    std::vector<Event> events;  // one a hit
     Eigen::Vector3d direction;  // of the last segment
     PathEnd end;
     double geometric_length;  // from the origin to the last hit, mm
     double optical_length;    // sum of index * length, mm
 };
 
-// Sequential trace: reflects until the ray is absorbed, leaves the scene, or has met `most_hits` faces.
+// Sequential trace: reflects and refracts until the ray is absorbed, leaves the scene, or has met `most_hits` faces. It
+// starts in the ambient medium. At a refracting face all light goes on, refracted or else totally reflected.
 Path trace(const Scene& scene, const Medium& ambient, const Ray& ray, int most_hits = 64);
 
 }  // namespace stepdiag

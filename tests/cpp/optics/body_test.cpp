@@ -1,0 +1,172 @@
+#include "stepdiag/optics/body.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "refuses.hpp"
+#include "stepdiag/core/rotation.hpp"
+#include "stepdiag/optics/path.hpp"
+
+namespace {
+
+using namespace stepdiag;
+using Eigen::Vector3d;
+
+constexpr double pi = 3.14159265358979323846;
+constexpr Medium glass{1.5168}, air{1.00027};
+
+// Directions and lengths of some tens of millimetres come from fewer than twenty rounded operations a face.
+constexpr double direction_rounding = 1e-14, length_rounding = 1e-12;
+
+Ray ray_at(double incidence, const Vector3d& through, double before) {
+    const Vector3d direction(std::sin(incidence), 0.0, std::cos(incidence));
+    return {through - before * direction, direction};
+}
+
+TEST(Refract, SinesAreInTheRatioOfTheIndices) {
+    for (const double angle : {0.0, 1e-9, 1e-3, 0.3, 1.0, 1.5}) {
+        const Vector3d direction(std::sin(angle), 0.0, -std::cos(angle));
+        const auto refracted = refract(direction, Vector3d::UnitZ(), 1.0 / 1.5);
+        ASSERT_TRUE(refracted);
+        EXPECT_NEAR(refracted->norm(), 1.0, direction_rounding);
+        EXPECT_NEAR(refracted->x(), std::sin(angle) / 1.5, direction_rounding);
+        EXPECT_EQ(refracted->y(), 0.0);
+        // The same face seen from behind, and the way back.
+        EXPECT_EQ(*refract(direction, -Vector3d::UnitZ(), 1.0 / 1.5), *refracted);
+        EXPECT_LT((*refract(-*refracted, Vector3d::UnitZ(), 1.5) + direction).norm(), direction_rounding);
+    }
+}
+
+TEST(Refract, BeyondTheCriticalAngleThereIsNone) {
+    const double critical = std::asin(1.0 / 1.5);
+    const auto leave = [](double angle) {
+        return refract(Vector3d(std::sin(angle), 0.0, std::cos(angle)), Vector3d::UnitZ(), 1.5);
+    };
+    EXPECT_TRUE(leave(critical - 1e-9));
+    EXPECT_FALSE(leave(critical + 1e-9));
+    EXPECT_FALSE(leave(std::nan("")));
+}
+
+TEST(Plate, DisplacesAndDoesNotTurn) {
+    const double thickness = 10.0;
+    const Scene scene(make_plate(80.0, 80.0, thickness, glass));
+    for (const double angle : {0.0, 1e-4, 0.1, 0.7}) {
+        const Ray ray = ray_at(angle, {0.0, 0.0, -0.5 * thickness}, 20.0);
+        const Path path = trace(scene, air, ray);
+        ASSERT_EQ(path.events, (std::vector<Event>{Event::refracted, Event::refracted}));
+        EXPECT_EQ(path.end, PathEnd::missed);
+        EXPECT_LT((path.direction - ray.direction).norm(), direction_rounding);
+        const double n = glass.index / air.index, root = std::sqrt(n * n - std::sin(angle) * std::sin(angle));
+        const Vector3d across = Vector3d(std::cos(angle), 0.0, -std::sin(angle));
+        // Textbook: d sin(theta) (1 - cos(theta)/sqrt(n^2 - sin^2(theta))), towards the normal's side.
+        EXPECT_NEAR((path.hits.back().point - ray.origin).dot(across),
+                    -thickness * std::sin(angle) * (1.0 - std::cos(angle) / root), length_rounding);
+        EXPECT_NEAR(path.optical_length, air.index * 20.0 + glass.index * thickness * n / root, length_rounding);
+    }
+}
+
+TEST(Wedge, TurnsByItsClosedForm) {
+    const double angle = pi / 180.0;
+    const Scene scene(make_wedge(40.0, 40.0, 8.0, angle, glass));
+    const Path path = trace(scene, air, {{3.0, 1.0, -50.0}, Vector3d::UnitZ()});
+    ASSERT_EQ(path.events.size(), 2u);
+    // Square through the first face; the second, turned by `angle`, makes asin(n sin) of it, towards the thick side.
+    const double turned = std::asin(glass.index / air.index * std::sin(angle)) - angle;
+    EXPECT_NEAR(path.direction.x(), std::sin(turned), direction_rounding);
+    EXPECT_NEAR(path.direction.z(), std::cos(turned), direction_rounding);
+}
+
+TEST(Prism, DeviatesLeastByItsClosedForm) {
+    const double apex = pi / 3.0, side = 30.0;
+    const Scene scene(make_prism(side, 30.0, apex, glass));
+    const double least = 2.0 * std::asin(glass.index / air.index * std::sin(0.5 * apex)) - apex;
+    const auto deviation = [&](double turn) {
+        const Vector3d middle(-0.5 * side * std::sin(0.5 * apex), 0.0, 0.5 * side * std::cos(0.5 * apex));
+        const double rise =
+            0.5 * least + turn;  // at least deviation light runs level inside, so it comes in from below
+        const Vector3d direction(std::cos(rise), 0.0, std::sin(rise));
+        const Path path = trace(scene, air, {middle - 40.0 * direction, direction});
+        EXPECT_EQ(path.events.size(), 2u);
+        return std::atan2(direction.cross(path.direction).norm(), direction.dot(path.direction));
+    };
+    EXPECT_NEAR(deviation(0.0), least, direction_rounding);
+    EXPECT_GT(deviation(0.01), least);
+    EXPECT_GT(deviation(-0.01), least);
+}
+
+TEST(Prism, RightAngleTurnsLightBackByTotalReflection) {
+    const auto back = [](Medium medium) {
+        const Scene scene(make_prism(30.0, 30.0, 0.5 * pi, medium));
+        return trace(scene, {1.0}, {{5.0, 1.0, -40.0}, Vector3d::UnitZ()});
+    };
+    const Path path = back(glass);
+    const std::vector<Event> expected = {Event::refracted, Event::totally_reflected, Event::totally_reflected,
+                                         Event::refracted};
+    EXPECT_EQ(path.events, expected);
+    EXPECT_LT((path.direction + Vector3d::UnitZ()).norm(), direction_rounding);
+    EXPECT_NEAR(path.hits.back().point.x(), -5.0, length_rounding);
+    EXPECT_EQ(back({1.3}).events[1], Event::refracted);  // 45 degrees are below the critical angle of 50.3
+}
+
+TEST(CornerCube, SendsLightBackAntiparallelWhereverItPoints) {
+    const Vector3d tilt(0.3, -0.2, 0.7);
+    const Placement placement{{10.0, -20.0, 300.0}, rotation_exp(tilt)};
+    const Scene scene(make_corner_cube(25.0, glass, placement));
+    for (const Vector3d& aim : {Vector3d(0.0, 0.0, 0.0), Vector3d(0.05, -0.02, 0.0), Vector3d(-0.1, 0.08, 0.3)}) {
+        const Vector3d direction = placement.rotation * rotation_exp(aim) * Vector3d(0.0, 0.0, -1.0);
+        const Vector3d entry = placement.position + placement.rotation * Vector3d(3.0, 2.0, 25.0);
+        const Path path = trace(scene, air, {entry - 100.0 * direction, direction});
+        ASSERT_EQ(path.events.size(), 5u);
+        EXPECT_EQ(path.events.front(), Event::refracted);
+        EXPECT_EQ(path.events.back(), Event::refracted);
+        EXPECT_LT((path.direction + direction).norm(), direction_rounding);
+    }
+}
+
+TEST(Body, WhatIsNoConvexBodyIsRefusedByName) {
+    const std::vector<Vector3d> cube = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                                        {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+    const std::vector<std::vector<int>> sides = {{0, 1, 2, 3}, {4, 5, 6, 7}, {0, 1, 5, 4},
+                                                 {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
+    EXPECT_EQ(make_body(cube, sides, glass).size(), 6u);
+    const auto changed = [&](auto change) {
+        auto corners = cube;
+        auto faces = sides;
+        change(corners, faces);
+        make_body(corners, faces, glass);
+    };
+    expect_refused([&] { changed([](auto&, auto& f) { f.pop_back(); }); }, "not closed");
+    expect_refused([&] { changed([](auto&, auto& f) { f.resize(2); }); }, "four faces");
+    expect_refused([&] { changed([](auto&, auto& f) { f[2] = {0, 1, 9, 4}; }); }, "no corner 9");
+    expect_refused([&] { changed([](auto&, auto& f) { f[1] = {4, 5}; }); }, "three corners");
+    expect_refused([&] { changed([](auto& c, auto&) { c[6].z() = 1.1; }); }, "not planar");
+    expect_refused([&] { changed([](auto& c, auto&) { c[6].x() = std::nan(""); }); }, "finite");
+    expect_refused([&] { changed([](auto& c, auto&) { c[1] = c[2] = c[0]; }); }, "no area");
+    expect_refused([&] { make_body(cube, sides, {0.5}); }, "index");
+    // A roof turned inside out: planar and closed, with a dent.
+    const std::vector<Vector3d> dented = {{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}, {0, 0, 4},
+                                          {4, 0, 4}, {4, 4, 4}, {0, 4, 4}, {2, 2, 3}};
+    expect_refused(
+        [&] {
+            make_body(dented,
+                      {{0, 1, 2, 3},
+                       {0, 1, 5, 4},
+                       {1, 2, 6, 5},
+                       {2, 3, 7, 6},
+                       {3, 0, 4, 7},
+                       {4, 5, 8},
+                       {5, 6, 8},
+                       {6, 7, 8},
+                       {7, 4, 8}},
+                      glass);
+        },
+        "not convex");
+    expect_refused([] { make_plate(0.0, 1.0, 1.0, glass); }, "width");
+    expect_refused([] { make_wedge(10.0, 10.0, 1.0, 0.5, glass); }, "wedge angle");
+    expect_refused([] { make_prism(10.0, 10.0, 4.0, glass); }, "apex");
+    expect_refused([] { make_corner_cube(-1.0, glass); }, "depth");
+}
+
+}  // namespace
