@@ -6,6 +6,8 @@ and a constant. Shares nothing with the evaluators, which solve angles, slopes a
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import reference
 from truth import SQUARENESS_AXIS, Setup
@@ -16,7 +18,7 @@ NEGLIGIBLE = 1e-6  # of a column's length; what is determined stands clear of it
 
 
 class RankModel:
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: Setup, lost: Iterable[tuple[str, int]] = ()) -> None:
         self.setup = setup
         self.names: list[tuple[str, int]] = []
         for axis in AXES:
@@ -28,12 +30,19 @@ class RankModel:
         for line in setup.lines:
             columns += [self.setup_derivative(line, kind, i) for kind in ("laser", "reflector") for i in (0, 1)]
             columns.append(self.constant(line))
-        matrix = np.column_stack(columns)
+        matrix = np.column_stack(columns)[self.kept_rows(set(lost))]
         length = np.linalg.norm(matrix, axis=0)
         self.scale = np.where(length > 0, length, 1.0)
         _, values, rows = np.linalg.svd(matrix / self.scale)
         rank = int(np.sum(values > NEGLIGIBLE * values[0]))
         self.null = rows[rank:] / self.scale  # a basis of what no reading sees
+
+    def kept_rows(self, lost: set[tuple[str, int]]) -> np.ndarray:
+        kept: list[bool] = []
+        for line in [*self.setup.lines, *self.setup.scale_lines]:
+            for point in range(len(self.setup.plan.points(line))):
+                kept += [(line, point) not in lost] * (3 if line in self.setup.lines else 1)
+        return np.array(kept)
 
     def rows(self, table: reference.ErrorTable, misalignment: dict[str, dict[str, tuple[float, float]]]) -> np.ndarray:
         """Distances and tilts of the lines, distances of the scale lines, in mm and in mm at a lever of 1 m."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from rank_model import RankModel
-from truth import DIAGONALS, FACES, SCALE_LINES, SQUARENESS_AXIS, Setup
+from truth import DIAGONALS, FACES, SCALE_LINES, SQUARENESS_AXIS, Setup, without
 
 import stepdiag as sd
 
@@ -32,12 +33,25 @@ FUNCTIONS = {f"E{c}{a}" for c in "XYZABC" for a in "XYZ"}
 )
 def test_evaluation_determines_what_the_rank_allows(lines: list[str], scale_lines: list[str]) -> None:
     setup = Setup(steps=2, lines=lines, scale_lines=scale_lines, order="YZX", tool=(10.0, -20.0, 60.0))
-    model = RankModel(setup)
+    assert_claims_are_the_rank(setup, [])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_lost_readings_are_bridged_where_the_rank_allows(seed: int) -> None:
+    setup = Setup(steps=3, lines=DIAGONALS, scale_lines=SCALE_LINES, tool=(10.0, -20.0, 60.0))
+    random = np.random.default_rng(seed)
+    points = [(line, k) for line in DIAGONALS for k in range(3 * setup.steps + 1)]
+    lost = [points[i] for i in random.choice(len(points), size=1 + seed % 4, replace=False)]
+    assert_claims_are_the_rank(setup, lost)
+
+
+def assert_claims_are_the_rank(setup: Setup, lost: list[tuple[str, int]]) -> None:
+    model = RankModel(setup, lost)
     shapes = {name for name in FUNCTIONS if model.shape_is_determined(name)}
     slopes = {axis for axis in "XYZ" if f"E{axis}{axis}" in shapes and model.slope_is_determined(axis)}
     squareness = {name for name in SQUARENESS_AXIS if model.determines({(name, 0): 1.0})}
 
-    run = setup.simulate(setup.errors(3))
+    run = without(setup.simulate(setup.errors(3)), lost)
     if not shapes:
         with pytest.raises(sd.InvalidArgument, match="nothing can be determined"):
             setup.evaluate(run)

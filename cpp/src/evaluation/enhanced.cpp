@@ -108,8 +108,12 @@ private:
             const auto theta = functions_of<Width>(out, layout_, axis, Component::A);
             const auto& intervals = angles_[index(axis)].intervals;
             for (std::size_t i = 0; i < intervals.size(); ++i) {
-                for (int c = 0; c < 3; ++c) theta[c][i + 1] = theta[c][i];
-                for (std::size_t s = 0; s < intervals[i].steps.size(); ++s) {
+                for (int c = 0; c < 3; ++c) {
+                    theta[c][i + 1] = theta[c][i];
+                    for (const auto& [reading, channel, coefficient] : intervals[i].bridge[c])
+                        theta[c][i + 1] += coefficient * readings.values[values_per_reading * reading + channel];
+                }
+                for (std::size_t s = 0; !intervals[i].is_bridged && s < intervals[i].steps.size(); ++s) {
                     const Step& step = intervals[i].steps[s];
                     if (readings.only_visit >= 0 && readings.only_visit != step.visit) continue;
                     const Row<Width>* from =

@@ -153,7 +153,12 @@ void add_up_steps(const AxisSystem& system, const std::vector<Row<Width>>& lengt
     out[0][0] = out[1][0] = out[2][0] = x;
     for (std::size_t i = 0; i < system.intervals.size(); ++i) {
         const StepSystem& interval = system.intervals[i];
-        for (std::size_t r = 0; r < interval.steps.size(); ++r) {
+        if (interval.is_bridged) {
+            for (const ReadingTerm& term : interval.bridge[0]) x += term.coefficient * lengths[term.reading];
+            for (const ReadingTerm& term : interval.bridge[1]) y += term.coefficient * lengths[term.reading];
+            for (const ReadingTerm& term : interval.bridge[2]) z += term.coefficient * lengths[term.reading];
+        }
+        for (std::size_t r = 0; !interval.is_bridged && r < interval.steps.size(); ++r) {
             const Step& step = interval.steps[r];
             if (only_visit >= 0 && only_visit != step.visit) continue;
             const Row<Width>* reading = &lengths[visits[step.visit].first_reading + step.point];

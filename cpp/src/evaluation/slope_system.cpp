@@ -10,10 +10,10 @@ namespace {
 // A sum of lengths, by reading.
 using Sum = std::map<int, double>;
 
-void add_step(Sum& sum, const std::vector<Visit>& visits, const Step& step, double factor) {
+void add_step(Sum& sum, const std::vector<Visit>& visits, const Step& step) {
     const int from = visits[step.visit].first_reading + step.point;
-    sum[from] -= factor * step.sign;
-    sum[from + 1] += factor * step.sign;
+    sum[from] -= step.sign;
+    sum[from + 1] += step.sign;
 }
 
 // The sum of the increments of one line over the travel of one axis, counted in the axis' direction; empty where it
@@ -25,16 +25,12 @@ Sum sum_over_travel(const std::vector<Visit>& visits, int visit, const AxisSyste
         const auto own = std::find_if(interval.steps.begin(), interval.steps.end(),
                                       [&](const Step& step) { return step.visit == visit; });
         if (own != interval.steps.end()) {
-            add_step(sum, visits, *own, 1.0);
+            add_step(sum, visits, *own);
             continue;
         }
-        const Eigen::RowVectorXd prediction = direction * interval.solution->pseudoinverse;
-        Eigen::RowVector3d predicted = Eigen::RowVector3d::Zero();
-        for (std::size_t r = 0; r < interval.steps.size(); ++r) {
-            predicted += prediction[Eigen::Index(r)] * visits[interval.steps[r].visit].direction().transpose();
-            add_step(sum, visits, interval.steps[r], prediction[Eigen::Index(r)]);
-        }
-        if ((predicted - direction).norm() > 1e-9) return {};  // the other lines do not span this one's direction
+        const auto predicted = solve_length_along(interval, direction, visits);
+        if (!predicted) return {};
+        for (const ReadingTerm& term : *predicted) sum[term.reading] += term.coefficient;
     }
     return sum;
 }

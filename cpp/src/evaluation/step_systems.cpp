@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <sstream>
 
 namespace stepdiag {
@@ -30,68 +31,265 @@ private:
     std::shared_ptr<const LeastSquares> last_;
 };
 
-// Rows of machine_R_line^T that a step's readings see, from `first` on.
-template <class HasReading>
-AxisSystem make_system(const std::vector<Visit>& visits, const AxisSteps& steps, const Plan& plan, Axis axis, int first,
-                       int rows_per_step, HasReading&& has_reading) {
-    AxisSystem system;
-    system.determined.fill(true);
-    StepSolver solver;
-    std::vector<std::vector<Eigen::Vector3d>> variances(visits.size());
-    for (std::size_t v = 0; v < visits.size(); ++v)
-        for (const VisitPoint& point : visits[v].points) variances[v].push_back(point.variance());
+// What readings see of an interval's three components.
+struct Kind {
+    int first_column;   // of machine_R_line: local x and y for the tilts, z for the lengths
+    int rows_per_step;  // equations that a step makes
+    int first_channel;  // of a reading
+};
+constexpr Kind angles{0, 2, 1}, lengths{2, 1, 0};
 
-    for (std::size_t i = 0; i < steps.size(); ++i) {
-        StepSystem interval;
-        for (const Step& step : steps[i])
-            if (has_reading(step.visit, step.point) && has_reading(step.visit, step.point + 1))
-                interval.steps.push_back(step);
-        Equations equations(rows_per_step * interval.steps.size(), 3);
-        Eigen::VectorXd uncertainty(equations.rows());
-        Eigen::Index row = 0;
-        for (const Step& step : interval.steps)
-            for (int r = 0; r < rows_per_step; ++r, ++row) {
-                const int channel = rows_per_step == 1 ? 0 : 1 + r;  // length, or alpha and beta
-                equations.row(row) = visits[step.visit].frame.col(first + r).transpose();
-                uncertainty[row] = std::sqrt(variances[step.visit][step.point][channel] +
-                                             variances[step.visit][step.point + 1][channel]);
-            }
-        interval.solution = solver.solve(equations, uncertainty);
+Equations equations_of(const std::vector<Step>& steps, const std::vector<Visit>& visits, const Kind& kind) {
+    Equations equations(kind.rows_per_step * steps.size(), 3);
+    for (std::size_t s = 0; s < steps.size(); ++s)
+        for (int r = 0; r < kind.rows_per_step; ++r)
+            equations.row(kind.rows_per_step * s + r) =
+                visits[steps[s].visit].frame.col(kind.first_column + r).transpose();
+    return equations;
+}
+
+// The component of one interval along a direction as a sum of readings; none where they do not determine it.
+std::optional<ReadingSum> solve_along(const StepSystem& interval, const Eigen::RowVector3d& direction,
+                                      const std::vector<Visit>& visits, const Kind& kind) {
+    constexpr double negligible = 1e-9;
+    ReadingSum sum;
+    if (interval.is_bridged) {
         for (int c = 0; c < 3; ++c) {
-            if (interval.solution->determined[c]) continue;
-            system.determined[c] = false;
-            if (!system.gap.empty()) continue;
-            std::ostringstream text;
-            text << "step " << i + 1 << " of " << letter(axis) << " (" << plan.node_position(axis, int(i)) << " to "
-                 << plan.node_position(axis, int(i) + 1) << " mm) was read on " << interval.steps.size()
-                 << (interval.steps.size() == 1 ? " line" : " lines");
-            system.gap = text.str();
+            if (std::abs(direction[c]) < negligible) continue;
+            if (!interval.determined[c]) return std::nullopt;
+            for (const ReadingTerm& term : interval.bridge[c])
+                sum.push_back({term.reading, term.channel, direction[c] * term.coefficient});
         }
-        system.intervals.push_back(std::move(interval));
+        return sum;
     }
-    return system;
+    const Eigen::RowVectorXd weights = direction * interval.solution->pseudoinverse;
+    if ((weights * equations_of(interval.steps, visits, kind) - direction).norm() > negligible) return std::nullopt;
+    for (Eigen::Index row = 0; row < weights.size(); ++row) {
+        const Step& step = interval.steps[row / kind.rows_per_step];
+        const int reading = visits[step.visit].first_reading + step.point;
+        const int channel = kind.first_channel + int(row % kind.rows_per_step);
+        sum.push_back({reading, channel, -step.sign * weights[row]});
+        sum.push_back({reading + 1, channel, step.sign * weights[row]});
+    }
+    return sum;
+}
+
+// Builds the systems of all three axes, and bridges gaps: intervals that would be determined if no reading were lost.
+class SystemBuilder {
+public:
+    SystemBuilder(const std::vector<Visit>& visits, const std::array<AxisSteps, 3>& steps, const Plan& plan, Kind kind,
+                  std::vector<std::vector<bool>> has_reading)
+        : visits_(visits), steps_(steps), plan_(plan), kind_(kind), has_reading_(std::move(has_reading)) {
+        for (const Visit& visit : visits) {
+            variances_.emplace_back();
+            for (const VisitPoint& point : visit.points) variances_.back().push_back(point.variance());
+        }
+    }
+
+    AxisSystems build() {
+        for (const Axis axis : all_axes) solve_steps(axis);
+        bridge_gaps();
+        for (const Axis axis : all_axes) sum_up(axis);
+        return std::move(systems_);
+    }
+
+private:
+    static constexpr std::size_t most_gaps = 100;  // solved jointly: their number enters with its third power
+
+    struct Gap {
+        int axis;
+        int interval;
+    };
+    // An equation for the components of all gaps: their coefficients, and the readings on its right side.
+    struct Bridge {
+        Eigen::RowVectorXd coefficients;
+        ReadingSum right;
+        double variance;
+    };
+
+    void solve_steps(Axis axis) {
+        StepSolver solver, complete_solver;
+        for (std::size_t i = 0; i < steps_[index(axis)].size(); ++i) {
+            StepSystem interval;
+            for (const Step& step : steps_[index(axis)][i])
+                if (has_reading_[step.visit][step.point] && has_reading_[step.visit][step.point + 1])
+                    interval.steps.push_back(step);
+            Eigen::VectorXd uncertainty(kind_.rows_per_step * interval.steps.size());
+            for (Eigen::Index row = 0; row < uncertainty.size(); ++row)
+                uncertainty[row] =
+                    std::sqrt(step_variance(interval.steps[row / kind_.rows_per_step], row % kind_.rows_per_step));
+            interval.solution = solver.solve(equations_of(interval.steps, visits_, kind_), uncertainty);
+            std::copy_n(interval.solution->determined.begin(), 3, interval.determined.begin());
+            if (interval.steps.size() < steps_[index(axis)][i].size()) {
+                const Equations complete = equations_of(steps_[index(axis)][i], visits_, kind_);
+                const auto possible = complete_solver.solve(complete, Eigen::VectorXd::Ones(complete.rows()));
+                if (possible->rank > interval.solution->rank) gaps_.push_back({index(axis), int(i)});
+            }
+            systems_[index(axis)].intervals.push_back(std::move(interval));
+        }
+    }
+
+    double step_variance(const Step& step, Eigen::Index row) const {
+        const auto channel = kind_.first_channel + row;
+        return variances_[step.visit][step.point][channel] + variances_[step.visit][step.point + 1][channel];
+    }
+
+    // The unknown number of the first component of a gap; none where the interval is no gap.
+    std::optional<int> unknown(int axis, int interval) const {
+        for (std::size_t g = 0; g < gaps_.size(); ++g)
+            if (gaps_[g].axis == axis && gaps_[g].interval == interval) return int(3 * g);
+        return std::nullopt;
+    }
+
+    void bridge_gaps() {
+        if (gaps_.empty() || gaps_.size() > most_gaps) return;
+        std::vector<Bridge> bridges;
+        for (std::size_t g = 0; g < gaps_.size(); ++g) add_steps_inside(g, bridges);
+        for (std::size_t v = 0; v < visits_.size(); ++v) add_reaches_over_lost_points(int(v), bridges);
+        Eigen::MatrixXd equations(bridges.size(), 3 * gaps_.size());
+        Eigen::VectorXd uncertainty(bridges.size());
+        for (std::size_t b = 0; b < bridges.size(); ++b) {
+            equations.row(b) = bridges[b].coefficients;
+            uncertainty[b] = std::sqrt(bridges[b].variance);
+        }
+        const LeastSquares solution = solve_least_squares(equations, uncertainty);
+        for (std::size_t g = 0; g < gaps_.size(); ++g) {
+            StepSystem& interval = systems_[gaps_[g].axis].intervals[gaps_[g].interval];
+            interval.is_bridged = true;
+            for (int c = 0; c < 3; ++c) {
+                interval.determined[c] = solution.determined[3 * g + c];
+                interval.bridge[c] = combine(bridges, solution.pseudoinverse.row(3 * g + c));
+            }
+        }
+    }
+
+    // The steps that were read in a gap: they do not suffice, but they count.
+    void add_steps_inside(std::size_t gap, std::vector<Bridge>& bridges) const {
+        const StepSystem& interval = systems_[gaps_[gap].axis].intervals[gaps_[gap].interval];
+        const Equations equations = equations_of(interval.steps, visits_, kind_);
+        for (Eigen::Index row = 0; row < equations.rows(); ++row) {
+            const Step& step = interval.steps[row / kind_.rows_per_step];
+            Bridge bridge{
+                Eigen::RowVectorXd::Zero(3 * gaps_.size()), {}, step_variance(step, row % kind_.rows_per_step)};
+            bridge.coefficients.segment<3>(3 * gap) = equations.row(row);
+            add_difference(bridge.right, step.visit, step.point, step.point + 1, int(row % kind_.rows_per_step),
+                           step.sign);
+            bridges.push_back(std::move(bridge));
+        }
+    }
+
+    // The change from the last reading before lost points to the first one after them is the sum of the steps between.
+    void add_reaches_over_lost_points(int visit, std::vector<Bridge>& bridges) const {
+        if (visits_[visit].is_scale_line) return;
+        int last = -1;
+        for (int k = 0; k < int(visits_[visit].points.size()); ++k) {
+            if (!has_reading_[visit][k]) continue;
+            if (last >= 0 && k > last + 1)
+                for (int r = 0; r < kind_.rows_per_step; ++r) add_reach(visit, last, k, r, bridges);
+            last = k;
+        }
+    }
+
+    void add_reach(int visit, int from, int to, int row, std::vector<Bridge>& bridges) const {
+        const auto channel = kind_.first_channel + row;
+        Bridge bridge{Eigen::RowVectorXd::Zero(3 * gaps_.size()),
+                      {},
+                      variances_[visit][from][channel] + variances_[visit][to][channel]};
+        add_difference(bridge.right, visit, from, to, row, 1.0);
+        for (int k = from; k < to; ++k) {
+            const PlanPoint &start = visits_[visit].points[k].plan, &end = visits_[visit].points[k + 1].plan;
+            const int axis = index(*end.moved), interval = std::min(start.node[axis], end.node[axis]);
+            const double sign = end.node[axis] > start.node[axis] ? 1.0 : -1.0;
+            const Eigen::RowVector3d direction = sign * visits_[visit].frame.col(kind_.first_column + row).transpose();
+            if (const auto first = unknown(axis, interval)) {
+                bridge.coefficients.segment<3>(*first) += direction;
+                continue;
+            }
+            const auto known = solve_along(systems_[axis].intervals[interval], direction, visits_, kind_);
+            if (!known) return;
+            for (const ReadingTerm& term : *known)
+                bridge.right.push_back({term.reading, term.channel, -term.coefficient});
+        }
+        if (bridge.coefficients.cwiseAbs().maxCoeff() > 0.0) bridges.push_back(std::move(bridge));
+    }
+
+    void add_difference(ReadingSum& sum, int visit, int from, int to, int row, double factor) const {
+        const int first = visits_[visit].first_reading, channel = kind_.first_channel + row;
+        sum.push_back({first + from, channel, -factor});
+        sum.push_back({first + to, channel, factor});
+    }
+
+    static ReadingSum combine(const std::vector<Bridge>& bridges, const Eigen::RowVectorXd& weights) {
+        std::map<std::pair<int, int>, double> sum;
+        for (std::size_t b = 0; b < bridges.size(); ++b)
+            for (const ReadingTerm& term : bridges[b].right)
+                sum[{term.reading, term.channel}] += weights[b] * term.coefficient;
+        ReadingSum combined;
+        for (const auto& [key, coefficient] : sum)
+            if (coefficient != 0.0) combined.push_back({key.first, key.second, coefficient});
+        return combined;
+    }
+
+    void sum_up(Axis axis) {
+        AxisSystem& system = systems_[index(axis)];
+        system.determined.fill(true);
+        for (std::size_t i = 0; i < system.intervals.size(); ++i)
+            for (int c = 0; c < 3; ++c) {
+                if (system.intervals[i].determined[c]) continue;
+                system.determined[c] = false;
+                if (system.gap.empty()) system.gap = describe_gap(axis, int(i));
+            }
+    }
+
+    std::string describe_gap(Axis axis, int interval) const {
+        const auto read = systems_[index(axis)].intervals[interval].steps.size();
+        const auto planned = steps_[index(axis)][interval].size();
+        std::ostringstream text;
+        text << "step " << interval + 1 << " of " << letter(axis) << " (" << plan_.node_position(axis, interval)
+             << " to " << plan_.node_position(axis, interval + 1) << " mm) was read on " << read
+             << (read == 1 ? " line" : " lines");
+        if (read < planned) text << " of " << planned;
+        return text.str();
+    }
+
+    const std::vector<Visit>& visits_;
+    const std::array<AxisSteps, 3>& steps_;
+    const Plan& plan_;
+    Kind kind_;
+    std::vector<std::vector<bool>> has_reading_;  // by visit and point
+    std::vector<std::vector<Eigen::Vector3d>> variances_;
+    AxisSystems systems_;
+    std::vector<Gap> gaps_;
+};
+
+template <class HasReading>
+std::vector<std::vector<bool>> map_points(const std::vector<Visit>& visits, HasReading&& has_reading) {
+    std::vector<std::vector<bool>> result;
+    for (std::size_t v = 0; v < visits.size(); ++v) {
+        result.emplace_back();
+        for (const VisitPoint& point : visits[v].points) result.back().push_back(has_reading(int(v), point));
+    }
+    return result;
 }
 
 }  // namespace
 
 AxisSystems make_angle_systems(const std::vector<Visit>& visits, const std::array<AxisSteps, 3>& steps,
                                const Plan& plan) {
-    const auto has_tilt = [&](int visit, int point) { return visits[visit].points[point].has_tilt; };
-    AxisSystems systems;
-    for (const Axis axis : all_axes)
-        systems[index(axis)] = make_system(visits, steps[index(axis)], plan, axis, 0, 2, has_tilt);
-    return systems;
+    return SystemBuilder(visits, steps, plan, angles,
+                         map_points(visits, [](int, const VisitPoint& p) { return p.has_tilt; }))
+        .build();
 }
 
 AxisSystems make_length_systems(const std::vector<Visit>& visits, const std::array<AxisSteps, 3>& steps,
                                 const Plan& plan, const std::vector<bool>& usable) {
-    const auto has_length = [&](int visit, int point) {
-        return usable[visit] && visits[visit].points[point].has_length;
-    };
-    AxisSystems systems;
-    for (const Axis axis : all_axes)
-        systems[index(axis)] = make_system(visits, steps[index(axis)], plan, axis, 2, 1, has_length);
-    return systems;
+    const auto has_length = [&](int visit, const VisitPoint& point) { return usable[visit] && point.has_length; };
+    return SystemBuilder(visits, steps, plan, lengths, map_points(visits, has_length)).build();
+}
+
+std::optional<ReadingSum> solve_length_along(const StepSystem& interval, const Eigen::RowVector3d& direction,
+                                             const std::vector<Visit>& visits) {
+    return solve_along(interval, direction, visits, lengths);
 }
 
 }  // namespace stepdiag

@@ -11,11 +11,22 @@
 
 namespace stepdiag {
 
+// One value of one reading: `channel` 0 is the length, 1 alpha, 2 beta.
+struct ReadingTerm {
+    int reading;
+    int channel;
+    double coefficient;
+};
+using ReadingSum = std::vector<ReadingTerm>;
+
 // One interval of one axis: the steps that were read at both ends, and the pseudoinverse that makes three components of
-// them.
+// them. Where readings were lost and the steps alone do not suffice, sums that reach over the lost points.
 struct StepSystem {
     std::vector<Step> steps;
     std::shared_ptr<const LeastSquares> solution;  // 3 unknowns; one equation a step (length) or two (alpha, beta)
+    bool is_bridged = false;
+    std::array<ReadingSum, 3> bridge;  // then: the components
+    std::array<bool, 3> determined{};  // the components
 };
 
 // All intervals of an axis.
@@ -33,5 +44,9 @@ AxisSystems make_angle_systems(const std::vector<Visit>& visits, const std::arra
 // Lengths: increments are the line's direction times the increment of delta. Visits that are not `usable` are left out.
 AxisSystems make_length_systems(const std::vector<Visit>& visits, const std::array<AxisSteps, 3>& steps,
                                 const Plan& plan, const std::vector<bool>& usable);
+
+// What an interval adds to the length along a direction, as a sum of lengths; none where they do not determine it.
+std::optional<ReadingSum> solve_length_along(const StepSystem& interval, const Eigen::RowVector3d& direction,
+                                             const std::vector<Visit>& visits);
 
 }  // namespace stepdiag
