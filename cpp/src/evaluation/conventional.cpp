@@ -25,7 +25,7 @@ public:
         const auto [axis, component, sign] = squareness_term(s);
         return systems_[index(axis)].determined[component] && systems_[component].determined[index(axis)];
     }
-    const std::string& gap(Axis axis) const { return systems_[index(axis)].gap; }
+    const AxisSystem& lengths(Axis axis) const { return systems_[index(axis)]; }
 
     template <int Width>
     std::vector<Row<Width>> apply(const ReadingRows<Width>& readings) const {
@@ -76,10 +76,11 @@ Calibration evaluate_conventional(const Measurement& measurement, const Plan& pl
     Calibration calibration{"conventional", chain, plan.volume(), tool, {}, {}, {}, {}};
     evaluate_linear(map, visits, plan, options.full_covariance, calibration);
     for (const Axis axis : all_axes)
-        if (!map.gap(axis).empty())
+        if (const AxisSystem& system = map.lengths(axis); !system.gap.empty())
             calibration.undetermined.push_back(
-                std::string("translations of ") + letter(axis) + ": " + map.gap(axis) +
-                "; three body diagonals of different direction are needed at every step");
+                std::string("translations of ") + letter(axis) + ": " + system.gap +
+                (system.gap_was_planned ? "; three body diagonals of different direction are needed at every step"
+                                        : "; measure the lost points again"));
     if (!is_anything_determined(calibration))
         throw InvalidArgument("conventional evaluation: nothing can be determined. " +
                               calibration.undetermined.front());

@@ -10,13 +10,15 @@
 #include <vector>
 
 #include "evaluation/step_systems.hpp"
+#include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
 
 template <int Width>
 using Row = Eigen::Array<double, Width, 1>;
 
-constexpr int values_per_reading = 3;  // length, alpha, beta
+constexpr std::size_t largest_covariance = 10'000;  // values: 800 MB
+constexpr int values_per_reading = 3;               // length, alpha, beta
 
 // What a map is applied to: `width` sets of readings. Where only one visit's readings differ from zero, or no tilt
 // does, a map may skip the rest.
@@ -114,6 +116,9 @@ void evaluate_linear(const Map& map, const std::vector<Visit>& visits, const Pla
     for (const Squareness s : all_squarenesses)
         if (map.is_determined(s)) rows.push_back(layout.row(s));
 
+    if (full_covariance && rows.size() > largest_covariance)
+        throw InvalidArgument("full_covariance: expected at most " + std::to_string(largest_covariance) +
+                              " values, the calibration has " + std::to_string(rows.size()));
     const auto values = map.template apply<1>({readings_of(visits), -1, true});
     std::vector<Row<width>> variance(layout.size(), Row<width>::Zero());
     Eigen::MatrixXd covariance;

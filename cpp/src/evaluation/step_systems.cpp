@@ -237,7 +237,9 @@ private:
             for (int c = 0; c < 3; ++c) {
                 if (system.intervals[i].determined[c]) continue;
                 system.determined[c] = false;
-                if (system.gap.empty()) system.gap = describe_gap(axis, int(i));
+                if (!system.gap.empty()) continue;
+                system.gap = describe_gap(axis, int(i));
+                system.gap_was_planned = system.intervals[i].steps.size() == steps_[index(axis)][i].size();
             }
     }
 

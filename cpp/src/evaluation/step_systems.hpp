@@ -34,6 +34,7 @@ struct AxisSystem {
     std::vector<StepSystem> intervals;
     std::array<bool, 3> determined{};  // component: in every interval
     std::string gap;                   // where not: the first interval that lacks readings, in words
+    bool gap_was_planned = false;      // and whether it lacks them even if no reading had been lost
 };
 using AxisSystems = std::array<AxisSystem, 3>;
 

@@ -1,6 +1,7 @@
 #include "evaluation/visits.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <sstream>
 
@@ -13,7 +14,7 @@ constexpr double position_tolerance = 1e-3;  // mm: positions are written with t
 
 std::string row_name(const Measurement& measurement, std::size_t row) {
     const Station& station = measurement.stations()[row];
-    return "measurement row " + std::to_string(row + 1) + " (run " + std::to_string(station.run) + ", line " +
+    return "data row " + std::to_string(row + 1) + " (run " + std::to_string(station.run) + ", line " +
            station.line.name() + ", point " + std::to_string(station.point) + ")";
 }
 
@@ -47,15 +48,17 @@ struct Reduced {
 // Reduces the raw channels of one row after another.
 class Reducer {
 public:
-    Reducer(const Measurement& measurement, const HeadCalibration& head, const ReadingUncertainty& uncertainty)
+    // Tilts and spots are not looked at where only distances count.
+    Reducer(const Measurement& measurement, const HeadCalibration& head, const ReadingUncertainty& uncertainty,
+            LengthKind kind)
         : measurement_(measurement),
           head_(head),
           uncertainty_(uncertainty),
           distance_(measurement.find("distance")),
-          alpha_(measurement.find("alpha")),
-          beta_(measurement.find("beta")),
-          spot_x_(measurement.find("spot_x")),
-          spot_y_(measurement.find("spot_y")) {
+          alpha_(kind == LengthKind::distance ? nullptr : measurement.find("alpha")),
+          beta_(kind == LengthKind::distance ? nullptr : measurement.find("beta")),
+          spot_x_(kind == LengthKind::distance ? nullptr : measurement.find("spot_x")),
+          spot_y_(kind == LengthKind::distance ? nullptr : measurement.find("spot_y")) {
         const int beams = measurement.beam_count();
         if (beams > 0 && beams != int(head.beam_offsets.size()))
             throw InvalidArgument("measurement: has " + std::to_string(beams) + " beams d1 ... d" +
@@ -186,7 +189,7 @@ std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& pl
         if (!(u > 0.0 && std::isfinite(u)))
             throw InvalidArgument(std::string("uncertainty.") + key +
                                   ": expected a positive finite standard uncertainty");
-    const Reducer reducer(measurement, head, uncertainty);
+    const Reducer reducer(measurement, head, uncertainty, kind);
     std::map<std::pair<int, std::string>, std::vector<std::size_t>> rows;
     for (std::size_t i = 0; i < measurement.size(); ++i)
         rows[{measurement.stations()[i].run, measurement.stations()[i].line.name()}].push_back(i);
@@ -213,8 +216,8 @@ std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& pl
                                       std::to_string(planned.size() - 1));
             check_position(measurement, row, planned[station.point].commanded);
             VisitPoint& point = visit.points[station.point];
-            // Positions are the commanded ones: where they were rounded, the machine was sent to the rounded point.
-            const Eigen::Vector3d travel = visit.frame.transpose() * (station.commanded - start);
+            // The file's position only finds the point: it may have been rounded when it was written.
+            const Eigen::Vector3d travel = visit.frame.transpose() * (planned[station.point].commanded - start);
             point.lateral = travel.head<2>();
             fill_point(point, reducer.reduce(row), travel.z(), visit.is_scale_line, kind);
         }

@@ -5,12 +5,14 @@
 //     q the vector from beam origin to functional point. Taken off are the commanded travel, the lever arm times the
 //     tilts (its lateral part, "effective lever arm"), and the angular contribution n . sum_a theta_a x L_a.
 //  3. Trends: what is left of a step is n_d . (delta_a(i+1) - delta_a(i)) plus, to first order, the lateral travel
-//  times the
-//     unknown laser angles of the line. Sums over an axis' travel and the scale lines make the slope system for scales,
-//     squarenesses and laser angles; its rank says which are determined.
+//  times
+//     the unknown laser angles of the line. Sums over an axis' travel and the scale lines make the slope system for
+//     scales, squarenesses and laser angles; its rank says which are determined.
 //  4. Steps: corrected for the laser angles, solved by pseudoinverse, summed; straightness slopes are the frame choice.
-// Covariance by eq. 6 from the raw channels, so that neighbouring increments share a reading. Left are second-order
-// terms: nanometres, but 0.7 to 1.9 um at 1 mrad of laser misalignment.
+// Lost readings are bridged: the change over lost points is the sum of the steps between, solved jointly where the
+// steps that were read do not suffice. Covariance by eq. 6 from the raw channels, so that neighbouring increments share
+// a reading. Left are second-order terms: nanometres, but tenths of a micrometre to micrometres at 1 mrad of laser
+// misalignment.
 #pragma once
 
 #include "stepdiag/evaluation/evaluation.hpp"

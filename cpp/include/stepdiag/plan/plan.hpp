@@ -27,7 +27,8 @@ struct LateralExcursion {
 
 class Plan {
 public:
-    static constexpr int largest_step_count = 10'000;
+    // A thousand steps an axis are far beyond any run; the covariance of an evaluation costs their square.
+    static constexpr int largest_step_count = 2'000;
 
     // `volume`: edges X, Y, Z, mm. `order`: the axes in the order in which a step moves them. Scale lines are
     // single-axis lines of two points. Throws InvalidArgument for an empty or doubled line, a volume without extent,
