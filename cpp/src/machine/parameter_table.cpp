@@ -1,5 +1,6 @@
 #include "stepdiag/machine/parameter_table.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/text_file.hpp"
@@ -8,7 +9,8 @@
 namespace stepdiag {
 namespace {
 
-const std::vector<std::string> columns = {"parameter", "position_mm", "value", "unit", "standard_uncertainty"};
+// Leading lines that a reader looks for first; the others follow by name.
+const std::vector<std::string> first_keys = {"format", "chain", "volume_mm", "tool_mm"};
 
 // Power of ten from the unit in the file to the native one.
 constexpr int micro_to_milli = -3;   // um -> mm
@@ -29,22 +31,16 @@ public:
 
     ParameterTable read() {
         read_header();
-        const bool has_direction =
-            csv_.header.fields.size() == columns.size() + 1 && csv_.header.fields.back() == "direction";
-        if (has_direction) csv_.header.fields.pop_back();
-        if (csv_.header.fields != columns)
-            fail(csv_.header.line,
-                 "expected the columns parameter,position_mm,value,unit,standard_uncertainty[,direction]");
-        for (const CsvRow& row : csv_.rows)
-            if (has_direction && !row.fields.back().empty())
-                fail(row.line,
-                     "direction: tables that depend on direction (reversal) are not supported yet; expected an empty "
-                     "field");
+        find_columns();
         for (const CsvRow& row : csv_.rows) read_row(row);
         return std::move(table_);
     }
 
 private:
+    enum Column { parameter, position, value, unit, uncertainty, direction, column_count };
+    static inline const std::array<std::string, column_count> column_names = {
+        "parameter", "position_mm", "value", "unit", "standard_uncertainty", "direction"};
+
     [[noreturn]] void fail(int line, const std::string& why) const {
         throw InvalidArgument(file_name_ + ", line " + std::to_string(line) + ": " + why);
     }
@@ -54,62 +50,121 @@ private:
             const std::string_view text = comment.fields.front();
             const auto equals = text.find('=');
             if (equals == std::string_view::npos) continue;  // a remark, not a key
-            table_.header[trimmed(text.substr(0, equals))] = trimmed(text.substr(equals + 1));
+            const std::string key = trimmed(text.substr(0, equals)), given = trimmed(text.substr(equals + 1));
+            if (key == "format" && given != error_map_format && given != calibration_format)
+                fail(comment.line, "format: expected " + quoted(error_map_format) + " or " +
+                                       quoted(calibration_format) + ", got " + quoted(given));
+            table_.header[key] = given;
         }
     }
 
-    double number(const CsvRow& row, int column, int exponent_shift) const {
-        const auto value = parse_decimal(row.fields[column], exponent_shift);
-        if (!value)
-            fail(row.line, columns[column] + ": expected a finite decimal number, got " + quoted(row.fields[column]));
-        return *value;
+    void find_columns() {
+        const auto& names = csv_.header.fields;
+        for (std::size_t i = 0; i < names.size(); ++i) {
+            const auto known = std::find(column_names.begin(), column_names.end(), names[i]);
+            if (known == column_names.end())
+                fail(csv_.header.line,
+                     "unknown column " + quoted(names[i]) +
+                         "; expected parameter,position_mm,value,unit,standard_uncertainty[,direction] in any order");
+            auto& field = field_[known - column_names.begin()];
+            if (field) fail(csv_.header.line, "the column " + quoted(names[i]) + " is given twice");
+            field = i;
+        }
+        for (int c = 0; c < column_count; ++c)
+            if (c != direction && !field_[c])
+                fail(csv_.header.line, "the column " + quoted(column_names[c]) + " is missing");
+    }
+
+    const std::string& field(const CsvRow& row, Column column) const { return row.fields[*field_[column]]; }
+
+    double number(const CsvRow& row, Column column, int exponent_shift) const {
+        const auto number = parse_decimal(field(row, column), exponent_shift);
+        if (!number)
+            fail(row.line,
+                 column_names[column] + ": expected a finite decimal number, got " + quoted(field(row, column)));
+        return *number;
     }
 
     void read_row(const CsvRow& row) {
-        const auto function = FunctionId::parse(row.fields[0]);
-        const auto squareness = parse_squareness(row.fields[0]);
+        const std::string& name = field(row, parameter);
+        const auto function = FunctionId::parse(name);
+        const auto squareness = parse_squareness(name);
         if (!function && !squareness)
-            fail(row.line, "parameter: expected EXX ... ECZ, C0Y, B0Z or A0Z, got " + quoted(row.fields[0]));
-        const std::string unit = !function || function->is_rotation() ? "urad" : "um";
-        if (row.fields[3] != unit)
-            fail(row.line,
-                 "unit: expected " + quoted(unit) + " for " + row.fields[0] + ", got " + quoted(row.fields[3]));
-        const int shift = unit == "um" ? micro_to_milli : micro_to_radian;
-        const double value = number(row, 2, shift);
-        std::optional<double> uncertainty;
-        if (!row.fields[4].empty()) {
-            uncertainty = number(row, 4, shift);
-            if (*uncertainty < 0.0)
-                fail(row.line, "standard_uncertainty: expected at least 0, got " + quoted(row.fields[4]));
+            fail(row.line, "parameter: expected EXX ... ECZ, C0Y, B0Z or A0Z, got " + quoted(name));
+        if (field_[direction]) check_direction(row);
+        const std::string native = !function || function->is_rotation() ? "urad" : "um";
+        if (field(row, unit) != native)
+            fail(row.line, "unit: expected " + quoted(native) + " for " + name + ", got " + quoted(field(row, unit)));
+        const int shift = native == "um" ? micro_to_milli : micro_to_radian;
+        const double error = number(row, value, shift);
+        std::optional<double> deviation;
+        if (!field(row, uncertainty).empty()) {
+            deviation = number(row, uncertainty, shift);
+            if (*deviation < 0.0)
+                fail(row.line, "standard_uncertainty: expected at least 0, got " + quoted(field(row, uncertainty)));
         }
-        if (function) add_node(row, *function, value, uncertainty);
-        else add_squareness(row, *squareness, value, uncertainty);
+        if (function) add_node(row, *function, error, deviation);
+        else add_squareness(row, *squareness, error, deviation);
     }
 
-    void add_node(const CsvRow& row, FunctionId id, double value, std::optional<double> uncertainty) {
-        const double position = number(row, 1, 0);
+    // One direction, or none, for all rows of a parameter.
+    void check_direction(const CsvRow& row) {
+        const std::string& given = field(row, direction);
+        if (!given.empty() && given != "+" && given != "-" && given != "\u2212")
+            fail(row.line, "direction: expected + or - or an empty field, got " + quoted(given));
+        const std::string sign = given == "\u2212" ? "-" : given;
+        const std::string& name = field(row, parameter);
+        const std::string& before = directions_.emplace(name, sign).first->second;
+        if (before == sign) return;
+        if (before.empty() || sign.empty())
+            fail(row.line, "direction: expected " + (before.empty() ? "an empty field" : before) +
+                               " as in the rows of " + name + " above, got " + quoted(given));
+        fail(row.line, "direction: " + name +
+                           " is given for + and for -; tables for both directions (reversal) are not supported yet");
+    }
+
+    void add_node(const CsvRow& row, FunctionId id, double error, std::optional<double> deviation) {
+        const double place = number(row, position, 0);
         auto& function = table_.functions[id.index()];
         if (!function) function.emplace();
-        if (!function->position.empty() && !(position > function->position.back()))
+        if (!function->position.empty() && !(place > function->position.back()))
             fail(row.line,
-                 "position_mm: positions of " + id.name() + " must ascend, but " + row.fields[1] + " does not");
-        function->position.push_back(position);
-        function->value.push_back(value);
-        function->standard_uncertainty.push_back(uncertainty);
+                 "position_mm: positions of " + id.name() + " must ascend, but " + field(row, position) + " does not");
+        function->position.push_back(place);
+        function->value.push_back(error);
+        function->standard_uncertainty.push_back(deviation);
     }
 
-    void add_squareness(const CsvRow& row, Squareness id, double value, std::optional<double> uncertainty) {
-        if (!row.fields[1].empty())
-            fail(row.line, "position_mm: expected an empty field for " + name(id) + ", got " + quoted(row.fields[1]));
+    void add_squareness(const CsvRow& row, Squareness id, double error, std::optional<double> deviation) {
+        if (!field(row, position).empty())
+            fail(row.line,
+                 "position_mm: expected an empty field for " + name(id) + ", got " + quoted(field(row, position)));
         auto& entry = table_.squarenesses[static_cast<int>(id)];
         if (entry) fail(row.line, name(id) + " is given twice");
-        entry = SquarenessValue{value, uncertainty};
+        entry = SquarenessValue{error, deviation};
     }
 
     const std::string& file_name_;
     CsvFile csv_;
+    std::array<std::optional<std::size_t>, column_count> field_;
+    std::map<std::string, std::string> directions_;  // by parameter
     ParameterTable table_;
 };
+
+std::string format_header(const std::map<std::string, std::string>& header) {
+    std::string text;
+    const auto line = [&](const std::string& key, const std::string& given) {
+        if (key.find_first_of("=\r\n") != std::string::npos || given.find_first_of("\r\n") != std::string::npos)
+            throw InvalidArgument("header " + quoted(key) +
+                                  ": expected a key without \"=\" and no line breaks in key or value");
+        text += "# " + key + "=" + given + "\n";
+    };
+    for (const auto& key : first_keys)
+        if (const auto entry = header.find(key); entry != header.end()) line(key, entry->second);
+    for (const auto& [key, given] : header)
+        if (std::find(first_keys.begin(), first_keys.end(), key) == first_keys.end()) line(key, given);
+    return text;
+}
 
 }  // namespace
 
@@ -122,8 +177,7 @@ ParameterTable read_parameter_table(const std::string& path) {
 }
 
 std::string format_parameter_table(const ParameterTable& table) {
-    std::string text;
-    for (const auto& [key, value] : table.header) text += "# " + key + "=" + value + "\n";
+    std::string text = format_header(table.header);
     text += "parameter,position_mm,value,unit,standard_uncertainty\n";
     const auto row = [&](const std::string& parameter, const std::string& position, double value, bool rotation,
                          std::optional<double> uncertainty) {

@@ -36,7 +36,7 @@ ParameterTable extreme_table() {
         }
     };
     ParameterTable table;
-    table.header = {{"format", "1"}, {"chain", "[w X' b Y Z t]"}};
+    table.header = {{"format", stepdiag::error_map_format}, {"chain", "[w X' b Y Z t]"}};
     for (int i = 0; i < stepdiag::function_count; ++i) {
         FunctionTable function;
         double position = -1e-3 * i;
@@ -122,7 +122,11 @@ TEST(ParameterTable, MalformedTextIsRefusedWithFileAndLine) {
         {"", "t.csv"},
         {"EXX,0,0,um,\n", "line 1"},
         {"parameter,position_mm,value,unit\nEXX,0,0,um\n", "line 1"},
-        {"parameter,position_um,value,unit,standard_uncertainty\n", "line 1"},
+        {"parameter,position_um,value,unit,standard_uncertainty\n", "line 1: unknown column \"position_um\""},
+        {"parameter,value,unit,standard_uncertainty\n", "line 1: the column \"position_mm\" is missing"},
+        {"unit,parameter,position_mm,value,unit,standard_uncertainty\n", "line 1: the column \"unit\" is given twice"},
+        {"# format=stepdiag error map 2\n" + header, "line 1: format: expected \"stepdiag error map 1\" or \"stepdiag"},
+        {"# format=stepdiag error map 2\n" + header, "got \"stepdiag error map 2\""},
         {header + "EXX,0,0,um\n", "line 2"},
         {header + "EXX,0,0,um,,\n", "line 2"},
         {header + "EXQ,0,0,um,\n", "line 2: parameter"},
@@ -178,4 +182,49 @@ TEST(ParameterTable, WhatIsNotFiniteIsNotWritten) {
     expect_refused([&] { format_parameter_table(table); }, "EXX");
     table.functions[0] = FunctionTable{{0.0}, {0.0}, {nan}};
     expect_refused([&] { format_parameter_table(table); }, "EXX");
+}
+
+TEST(ParameterTable, ColumnsMayStandInAnyOrder) {
+    const auto table = parse_parameter_table(
+        "unit,standard_uncertainty,value,parameter,position_mm\num,0.5,2.5,EXX,10\nurad,,-3,A0Z,\n", "t.csv");
+    EXPECT_EQ(table.functions[0]->position, std::vector<double>{10.0});
+    EXPECT_EQ(table.functions[0]->value, std::vector<double>{2.5e-3});
+    EXPECT_EQ(table.functions[0]->standard_uncertainty[0], 0.5e-3);
+    EXPECT_EQ(table.squarenesses[2]->value, -3e-6);
+}
+
+TEST(ParameterTable, OneDirectionOfEachParameterIsReadAsThatTable) {
+    const std::string directed = "direction,parameter,position_mm,value,unit,standard_uncertainty\n";
+    const auto table = parse_parameter_table(
+        directed + "+,EXX,0,0,um,\n+,EXX,10,1,um,\n-,EYX,0,0,um,\n\u2212,EYX,10,2,um,\n,C0Y,,3,urad,\n", "t.csv");
+    EXPECT_EQ(table.functions[0]->value, (std::vector<double>{0.0, 1e-3}));
+    EXPECT_EQ(table.functions[1]->value, (std::vector<double>{0.0, 2e-3}));
+    EXPECT_EQ(table.squarenesses[0]->value, 3e-6);
+    for (const auto& [rows, culprit] : std::vector<std::pair<std::string, std::string>>{
+             {"+,EXX,0,0,um,\n-,EXX,0,0,um,\n",
+              "line 3: direction: EXX is given for + and for -; tables for both directions (reversal) are not "
+              "supported"},
+             {"+,C0Y,,0,urad,\n\u2212,C0Y,,0,urad,\n", "tables for both directions (reversal) are not supported yet"},
+             {"+,EXX,0,0,um,\n,EXX,10,0,um,\n", "line 3: direction: expected + as in"},
+             {",EXX,0,0,um,\n+,EXX,10,0,um,\n", "line 3: direction: expected an empty field"},
+             {"forward,EXX,0,0,um,\n", "line 2: direction: expected + or -"}})
+        expect_refused([&, &text = rows] { parse_parameter_table(directed + text, "t.csv"); }, culprit);
+}
+
+TEST(ParameterTable, FormatChainVolumeAndToolAreWrittenFirst) {
+    ParameterTable table;
+    table.header = {{"a", "1"},      {"chain", "c"},   {"format", stepdiag::calibration_format},
+                    {"method", "m"}, {"tool_mm", "t"}, {"volume_mm", "v"}};
+    const std::string text = format_parameter_table(table);
+    EXPECT_EQ(text.substr(0, text.find("parameter")),
+              "# format=stepdiag calibration 1\n# chain=c\n# volume_mm=v\n# tool_mm=t\n# a=1\n# method=m\n");
+}
+
+TEST(ParameterTable, HeaderThatCouldNotBeReadBackIsNotWritten) {
+    for (const auto& [key, value] : std::vector<std::pair<std::string, std::string>>{
+             {"note", "two\nlines"}, {"note", "carriage\rreturn"}, {"two\nlines", "x"}, {"note=1", "x"}}) {
+        ParameterTable table;
+        table.header[key] = value;
+        expect_refused([&] { format_parameter_table(table); }, "header \"" + key);
+    }
 }

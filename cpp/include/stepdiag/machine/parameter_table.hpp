@@ -33,12 +33,18 @@ struct ParameterTable {
     std::array<std::optional<SquarenessValue>, squareness_count> squarenesses;
 };
 
-// Throws InvalidArgument naming file and line: unreadable or binary file, wrong header, unknown parameter or unit, a
-// number that is none or not finite, positions that do not ascend, a squareness with a position or given twice.
+// What the leading line "# format=..." of a table may say.
+inline constexpr const char* error_map_format = "stepdiag error map 1";
+inline constexpr const char* calibration_format = "stepdiag calibration 1";
+
+// Columns may stand in any order. Throws InvalidArgument naming file and line: unreadable or binary file, another
+// format, a column missing, unknown or doubled, unknown parameter or unit, a number that is none or not finite,
+// positions that do not ascend, a squareness with a position or given twice, a parameter given for both directions.
 ParameterTable read_parameter_table(const std::string& path);
 ParameterTable parse_parameter_table(std::string_view text, const std::string& file_name);
 
-// Writes to a temporary file beside `path`, then renames it.
+// Writes to a temporary file beside `path`, then renames it. Throws InvalidArgument for what could not be read back: a
+// header key with "=", a line break in the header, a value that is not finite.
 void write_parameter_table(const ParameterTable& table, const std::string& path);
 std::string format_parameter_table(const ParameterTable& table);
 
