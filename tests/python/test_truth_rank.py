@@ -173,6 +173,24 @@ def test_three_lines_cannot_bridge_and_say_where() -> None:
     assert_clean(calibration, truth)
 
 
+def test_advice_after_losses_is_to_measure_again() -> None:
+    setup = Setup(steps=5)
+    run = without(setup.simulate(setup.errors(2)), [(line, k) for line in DIAGONALS for k in (4, 5)] + [("0p0", 1)])
+    advice = setup.evaluate(run).undetermined
+    assert any("measure the lost points again" in sentence for sentence in advice)
+    assert not any("add body diagonals" in sentence or "add the scale line" in sentence for sentence in advice)
+
+
+def test_conventional_looks_at_distances_only() -> None:
+    """An interferometer zeroed at the start leaves no absolute distance to make tilts of spots with."""
+    setup = Setup(steps=5, head=sd.Head("psd", psd_distance=50.0))
+    run = setup.simulate(setup.errors(2))
+    zeroed = changed(run, {"distance": run.channels["distance"] - 100.0})
+    for name, (_, value, _) in setup.evaluate(zeroed, method="conventional").functions.items():
+        expected = setup.evaluate(run, method="conventional").functions[name][1]
+        np.testing.assert_allclose(value, expected, atol=2e-12, err_msg=name)  # mm: distances near 1 m are rounded
+
+
 def test_conventional_evaluation_says_that_it_knows_no_rotations() -> None:
     setup = Setup(steps=10)
     calibration = setup.evaluate(setup.simulate(setup.errors(2)), method="conventional")
