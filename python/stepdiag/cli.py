@@ -65,11 +65,16 @@ def simulate(scenario: Path, output: Path) -> None:
     Lost readings are empty fields.
     """
     from stepdiag.files import check_output
+    from stepdiag.map_warnings import scenario_warnings
     from stepdiag.scenario import read_scenario, simulate_scenario
 
     check_output(output)
     _keep_apart(output, scenario)
-    simulate_scenario(read_scenario(scenario)).write(output)
+    described = read_scenario(scenario)
+    _keep_map(output, described.error_map)
+    for warning in scenario_warnings(described):
+        _tell("warning", warning)
+    simulate_scenario(described).write(output)
 
 
 @cli.command(
@@ -102,6 +107,7 @@ def evaluate(scenario: Path, run: Path, method: str, output: Path) -> None:
     _keep_apart(output, scenario, run)
     check_input(run)
     plan = read_scenario(scenario)
+    _keep_map(output, plan.error_map)
     measurement = _core.read_measurement(run)
     try:
         calibration = evaluate_scenario(
@@ -199,13 +205,27 @@ def init(folder: Path, scenario: Path | None) -> None:
 
 def _keep_apart(output: Path, *inputs: Path) -> None:
     for path in inputs:
-        if output.exists() and path.exists() and output.samefile(path):
+        if _same_file(output, path):
             raise InvalidArgument(f"{output}: is also an input; give the output another name")
 
 
+def _keep_map(output: Path, error_map: Path | None) -> None:
+    # By name too: a result that fills the place of a missing map would be taken for the machine's errors.
+    if error_map is not None and (output.resolve() == error_map.resolve() or _same_file(output, error_map)):
+        raise InvalidArgument(f"{output}: is the scenario's machine.errors; give the output another name")
+
+
+def _same_file(one: Path, other: Path) -> bool:
+    return one.exists() and other.exists() and one.samefile(other)
+
+
 def _complain(message: str) -> None:
+    _tell("error", message)
+
+
+def _tell(what: str, message: str) -> None:
     line = " ".join(message.split())
-    click.echo(f"stepdiag: error: {line}", err=True)
+    click.echo(f"stepdiag: {what}: {line}", err=True)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -70,6 +70,8 @@ def write_whole(path: Path, content: str | bytes) -> None:
 def check_output(path: Path) -> None:
     """Raises InvalidArgument where `path` cannot become a file: before the work, not after it."""
     folder = path.parent
+    if _is_device_name(path):
+        raise InvalidArgument(f"{path}: cannot be written: expected the name of a file, got one under /dev")
     if not folder.is_dir():
         raise InvalidArgument(f"{path}: cannot be written: the folder {folder} does not exist")
     try:
@@ -84,6 +86,12 @@ def check_output(path: Path) -> None:
         raise InvalidArgument(f"{path}: cannot be written: it is {what}")
     if not os.access(folder, os.W_OK):
         raise InvalidArgument(f"{path}: cannot be written: no permission to write in {folder}")
+
+
+def _is_device_name(path: Path) -> bool:
+    # Not by what it leads to: /dev/stdout may be a file, which renaming would put in place of the link.
+    name = os.path.abspath(path)
+    return name.startswith("/dev/") and not name.startswith("/dev/shm/")  # a disk in memory holds files
 
 
 def make_folder(path: Path) -> None:

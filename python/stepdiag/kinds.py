@@ -1,5 +1,6 @@
 """Which of our files is this, and is it sound?"""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,12 +27,14 @@ def examine(path: Path) -> Finding:
     if path.suffix.lower() == ".toml":
         return _scenario(path)
     comments, header = _head_of(read_beginning(path))
+    leading = dict(re.findall(r"(?m)^#\s*(\w+)\s*=\s*(.*?)\s*$", "\n".join(comments)))
     columns = {column.strip().strip('"') for column in header.split(",")}
+    if leading.get("format", "").startswith("stepdiag calibration"):
+        return _calibration(path)
+    if leading.get("format", "").startswith("stepdiag error map"):
+        return _error_map(path)
     if {"parameter", "value"} & columns:
-        is_calibration = any(
-            line.replace(" ", "").startswith(("#format=stepdiagcalibration", "#method=")) for line in comments
-        )
-        return _calibration(path) if is_calibration else _error_map(path)
+        return _calibration(path) if "method" in leading else _error_map(path)
     if {"line", "point"} & columns:
         return _measurement(path)
     if header.lstrip().startswith("[") or "=" in header:
@@ -54,13 +57,15 @@ def _head_of(text: str) -> tuple[list[str], str]:
 
 
 def _scenario(path: Path) -> Finding:
+    from stepdiag.map_warnings import scenario_warnings
     from stepdiag.scenario import read_scenario
 
     scenario = read_scenario(path)
     plan = scenario.plan
     lines = f"{len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines"
     summary = f"{scenario.chain.name}, {lines}"
-    return Finding("scenario", summary, tuple(scenario.machine().errors.warnings(plan.volume)))
+    scenario.machine()  # refuses an error map that is not sound
+    return Finding("scenario", summary, tuple(scenario_warnings(scenario)))
 
 
 def _measurement(path: Path) -> Finding:
@@ -80,7 +85,9 @@ def _error_map(path: Path) -> Finding:
 def _calibration(path: Path) -> Finding:
     calibration = _core.read_calibration(path)
     count = len(calibration.functions) + len(calibration.squareness)
-    summary = f"{calibration.method}, {calibration.chain.name}, {count} of 21 parameters determined"
+    slopes = calibration.undetermined_slopes
+    summary = f"{calibration.method}, {calibration.chain.name}, {count} of 21 parameters"
+    summary += f", slopes of {', '.join(slopes)} open" if slopes else " determined"
     return Finding("calibration", summary, tuple(calibration.undetermined))
 
 

@@ -42,20 +42,25 @@ class Scenario:
     refractive_index: float
     uncertainty: _core.ReadingUncertainty
 
+    @property
+    def error_map(self) -> Path | None:
+        """The file of the error map that [machine] names."""
+        errors = self.keys.machine.errors
+        return None if errors is None else self.path.parent / errors
+
     def machine(self) -> _core.Machine:
         """The machine to simulate: reads the error map, or makes the random one."""
         return _core.Machine(self.chain, self._errors(), self.tool)
 
     def _errors(self) -> _core.ErrorMap:
-        machine = self.keys.machine
-        if machine.errors is not None:
+        path, random = self.error_map, self.keys.machine.random
+        if path is not None:
             with _located(f"{self.path}: machine.errors"):
-                path = self.path.parent / machine.errors
                 check_input(path)
                 return _core.read_error_map(path)
-        if machine.random is not None:
+        if random is not None:
             with _located(f"{self.path}: machine.random"):
-                return _random_errors(self.keys, machine.random)
+                return _random_errors(self.keys, random)
         return _core.ErrorMap()
 
 

@@ -8,8 +8,10 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from stepdiag._core import Plan
+
 # Limits that the core checks as well; here they keep numbers inside the integer types behind the bindings.
-LARGEST_STEPS: Final = 10_000
+LARGEST_STEPS: Final = Plan.largest_step_count
 LARGEST_EDGE: Final = 1e6
 LARGEST_INTERVALS: Final = 1_000_000
 LARGEST_SEED: Final = 2**64 - 1
@@ -144,11 +146,19 @@ class HeadSection(Section):
         None,
         [[0.0, 0.0], [20.0, 0.0], [0.0, 20.0]],
     )
-    wavelength_nm: Positive = key(_positive, "Vacuum wavelength.", 1530.0)
-    aperture_mm: PositiveLength = key(_positive_length, "Edge of the square that takes the beam back.", 50.0)
+    wavelength_nm: Positive = key(
+        _positive, "Vacuum wavelength; changes nothing yet: the air's index is given, not computed.", 1530.0
+    )
+    aperture_mm: PositiveLength = key(
+        _positive_length,
+        "Edge of the square that takes the beam back. A beam outside it is a lost reading of `ideal`; "
+        "the other layouts lose none.",
+        50.0,
+    )
     mirror_mm: tuple[PositiveLength, PositiveLength] | None = key(
         "two positive lengths in mm",
-        "Width and height of the mirror; by default as large as the plan needs.",
+        "Width and height of the mirror; by default as large as the plan needs. A beam that misses it is a lost "
+        "reading of `ideal`; the other layouts lose none.",
         None,
         [120.0, 120.0],
     )

@@ -29,6 +29,11 @@ seed = 3
 """
 
 
+def of_map(path: str) -> str:
+    """The scenario with an error map in place of the random one."""
+    return SCENARIO.replace("[machine.random]\nseed = 7", f'errors = "{path}"')
+
+
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with a scenario and its run, which is also the working folder."""

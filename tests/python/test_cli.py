@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 import tomlkit
-from conftest import SCENARIO
+from conftest import SCENARIO, of_map
 
 import stepdiag as sd
 from stepdiag.cli import main
@@ -119,7 +119,9 @@ MISTAKES: list[tuple[list[str], str]] = [
     (["simulate", "run.csv", "-o", "out.csv"], "run.csv: not valid TOML"),
     (["simulate", "scenario.toml", "-o", "no/out.csv"], "no/out.csv: cannot be written: the folder no does not exist"),
     (["simulate", "scenario.toml", "-o", "."], "cannot be written: it is a folder"),
-    (["simulate", "scenario.toml", "-o", "/dev/null"], "/dev/null: cannot be written: it is not a regular file"),
+    (["simulate", "scenario.toml", "-o", "/dev/null"], "/dev/null: cannot be written: expected the name of a file"),
+    (["simulate", "scenario.toml", "-o", "/dev/stdout"], "expected the name of a file, got one under /dev"),
+    (["evaluate", "scenario.toml", "run.csv", "-o", "/dev/fd/1"], "expected the name of a file, got one under /dev"),
     (["simulate", "scenario.toml", "-o", "run.csv/out.csv"], "the folder run.csv does not exist"),
     (["simulate", "scenario.toml", "-o", "scenario.toml"], "is also an input"),
     (["evaluate", "scenario.toml", "run.csv", "-m", "magic", "-o", "out.csv"], "'magic' is not one of"),
@@ -127,6 +129,9 @@ MISTAKES: list[tuple[list[str], str]] = [
     (["evaluate", "scenario.toml", "no.csv", "-o", "out.csv"], "no.csv: cannot be read"),
     (["evaluate", "scenario.toml", "/dev/zero", "-o", "out.csv"], "/dev/zero: expected a file, got a device"),
     (["evaluate", "scenario.toml", "run.csv", "-o", "./run.csv"], "is also an input"),
+    (["simulate", "of_map.toml", "-o", "truth.csv"], "is the scenario's machine.errors"),
+    (["evaluate", "of_map.toml", "run.csv", "-o", "./truth.csv"], "is the scenario's machine.errors"),
+    (["evaluate", "no_map.toml", "run.csv", "-o", "missing.csv"], "is the scenario's machine.errors"),
     (["evaluate", "other.toml", "run.csv", "-o", "out.csv"], "run.csv: "),
     (["evaluate", "scenario.toml", "run.csv", "-o", "no/out.csv"], "the folder no does not exist"),
     (["check"], "Missing argument 'FILE...'"),
@@ -146,6 +151,9 @@ def test_mistake_gives_exit_code_2_and_one_line(
     here: Path, arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("other.toml").write_text(SCENARIO.replace("steps = 5", "steps = 4"))
+    Path("of_map.toml").write_text(of_map("truth.csv"))
+    Path("no_map.toml").write_text(of_map("missing.csv"))
+    sd.ErrorMap().write("truth.csv")
     Path("notes.txt").write_text("nothing of ours\n")
     before = {path.name: path.read_bytes() for path in here.iterdir()}
     capsys.readouterr()

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from conftest import SCENARIO
+from conftest import SCENARIO, of_map
 
 import stepdiag as sd
 from stepdiag.cli import main
@@ -27,6 +27,71 @@ def test_check_warns_of_a_map_that_breaks_the_zeros(here: Path, capsys: pytest.C
     Path("truth.csv").write_text("parameter,position_mm,value,unit,standard_uncertainty\nEYX,0,1.5,um,\nEYX,80,0,um,\n")
     assert run("check", "truth.csv") == 0
     assert "truth.csv: warning: EYX is 1.5 um at home" in capsys.readouterr().out
+
+
+COLUMNS = "parameter,position_mm,value,unit,standard_uncertainty\n"
+
+# What an error map says, and what is told of it by simulate and check.
+ODD_MAPS = {
+    "zeros": (f"{COLUMNS}EYX,0,1.5,um,\nEYX,80,0,um,\n", "EYX is 1.5 um at home"),
+    "chain": (f"# chain=[w b X Y Z t]\n{COLUMNS}", "is for the chain [w b X Y Z t], the scenario has [w X' b Y Z t]"),
+    "no chain": (f"# chain=serial\n{COLUMNS}", "is for the chain serial"),
+    "volume": (f"# volume_mm=80 60 40\n{COLUMNS}", "is for the volume 80 60 40 mm, the scenario has 80 60 50 mm"),
+    "no volume": (f"# volume_mm=large\n{COLUMNS}", "is for the volume large mm"),
+    "tool": (f"# tool_mm=0 0 -100\n{COLUMNS}", "is for the tool offset 0 0 -100 mm, the scenario has 0 0 0 mm"),
+}
+
+
+@pytest.mark.parametrize("name", ODD_MAPS)
+def test_odd_map_of_a_scenario_is_used_as_given_with_a_warning(
+    here: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    content, warning = ODD_MAPS[name]
+    Path("truth.csv").write_text(content)
+    Path("scenario.toml").write_text(of_map("truth.csv"))
+    assert run("simulate", "scenario.toml", "-o", "out.csv") == 0
+    said = capsys.readouterr().err
+    assert said.startswith(f"stepdiag: warning: truth.csv: {warning}")
+    assert said.count("\n") == 1
+    assert run("check", "scenario.toml") == 0
+    assert f"scenario.toml: warning: truth.csv: {warning}" in capsys.readouterr().out
+
+
+def test_map_of_the_same_machine_gives_no_warning(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scenario = sd.read_scenario("scenario.toml")
+    errors = scenario.machine().errors
+    errors.write("truth.csv", chain=scenario.chain, volume=scenario.plan.volume, tool=scenario.tool)
+    Path("scenario.toml").write_text(of_map("truth.csv"))
+    assert run("simulate", "scenario.toml", "-o", "out.csv") == 0
+    assert run("check", "scenario.toml") == 0
+    said = capsys.readouterr()
+    assert "warning" not in said.err + said.out
+
+
+def test_calibration_with_open_slopes_says_so(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("no_scales.toml").write_text(SCENARIO.replace('["p00", "0p0", "00p"]', '["p00"]'))
+    run("simulate", "no_scales.toml", "-o", "no_scales.csv")
+    run("evaluate", "no_scales.toml", "no_scales.csv", "-o", "open.csv")
+    slopes = sd.read_calibration("open.csv").undetermined_slopes
+    capsys.readouterr()
+    assert run("check", "open.csv") == 0
+    said = capsys.readouterr().out.splitlines()[0]
+    assert slopes
+    assert said.endswith(f" of 21 parameters, slopes of {', '.join(slopes)} open")
+    Path("next.toml").write_text(of_map("open.csv"))
+    assert run("simulate", "next.toml", "-o", "next.csv") == 0
+    assert (
+        f"warning: open.csv: is a calibration that leaves the slopes of {', '.join(slopes)}" in capsys.readouterr().err
+    )
+
+
+def test_format_says_what_a_table_is_whatever_else_it_holds(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("map.csv").write_text(f"# method=enhanced\n# format=stepdiag error map 1\n{COLUMNS}C0Y,,1,urad,\n")
+    assert run("check", "map.csv") == 0
+    assert "map.csv: error map: 1 of 21" in capsys.readouterr().out
+    Path("torn.csv").write_text("# format=stepdiag calibration 1\nline,point\n")
+    assert run("check", "torn.csv") == 2
+    assert "parameter" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -65,7 +130,7 @@ def test_check_goes_on_after_a_bad_file(here: Path, capsys: pytest.CaptureFixtur
 
 
 def test_check_looks_into_the_map_that_a_scenario_names(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    Path("scenario.toml").write_text(SCENARIO.replace("[machine.random]\nseed = 7", 'errors = "truth.csv"'))
+    Path("scenario.toml").write_text(of_map("truth.csv"))
     assert run("check", "scenario.toml") == 2
     assert "machine.errors" in capsys.readouterr().err
 

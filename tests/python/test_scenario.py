@@ -153,7 +153,7 @@ def test_byte_order_mark_is_passed_over(tmp_path: Path) -> None:
 
 # --- what is wrong with a file ---------------------------------------------------------------------------------------
 EDGE = "expected a length in mm, above 0 and up to 1e6, got "
-STEPS = "plan.steps: expected an integer from 1 to 10000, got "
+STEPS = "plan.steps: expected an integer from 1 to 2000, got "
 
 MALFORMED = [
     # keys

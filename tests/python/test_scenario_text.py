@@ -2,11 +2,7 @@
 
 from pathlib import Path
 
-import pytest
-
-import stepdiag as sd
 from stepdiag.scenario import parse_scenario
-from stepdiag.scenario_keys import LARGEST_STEPS
 from stepdiag.scenario_text import key_table, keys, sections, template
 
 
@@ -29,9 +25,3 @@ def test_template_is_a_scenario_and_stays_one_with_every_key_uncommented() -> No
     everything = everything.replace('errors = "truth.csv"\n', "").replace("[misalignment.LINE] replaces", "#")
     everything = "\n".join(line for line in everything.splitlines() if "[adjustment.LINE]" not in line)
     assert parse_scenario(everything).keys.adjustment.laser_urad == "free"
-
-
-def test_limits_of_the_keys_are_those_of_the_core() -> None:
-    sd.Plan((800, 600, 500), ["ppp"], LARGEST_STEPS)
-    with pytest.raises(sd.InvalidArgument):
-        sd.Plan((800, 600, 500), ["ppp"], LARGEST_STEPS + 1)
