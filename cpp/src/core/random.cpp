@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "stepdiag/core/units.hpp"
+
 namespace stepdiag {
 
 std::array<double, 2> uniform_pair(std::uint64_t seed, RandomStream stream, std::uint64_t counter) {
@@ -19,10 +21,9 @@ std::array<double, 2> uniform_pair(std::uint64_t seed, RandomStream stream, std:
 }
 
 std::array<double, 2> normal_pair(std::uint64_t seed, RandomStream stream, std::uint64_t counter) {
-    constexpr double two_pi = 6.283185307179586476925286766559;
     const auto [u, v] = uniform_pair(seed, stream, counter);
     const double radius = std::sqrt(-2.0 * std::log(u));
-    return {radius * std::cos(two_pi * v), radius * std::sin(two_pi * v)};
+    return {radius * std::cos(2.0 * pi * v), radius * std::sin(2.0 * pi * v)};
 }
 
 }  // namespace stepdiag

@@ -6,10 +6,15 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
+#include <cerrno>
 #include <charconv>
-#include <cstdlib>
+#include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <new>
+#include <utility>
 
 #include "stepdiag/core/error.hpp"
 
@@ -41,6 +46,29 @@ bool write_all(int file, std::string_view text) {
         text.remove_prefix(std::size_t(count));
     }
     return true;
+}
+
+// The file behind symbolic links, there or not: it is written, not the link.
+std::string linked_file(const std::string& path) {
+    std::filesystem::path file = path;
+    std::error_code error;
+    for (int links = 0; links < 40; ++links) {
+        const auto next = std::filesystem::read_symlink(file, error);
+        if (error) return file.string();
+        file = file.parent_path() / next;
+    }
+    return path;
+}
+
+// A new file beside `target` with the permissions of any new file, and its name; -1 where it cannot be made. (mkstemp
+// would give it others, and the umask that says which cannot be asked without changing it for other threads.)
+std::pair<int, std::string> open_temporary(const std::string& target) {
+    static std::atomic<unsigned> counter{0};
+    for (;;) {
+        const std::string name = target + "." + std::to_string(::getpid()) + "-" + std::to_string(++counter);
+        const int file = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        if (file >= 0 || errno != EEXIST) return {file, name};
+    }
 }
 
 // A whole number with an optional sign; clamped, because a decimal exponent beyond this is 0 or infinite anyway.
@@ -83,7 +111,7 @@ std::size_t first_broken_character(std::string_view text) {
 }  // namespace
 
 std::string read_text_file(const std::string& path) {
-    struct stat status {};
+    struct stat status = {};
     if (::stat(path.c_str(), &status) != 0) throw InvalidArgument(path + ": cannot be read: " + std::strerror(errno));
     if (!S_ISREG(status.st_mode) && !S_ISFIFO(status.st_mode))
         throw InvalidArgument(path + ": expected a file, got a folder or a device");
@@ -108,8 +136,9 @@ void write_text_file(const std::string& path, std::string_view text) {
     const auto fail = [&](const std::string& what) {
         throw InvalidArgument(path + ": " + what + ": " + std::strerror(errno));
     };
-    struct stat status {};
+    struct stat status = {};
     const bool exists = ::stat(path.c_str(), &status) == 0;
+    if (!exists && errno != ENOENT) fail("cannot be written");
     if (exists && S_ISDIR(status.st_mode)) throw InvalidArgument(path + ": cannot be written: it is a folder");
     if (exists && !S_ISREG(status.st_mode)) {  // a pipe or a device is written to, not replaced
         const int file = ::open(path.c_str(), O_WRONLY);
@@ -117,19 +146,11 @@ void write_text_file(const std::string& path, std::string_view text) {
         if (file < 0 || ::close(file) != 0 || !written) fail("cannot be written");
         return;
     }
-    std::string target = path;
-    if (exists)  // the file behind a symbolic link is replaced, not the link
-        if (char* real = ::realpath(path.c_str(), nullptr)) {
-            target = real;
-            ::free(real);
-        }
-    std::string temporary = target + ".XXXXXX";
-    const int file = ::mkstemp(temporary.data());
+    const std::string target = linked_file(path);
+    const auto [file, temporary] = open_temporary(target);
     if (file < 0) fail("cannot be written");
-    const mode_t mask = ::umask(0);
-    ::umask(mask);
-    const bool written = write_all(file, text) && ::fchmod(file, exists ? status.st_mode & 07777 : 0666 & ~mask) == 0 &&
-                         ::fsync(file) == 0;
+    const bool written =
+        write_all(file, text) && (!exists || ::fchmod(file, status.st_mode & 07777) == 0) && ::fsync(file) == 0;
     if (::close(file) == 0 && written && ::rename(temporary.c_str(), target.c_str()) == 0) return;
     const int error = errno;
     ::unlink(temporary.c_str());

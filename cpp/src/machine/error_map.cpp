@@ -6,6 +6,7 @@
 
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/core/random.hpp"
+#include "stepdiag/core/units.hpp"
 
 namespace stepdiag {
 namespace {
@@ -37,7 +38,6 @@ void check_function(const FunctionTable& table, const std::string& name) {
 // Random harmonics of one function at its equidistant nodes; `slope` adds a random straight line.
 std::vector<double> random_shape(std::uint64_t seed, int function, int intervals, bool slope, double amplitude) {
     constexpr int harmonics = 5;
-    constexpr double pi = 3.14159265358979323846;
     std::vector<double> value(intervals + 1, 0.0);
     for (int h = 0; h <= harmonics; ++h) {
         const double weight = normal_pair(seed, RandomStream::error_map, std::uint64_t(function) * 64 + h)[0] / (h + 1);
@@ -91,6 +91,7 @@ Eigen::Vector3d ErrorMap::theta(Axis axis, double position) const {
 }
 
 std::vector<std::string> ErrorMap::warnings(const Eigen::Vector3d& volume) const {
+    if (!volume.allFinite()) throw InvalidArgument("volume: expected three finite edges in mm");
     std::vector<std::string> sentences;
     for (int i = 0; i < function_count; ++i) {
         if (!table_.functions[i]) continue;
@@ -103,7 +104,7 @@ std::vector<std::string> ErrorMap::warnings(const Eigen::Vector3d& volume) const
         const auto report = [&](double position, const char* where) {
             if (std::abs(function(id, position)) <= tolerance) return;
             std::ostringstream text;
-            text << id.name() << " is " << function(id, position) / (id.is_rotation() ? 1e-6 : 1e-3)
+            text << id.name() << " is " << function(id, position) / (id.is_rotation() ? microradian : micrometre)
                  << (id.is_rotation() ? " urad " : " um ") << where << ", where the frame choice has 0; used as given";
             sentences.push_back(text.str());
         };
@@ -140,8 +141,8 @@ ErrorMap make_random_error_map(const Eigen::Vector3d& volume, const RandomErrorM
                                       id.is_rotation() ? options.rotation : options.translation);
         if (id.is_positioning() && options.screw_amplitude > 0.0)
             for (int k = 0; k <= options.intervals; ++k)
-                function.value[k] += options.screw_amplitude * std::sin(2.0 * 3.14159265358979323846 *
-                                                                        function.position[k] / options.screw_pitch);
+                function.value[k] +=
+                    options.screw_amplitude * std::sin(2.0 * pi * function.position[k] / options.screw_pitch);
         function.standard_uncertainty.resize(function.position.size());
         table.functions[i] = std::move(function);
     }

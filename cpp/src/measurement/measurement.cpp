@@ -67,10 +67,9 @@ Measurement::Measurement(std::vector<Station> stations, std::vector<Channel> cha
             if (channel.value[i] && !std::isfinite(*channel.value[i]))
                 throw InvalidArgument(row_name(stations_[i], i) + ": " + channel.name +
                                       " must be finite, or absent where it was lost");
-            if (weighted && channel.standard_uncertainty[i] &&
-                !(*channel.standard_uncertainty[i] > 0.0 && std::isfinite(*channel.standard_uncertainty[i])))
+            if (weighted && channel.standard_uncertainty[i] && !is_usable_uncertainty(*channel.standard_uncertainty[i]))
                 throw InvalidArgument(row_name(stations_[i], i) + ": standard uncertainty of " + channel.name +
-                                      " must be positive and finite");
+                                      " must be 1e-12 to 1e6 mm or rad");
         }
     }
 }

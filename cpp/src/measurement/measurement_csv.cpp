@@ -1,5 +1,8 @@
 #include <algorithm>
+#include <array>
 #include <charconv>
+#include <limits>
+#include <tuple>
 
 #include "core/text_file.hpp"
 #include "measurement/channel_column.hpp"
@@ -143,9 +146,9 @@ private:
         std::optional<double> value;
         if (!text.empty()) {
             value = parse_decimal(text, column.uncertainty ? format.uncertainty_shift : format.exponent_shift);
-            if (!value || (column.uncertainty && *value <= 0.0))
+            if (!value || (column.uncertainty && !is_usable_uncertainty(*value)))
                 fail(row, column.field,
-                     column.uncertainty ? "a positive decimal number or an empty field"
+                     column.uncertainty ? "an empty field or a standard uncertainty of 1e-12 to 1e6 mm or rad"
                                         : "a finite decimal number, or an empty field for a lost reading");
         }
         (column.uncertainty ? channel.standard_uncertainty : channel.value).push_back(value);

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/core/units.hpp"
 
 namespace stepdiag {
 namespace {
@@ -121,7 +122,7 @@ std::vector<Face> make_wedge(double width, double height, double thickness, doub
 std::vector<Face> make_prism(double side, double height, double apex, Medium glass, const Placement& placement) {
     require_positive(side, "side");
     require_positive(height, "height");
-    if (!(apex > 0.0 && apex < 3.14159)) throw InvalidArgument("prism apex: expected an angle between 0 and pi");
+    if (!(apex > 0.0 && apex < pi)) throw InvalidArgument("prism apex: expected an angle between 0 and pi");
     const double x = side * std::sin(0.5 * apex), y = 0.5 * height, z = side * std::cos(0.5 * apex);
     return make_body({{-x, -y, 0}, {x, -y, 0}, {0, -y, z}, {-x, y, 0}, {x, y, 0}, {0, y, z}},
                      {{0, 1, 4, 3}, {1, 2, 5, 4}, {2, 0, 3, 5}, {0, 1, 2}, {3, 4, 5}}, glass, placement);
@@ -133,7 +134,7 @@ std::vector<Face> make_corner_cube(double depth, Medium glass, const Placement& 
     const double radius = std::sqrt(2.0) * depth;
     Corners corners{Eigen::Vector3d::Zero()};
     for (int k = 0; k < 3; ++k) {
-        const double angle = 2.0 * 3.14159265358979323846 * k / 3.0;
+        const double angle = 2.0 * pi * k / 3.0;
         corners.emplace_back(radius * std::cos(angle), radius * std::sin(angle), depth);
     }
     return make_body(corners, {{1, 2, 3}, {0, 1, 2}, {0, 2, 3}, {0, 3, 1}}, glass, placement);

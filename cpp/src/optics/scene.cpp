@@ -9,7 +9,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <memory>
+#include <new>
+#include <stdexcept>
 #include <string>
+#include <type_traits>
 
 #include "stepdiag/core/error.hpp"
 
@@ -27,6 +32,18 @@ RTCDevice device() {
     }();
     return device;
 }
+
+// What Embree made; it makes nothing where memory runs out.
+template <class Made>
+Made* not_null(Made* object) {
+    if (!object) throw std::bad_alloc();
+    return object;
+}
+
+struct Release {
+    void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); }
+};
+using Geometry = std::unique_ptr<std::remove_pointer_t<RTCGeometry>, Release>;
 
 void intersect(RTCScene scene, RTCRayHit& query) {
 #if STEPDIAG_EMBREE_MAJOR >= 4
@@ -71,7 +88,7 @@ Scene::Scene(std::vector<Face> faces) : faces_(std::move(faces)), centre_(Eigen:
         for (const auto& corner : face.outline) centre_ += corner, ++corners;
     if (corners > 0) centre_ /= double(corners);
 
-    embree_ = std::shared_ptr<void>(rtcNewScene(device()),
+    embree_ = std::shared_ptr<void>(not_null(rtcNewScene(device())),
                                     [](void* scene) { rtcReleaseScene(static_cast<RTCScene>(scene)); });
     const auto scene = static_cast<RTCScene>(embree_.get());
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
@@ -79,20 +96,19 @@ Scene::Scene(std::vector<Face> faces) : faces_(std::move(faces)), centre_(Eigen:
     double extent = 0.0;
     for (const Face& face : faces_) {
         const std::size_t n = face.outline.size();
-        const RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
-        auto* vertex = static_cast<float*>(
-            rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), n));
-        auto* triangle = static_cast<unsigned*>(
-            rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), n - 2));
+        const Geometry geometry(not_null(rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE)));
+        auto* vertex = static_cast<float*>(not_null(rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0,
+                                                                            RTC_FORMAT_FLOAT3, 3 * sizeof(float), n)));
+        auto* triangle = static_cast<unsigned*>(not_null(rtcSetNewGeometryBuffer(
+            geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), n - 2)));
         for (const auto& corner : face.outline)
             for (int c = 0; c < 3; ++c) {
                 *vertex++ = float(corner[c] - centre_[c]);
                 extent = std::max(extent, std::abs(corner[c] - centre_[c]));
             }
         for (unsigned i = 2; i < n; ++i) *triangle++ = 0, *triangle++ = i - 1, *triangle++ = i;
-        rtcCommitGeometry(geometry);
-        rtcAttachGeometry(scene, geometry);  // geometry ids count up from 0: the face's index
-        rtcReleaseGeometry(geometry);
+        rtcCommitGeometry(geometry.get());
+        rtcAttachGeometry(scene, geometry.get());  // geometry ids count up from 0: the face's index
     }
     rtcCommitScene(scene);
     gap_ = 1e-6 * extent;  // some ten units of single precision's last place

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <limits>
 #include <random>
+#include <thread>
 
 #include "refuses.hpp"
 
@@ -158,6 +159,60 @@ TEST(TextFile, WritingReplacesTheWholeFileAndLeavesNothingElse) {
     stepdiag::write_text_file(path, "a long first text\n");
     stepdiag::write_text_file(path, "short\n");
     EXPECT_EQ(stepdiag::read_text_file(path), "short\n");
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
+    fs::remove_all(folder);
+}
+
+TEST(TextFile, ModeOfAnExistingFileIsKeptAndANewOneHasThatOfAnyNewFile) {
+    namespace fs = std::filesystem;
+    const fs::path folder = fs::temp_directory_path() / "stepdiag_text_file_mode_test";
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+    const fs::path plain = folder / "plain", file = folder / "a.csv";
+    std::ofstream(plain) << "x";
+    stepdiag::write_text_file(file.string(), "first");
+    EXPECT_EQ(fs::status(file).permissions(), fs::status(plain).permissions());
+    const auto own = fs::perms::owner_read | fs::perms::owner_write | fs::perms::others_read;
+    fs::permissions(file, own);
+    stepdiag::write_text_file(file.string(), "second");
+    EXPECT_EQ(fs::status(file).permissions(), own);
+    fs::remove_all(folder);
+}
+
+TEST(TextFile, FileBehindALinkIsWrittenEvenWhereItIsNotThereYet) {
+    namespace fs = std::filesystem;
+    const fs::path folder = fs::temp_directory_path() / "stepdiag_text_file_link_test";
+    fs::remove_all(folder);
+    fs::create_directories(folder / "deep");
+    fs::create_symlink("deep/second", folder / "first");
+    fs::create_symlink("target.csv", folder / "deep" / "second");
+    fs::create_symlink("no/such/folder", folder / "astray");
+    fs::create_symlink("circle", folder / "circle");
+    for (const char* text : {"new", "changed"}) {
+        stepdiag::write_text_file((folder / "first").string(), text);
+        EXPECT_TRUE(fs::is_symlink(folder / "first") && fs::is_symlink(folder / "deep" / "second"));
+        EXPECT_EQ(stepdiag::read_text_file((folder / "deep" / "target.csv").string()), text);
+    }
+    expect_refused([&] { stepdiag::write_text_file((folder / "astray").string(), "x"); }, "astray: cannot be written");
+    expect_refused([&] { stepdiag::write_text_file((folder / "circle").string(), "x"); }, "circle: cannot be written");
+    EXPECT_TRUE(fs::is_symlink(folder / "circle"));
+    fs::remove_all(folder);
+}
+
+TEST(TextFile, ManyThreadsWritingOneFileLeaveOneWholeText) {
+    namespace fs = std::filesystem;
+    const fs::path folder = fs::temp_directory_path() / "stepdiag_text_file_thread_test";
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+    const std::string path = (folder / "a.csv").string();
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 4; ++t)
+        threads.emplace_back([&, t] {
+            for (int i = 0; i < 20; ++i) stepdiag::write_text_file(path, std::string(10'000, char('a' + t)));
+        });
+    for (auto& thread : threads) thread.join();
+    const std::string text = stepdiag::read_text_file(path);
+    EXPECT_EQ(text, std::string(10'000, text[0]));
     EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
     fs::remove_all(folder);
 }

@@ -124,6 +124,7 @@ TEST(ErrorMap, MapOutsideTheFrameChoiceIsUsedWithAWarning) {
     ASSERT_EQ(warnings.size(), 2u);
     EXPECT_NE(warnings[0].find("EYX"), std::string::npos);
     EXPECT_EQ(map.function(eyx, 0.0), 1e-3);
+    expect_refused([&] { map.warnings({1.0, 2.0, not_a_number}); }, "volume");
     EXPECT_EQ(with(exx, nodes({0.0, 800.0}, {0.0, 2e-3})).warnings(volume).size(), 0u);  // positioning keeps its slope
 }
 

@@ -37,9 +37,9 @@ struct AnyDouble {
             if (std::isfinite(value)) return value;
         }
     }
-    double positive() {
-        const double value = std::abs((*this)());
-        return value > 0.0 ? value : 1.0;
+    double uncertainty() {  // of every size that one may have
+        for (;;)
+            if (const double value = std::abs((*this)()); stepdiag::is_usable_uncertainty(value)) return value;
     }
 };
 
@@ -59,7 +59,7 @@ Measurement random_measurement(const std::vector<std::string>& names, bool weigh
             const bool has_unit = channel.name != "time" && channel.name != "temperature";
             if (weighted && has_unit)
                 channel.standard_uncertainty.push_back(i % 11 == 2 ? std::nullopt
-                                                                   : std::optional<double>(any.positive()));
+                                                                   : std::optional<double>(any.uncertainty()));
         }
     }
     return Measurement(stations, channels);
@@ -202,6 +202,8 @@ TEST(Measurement, MalformedTextIsRefusedWithFileAndLine) {
         {header + "ppp,0,0,0,0,100,0,0\nppp,1,40,0,0,12", "line 3"},  // truncated
         {"line,point,x_mm,y_mm,z_mm,distance_mm,u_distance_um\nppp,0,0,0,0,1,0\n", "line 2: u_distance_um"},
         {"line,point,x_mm,y_mm,z_mm,distance_mm,u_distance_um\nppp,0,0,0,0,1,-1\n", "line 2: u_distance_um"},
+        {"line,point,x_mm,y_mm,z_mm,distance_mm,u_distance_um\nppp,0,0,0,0,1,1e-300\n", "line 2: u_distance_um"},
+        {"line,point,x_mm,y_mm,z_mm,distance_mm,u_distance_um\nppp,0,0,0,0,1,1e300\n", "line 2: u_distance_um"},
         {"line,point,x_mm,y_mm,z_mm,distance_mm,run\nppp,0,0,0,0,1,first\n", "line 2: run"},
         {"line,point,x_mm,y_mm,z_mm,distance_mm,direction\nppp,0,0,0,0,1,up\n", "line 2: direction"},
     };
@@ -245,7 +247,8 @@ TEST(Measurement, ArraysThatMakeNoMeasurementAreRefused) {
     expect_refused([&] { make({station(0)}, {{"distance", {undefined}, {}}}); }, "row 1");
     expect_refused([&] { make({station(0)}, {{"distance", {INFINITY}, {}}}); }, "row 1");
     expect_refused([&] { make({station(0)}, {{"distance", {1.0}, {0.0}}}); }, "row 1");
-    expect_refused([&] { make({station(0)}, {{"distance", {1.0}, {undefined}}}); }, "row 1");
+    for (const double u : {undefined, double(INFINITY), 1e300, 1.1e6, 0.9e-12, 1e-300, -1.0})
+        expect_refused([&] { make({station(0)}, {{"distance", {1.0}, {u}}}); }, "uncertainty of distance");
     Station astray = station(0);
     astray.commanded.y() = undefined;
     expect_refused([&] { make({astray}, {one}); }, "row 1");

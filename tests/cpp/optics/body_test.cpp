@@ -7,6 +7,7 @@
 
 #include "refuses.hpp"
 #include "stepdiag/core/rotation.hpp"
+#include "stepdiag/core/units.hpp"
 #include "stepdiag/optics/path.hpp"
 
 namespace {
@@ -14,7 +15,6 @@ namespace {
 using namespace stepdiag;
 using Eigen::Vector3d;
 
-constexpr double pi = 3.14159265358979323846;
 constexpr Medium glass{1.5168}, air{1.00027};
 
 // Directions and lengths of some tens of millimetres come from fewer than twenty rounded operations a face.

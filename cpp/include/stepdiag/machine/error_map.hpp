@@ -27,7 +27,8 @@ public:
     const ParameterTable& table() const { return table_; }
 
     // Where the map breaks the frame choice (a function not 0 at home, a straightness not 0 at the end of travel
-    // `volume`): one sentence each. Such a map is used as given.
+    // `volume`): one sentence each. Such a map is used as given. Throws InvalidArgument for a volume that is not
+    // finite.
     std::vector<std::string> warnings(const Eigen::Vector3d& volume) const;
 
 private:

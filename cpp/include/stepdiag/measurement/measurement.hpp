@@ -35,10 +35,13 @@ struct Channel {
     std::vector<std::optional<double>> standard_uncertainty = {};
 };
 
+// Outside these bounds (mm, rad) a weight is a mistake, and its square would leave the range of a double.
+inline constexpr bool is_usable_uncertainty(double u) { return u >= 1e-12 && u <= 1e6; }
+
 class Measurement {
 public:
     // Throws InvalidArgument naming row or channel: lengths that differ, a key given twice, a point below 0, positions
-    // or readings that are not finite, an uncertainty that is not positive, a channel unknown or given twice, or
+    // or readings that are not finite, an uncertainty that is not usable, a channel unknown or given twice, or
     // channels that make no head's readings (distance, distance+alpha+beta, distance+spot_x+spot_y, d1..dn with n >=
     // 3).
     Measurement(std::vector<Station> stations, std::vector<Channel> channels);

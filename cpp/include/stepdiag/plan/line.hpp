@@ -13,8 +13,8 @@ namespace stepdiag {
 
 class Line {
 public:
-    static Line parse(
-        std::string_view name);  // throws InvalidArgument for anything but three of p n 0 with one moved axis
+    // Throws InvalidArgument for anything but three of p n 0 that move an axis.
+    static Line parse(std::string_view name);
 
     std::string name() const;
     int sign(Axis axis) const { return sign_[index(axis)]; }
