@@ -1,5 +1,6 @@
 """The demonstration: its numbers, its files, and that it makes the same ones again."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -34,20 +35,31 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Result]:
     return {case.name: run_case(case, folder) for case in CASES}
 
 
-# What is left of the enhanced method is of second order: products of errors (60 µrad, 20 µm) and, with misalignment, of
-# angles up to 1 mrad over a metre of travel. The limits are those that the project has set itself for this machine.
+# What is left of the enhanced method is of second order: products of errors (60 µrad, 20 µm) with each other and with
+# the misalignment (mm, rad). The limits of 1a, 1b and 4 are those that the project has set itself: for this machine, and
+# for the angles of 1b for misaligned runs at large; squarenesses are angles here.
+# For 1c and 1d it asks 2.5 µm only; the products say more. An error of 60 µrad times the laser's 1.22 mrad is 73 nrad,
+# and over the diagonal of 1118 mm 82 nm. Lengths and squarenesses sum over axes and lines: three such products are
+# allowed. Angles are read at every step by themselves: one product in 1d. In 1c, where the mirror stays, no more than
+# the 50 nrad of 1b.
 @pytest.mark.parametrize(
-    ("case", "length_limit", "angle_limit"),
-    [("1a", 15e-6, 5e-9), ("1b", 150e-6, 50e-9), ("1c", 2.5e-3, 2.5e-6), ("1d", 2.5e-3, 2.5e-6), ("4", 15e-6, 5e-9)],
+    ("case", "length_limit", "angle_limit", "squareness_limit"),
+    [
+        ("1a", 15e-6, 5e-9, 5e-9),
+        ("1b", 150e-6, 50e-9, 50e-9),
+        ("1c", 250e-6, 50e-9, 220e-9),
+        ("1d", 250e-6, 73e-9, 220e-9),
+        ("4", 15e-6, 5e-9, 5e-9),
+    ],
 )
 def test_enhanced_recovers_the_truth_to_second_order(
-    results: dict[str, Result], case: str, length_limit: float, angle_limit: float
+    results: dict[str, Result], case: str, length_limit: float, angle_limit: float, squareness_limit: float
 ) -> None:
     largest = sd.largest_deviations(results[case].calibrations["enhanced"], results[case].truth)
     assert abs(largest["positioning"].value) <= length_limit
     assert abs(largest["straightness"].value) <= length_limit
     assert abs(largest["angle"].value) <= angle_limit
-    assert abs(largest["squareness"].value) <= angle_limit
+    assert abs(largest["squareness"].value) <= squareness_limit
 
 
 @pytest.mark.parametrize("case", ["1a", "1b", "1c", "1d"])
@@ -123,6 +135,31 @@ def test_demo_makes_the_same_bytes_again(demo: Path, tmp_path: Path) -> None:
     assert files == again
     for file in files:
         assert (demo / file).read_bytes() == (tmp_path / "again" / file).read_bytes(), file
+
+
+def table_of_report(report: str) -> dict[tuple[str, str], list[str]]:
+    """The cells of the error table, by case and method."""
+    cells, case = {}, ""
+    for line in report.split("\n\n")[0].splitlines()[3:]:
+        name, *rest = line.split()
+        if line.startswith("   "):
+            cells[case, name] = rest
+        else:
+            case = name
+    return cells
+
+
+def test_readme_has_the_numbers_of_the_demo(demo: Path) -> None:
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    table = table_of_report((demo / "report.txt").read_text(encoding="utf-8"))
+    rows = re.findall(r"^\|.*\((\d\w?)(?:, \w+)?\) \| (.+) \|$", readme, re.MULTILINE)
+    assert [panel for panel, _ in rows] == ["1a", "1b", "1c", "1d", "3a"]
+    for panel, row in rows:
+        case = "3" if panel == "3a" else panel
+        said = [cell.split()[0] for cell in row.split(" | ")]
+        made = [table[case, "conventional"][0], table[case, "enhanced"][0], table[case, "enhanced"][2]]
+        digits = [len(number.partition(".")[2]) for number in said]
+        assert said == [f"{float(number):.{count}f}" for number, count in zip(made, digits, strict=True)], case
 
 
 def test_report_has_a_row_for_each_case_and_method(demo: Path, capsys: pytest.CaptureFixture[str]) -> None:

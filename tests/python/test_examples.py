@@ -15,9 +15,14 @@ def output_of(*arguments: str | Path) -> str:
 
 
 def test_quickstart_shows_that_enhanced_is_better() -> None:
-    conventional, enhanced = output_of(EXAMPLES / "quickstart.py").splitlines()
+    lines = output_of(EXAMPLES / "quickstart.py").splitlines()
+    conventional, enhanced = lines
     assert conventional.startswith("conventional: positioning known to 100.0")
     assert enhanced.startswith("enhanced: positioning known to 0.0")
+    readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
+    assert "\n".join(f"    {line}" for line in lines) in readme
+    code = (EXAMPLES / "quickstart.py").read_text(encoding="utf-8")
+    assert all(line in code for line in readme.split("```python\n")[1].split("```")[0].splitlines())
 
 
 def test_own_measurement_goes_from_files_to_a_table(tmp_path: Path) -> None:
