@@ -54,7 +54,7 @@ class ErrorMap:
         """
     def write(self, path: str | os.PathLike[str], *, chain: Chain | str | None = None, volume: numpy.typing.ArrayLike | None = None, tool: numpy.typing.ArrayLike | None = None) -> None:
         """
-        Writes the error-map CSV; numbers are read back to the same bits. Raises InvalidArgument when it cannot be written.
+        Writes the error-map CSV; numbers are read back to the same bits. What a calibration says of its method and of what it left undetermined is not kept. Raises InvalidArgument when it cannot be written.
         """
     @property
     def functions(self) -> dict[str, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]]:
@@ -98,10 +98,10 @@ class Plan:
     """
     The lines measured through a volume, in single-axis steps. Lines are named by the travel signs of X, Y, Z: three of p n 0.
     """
-    largest_step_count: typing.ClassVar[int] = 10000
-    def __init__(self, volume: numpy.typing.ArrayLike, lines: collections.abc.Sequence[str], steps: typing.SupportsInt | typing.SupportsIndex, order: str = 'XYZ', scale_lines: collections.abc.Sequence[str] = []) -> None:
+    largest_step_count: typing.ClassVar[int] = 2000
+    def __init__(self, volume: numpy.typing.ArrayLike, lines: collections.abc.Sequence[str], steps: typing.SupportsIndex, order: str = 'XYZ', scale_lines: collections.abc.Sequence[str] = []) -> None:
         """
-        volume: edges in mm. steps: per axis. Raises InvalidArgument for an unknown or doubled line, a volume without extent, steps outside 1 .. 10000.
+        volume: edges in mm. steps: per axis. Raises InvalidArgument for an unknown or doubled line, a volume without extent, steps outside 1 .. 2000.
         """
     def frame(self, line: str) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -142,7 +142,7 @@ class Measurement:
     """
     A run's readings, row by row: line, point, run, direction, commanded position (mm), and channels in native units (mm, rad; NaN where a reading was lost).
     """
-    def __init__(self, line: collections.abc.Sequence[str], point: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], position: numpy.typing.ArrayLike, channels: dict[str, numpy.typing.ArrayLike], *, run: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, direction: collections.abc.Sequence[str] | None = None, standard_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}) -> None:
+    def __init__(self, line: collections.abc.Sequence[str], point: collections.abc.Sequence[typing.SupportsIndex], position: numpy.typing.ArrayLike, channels: dict[str, numpy.typing.ArrayLike], *, run: collections.abc.Sequence[typing.SupportsIndex] | None = None, direction: collections.abc.Sequence[str] | None = None, standard_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}) -> None:
         """
         channels: name -> (n,) with names distance, alpha, beta, spot_x, spot_y, d1 ..., time, temperature. Raises InvalidArgument.
         """
@@ -216,7 +216,9 @@ class Misalignment:
     How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm.
     """
     def __init__(self, reflector: numpy.typing.ArrayLike = (0.0, 0.0), laser: numpy.typing.ArrayLike = (0.0, 0.0), psd_zero: numpy.typing.ArrayLike = (0.0, 0.0)) -> None:
-        ...
+        """
+        Raises InvalidArgument for what is no pair of finite numbers.
+        """
     @property
     def laser(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
@@ -230,8 +232,10 @@ class Noise:
     """
     Standard deviations of an independent Gaussian per reading: distance (mm; also d1 ...), tilt (rad), spot (mm).
     """
-    def __init__(self, distance: typing.SupportsFloat | typing.SupportsIndex = 0.0, tilt: typing.SupportsFloat | typing.SupportsIndex = 0.0, spot: typing.SupportsFloat | typing.SupportsIndex = 0.0, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
+    def __init__(self, distance: typing.SupportsFloat | typing.SupportsIndex = 0.0, tilt: typing.SupportsFloat | typing.SupportsIndex = 0.0, spot: typing.SupportsFloat | typing.SupportsIndex = 0.0, seed: typing.SupportsIndex = 0) -> None:
+        """
+        Raises InvalidArgument for a deviation that is negative or not finite, and for a seed outside 0 .. 2^64 - 1.
+        """
     @property
     def distance(self) -> float:
         ...
@@ -249,7 +253,9 @@ class ReadingUncertainty:
     Standard uncertainty of a reading where the run gives none: distance (mm; also d1 ...), tilt (rad), spot (mm).
     """
     def __init__(self, distance: typing.SupportsFloat | typing.SupportsIndex = 0.0001, tilt: typing.SupportsFloat | typing.SupportsIndex = 1e-06, spot: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> None:
-        ...
+        """
+        Raises InvalidArgument for what is not within 1e-12 .. 1e6.
+        """
     @property
     def distance(self) -> float:
         ...
@@ -321,7 +327,7 @@ def evaluate(measurement: Measurement, plan: Plan, head: Head, chain: Chain | st
     """
     Calibration from a run. Of the head only psd_distance and beam_offsets are used, of the machine only chain and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan.
     """
-def random_error_map(volume: numpy.typing.ArrayLike, *, seed: typing.SupportsInt | typing.SupportsIndex, translation: typing.SupportsFloat | typing.SupportsIndex = 0.02, rotation: typing.SupportsFloat | typing.SupportsIndex = 6e-05, squareness: typing.SupportsFloat | typing.SupportsIndex = 6e-05, intervals: typing.SupportsInt | typing.SupportsIndex = 50, screw_pitch: typing.SupportsFloat | typing.SupportsIndex = 0.0, screw_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> ErrorMap:
+def random_error_map(volume: numpy.typing.ArrayLike, *, seed: typing.SupportsIndex, translation: typing.SupportsFloat | typing.SupportsIndex = 0.02, rotation: typing.SupportsFloat | typing.SupportsIndex = 6e-05, squareness: typing.SupportsFloat | typing.SupportsIndex = 6e-05, intervals: typing.SupportsIndex = 50, screw_pitch: typing.SupportsFloat | typing.SupportsIndex = 0.0, screw_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> ErrorMap:
     """
     A random machine with peaks of `translation` mm and `rotation` rad at equidistant nodes, squarenesses uniform within +-`squareness` rad, in the frame choice of the conventions. Same arguments, same bits.
     """

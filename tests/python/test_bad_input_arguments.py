@@ -56,6 +56,9 @@ def test_what_is_no_chain_is_refused(text: str) -> None:
         ((VOLUME, DIAGONALS, -4), "steps"),
         ((VOLUME, DIAGONALS, 10**9), "steps"),
         ((VOLUME, DIAGONALS, 2**40), "steps"),
+        ((VOLUME, DIAGONALS, -(2**70)), "steps"),
+        ((VOLUME, DIAGONALS, 2**70), "got 1180591620717411303424"),
+        ((VOLUME, DIAGONALS, True), "steps"),
         ((VOLUME, DIAGONALS, 5, "XY"), "order"),
         ((VOLUME, DIAGONALS, 5, "XYX"), "order"),
         ((VOLUME, DIAGONALS, 5, "XYZ", ["pp0"]), "scale_lines"),
@@ -131,7 +134,10 @@ def test_error_map_is_not_asked_for_what_makes_no_sense() -> None:
     refused(ERRORS.function, "EXQ", [0.0], names="EXQ")
     refused(ERRORS.function, "EXX", [[0.0]], names="position")
     refused(ERRORS.function, "EXX", "far", names="position")
+    refused(ERRORS.function, "EXX", [0.0, NAN], names="position")
+    refused(ERRORS.function, "EXX", [INF], names="position")
     refused(ERRORS.warnings, (1.0, 2.0), names="volume")
+    refused(ERRORS.warnings, (1.0, 2.0, NAN), names="volume")
 
 
 @pytest.mark.parametrize(
@@ -143,6 +149,8 @@ def test_error_map_is_not_asked_for_what_makes_no_sense() -> None:
         (VOLUME, {"intervals": 1}, "intervals"),
         (VOLUME, {"intervals": -1}, "intervals"),
         (VOLUME, {"intervals": 10**9}, "intervals"),
+        (VOLUME, {"intervals": 2**70}, "intervals"),
+        (VOLUME, {"intervals": True}, "intervals"),
         (VOLUME, {"translation": -1e-3}, "translation"),
         (VOLUME, {"rotation": NAN}, "rotation"),
         (VOLUME, {"squareness": INF}, "squareness"),
@@ -152,6 +160,17 @@ def test_error_map_is_not_asked_for_what_makes_no_sense() -> None:
 )
 def test_random_error_map_of_nonsense_is_refused(volume: Any, options: dict[str, Any], names: str) -> None:
     refused(sd.random_error_map, volume, seed=1, names=names, **options)
+
+
+@pytest.mark.parametrize("seed", [-1, 2**64, 2**70, -(2**70), True])
+def test_seed_that_is_none_is_refused(seed: Any) -> None:
+    refused(sd.Noise, seed=seed, names="seed")
+    refused(sd.random_error_map, VOLUME, seed=seed, names="seed")
+
+
+def test_seed_of_any_integer_type_is_taken() -> None:
+    assert sd.Noise(seed=2**64 - 1).seed == 2**64 - 1
+    assert sd.Noise(seed=np.uint64(5)).seed == sd.Noise(seed=np.int8(5)).seed == 5
 
 
 def test_machine_refuses_tools_and_positions_that_make_no_sense() -> None:
@@ -177,6 +196,10 @@ def test_machine_refuses_tools_and_positions_that_make_no_sense() -> None:
         ({"line": ["diagonal"] * len(RUN)}, "diagonal"),
         ({"line": [], "point": [], "position": np.zeros((0, 3)), "channels": {"distance": []}}, "measurement"),
         ({"point": -np.ones(len(RUN), dtype=int)}, "row 1"),
+        ({"point": [2**31] * len(RUN)}, "point"),
+        ({"point": [2**70] * len(RUN)}, "point"),
+        ({"point": [True] * len(RUN)}, "point"),
+        ({"run": [-(2**31) - 1] * len(RUN)}, "run"),
         ({"channels": {}}, "channels"),
         ({"channels": {"distance": ONES[:-1]}}, "distance"),
         ({"channels": {"distance": [ONES]}}, "distance"),
@@ -195,6 +218,8 @@ def test_machine_refuses_tools_and_positions_that_make_no_sense() -> None:
         ({"standard_uncertainty": {"distance": 0 * ONES}}, "row 1"),
         ({"standard_uncertainty": {"alpha": -ONES}}, "row 1"),
         ({"standard_uncertainty": {"alpha": INF * ONES}}, "row 1"),
+        ({"standard_uncertainty": {"alpha": 1e-300 * ONES}}, "uncertainty of alpha"),
+        ({"standard_uncertainty": {"beta": 1e300 * ONES}}, "uncertainty of beta"),
     ],
 )
 def test_what_makes_no_measurement_is_refused(change: dict[str, Any], names: str) -> None:
@@ -209,6 +234,7 @@ def test_what_makes_no_measurement_is_refused(change: dict[str, Any], names: str
         (sd.Plan, (VOLUME, DIAGONALS, 2.5)),
         (sd.Plan, (VOLUME, DIAGONALS, "five")),
         (sd.Plan, (VOLUME, DIAGONALS, 10**30)),
+        (sd.Plan, (VOLUME, DIAGONALS, np.bool_(True))),
         (sd.Plan, (VOLUME, 5, 5)),
         (sd.Machine, (CHAIN, "errors")),
         (sd.simulate, (1, 2, 3)),

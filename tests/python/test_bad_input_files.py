@@ -22,6 +22,8 @@ TABLE = "parameter,position_mm,value,unit,standard_uncertainty\n"
 HEADER = "# chain=[w X' b Y Z t]\n# volume_mm=800 600 500\n# tool_mm=0 0 0\n"
 ROW = "ppp,0,0,0,0,100,0,0\n"
 
+ERRORS = sd.ErrorMap()
+
 Reader = Callable[[Path], Any]
 
 
@@ -70,6 +72,8 @@ BAD_TABLES = [
     ("", "empty"),
     ("just some words\n", "line 1"),
     (TABLE.replace("unit,", "") + "EXX,0,0,\n", "line 1"),
+    (TABLE.replace("unit", "value") + "EXX,0,0,0,\n", "line 1"),
+    (TABLE.replace("\n", ",direction\n") + "EXX,0,0,um,,+\nEXX,0,0,um,,-\n", "reversal"),
     (TABLE + "EXX,0,0,um\n", "line 2"),
     (TABLE + "EXX,0,0,um,\nEXX,10,1.2", "line 3"),  # cut off
     (TABLE + "EXW,0,0,um,\n", "EXW"),
@@ -89,6 +93,12 @@ BAD_TABLES = [
     (TABLE + 'EXX,0,"0,um,\n', "line 2"),
     ("\x7fELF\0\0\0", "binary"),
 ]
+
+
+@pytest.mark.parametrize("call", [sd.read_measurement, sd.read_error_map, sd.read_calibration, ERRORS.write])
+def test_name_with_a_nul_byte_is_refused(call: Callable[[str], Any]) -> None:
+    with pytest.raises(sd.InvalidArgument, match=r"path: .*NUL"):
+        call("one.csv\0two.csv")
 
 
 @pytest.mark.parametrize(("text", "culprit"), BAD_TABLES)

@@ -36,10 +36,15 @@ void bind_evaluation(py::module_& m) {
                                    "Standard uncertainty of a reading where the run gives none: distance (mm; also d1 "
                                    "...), tilt (rad), spot (mm).")
         .def(py::init([](double distance, double tilt, double spot) {
+                 for (const auto& [key, u] :
+                      {std::pair("distance", distance), std::pair("tilt", tilt), std::pair("spot", spot)})
+                     if (!is_usable_uncertainty(u))
+                         throw InvalidArgument(std::string("uncertainty ") + key +
+                                               ": expected a standard uncertainty of 1e-12 to 1e6 mm or rad");
                  return ReadingUncertainty{distance, tilt, spot};
              }),
              py::arg("distance") = ReadingUncertainty{}.distance, py::arg("tilt") = ReadingUncertainty{}.tilt,
-             py::arg("spot") = ReadingUncertainty{}.spot)
+             py::arg("spot") = ReadingUncertainty{}.spot, "Raises InvalidArgument for what is not within 1e-12 .. 1e6.")
         .def_readonly("distance", &ReadingUncertainty::distance)
         .def_readonly("tilt", &ReadingUncertainty::tilt)
         .def_readonly("spot", &ReadingUncertainty::spot);

@@ -68,15 +68,15 @@ void bind_machine(py::module_& m) {
              py::arg("squareness") = std::map<std::string, double>{},
              "functions: name -> (position, value), one-dimensional and of one length, positions ascending. Raises "
              "InvalidArgument.")
-        .def_property_readonly(
-            "functions",
-            [](const ErrorMap& map) {
-                std::map<std::string, std::pair<DoubleArray, DoubleArray>> functions;
-                for (int i = 0; i < function_count; ++i)
-                    if (const auto& table = map.table().functions[i])
-                        functions[FunctionId::at(i).name()] = {to_numpy(table->position), to_numpy(table->value)};
-                return functions;
-            })
+        .def_property_readonly("functions",
+                               [](const ErrorMap& map) {
+                                   std::map<std::string, std::pair<DoubleArray, DoubleArray>> functions;
+                                   for (int i = 0; i < function_count; ++i)
+                                       if (const auto& table = map.table().functions[i])
+                                           functions[FunctionId::at(i).name()] = {to_numpy(table->position),
+                                                                                  to_numpy(table->value)};
+                                   return functions;
+                               })
         .def_property_readonly("squareness",
                                [](const ErrorMap& map) {
                                    std::map<std::string, double> values;
@@ -94,6 +94,7 @@ void bind_machine(py::module_& m) {
                 const auto id = FunctionId::parse(name);
                 if (!id) throw InvalidArgument("name: expected EXX ... ECZ, got \"" + name + "\"");
                 Eigen::VectorXd value = to_vector(position, "position");
+                if (!value.allFinite()) throw InvalidArgument("position: expected finite positions in mm");
                 for (double& p : value) p = map.function(*id, p);
                 return to_numpy_vector(value);
             },
@@ -110,7 +111,8 @@ void bind_machine(py::module_& m) {
             [](const ErrorMap& map, const PathLike& path, const std::optional<ChainLike>& chain,
                const std::optional<ArrayLike>& volume, const std::optional<ArrayLike>& tool) {
                 ParameterTable table = map.table();
-                table.header["format"] = "stepdiag error map 1";
+                for (const char* key : {"method", "undetermined", "undetermined_slopes"}) table.header.erase(key);
+                table.header["format"] = error_map_format;
                 if (chain) table.header["chain"] = to_chain(*chain).name();
                 if (volume) table.header["volume_mm"] = format_lengths(to_vector3(*volume, "volume"));
                 if (tool) table.header["tool_mm"] = format_lengths(to_vector3(*tool, "tool"));
@@ -118,20 +120,23 @@ void bind_machine(py::module_& m) {
             },
             py::arg("path"), py::kw_only(), py::arg("chain") = std::nullopt, py::arg("volume") = std::nullopt,
             py::arg("tool") = std::nullopt,
-            "Writes the error-map CSV; numbers are read back to the same bits. Raises InvalidArgument when it cannot "
+            "Writes the error-map CSV; numbers are read back to the same bits. What a calibration says of its method "
+            "and of "
+            "what it left undetermined is not kept. Raises InvalidArgument when it cannot "
             "be written.");
     m.def(
         "read_error_map", [](const PathLike& path) { return read_error_map(to_path(path)); }, py::arg("path"),
         "Reads an error map or calibration CSV. Raises InvalidArgument naming file and line.");
     m.def(
         "random_error_map",
-        [](const ArrayLike& volume, std::uint64_t seed, double translation, double rotation, double squareness,
-           int intervals, double screw_pitch, double screw_amplitude) {
-            return make_random_error_map(to_vector3(volume, "volume"), {seed, translation, rotation, squareness,
-                                                                        intervals, screw_pitch, screw_amplitude});
+        [](const ArrayLike& volume, const IntegerLike& seed, double translation, double rotation, double squareness,
+           const IntegerLike& intervals, double screw_pitch, double screw_amplitude) {
+            return make_random_error_map(to_vector3(volume, "volume"),
+                                         {to_seed(seed), translation, rotation, squareness,
+                                          to_int(intervals, "intervals"), screw_pitch, screw_amplitude});
         },
         py::arg("volume"), py::kw_only(), py::arg("seed"), py::arg("translation") = 0.02, py::arg("rotation") = 60e-6,
-        py::arg("squareness") = 60e-6, py::arg("intervals") = 50, py::arg("screw_pitch") = 0.0,
+        py::arg("squareness") = 60e-6, py::arg("intervals") = integer(50), py::arg("screw_pitch") = 0.0,
         py::arg("screw_amplitude") = 0.0,
         "A random machine with peaks of `translation` mm and `rotation` rad at equidistant nodes, squarenesses uniform "
         "within +-`squareness` rad, in the frame choice of the conventions. Same arguments, same bits.");

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "bindings.hpp"
 #include "stepdiag/measurement/measurement.hpp"
@@ -16,9 +18,9 @@ std::vector<std::optional<double>> to_fields(const ArrayLike& array, const std::
     return fields;
 }
 
-Measurement make_measurement(const std::vector<std::string>& line, const std::vector<int>& point,
+Measurement make_measurement(const std::vector<std::string>& line, const std::vector<IntegerLike>& point,
                              const ArrayLike& position, const py::typing::Dict<py::str, ArrayLike>& channels,
-                             const std::optional<std::vector<int>>& run,
+                             const std::optional<std::vector<IntegerLike>>& run,
                              const std::optional<std::vector<std::string>>& direction,
                              const ChannelArrays& standard_uncertainty) {
     const Points positions = to_points(position, "position");
@@ -33,8 +35,8 @@ Measurement make_measurement(const std::vector<std::string>& line, const std::ve
     if (direction) check_size(direction->size(), "direction");
     std::vector<Station> stations;
     for (std::size_t i = 0; i < line.size(); ++i) {
-        Station station{run ? (*run)[i] : 0, Line::parse(line[i]), point[i], Direction::forward,
-                        positions.row(Eigen::Index(i)).transpose()};
+        Station station{run ? to_int((*run)[i], "run") : 0, Line::parse(line[i]), to_int(point[i], "point"),
+                        Direction::forward, positions.row(Eigen::Index(i)).transpose()};
         if (direction) {
             if ((*direction)[i] != "forward" && (*direction)[i] != "backward")
                 throw InvalidArgument("direction: expected \"forward\" or \"backward\", got \"" + (*direction)[i] +

@@ -1,5 +1,3 @@
-#include <algorithm>
-
 #include "bindings.hpp"
 #include "stepdiag/plan/plan.hpp"
 
@@ -24,19 +22,16 @@ void bind_plan(py::module_& m) {
     py::class_<Plan>(m, "Plan",
                      "The lines measured through a volume, in single-axis steps. Lines are named by the travel signs "
                      "of X, Y, Z: three of p n 0.")
-        .def(py::init([](const ArrayLike& volume, const std::vector<std::string>& lines, std::int64_t steps,
+        .def(py::init([](const ArrayLike& volume, const std::vector<std::string>& lines, const IntegerLike& steps,
                          const std::string& order, const std::vector<std::string>& scale_lines) {
-                 const int bounded = int(std::clamp<std::int64_t>(steps, -1, Plan::largest_step_count + 1));
-                 if (bounded != steps)
-                     throw InvalidArgument("steps: expected 1 to " + std::to_string(Plan::largest_step_count) +
-                                           ", got " + std::to_string(steps));
-                 return Plan(to_vector3(volume, "volume"), parse_lines(lines), bounded, parse_order(order),
+                 const int count = int(to_integer(steps, "steps", 1, Plan::largest_step_count));
+                 return Plan(to_vector3(volume, "volume"), parse_lines(lines), count, parse_order(order),
                              parse_lines(scale_lines));
              }),
              py::arg("volume"), py::arg("lines"), py::arg("steps"), py::arg("order") = "XYZ",
              py::arg("scale_lines") = std::vector<std::string>{},
              "volume: edges in mm. steps: per axis. Raises InvalidArgument for an unknown or doubled line, a volume "
-             "without extent, steps outside 1 .. 10000.")
+             "without extent, steps outside 1 .. 2000.")
         .def_property_readonly_static("largest_step_count", [](const py::object&) { return Plan::largest_step_count; })
         .def_property_readonly("volume", [](const Plan& plan) { return to_numpy_vector(plan.volume()); })
         .def_property_readonly("lines", [](const Plan& plan) { return line_names(plan.lines()); })

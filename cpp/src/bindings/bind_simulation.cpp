@@ -2,6 +2,15 @@
 #include "stepdiag/simulation/simulate.hpp"
 
 namespace stepdiag::bindings {
+namespace {
+
+Eigen::Vector2d to_finite_pair(const ArrayLike& array, const char* key) {
+    const Eigen::Vector2d pair = to_vector2(array, key);
+    if (!pair.allFinite()) throw InvalidArgument("misalignment " + std::string(key) + ": expected two finite numbers");
+    return pair;
+}
+
+}  // namespace
 
 void bind_simulation(py::module_& m) {
     py::class_<Head>(
@@ -43,10 +52,11 @@ void bind_simulation(py::module_& m) {
         m, "Misalignment",
         "How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm.")
         .def(py::init([](const ArrayLike& reflector, const ArrayLike& laser, const ArrayLike& psd_zero) {
-                 return Misalignment{to_vector2(reflector, "reflector"), to_vector2(laser, "laser"),
-                                     to_vector2(psd_zero, "psd_zero")};
+                 return Misalignment{to_finite_pair(reflector, "reflector"), to_finite_pair(laser, "laser"),
+                                     to_finite_pair(psd_zero, "psd_zero")};
              }),
-             py::arg("reflector") = zeros(2), py::arg("laser") = zeros(2), py::arg("psd_zero") = zeros(2))
+             py::arg("reflector") = zeros(2), py::arg("laser") = zeros(2), py::arg("psd_zero") = zeros(2),
+             "Raises InvalidArgument for what is no pair of finite numbers.")
         .def_property_readonly("reflector", [](const Misalignment& m) { return to_numpy_vector(m.reflector); })
         .def_property_readonly("laser", [](const Misalignment& m) { return to_numpy_vector(m.laser); })
         .def_property_readonly("psd_zero", [](const Misalignment& m) { return to_numpy_vector(m.psd_zero); });
@@ -54,10 +64,14 @@ void bind_simulation(py::module_& m) {
     py::class_<Noise>(m, "Noise",
                       "Standard deviations of an independent Gaussian per reading: distance (mm; also d1 ...), tilt "
                       "(rad), spot (mm).")
-        .def(py::init([](double distance, double tilt, double spot, std::uint64_t seed) {
-                 return Noise{distance, tilt, spot, seed};
+        .def(py::init([](double distance, double tilt, double spot, const IntegerLike& seed) {
+                 const Noise noise{distance, tilt, spot, to_seed(seed)};
+                 check_noise(noise);
+                 return noise;
              }),
-             py::arg("distance") = 0.0, py::arg("tilt") = 0.0, py::arg("spot") = 0.0, py::arg("seed") = 0)
+             py::arg("distance") = 0.0, py::arg("tilt") = 0.0, py::arg("spot") = 0.0, py::arg("seed") = integer(0),
+             "Raises InvalidArgument for a deviation that is negative or not finite, and for a seed outside 0 .. 2^64 "
+             "- 1.")
         .def_readonly("distance", &Noise::distance)
         .def_readonly("tilt", &Noise::tilt)
         .def_readonly("spot", &Noise::spot)

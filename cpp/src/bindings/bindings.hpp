@@ -6,6 +6,7 @@
 #include <pybind11/stl.h>
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -24,6 +25,10 @@ using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 class ArrayLike : public py::object {
     PYBIND11_OBJECT_DEFAULT(ArrayLike, py::object, PyObject_Type)
 };
+// Anything that is a whole number to Python; the range is checked here, so that a wrong one is an InvalidArgument.
+class IntegerLike : public py::object {
+    PYBIND11_OBJECT_DEFAULT(IntegerLike, py::object, PyIndex_Check)
+};
 class ChainLike : public py::object {
     PYBIND11_OBJECT_DEFAULT(ChainLike, py::object, PyObject_Type)
 };
@@ -38,6 +43,9 @@ Eigen::VectorXd to_vector(const py::handle& array, const char* name);  // any le
 Eigen::Vector3d to_vector3(const py::handle& array, const char* name);
 Eigen::Vector2d to_vector2(const py::handle& array, const char* name);
 Points to_points(const py::handle& array, const char* name);  // (n, 3)
+std::int64_t to_integer(const IntegerLike& number, const std::string& name, std::int64_t lowest, std::int64_t highest);
+int to_int(const IntegerLike& number, const std::string& name);  // any that an int holds
+std::uint64_t to_seed(const IntegerLike& number);
 std::string to_path(const PathLike& path);
 Chain to_chain(const ChainLike& chain);  // a Chain, or its text
 Axis to_axis(const std::string& name);
@@ -47,6 +55,7 @@ DoubleArray to_numpy(const std::vector<std::optional<double>>& values);  // NaN 
 DoubleArray to_numpy(const Eigen::MatrixXd& matrix);
 DoubleArray to_numpy_vector(const Eigen::VectorXd& vector);
 
+inline IntegerLike integer(int number) { return py::reinterpret_steal<IntegerLike>(py::int_(number).release()); }
 inline ArrayLike zeros(int size) {
     return py::reinterpret_borrow<ArrayLike>(py::make_tuple(0.0, 0.0, 0.0)[py::slice(0, size, 1)]);
 }
@@ -63,6 +72,10 @@ namespace pybind11::detail {
 template <>
 struct handle_type_name<stepdiag::bindings::ArrayLike> {
     static constexpr auto name = const_name("numpy.typing.ArrayLike");
+};
+template <>
+struct handle_type_name<stepdiag::bindings::IntegerLike> {
+    static constexpr auto name = const_name("typing.SupportsIndex");
 };
 template <>
 struct handle_type_name<stepdiag::bindings::ChainLike> {

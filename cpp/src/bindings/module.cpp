@@ -1,4 +1,6 @@
 // stepdiag._core: the C++ library as Python sees it. Each part checks shapes, releases the interpreter lock and calls.
+#include <limits>
+
 #include "bindings.hpp"
 #include "stepdiag/version.hpp"
 
@@ -23,7 +25,46 @@ Eigen::VectorXd to_vector_of(const py::handle& object, const char* name, py::ssi
     return Eigen::Map<const Eigen::VectorXd>(array.data(), size);
 }
 
+[[noreturn]] void refuse_integer(const py::handle& number, const std::string& name, const std::string& range) {
+    throw InvalidArgument(name + ": expected a whole number of " + range + ", got " + std::string(py::repr(number)));
+}
+
+// A bool is an int to Python, but nobody means one here.
+py::int_ to_python_int(const IntegerLike& number, const std::string& name, const std::string& range) {
+    if (py::isinstance<py::bool_>(number)) refuse_integer(number, name, range);
+    const auto integer = py::reinterpret_steal<py::int_>(PyNumber_Index(number.ptr()));
+    if (!integer) {
+        PyErr_Clear();
+        refuse_integer(number, name, range);
+    }
+    return integer;
+}
+
 }  // namespace
+
+std::int64_t to_integer(const IntegerLike& number, const std::string& name, std::int64_t lowest, std::int64_t highest) {
+    const std::string range = std::to_string(lowest) + " to " + std::to_string(highest);
+    const py::int_ integer = to_python_int(number, name, range);
+    int overflow = 0;
+    const std::int64_t value = PyLong_AsLongLongAndOverflow(integer.ptr(), &overflow);
+    if (overflow != 0 || value < lowest || value > highest) refuse_integer(integer, name, range);
+    return value;
+}
+
+int to_int(const IntegerLike& number, const std::string& name) {
+    return int(to_integer(number, name, std::numeric_limits<int>::min(), std::numeric_limits<int>::max()));
+}
+
+std::uint64_t to_seed(const IntegerLike& number) {
+    const char* range = "0 to 2^64 - 1";
+    const py::int_ integer = to_python_int(number, "seed", range);
+    const std::uint64_t seed = PyLong_AsUnsignedLongLong(integer.ptr());
+    if (PyErr_Occurred()) {
+        PyErr_Clear();
+        refuse_integer(integer, "seed", range);
+    }
+    return seed;
+}
 
 Eigen::VectorXd to_vector(const py::handle& object, const char* name) {
     const DoubleArray array = to_array(object, name);
@@ -45,7 +86,11 @@ Points to_points(const py::handle& object, const char* name) {
 }
 
 std::string to_path(const PathLike& path) {
-    return py::module_::import("os").attr("fsencode")(path).cast<std::string>();  // any bytes may name a file
+    // Any bytes may name a file, but for the one that ends a name in C.
+    const auto name = py::module_::import("os").attr("fsencode")(path).cast<std::string>();
+    if (name.find('\0') != std::string::npos)
+        throw InvalidArgument("path: expected the name of a file, got one with a NUL byte");
+    return name;
 }
 
 Chain to_chain(const ChainLike& chain) {

@@ -24,9 +24,7 @@ void check_options(const Plan& plan, const SimulationOptions& options) {
         if (!small(misalignment.reflector) || !small(misalignment.laser) || !misalignment.psd_zero.allFinite())
             throw InvalidArgument("misalignment of " + line + ": expected angles below 0.1 rad and finite lengths");
     }
-    for (const double deviation : {options.noise.distance, options.noise.tilt, options.noise.spot})
-        if (!(std::isfinite(deviation) && deviation >= 0.0))
-            throw InvalidArgument("noise: expected finite standard deviations, at least 0");
+    check_noise(options.noise);
     if (!(std::isfinite(options.ambient.index) && options.ambient.index >= 1.0))
         throw InvalidArgument("refractive_index: expected a finite value of at least 1");
 }
@@ -49,6 +47,13 @@ double deviation(const Noise& noise, const std::string& channel) {
 }
 
 }  // namespace
+
+void check_noise(const Noise& noise) {
+    for (const auto& [key, deviation] :
+         {std::pair("distance", noise.distance), std::pair("tilt", noise.tilt), std::pair("spot", noise.spot)})
+        if (!(std::isfinite(deviation) && deviation >= 0.0))
+            throw InvalidArgument(std::string("noise ") + key + ": expected a finite standard deviation, at least 0");
+}
 
 Measurement simulate(const Machine& machine, const Plan& plan, const Head& head, const SimulationOptions& options) {
     check_head(head);

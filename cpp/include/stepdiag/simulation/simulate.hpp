@@ -23,6 +23,9 @@ struct Noise {
     std::uint64_t seed = 0;
 };
 
+// Throws InvalidArgument for a deviation that is negative or not finite.
+void check_noise(const Noise& noise);
+
 struct SimulationOptions {
     std::map<std::string, Misalignment> misalignment;  // by line name; a line without an entry is aligned
     Noise noise;
