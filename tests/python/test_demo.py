@@ -36,8 +36,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Result]:
 
 
 # What is left of the enhanced method is of second order: products of errors (60 µrad, 20 µm) with each other and with
-# the misalignment (mm, rad). The limits of 1a, 1b and 4 are those that the project has set itself: for this machine, and
-# for the angles of 1b for misaligned runs at large; squarenesses are angles here.
+# the misalignment (mm, rad). The limits of 1a, 1b and 4 are those that the project has set itself: for this machine,
+# the angles of 1b for misaligned runs at large; squarenesses are angles here.
 # For 1c and 1d it asks 2.5 µm only; the products say more. An error of 60 µrad times the laser's 1.22 mrad is 73 nrad,
 # and over the diagonal of 1118 mm 82 nm. Lengths and squarenesses sum over axes and lines: three such products are
 # allowed. Angles are read at every step by themselves: one product in 1d. In 1c, where the mirror stays, no more than
