@@ -186,7 +186,8 @@ def _head(keys: HeadSection, plan: _core.Plan, path: Path) -> _core.Head:
         raise InvalidArgument(f'{path}: head.psd_distance_mm: missing; the layout "psd" needs it')
     if keys.layout == "multi_beam" and keys.beam_offsets_mm is None:
         raise InvalidArgument(f'{path}: head.beam_offsets_mm: missing; the layout "multi_beam" needs it')
-    smallest = plan.smallest_mirror()
+    with _located(f"{path}: plan"):  # it may find the steps too small
+        smallest = plan.smallest_mirror()
     if keys.mirror_mm is not None and (keys.mirror_mm[0] < smallest[0] or keys.mirror_mm[1] < smallest[1]):
         least = [math.ceil(10.0 * edge) / 10.0 for edge in smallest]  # so that what is named will do
         raise InvalidArgument(
