@@ -1,5 +1,6 @@
 """Which of our files is this, and is it sound?"""
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -97,7 +98,7 @@ def _warnings(errors: _core.ErrorMap) -> Iterator[str]:
         volume = [float(number) for number in errors.header.get("volume_mm", "").split()]
     except ValueError:
         volume = []
-    if len(volume) != 3:
+    if len(volume) != 3 or not all(map(math.isfinite, volume)):
         ends = {
             axis: max((p[-1] for name, (p, _) in errors.functions.items() if name[2] == axis), default=1.0)
             for axis in "XYZ"

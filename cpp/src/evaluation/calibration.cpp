@@ -10,7 +10,6 @@
 namespace stepdiag {
 namespace {
 
-constexpr const char* format = "stepdiag calibration 1";
 constexpr std::string_view sentence_break = " | ";
 
 // An uncertainty that a file did not give is NaN in a Calibration.
@@ -85,7 +84,7 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
     for (int i = 0; i < squareness_count; ++i)
         if (const auto& entry = calibration.squarenesses[i])
             table.squarenesses[i] = SquarenessValue{entry->value, if_known(entry->standard_uncertainty)};
-    table.header = {{"format", format},
+    table.header = {{"format", calibration_format},
                     {"method", calibration.method},
                     {"chain", calibration.chain.name()},
                     {"volume_mm", format_lengths(calibration.volume)},

@@ -90,7 +90,7 @@ private:
             const std::string name = names[i].substr(0, unit);
             const bool uncertainty = name.substr(0, 2) == "u_";
             const auto column = channel_column(uncertainty ? name.substr(2) : name);
-            if (!column || unit == std::string::npos ||
+            if (!column || unit == std::string::npos || (uncertainty && column->uncertainty_unit.empty()) ||
                 names[i].substr(unit + 1) != (uncertainty ? column->uncertainty_unit : column->unit))
                 fail(csv_.header.line, "unknown column \"" + names[i] +
                                            "\"; columns carry their unit, such as distance_mm, alpha_urad, spot_x_mm, "

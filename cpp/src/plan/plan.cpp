@@ -73,12 +73,12 @@ std::vector<PlanPoint> Plan::points(const Line& line) const {
 
 LateralExcursion Plan::lateral_excursion(const Line& line) const {
     // The travel repeats itself step by step, so the first step shows all of it.
-    const Plan one_step(volume_ / steps_, {line}, 1, order_);
+    const Plan one_step(volume_, {line}, 1, order_);
     const Eigen::Matrix<double, 3, 2> lateral = frame(line).leftCols<2>();
     LateralExcursion excursion{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
     const auto points = one_step.points(line);
     for (const PlanPoint& point : points) {
-        const Eigen::Vector2d offset = lateral.transpose() * (point.commanded - points.front().commanded);
+        const Eigen::Vector2d offset = lateral.transpose() * (point.commanded - points.front().commanded) / steps_;
         excursion.lowest = excursion.lowest.cwiseMin(offset);
         excursion.highest = excursion.highest.cwiseMax(offset);
     }
