@@ -12,6 +12,7 @@ from stepdiag._core import Plan
 
 # Limits that the core checks as well; here they keep numbers inside the integer types behind the bindings.
 LARGEST_STEPS: Final = Plan.largest_step_count
+SMALLEST_EDGE: Final = 1e-3
 LARGEST_EDGE: Final = 1e6
 LARGEST_INTERVALS: Final = 1_000_000
 LARGEST_SEED: Final = 2**64 - 1
@@ -31,7 +32,7 @@ def _weighs(choice: str | float) -> str | float:
     raise ValueError("not positive")
 
 
-Edge = Annotated[float, Field(gt=0.0, le=LARGEST_EDGE)]
+Edge = Annotated[float, Field(ge=SMALLEST_EDGE, le=LARGEST_EDGE)]
 Length = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
 PositiveLength = Annotated[float, Field(gt=0.0, le=LARGEST_LENGTH)]
 Angle = Annotated[float, Field(ge=-LARGEST_ANGLE, le=LARGEST_ANGLE)]
@@ -42,7 +43,7 @@ Pair = tuple[Length, Length]
 AnglePair = tuple[Angle, Angle]
 Choice = Annotated[Literal["free", "fixed"] | float, AfterValidator(_weighs)]
 
-_edge = "a length in mm, above 0 and up to 1e6"
+_edge = "a length in mm from 0.001 to 1e6"
 _amplitude = "a number of at least 0"
 _deviation = "a standard deviation of at least 0"
 _positive = "a positive number"

@@ -152,12 +152,12 @@ def test_byte_order_mark_is_passed_over(tmp_path: Path) -> None:
 
 
 # --- what is wrong with a file ---------------------------------------------------------------------------------------
-EDGE = "expected a length in mm, above 0 and up to 1e6, got "
+EDGE = "expected a length in mm from 0.001 to 1e6, got "
 STEPS = "plan.steps: expected an integer from 1 to 2000, got "
 
 MALFORMED = [
     # keys
-    ("x_mm = 800.0", "", "volume.x_mm: missing; expected a length in mm, above 0 and up to 1e6"),
+    ("x_mm = 800.0", "", "volume.x_mm: missing; expected a length in mm from 0.001 to 1e6"),
     ("steps = 50", "step = 50", "plan.step: unknown key; did you mean steps? (and 1 more)"),
     ("[noise]", "[noises]", "noises: unknown section; did you mean noise?"),
     ("laser_urad = [700, 1000]", "lasr_urad = [1, 2]", "misalignment.npp.lasr_urad: unknown key; did you mean laser_urad?"),
