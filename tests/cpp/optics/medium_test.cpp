@@ -75,7 +75,8 @@ TEST(GlassIndex, CatalogueValuesAreReproduced) {
                            {"F2", 1.62004, 36.37},
                            {"N-SF11", 1.78472, 25.68}};
     for (const auto& [name, n_d, V_d] : catalogue) {
-        const auto n = [&](double wavelength) { return refractive_index(find_glass(name), wavelength); };
+        const Glass& glass = find_glass(name);
+        const auto n = [&](double wavelength) { return refractive_index(glass, wavelength); };
         EXPECT_NEAR(n(587.5618), n_d, 0.6e-5) << name;  // rounded to five decimals
         EXPECT_NEAR((n(587.5618) - 1) / (n(486.1327) - n(656.2725)), V_d, 0.006) << name;
     }
