@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusal import refused
 from truth import CHAIN, DIAGONALS, VOLUME, Setup
 
 import stepdiag as sd
@@ -16,13 +17,6 @@ SETUP = Setup(steps=4)
 ERRORS = SETUP.errors(1)
 RUN = SETUP.simulate(ERRORS)
 ONES = np.ones(len(RUN))
-
-
-def refused(call: Callable[..., Any], *arguments: Any, names: str, **options: Any) -> None:
-    with pytest.raises(sd.InvalidArgument) as refusal:
-        call(*arguments, **options)
-    assert isinstance(refusal.value, ValueError)
-    assert names in str(refusal.value), f"{refusal.value} does not name {names}"
 
 
 @pytest.mark.parametrize(

@@ -135,8 +135,9 @@ void bind_machine(py::module_& m) {
                                          {to_seed(seed), translation, rotation, squareness,
                                           to_int(intervals, "intervals"), screw_pitch, screw_amplitude});
         },
-        py::arg("volume"), py::kw_only(), py::arg("seed"), py::arg("translation") = 0.02, py::arg("rotation") = 60e-6,
-        py::arg("squareness") = 60e-6, py::arg("intervals") = integer(50), py::arg("screw_pitch") = 0.0,
+        py::arg("volume"), py::kw_only(), py::arg("seed"), py::arg("translation") = RandomErrorMap{}.translation,
+        py::arg("rotation") = RandomErrorMap{}.rotation, py::arg("squareness") = RandomErrorMap{}.squareness,
+        py::arg("intervals") = integer(RandomErrorMap{}.intervals), py::arg("screw_pitch") = 0.0,
         py::arg("screw_amplitude") = 0.0,
         "A random machine with peaks of `translation` mm and `rotation` rad at equidistant nodes, squarenesses uniform "
         "within +-`squareness` rad, in the frame choice of the conventions. Same arguments, same bits.");

@@ -26,9 +26,10 @@ void bind_simulation(py::module_& m) {
                  check_head(head);
                  return head;
              }),
-             py::arg("layout") = "ideal", py::kw_only(), py::arg("standoff") = 100.0, py::arg("psd_distance") = 0.0,
-             py::arg("beam_offsets") = std::vector<ArrayLike>{}, py::arg("wavelength") = 1530.0,
-             py::arg("aperture") = 50.0, py::arg("mirror") = std::nullopt,
+             py::arg("layout") = "ideal", py::kw_only(), py::arg("standoff") = Head{}.standoff,
+             py::arg("psd_distance") = Head{}.psd_distance, py::arg("beam_offsets") = std::vector<ArrayLike>{},
+             py::arg("wavelength") = Head{}.wavelength, py::arg("aperture") = Head{}.aperture,
+             py::arg("mirror") = std::nullopt,
              "mirror: (width, height); none: as large as the plan needs. Raises InvalidArgument for lengths that are "
              "not positive and for beams on one line.")
         .def_property_readonly("layout", [](const Head& head) { return name(head.layout); })

@@ -38,6 +38,10 @@ Plan::Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, st
         }
 }
 
+bool Plan::contains(const Line& line) const {
+    return is_scale_line(line) || std::find(lines_.begin(), lines_.end(), line) != lines_.end();
+}
+
 bool Plan::is_scale_line(const Line& line) const {
     return std::find(scale_lines_.begin(), scale_lines_.end(), line) != scale_lines_.end();
 }
@@ -50,8 +54,7 @@ std::vector<double> Plan::nodes(Axis axis) const {
 
 std::vector<PlanPoint> Plan::points(const Line& line) const {
     const bool scale = is_scale_line(line);
-    if (!scale && std::find(lines_.begin(), lines_.end(), line) == lines_.end())
-        throw InvalidArgument("line \"" + line.name() + "\" is not in the plan");
+    if (!contains(line)) throw InvalidArgument("line \"" + line.name() + "\" is not in the plan");
     PlanPoint point{Eigen::Vector3d::Zero(), {0, 0, 0}, std::nullopt};
     const auto place = [&](Axis axis, int node) {
         point.node[index(axis)] = node;

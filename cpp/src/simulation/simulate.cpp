@@ -1,6 +1,5 @@
 #include "stepdiag/simulation/simulate.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -10,13 +9,9 @@
 namespace stepdiag {
 namespace {
 
-bool is_planned(const Plan& plan, const Line& line) {
-    return plan.is_scale_line(line) || std::find(plan.lines().begin(), plan.lines().end(), line) != plan.lines().end();
-}
-
 void check_options(const Plan& plan, const SimulationOptions& options) {
     for (const auto& [line, misalignment] : options.misalignment) {
-        if (!is_planned(plan, Line::parse(line)))
+        if (!plan.contains(Line::parse(line)))
             throw InvalidArgument("misalignment: line \"" + line + "\" is not in the plan");
         const auto small = [](const Eigen::Vector2d& angles) {
             return angles.allFinite() && angles.cwiseAbs().maxCoeff() < 0.1;

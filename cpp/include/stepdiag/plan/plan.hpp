@@ -42,6 +42,7 @@ public:
     int steps() const { return steps_; }
     const std::array<Axis, 3>& order() const { return order_; }
 
+    bool contains(const Line& line) const;  // among the lines or the scale lines
     bool is_scale_line(const Line& line) const;
     double node_position(Axis axis, int node) const { return node * volume_[index(axis)] / steps_; }
     std::vector<double> nodes(Axis axis) const;
