@@ -124,6 +124,15 @@ const Glass& find_glass(std::string_view name) {
     throw InvalidArgument("glass: expected one of " + known + ", got \"" + std::string(name) + "\"");
 }
 
+double refractive_index(const Environment& environment, double wavelength) {
+    if (const double* constant = std::get_if<double>(&environment.air)) {
+        if (!(std::isfinite(*constant) && *constant >= 1.0))
+            throw InvalidArgument("refractive_index: expected a finite value of at least 1");
+        return *constant;
+    }
+    return refractive_index(std::get<Air>(environment.air), wavelength, environment.equation);
+}
+
 double refractive_index(const Glass& glass, double wavelength) {
     require_range(wavelength, 334.0, 2325.0, glass.name + ", wavelength in nm");
     const double L = 1e-6 * wavelength * wavelength;

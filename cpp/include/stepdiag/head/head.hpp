@@ -9,19 +9,14 @@
 #include <Eigen/Core>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "stepdiag/head/head_layout.hpp"
 #include "stepdiag/measurement/head_calibration.hpp"
 #include "stepdiag/measurement/reading.hpp"
 #include "stepdiag/optics/medium.hpp"
 
 namespace stepdiag {
-
-enum class HeadLayout { ideal, psd, multi_beam };
-
-std::string name(HeadLayout layout);
-HeadLayout parse_head_layout(std::string_view text);
 
 struct Head {
     HeadLayout layout = HeadLayout::ideal;
@@ -35,7 +30,7 @@ struct Head {
     static constexpr double mirror_margin = 25.0;  // on every side, mm
 
     HeadCalibration calibration() const {
-        return {layout == HeadLayout::psd ? std::optional(psd_distance) : std::nullopt, beam_offsets};
+    return {layout == HeadLayout::psd ? std::optional(psd_distance) : std::nullopt, {0.0, 0.0}, beam_offsets, {}};
     }
 };
 

@@ -8,8 +8,14 @@
 namespace stepdiag {
 
 struct HeadCalibration {
-    std::optional<double> psd_distance;  // unfolded plane of the position sensing device behind the reference plane, mm
-    std::vector<Eigen::Vector2d> beam_offsets;  // (u, v) of the beams d1 ... dn in the sensor frame, mm
+    // Layout psd. The unfolded plane of the position sensing device behind the reference plane, mm: reduced, that is
+    // glass of thickness t counts as t n_air/n.
+    std::optional<double> psd_distance;
+    Eigen::Vector2d spot_beam = Eigen::Vector2d::Zero();  // (u, v) of the beam that makes the spot, mm
+    // Layout multi_beam: (u, v) of the beams d1 ... dn in the sensor frame, mm.
+    std::vector<Eigen::Vector2d> beam_offsets;
+    // What windows and splitters add to each distance of a nominal head, mm; the head has taken it off its readings.
+    std::vector<double> head_constants;
 };
 
 }  // namespace stepdiag

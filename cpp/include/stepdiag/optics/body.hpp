@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "stepdiag/optics/medium.hpp"
@@ -16,7 +17,10 @@ struct Face {
     Eigen::Vector3d normal;                // unit; of a body: outward
     std::vector<Eigen::Vector3d> outline;  // three or more corners in order, mm
     Surface surface;
-    Medium behind = {};  // refracting: what the normal points away from; the ambient medium is on the other side
+    Medium behind = {};                 // refracting, splitting: what the normal points away from
+    std::optional<Medium> before = {};  // and what it points into; none: the ambient medium
+    double reflectance = 1.0;           // reflecting, splitting: share of the power, 0 to 1
+    double absorptance = 0.0;           // splitting
 };
 
 // A rectangle in the local x-y plane of `scene_R_face`, centred at `centre`, normal along local z.

@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 namespace stepdiag {
@@ -31,6 +32,13 @@ AirEquation parse_air_equation(std::string_view text);  // "ciddor", "modified_e
 
 // Phase refractive index at 300 to 1700 nm. Throws InvalidArgument outside the ranges above.
 double refractive_index(const Air& air, double wavelength, AirEquation equation = AirEquation::ciddor);
+
+// The air around machine and head: a constant index at every wavelength, or a state of the air.
+struct Environment {
+    std::variant<double, Air> air = 1.0;
+    AirEquation equation = AirEquation::ciddor;
+};
+double refractive_index(const Environment& environment, double wavelength);
 
 // Optical glass by its Sellmeier equation, n^2 - 1 = sum B_i L / (L - C_i) with L = (wavelength/um)^2.
 struct Glass {

@@ -7,7 +7,12 @@
 
 namespace stepdiag {
 
-enum class Surface { reflecting, absorbing, refracting };
+enum class Surface {
+    reflecting,  // reflects the share `reflectance`, absorbs the rest
+    absorbing,
+    refracting,  // all light goes on, refracted or else totally reflected
+    splitting,   // light goes both ways: `reflectance` back, `absorptance` lost, the rest on by Snell's law
+};
 
 // Law of reflection, r = d - 2(n.d)n, for a unit normal of either side.
 inline Eigen::Vector3d reflect(const Eigen::Vector3d& direction, const Eigen::Vector3d& normal) {

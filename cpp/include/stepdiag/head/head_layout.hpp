@@ -1,0 +1,17 @@
+// Which readings a head gives.
+//   ideal       distance and the mirror's two tilts
+//   psd         layout b: distance and the spot on a position sensing device
+//   multi_beam  layout a: the distances of three or more parallel interferometer beams
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace stepdiag {
+
+enum class HeadLayout { ideal, psd, multi_beam };
+
+std::string name(HeadLayout layout);
+HeadLayout parse_head_layout(std::string_view text);  // throws InvalidArgument
+
+}  // namespace stepdiag

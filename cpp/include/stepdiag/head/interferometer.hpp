@@ -1,0 +1,63 @@
+// What an interferometer makes of the light that comes back to its collimator.
+//   chief_ray      half the optical path of the beam's axis to the collimator's plane and back (the conventions' reading)
+//   coupled_mode   the phase with which the returned Gaussian couples into the fibre's mode: -L phi^2/2 instead of
+//                  +L phi^2 for a mirror turned by phi, and the share of the light that couples
+// Optical lengths in mm, angles in rad, wavelengths in nm (vacuum).
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace stepdiag {
+
+enum class ReadingModel { chief_ray, coupled_mode };
+
+std::string name(ReadingModel model);
+ReadingModel parse_reading_model(std::string_view text);
+
+struct Interferometer {
+    double aperture = 10.0;               // edge of the square in the collimator's plane that takes the beam back, mm
+    double acceptance = 0.1;              // largest angle between the returned beam and the collimator's axis, rad
+    double least_coupling = 0.0;          // coupled_mode: a smaller share of the light is a lost reading
+    double resolution = 0.0;              // step of the distance, mm; 0: none
+    double periodic_amplitude = 0.0;      // of the non-linearity, mm; its period is half a wavelength in the air
+    double dead_path = 0.0;               // mm in air before the reference plane, whose index is taken as assumed
+    double index_error = 0.0;             // relative error of the index that distances are reduced with, e.g. 0.5e-6
+    ReadingModel model = ReadingModel::chief_ray;
+};
+
+// Throws InvalidArgument naming the value.
+void check_interferometer(const Interferometer& interferometer);
+
+// The collimator's mode: waist radius (1/e^2 of power) and the waist's place along the beam, from the collimator's plane.
+struct GaussianMode {
+    double wavelength;      // vacuum, nm
+    double waist_radius;    // mm
+    double waist_position;  // mm
+};
+
+// A beam that has come back, in the collimator's frame (beam out along +z, its plane z = 0).
+struct ReturnedBeam {
+    Eigen::Vector2d position;   // where the axis meets the collimator's plane, mm
+    Eigen::Vector3d direction;  // unit, z < 0
+    double optical_length;      // sum of n t along the axis, out and back, mm
+    double reduced_length;      // sum of t / n, mm
+};
+
+struct Coupling {
+    double optical_length;  // round trip as the fibre's phase has it, mm
+    double efficiency;      // share of the light that couples, 0 to 1
+};
+
+// Closed form of the overlap of a displaced, turned Gaussian with the mode, in a medium of index n at the collimator.
+Coupling couple(const GaussianMode& mode, const ReturnedBeam& beam, double index);
+
+// The distance that the instrument gives: half the path divided by the assumed index (with its error), dead path,
+// non-linearity, resolution; the noise and the head's constant are the caller's. None where the beam is outside
+// aperture, acceptance or least coupling. Aperture and acceptance hold for both models.
+std::optional<double> read_distance(const Interferometer& interferometer, const GaussianMode& mode,
+                                    const ReturnedBeam& beam, double true_index, double assumed_index);
+
+}  // namespace stepdiag
