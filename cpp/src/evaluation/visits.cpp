@@ -111,7 +111,8 @@ private:
             result.effects.push_back({distance->standard_uncertainty, 0.0, 0.0});
             return result;
         }
-        const auto reduced = reduce_spot(distance->value, {x->value, y->value}, *head_.psd_distance);
+        const auto reduced = reduce_spot(distance->value, {x->value, y->value}, *head_.psd_distance,
+                                         head_.spot_beam);
         if (!reduced)
             refuse(row, "no mirror gives this distance and spot with psd_distance " +
                             std::to_string(*head_.psd_distance) + " mm");

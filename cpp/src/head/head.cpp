@@ -18,16 +18,6 @@ constexpr int reference_face = 1;
 
 }  // namespace
 
-std::string name(HeadLayout layout) {
-    return layout == HeadLayout::ideal ? "ideal" : layout == HeadLayout::psd ? "psd" : "multi_beam";
-}
-
-HeadLayout parse_head_layout(std::string_view text) {
-    for (const HeadLayout layout : {HeadLayout::ideal, HeadLayout::psd, HeadLayout::multi_beam})
-        if (text == name(layout)) return layout;
-    throw InvalidArgument("layout: expected \"ideal\", \"psd\" or \"multi_beam\", got \"" + std::string(text) + "\"");
-}
-
 void check_head(const Head& head) {
     const auto require_length = [](double length, const char* key, double lowest) {
         if (!(std::isfinite(length) && length > lowest))

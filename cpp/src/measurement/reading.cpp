@@ -22,41 +22,48 @@ Eigen::VectorXd beam_distances(const Reading& reading, const std::vector<Eigen::
     return distances;
 }
 
-Eigen::Vector2d spot_position(const Reading& reading, double psd_distance) {
-    const double scale = 2.0 * (reading.distance + psd_distance / (1.0 - reading.tan2_phi()));
-    return scale * Eigen::Vector2d(-reading.beta, reading.alpha);
+namespace {
+
+// The spot's gain g(x), spot = g x with x = (-beta, alpha), and its gradient; its derivative by distance is 2.
+struct SpotGain {
+    double value;
+    Eigen::Vector2d gradient;
+};
+
+SpotGain spot_gain(double distance, const Eigen::Vector2d& x, double psd_distance, const Eigen::Vector2d& spot_beam) {
+    const double w = 1.0 - x.squaredNorm();
+    const double beyond = (psd_distance + x.dot(spot_beam)) / w;
+    return {2.0 * (distance + beyond), 2.0 / w * (spot_beam + 2.0 * beyond * x)};
 }
 
-std::optional<ReducedReading> reduce_spot(double distance, const Eigen::Vector2d& spot, double psd_distance) {
-    // |spot| = s is 2 tau (distance + psd_distance/(1 - tau^2)) with tau = tan(phi): solved for tau by Newton's method.
-    const double s = spot.norm();
-    if (!(distance > 0.0) || !(distance + psd_distance > 0.0)) return std::nullopt;
-    double tau = s / (2.0 * (distance + psd_distance));
-    double slope = 0.0;  // d s / d tau
-    for (int iteration = 0; iteration < 20; ++iteration) {
-        if (!(tau < 1.0)) return std::nullopt;
-        const double w = 1.0 - tau * tau;
-        slope = 2.0 * distance + 2.0 * psd_distance * (1.0 + tau * tau) / (w * w);
-        if (!(slope > 0.0)) return std::nullopt;
-        const double change = (s - 2.0 * tau * (distance + psd_distance / w)) / slope;
-        tau += change;
-        if (std::abs(change) <= 1e-17 + 1e-16 * tau) break;
-    }
-    if (!(tau < 1.0)) return std::nullopt;
+}  // namespace
 
-    // (-beta, alpha) = spot / gain with gain = s/tau; gain and its derivatives stay finite as s -> 0.
-    const double w = 1.0 - tau * tau;
-    const double gain = 2.0 * (distance + psd_distance / w);
-    ReducedReading reduced{{distance, spot.y() / gain, -spot.x() / gain}, Eigen::Matrix3d::Zero()};
-    const double gain_by_tau = 4.0 * psd_distance * tau / (w * w);
-    const double tau_by_distance = -2.0 * tau / slope;
-    const double gain_by_distance = 2.0 + gain_by_tau * tau_by_distance;
-    const Eigen::Vector2d gain_by_spot =
-        s > 0.0 ? Eigen::Vector2d(gain_by_tau / slope * spot / s) : Eigen::Vector2d::Zero();
-    const Eigen::Vector2d tilt = spot / gain;  // (-beta, alpha)
-    Eigen::Matrix<double, 2, 3> by_channel;    // of tilt, by (distance, spot)
-    by_channel.col(0) = -tilt / gain * gain_by_distance;
-    by_channel.rightCols<2>() = Eigen::Matrix2d::Identity() / gain - tilt / gain * gain_by_spot.transpose();
+Eigen::Vector2d spot_position(const Reading& reading, double psd_distance, const Eigen::Vector2d& spot_beam) {
+    const Eigen::Vector2d x(-reading.beta, reading.alpha);
+    return spot_gain(reading.distance, x, psd_distance, spot_beam).value * x;
+}
+
+std::optional<ReducedReading> reduce_spot(double distance, const Eigen::Vector2d& spot, double psd_distance,
+                                          const Eigen::Vector2d& spot_beam) {
+    if (!(distance > 0.0) || !(distance + psd_distance > 0.0)) return std::nullopt;
+    // Newton's method for g(x) x = spot.
+    Eigen::Vector2d x = spot / (2.0 * (distance + psd_distance));
+    Eigen::Matrix2d inverse;  // d x / d spot
+    for (int iteration = 0; iteration < 20; ++iteration) {
+        if (!(x.squaredNorm() < 1.0)) return std::nullopt;
+        const SpotGain gain = spot_gain(distance, x, psd_distance, spot_beam);
+        const Eigen::Matrix2d slopes = gain.value * Eigen::Matrix2d::Identity() + x * gain.gradient.transpose();
+        if (!(gain.value > 0.0) || !(slopes.determinant() > 0.0)) return std::nullopt;
+        inverse = slopes.inverse();
+        const Eigen::Vector2d change = inverse * (spot - gain.value * x);
+        x += change;
+        if (change.norm() <= 1e-17 + 1e-16 * x.norm()) break;
+    }
+    if (!(x.squaredNorm() < 1.0)) return std::nullopt;
+
+    ReducedReading reduced{{distance, x.y(), -x.x()}, Eigen::Matrix3d::Zero()};
+    Eigen::Matrix<double, 2, 3> by_channel;  // of x, by (distance, spot)
+    by_channel << -2.0 * inverse * x, inverse;
     reduced.jacobian(0, 0) = 1.0;
     reduced.jacobian.row(1) = by_channel.row(1);
     reduced.jacobian.row(2) = -by_channel.row(0);

@@ -8,7 +8,7 @@
 namespace stepdiag {
 
 // What the numbers are for; each purpose is a stream of its own under one seed.
-enum class RandomStream : std::uint32_t { reading_noise = 1, error_map = 2 };
+enum class RandomStream : std::uint32_t { reading_noise = 1, error_map = 2, verification = 3 };
 
 // Two independent standard normal numbers for one counter (Box-Muller on the two 64-bit halves of one Philox block).
 std::array<double, 2> normal_pair(std::uint64_t seed, RandomStream stream, std::uint64_t counter);

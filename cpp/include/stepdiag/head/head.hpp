@@ -30,7 +30,7 @@ struct Head {
     static constexpr double mirror_margin = 25.0;  // on every side, mm
 
     HeadCalibration calibration() const {
-    return {layout == HeadLayout::psd ? std::optional(psd_distance) : std::nullopt, {0.0, 0.0}, beam_offsets, {}};
+    return {layout == HeadLayout::psd ? std::optional(psd_distance) : std::nullopt, beam_offsets};
     }
 };
 

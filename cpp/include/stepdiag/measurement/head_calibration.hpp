@@ -8,14 +8,15 @@
 namespace stepdiag {
 
 struct HeadCalibration {
-    // Layout psd. The unfolded plane of the position sensing device behind the reference plane, mm: reduced, that is
+    // Layout psd: the unfolded plane of the position sensing device behind the reference plane, mm; reduced, that is,
     // glass of thickness t counts as t n_air/n.
-    std::optional<double> psd_distance;
-    Eigen::Vector2d spot_beam = Eigen::Vector2d::Zero();  // (u, v) of the beam that makes the spot, mm
+    std::optional<double> psd_distance = {};
     // Layout multi_beam: (u, v) of the beams d1 ... dn in the sensor frame, mm.
-    std::vector<Eigen::Vector2d> beam_offsets;
+    std::vector<Eigen::Vector2d> beam_offsets = {};
+    // Layout psd: (u, v) of the beam that makes the spot, mm.
+    Eigen::Vector2d spot_beam = Eigen::Vector2d::Zero();
     // What windows and splitters add to each distance of a nominal head, mm; the head has taken it off its readings.
-    std::vector<double> head_constants;
+    std::vector<double> head_constants = {};
 };
 
 }  // namespace stepdiag

@@ -1,0 +1,88 @@
+// A head as its design says, with its components out of their places: which light of its beams comes back from a mirror.
+// Two ways to the same answer: the Embree trace of a pose's whole ray tree, which finds the faces, and the replay of the
+// paths it found, for many poses at once. Everything is in the sensor frame: beam along +z, reference plane z = 0.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <stdexcept>
+#include <vector>
+
+#include "stepdiag/head/design.hpp"
+#include "stepdiag/optics/ray_tree.hpp"
+#include "stepdiag/optics/replay.hpp"
+#include "stepdiag/optics/scene.hpp"
+
+namespace stepdiag {
+
+// The mirror's centre and axes; its normal is the third.
+struct MirrorPose {
+    Eigen::Vector3d point;
+    Eigen::Matrix3d rotation;
+};
+
+// Light of a beam where it belongs: on its collimator's plane, or on its sensor; in the frame of that component.
+struct Arrival {
+    ReturnedBeam beam;
+    double power;  // share of the source's
+};
+using Arrivals = std::vector<Arrival>;  // strongest first; none: the beam is lost. An interferometer has one at most.
+
+struct ReplayOptions {
+    double verified_share = 1e-3;  // of the poses that were replayed, traced as well and compared; 1: all, 0: none
+    std::uint64_t seed = 0;        // decides which
+};
+
+struct ReplayCount {
+    long replayed = 0;  // poses of a beam
+    long traced = 0;    // poses that the recorded paths did not fit
+    long verified = 0;
+};
+
+// A replayed pose that differs from its trace: another face came into the beam's way.
+class ReplayMismatch : public std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+class TracedHead {
+public:
+    // Throws InvalidArgument for a design that makes no sense, pose errors of components that it does not have or not
+    // finite, an environment out of range.
+    TracedHead(HeadDesign design, PoseErrors errors, const Environment& environment, const Eigen::Vector2d& mirror);
+
+    const HeadDesign& design() const { return design_; }
+    double air_index(int beam) const { return optics_[beam].air.index; }
+
+    // One pose by Embree.
+    RayTree trace(int beam, const MirrorPose& mirror) const;
+    Arrivals arrivals(int beam, const MirrorPose& mirror) const;
+    int mirror_face() const;  // its index in the tree's hits
+    int detector_face(int beam) const { return optics_[beam].detector_face; }
+
+    // Many poses by replay. The paths are recorded at the first, the middle and the last pose; where these do not have
+    // the same ones, and for each pose that does not follow them, the Embree trace takes its place. Throws
+    // ReplayMismatch naming the pose where a verification differs by more than rounding (1e-9 mm).
+    std::vector<Arrivals> replay(int beam, const std::vector<MirrorPose>& mirrors, const ReplayOptions& options = {},
+                                 ReplayCount* count = nullptr) const;
+
+private:
+    struct BeamOptics {
+        Medium air;
+        Scene fixed;  // without the mirror
+        std::vector<FaceFrame> frames;
+        std::vector<Outline> outlines;
+        Ray source;
+        int detector_face;
+        Placement detector;  // where the light is wanted
+    };
+    Face mirror_at(const MirrorPose& pose) const;
+    Arrival arrival(int beam, const Eigen::Vector3d& point, const Eigen::Vector3d& direction, double optical_length,
+                    double reduced_length, double power) const;
+    std::vector<int> wanted_segments(const RayTree& tree, int beam) const;
+
+    HeadDesign design_;
+    Eigen::Vector2d mirror_;
+    std::vector<BeamOptics> optics_;
+};
+
+}  // namespace stepdiag

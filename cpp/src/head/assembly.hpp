@@ -1,0 +1,29 @@
+// A head's design put together: every component in its place, or out of it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "stepdiag/head/design.hpp"
+
+namespace stepdiag {
+
+// Where a component stands with its pose error.
+Placement moved(const Placement& nominal, const PoseError& error);
+PoseError error_of(const PoseErrors& errors, const std::string& component);
+
+std::vector<std::string> component_names(const HeadDesign& design);
+std::size_t sensor_of(const HeadDesign& design, const HeadBeam& beam);  // its index
+
+// All faces in the head's frame for light of one wavelength: the bodies', then a square around each source that stops
+// the light that comes back to it, then the sensors.
+struct Assembly {
+    std::vector<Face> faces;
+    std::vector<int> component;   // of each face: bodies, beams, sensors counted through
+    std::vector<int> beam_face;   // by beam: the square around the source
+    std::vector<int> sensor_face;  // by sensor
+};
+
+Assembly assemble(const HeadDesign& design, const PoseErrors& errors, double wavelength);
+
+}  // namespace stepdiag

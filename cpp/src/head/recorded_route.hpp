@@ -1,0 +1,39 @@
+// The path of a beam as one pose's trace found it, and its replay for the other poses.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "stepdiag/head/traced_head.hpp"
+
+namespace stepdiag {
+
+struct RecordedEncounter {
+    int face;
+    Event event;
+    double index_before, index_after;
+};
+struct RecordedRoute {
+    std::vector<RecordedEncounter> encounters;
+    double power;  // of the arrival
+};
+
+RecordedRoute record_route(const RayTree& tree, int segment);
+bool same_faces(const std::vector<RecordedRoute>& a, const std::vector<RecordedRoute>& b);
+
+// A column for each coordinate, a row for each pose.
+struct RouteReplay {
+    Eigen::Matrix<double, Eigen::Dynamic, 3> points, directions;
+    std::vector<double> optical_length, reduced_length;
+    std::vector<std::uint8_t> followed;
+
+    Eigen::Vector3d point(std::size_t i) const { return points.row(Eigen::Index(i)); }
+    Eigen::Vector3d direction(std::size_t i) const { return directions.row(Eigen::Index(i)); }
+};
+
+// Frames and outlines of the head's faces; the mirror's face is the last outline, its frames follow from its poses.
+RouteReplay replay_route(const RecordedRoute& route, const std::vector<FaceFrame>& frames,
+                         const std::vector<Outline>& outlines, const Ray& source,
+                         const std::vector<MirrorPose>& mirrors, double gap);
+
+}  // namespace stepdiag
