@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
 
 namespace {
 
@@ -82,4 +83,59 @@ TEST(Random, StreamsAndSeedsAreApart) {
     EXPECT_EQ(noise, stepdiag::uniform_pair(1, stepdiag::RandomStream::reading_noise, 5));
     EXPECT_NE(noise, stepdiag::uniform_pair(1, stepdiag::RandomStream::error_map, 5));
     EXPECT_NE(noise, stepdiag::uniform_pair(2, stepdiag::RandomStream::reading_noise, 5));
+}
+
+TEST(Random, ItemsAndDrawsOfOneCounterAreApart) {
+    using stepdiag::RandomBlock;
+    const auto stream = stepdiag::RandomStream::camera_read_noise;
+    const auto first = stepdiag::uniform_pair(1, stream, RandomBlock{7, 0, 0});
+    EXPECT_EQ(first, stepdiag::uniform_pair(1, stream, 7));
+    EXPECT_NE(first, stepdiag::uniform_pair(1, stream, RandomBlock{7, 1, 0}));
+    EXPECT_NE(first, stepdiag::uniform_pair(1, stream, RandomBlock{7, 0, 1}));
+    EXPECT_NE(stepdiag::uniform_pair(1, stream, RandomBlock{7, 1, 0}),
+              stepdiag::uniform_pair(1, stream, RandomBlock{7, 0, 1}));
+}
+
+// Pearson's statistic over all values that are expected ten times or more, the rest in one class at each end.
+TEST(Random, PoissonNumbersHaveTheirDistribution) {
+    constexpr int count = 100'000;
+    for (const double mean : {0.01, 0.7, 3.0, 9.999, 10.0, 10.7, 55.0, 1234.5}) {
+        std::map<long, double> found;
+        for (int i = 0; i < count; ++i)
+            found[long(stepdiag::poisson(mean, 11, stepdiag::RandomStream::camera_shot_noise, 3, i))] += 1.0;
+        double statistic = 0.0, expected_below = 0.0, found_below = 0.0, expected_sum = 0.0, found_sum = 0.0;
+        int classes = 0;
+        const auto close_class = [&](double expected, double seen) {
+            statistic += (seen - expected) * (seen - expected) / expected;
+            ++classes;
+        };
+        for (long k = 0; k <= long(mean + 20.0 * std::sqrt(mean) + 20.0); ++k) {
+            expected_below += count * std::exp(k * std::log(mean) - mean - std::lgamma(k + 1.0));
+            found_below += found[k];
+            if (expected_below < 10.0) continue;
+            close_class(expected_below, found_below);
+            expected_sum += expected_below, found_sum += found_below;
+            expected_below = found_below = 0.0;
+        }
+        if (count - expected_sum > 0.5) close_class(count - expected_sum, count - found_sum);
+        // chi-square of (classes - 1) degrees of freedom: mean and five standard deviations
+        EXPECT_LT(statistic, classes - 1 + 5.0 * std::sqrt(2.0 * classes)) << "mean " << mean;
+    }
+}
+
+TEST(Random, LargePoissonNumbersHaveTheirMoments) {
+    constexpr int count = 20'000;
+    const double sigma = 1.0 / std::sqrt(count);
+    for (const double mean : {1e6, 1e12}) {
+        double first = 0.0, second = 0.0;
+        for (int i = 0; i < count; ++i) {
+            const double x =
+                (stepdiag::poisson(mean, 5, stepdiag::RandomStream::camera_shot_noise, i, 0) - mean) / std::sqrt(mean);
+            first += x / count;
+            second += x * x / count;
+        }
+        EXPECT_NEAR(first, 0.0, 5.0 * sigma);  // five standard deviations of the sample moment
+        EXPECT_NEAR(second, 1.0, 5.0 * std::sqrt(2.0) * sigma);
+    }
+    EXPECT_EQ(stepdiag::poisson(0.0, 5, stepdiag::RandomStream::camera_shot_noise, 0, 0), 0.0);
 }
