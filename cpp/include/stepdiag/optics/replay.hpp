@@ -1,8 +1,8 @@
 // Replay of a recorded path: many rays along one known sequence of faces, in double, several lanes at once.
 //   plane:  t = -(R_z.o + t_z)/(R_z.d),  o <- o + t d;  then reflection, Snell's law, or straight on
 // A face is given as a rigid frame (face_R_scene, face_t_scene: local = R x + t, the face in the plane local z = 0,
-// its normal along local z) and an outline in local x-y that does not change. Every number may vary from lane to lane or
-// be the same for all. Each lane checks at every face that it goes forward, stays inside the outline, refracts or is
+// its normal along local z) and an outline in local x-y that does not change. Every number may vary from lane to lane
+// or be the same for all. Each lane checks at every face that it goes forward, stays inside the outline, refracts or is
 // totally reflected as recorded, and is not NaN. That no other face came into the way is what a replay cannot see: a
 // fraction of all lanes is traced again for that (head/traced_head.hpp).
 #pragma once
@@ -35,7 +35,7 @@ struct FaceFrame {
 struct Outline {
     std::vector<Eigen::Vector2d> corners;
     bool is_centred_rectangle;
-    Eigen::Vector2d half_size;  // of a centred rectangle
+    Eigen::Vector2d half_size;                 // of a centred rectangle
     std::vector<std::array<double, 3>> edges;  // others: inside where a x + b y <= c for every edge (a, b, c)
 };
 
@@ -45,14 +45,15 @@ Outline outline_of(const Face& face, const FaceFrame& frame);
 // One face on the way.
 struct Encounter {
     Event event;
-    bool deflects = true;  // refracted: false where the medium is the same on both sides
+    bool deflects = true;  // refracted: false where the medium is the same on both sides; `index_after` is not read
     std::array<LaneValue, 9> rotation;
     std::array<LaneValue, 3> translation;
     const Outline* outline;
     LaneValue index_before, index_after;  // refracted, totally_reflected: both; others: before
 };
 
-// Rays at their start (input), and where they end (output; never null). Lengths are added to.
+// Rays at their start (input), and where they end (output; never null). Lengths are added to. Results may be written
+// over the very arrays that the rays came from, so that one route goes on where another ended.
 struct LaneRays {
     std::array<LaneValue, 3> origin, direction;
     LaneValue optical_length;  // sum of n t, mm
@@ -65,11 +66,16 @@ struct LaneResults {
     std::uint8_t* followed;  // 1 where every check was passed; the other results of a lane with 0 mean nothing
 };
 
-// `gap`: hits nearer than this do not count as forward (Scene::self_intersection_gap).
+// `gap`: hits nearer than this do not count as forward (Scene::self_intersection_gap). A lane's result does not depend
+// on how many lanes there are, on its place among them, nor on which values vary.
 void replay(const std::vector<Encounter>& route, const LaneRays& rays, std::size_t lanes, double gap,
             const LaneResults& results);
 
 // Name of the instruction set in use, e.g. "AVX3_ZEN4"; results are the same bits for the same one.
 std::string replay_target();
+// Those that this processor has, fastest first. The fastest is in use until another is chosen, for the whole process,
+// e.g. to get the bits of a lesser processor. Throws InvalidArgument naming those there are.
+std::vector<std::string> replay_targets();
+void choose_replay_target(const std::string& name);
 
 }  // namespace stepdiag

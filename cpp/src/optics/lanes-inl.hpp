@@ -1,0 +1,83 @@
+// Vectors of lanes as number types of encounter-inl.hpp, one or two at a time.
+#if defined(STEPDIAG_LANES_INL) == defined(HWY_TARGET_TOGGLE)
+#ifdef STEPDIAG_LANES_INL
+#undef STEPDIAG_LANES_INL
+#else
+#define STEPDIAG_LANES_INL
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstdint>
+
+#include "optics/number.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace stepdiag {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using Tag = hn::ScalableTag<double>;
+using Vector = hn::Vec<Tag>;
+using Mask = hn::Mask<Tag>;
+
+HWY_INLINE Vector mul_add(Vector a, Vector b, Vector c) { return hn::MulAdd(a, b, c); }
+HWY_INLINE Vector sub_mul(Vector a, Vector b, Vector c) { return hn::NegMulAdd(a, b, c); }
+HWY_INLINE Vector root(Vector a) { return hn::Sqrt(a); }
+HWY_INLINE Vector magnitude(Vector a) { return hn::Abs(a); }
+HWY_INLINE Vector negative(Vector a) { return hn::Neg(a); }
+HWY_INLINE Vector with_sign(Vector a, Vector sign) { return hn::CopySignToAbs(a, sign); }
+HWY_INLINE Mask both(Mask a, Mask b) { return hn::And(a, b); }
+HWY_INLINE Vector broadcast(Type<Vector>, double value) { return hn::Set(Tag(), value); }
+HWY_INLINE Vector load(Type<Vector>, const double* from) { return hn::LoadU(Tag(), from); }
+HWY_INLINE void store(Vector a, double* to) { hn::StoreU(a, Tag(), to); }
+HWY_INLINE void store(Mask a, std::uint8_t* to) {
+    HWY_ALIGN double truth[hn::MaxLanes(Tag())];
+    hn::StoreU(hn::IfThenElseZero(a, hn::Set(Tag(), 1.0)), Tag(), truth);
+    for (std::size_t i = 0; i < hn::Lanes(Tag()); ++i) to[i] = truth[i] != 0.0;
+}
+HWY_INLINE std::size_t width(Type<Vector>) { return hn::Lanes(Tag()); }
+
+// Two vectors side by side: while one waits for a root or a quotient, the other goes on.
+struct Pair {
+    Vector a, b;
+};
+struct MaskPair {
+    Mask a, b;
+};
+HWY_INLINE Pair operator+(Pair x, Pair y) { return {x.a + y.a, x.b + y.b}; }
+HWY_INLINE Pair operator-(Pair x, Pair y) { return {x.a - y.a, x.b - y.b}; }
+HWY_INLINE Pair operator*(Pair x, Pair y) { return {x.a * y.a, x.b * y.b}; }
+HWY_INLINE Pair operator/(Pair x, Pair y) { return {x.a / y.a, x.b / y.b}; }
+HWY_INLINE MaskPair operator>(Pair x, Pair y) { return {x.a > y.a, x.b > y.b}; }
+HWY_INLINE MaskPair operator<=(Pair x, Pair y) { return {x.a <= y.a, x.b <= y.b}; }
+HWY_INLINE Pair mul_add(Pair x, Pair y, Pair z) { return {mul_add(x.a, y.a, z.a), mul_add(x.b, y.b, z.b)}; }
+HWY_INLINE Pair sub_mul(Pair x, Pair y, Pair z) { return {sub_mul(x.a, y.a, z.a), sub_mul(x.b, y.b, z.b)}; }
+HWY_INLINE Pair root(Pair x) { return {root(x.a), root(x.b)}; }
+HWY_INLINE Pair magnitude(Pair x) { return {magnitude(x.a), magnitude(x.b)}; }
+HWY_INLINE Pair negative(Pair x) { return {negative(x.a), negative(x.b)}; }
+HWY_INLINE Pair with_sign(Pair x, Pair sign) { return {with_sign(x.a, sign.a), with_sign(x.b, sign.b)}; }
+HWY_INLINE MaskPair both(MaskPair x, MaskPair y) { return {both(x.a, y.a), both(x.b, y.b)}; }
+HWY_INLINE Pair broadcast(Type<Pair>, double value) {
+    const Vector all = hn::Set(Tag(), value);
+    return {all, all};
+}
+HWY_INLINE Pair load(Type<Pair>, const double* from) {
+    return {hn::LoadU(Tag(), from), hn::LoadU(Tag(), from + hn::Lanes(Tag()))};
+}
+template <class To>
+HWY_INLINE void store(Pair x, To* to) {
+    store(x.a, to);
+    store(x.b, to + hn::Lanes(Tag()));
+}
+HWY_INLINE void store(MaskPair x, std::uint8_t* to) {
+    store(x.a, to);
+    store(x.b, to + hn::Lanes(Tag()));
+}
+HWY_INLINE std::size_t width(Type<Pair>) { return 2 * hn::Lanes(Tag()); }
+
+}  // namespace HWY_NAMESPACE
+}  // namespace stepdiag
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,52 @@
+// A route as replay.cpp walks it: what is common to all lanes copied beside each other, the rest as pointers.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "stepdiag/optics/replay.hpp"
+
+namespace stepdiag {
+
+// Values of successive lanes start at from + (lane & mask): the mask is all ones, or 0 for a row of copies of one
+// value.
+struct LaneSource {
+    const double* from;
+    std::size_t mask;
+};
+
+struct PreparedEncounter {
+    static constexpr int index_before = 12, index_after = 13;  // among `numbers`, behind rotation and translation
+
+    Event event;
+    bool deflects;
+    bool plane_by_lane, indices_by_lane;
+    const Outline* outline;
+    double plane[12];  // where common: rotation and translation,
+    double index_before_after[2];
+    double inverse_index, index_ratio, one_less_ratio2;  // and of the indices 1/n1, mu = n1/n2, 1 - mu^2
+    LaneSource numbers[14];                              // where by lane
+};
+
+class PreparedRoute {
+public:
+    // For vectors of up to `width` lanes, which may read beyond `lanes` only what is copied here: where there are fewer
+    // lanes than `padded_below`, copies go on with the last lane. Throws InvalidArgument for strides other than 0
+    // and 1.
+    PreparedRoute(const std::vector<Encounter>& route, const LaneRays& rays, std::size_t lanes, std::size_t width,
+                  std::size_t padded_below);
+
+    std::vector<PreparedEncounter> encounters;
+    LaneSource start[8];  // origin, direction, optical and reduced length
+
+private:
+    LaneSource source(const LaneValue& value);
+
+    std::size_t lanes_, width_;
+    bool padded_;
+    std::unique_ptr<double[]> rows_;
+    double* next_row_;
+};
+
+}  // namespace stepdiag
