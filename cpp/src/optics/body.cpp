@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <string>
+#include <utility>
 
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/core/units.hpp"
@@ -63,10 +64,23 @@ Face make_rectangle(const Eigen::Vector3d& centre, const Eigen::Matrix3d& scene_
     return {centre, scene_R_face.col(2), {centre - x - y, centre + x - y, centre + x + y, centre - x + y}, surface, {}};
 }
 
+std::vector<Face> placed(std::vector<Face> faces, const Placement& placement) {
+    const auto place = [&](Eigen::Vector3d& point) { point = placement.position + placement.rotation * point; };
+    for (Face& face : faces) {
+        place(face.point);
+        face.normal = placement.rotation * face.normal;
+        for (auto& corner : face.outline) place(corner);
+    }
+    return faces;
+}
+
 std::vector<Face> make_body(const Corners& corners, const std::vector<std::vector<int>>& faces, Medium glass,
                             const Placement& placement) {
     if (faces.size() < 4)
         throw InvalidArgument("body: expected four faces or more, got " + std::to_string(faces.size()));
+    if (faces.size() > std::size_t(most_faces_of_a_body))
+        throw InvalidArgument("body: expected at most " + std::to_string(most_faces_of_a_body) +
+                              " faces, which are each held against every corner, got " + std::to_string(faces.size()));
     if (!(std::isfinite(glass.index) && glass.index >= 1.0))
         throw InvalidArgument("body: expected an index of at least 1");
     Corners placed;
@@ -138,6 +152,38 @@ std::vector<Face> make_corner_cube(double depth, Medium glass, const Placement& 
         corners.emplace_back(radius * std::cos(angle), radius * std::sin(angle), depth);
     }
     return make_body(corners, {{1, 2, 3}, {0, 1, 2}, {0, 2, 3}, {0, 3, 1}}, glass, placement);
+}
+
+std::vector<Face> make_cube_splitter(double edge, Medium glass, double reflectance, double absorptance,
+                                     const Placement& placement) {
+    require_positive(edge, "edge");
+    if (!(reflectance >= 0.0 && absorptance >= 0.0 && reflectance + absorptance <= 1.0 + 1e-12))
+        throw InvalidArgument("splitter: expected reflectance and absorptance of 0 to 1, together at most 1");
+    std::vector<Face> cube = make_plate(edge, edge, edge, glass);
+    const double root = std::sqrt(0.5), length = (1.0 - 2e-4) * edge;
+    Eigen::Matrix3d diagonal;  // local y along the cube's, normal between +x and -z
+    diagonal << -root, 0.0, root, 0.0, 1.0, 0.0, -root, 0.0, -root;
+    Face face = make_rectangle(Eigen::Vector3d::Zero(), diagonal, {length / root, length}, Surface::splitting);
+    face.before = face.behind = glass;
+    face.reflectance = reflectance;
+    face.absorptance = absorptance;
+    cube.push_back(face);
+    return placed(std::move(cube), placement);
+}
+
+std::vector<Face> make_mirror(double width, double height, double reflectance, const Placement& placement) {
+    require_positive(width, "width");
+    require_positive(height, "height");
+    if (!(reflectance >= 0.0 && reflectance <= 1.0)) throw InvalidArgument("mirror: expected a reflectance of 0 to 1");
+    Face face = make_rectangle(placement.position, placement.rotation, {width, height}, Surface::reflecting);
+    face.reflectance = reflectance;
+    return {face};
+}
+
+std::vector<Face> make_screen(double width, double height, const Placement& placement) {
+    require_positive(width, "width");
+    require_positive(height, "height");
+    return {make_rectangle(placement.position, placement.rotation, {width, height}, Surface::absorbing)};
 }
 
 }  // namespace stepdiag

@@ -9,6 +9,7 @@
 #include "stepdiag/core/rotation.hpp"
 #include "stepdiag/core/units.hpp"
 #include "stepdiag/optics/path.hpp"
+#include "stepdiag/optics/ray_tree.hpp"
 
 namespace {
 
@@ -125,6 +126,86 @@ TEST(CornerCube, SendsLightBackAntiparallelWhereverItPoints) {
     }
 }
 
+TEST(CubeSplitter, SendsLightStraightOnAndAtRightAngles) {
+    // Along +z to +x, along -z to -x; every way through is one edge of glass.
+    const double edge = 20.0;
+    const Scene scene(make_cube_splitter(edge, glass, 0.4));
+    for (const double along : {1.0, -1.0}) {
+        const Vector3d z = along * Vector3d::UnitZ(), x = along * Vector3d::UnitX();
+        const Vector3d aim(3.0, -4.0, 0.0);
+        const RayTree tree = trace_tree(scene, air, {aim - 50.0 * z, z});
+        // Source, up to the splitting face, two ways on, and outside.
+        ASSERT_EQ(tree.segments.size(), 6u);
+        for (const Segment& out : tree.segments) {
+            if (out.end != SegmentEnd::left) continue;
+            const bool is_reflected = std::abs(out.ray.direction.x()) > 0.5;
+            EXPECT_EQ(out.power, is_reflected ? 0.4 : 0.6);
+            EXPECT_LT((out.ray.direction - (is_reflected ? x : z)).norm(), direction_rounding);
+            // The splitting face is met at z = x: the reflected beam leaves at that height.
+            const Vector3d leaves =
+                is_reflected ? Vector3d(0.0, aim.y(), aim.x()) + 0.5 * edge * x : aim + 0.5 * edge * z;
+            EXPECT_LT((out.ray.origin - leaves).norm(), length_rounding);
+            const Path path = tree.path_to(int(&out - tree.segments.data()));
+            EXPECT_NEAR(path.optical_length, air.index * (50.0 - 0.5 * edge) + glass.index * edge, length_rounding);
+        }
+    }
+}
+
+TEST(CubeSplitter, TurnedByAnAngleTurnsTheReflectedBeamByTwiceIt) {
+    // Turned about y, in the plane of incidence. The reflected path through the cube, unfolded at the splitting face,
+    // is one through a plane plate, whichever way the cube stands: refraction turns nothing.
+    const Ray ray{{1.0, 2.0, -50.0}, Vector3d::UnitZ()};
+    for (const double turn : {1e-6, 1e-3, -0.1, 0.2}) {
+        const Scene scene(make_cube_splitter(20.0, glass, 0.5, 0.0, {{0.5, 0.0, 3.0}, rotation_exp({0.0, turn, 0.0})}));
+        const RayTree tree = trace_tree(scene, air, ray);
+        int left = 0;
+        for (const Segment& out : tree.segments) {
+            if (out.end != SegmentEnd::left) continue;
+            ++left;
+            const bool is_reflected = out.ray.direction.x() > 0.5;
+            const Vector3d expected =
+                is_reflected ? Vector3d(std::cos(2.0 * turn), 0.0, -std::sin(2.0 * turn)) : Vector3d(Vector3d::UnitZ());
+            EXPECT_LT((out.ray.direction - expected).norm(), direction_rounding) << turn;
+        }
+        EXPECT_EQ(left, 2);
+    }
+}
+
+TEST(CubeSplitter, NoRaySlipsPastTheSplittingFaceInsideItsMargin) {
+    // A grid right up to the margin of 1e-4 edges: each ray is split once, and none is lost at the cube's edges.
+    const double edge = 20.0, clear = (0.5 - 1.2e-4) * edge;
+    const Placement placement{{400.0, -300.0, 250.0}, rotation_exp({0.3, 0.2, -0.4})};
+    const Scene scene(make_cube_splitter(edge, glass, 0.5, 0.0, placement));
+    constexpr int n = 40;
+    for (int i = -n; i <= n; ++i)
+        for (int k = -n; k <= n; ++k) {
+            const Vector3d aim(clear * i / n, clear * k / n, -30.0);
+            const RayTree tree =
+                trace_tree(scene, air, {placement.position + placement.rotation * aim, placement.rotation.col(2)});
+            ASSERT_EQ(tree.segments.size(), 6u) << aim.transpose();
+            EXPECT_EQ(tree.left, 1.0);
+        }
+    // In the margin it goes straight on.
+    const Vector3d aim(0.5 * edge * (1.0 - 1e-4), 0.0, -30.0);
+    EXPECT_EQ(trace_tree(scene, air, {placement.position + placement.rotation * aim, placement.rotation.col(2)})
+                  .segments.size(),
+              3u);
+}
+
+TEST(Placed, FacesStandWhereTheirBodyIsMadeThere) {
+    const Placement placement{{10.0, -20.0, 300.0}, rotation_exp({0.3, -0.2, 0.7})};
+    const auto moved = placed(make_wedge(20.0, 30.0, 5.0, 0.1, glass), placement);
+    const auto made = make_wedge(20.0, 30.0, 5.0, 0.1, glass, placement);
+    ASSERT_EQ(moved.size(), made.size());
+    for (std::size_t f = 0; f < made.size(); ++f) {
+        EXPECT_LT((moved[f].point - made[f].point).norm(), length_rounding);
+        EXPECT_LT((moved[f].normal - made[f].normal).norm(), direction_rounding);
+        for (std::size_t k = 0; k < made[f].outline.size(); ++k)
+            EXPECT_LT((moved[f].outline[k] - made[f].outline[k]).norm(), length_rounding);
+        EXPECT_EQ(moved[f].behind.index, glass.index);
+    }
+}
+
 TEST(Body, WhatIsNoConvexBodyIsRefusedByName) {
     const std::vector<Vector3d> cube = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                         {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
@@ -167,6 +248,13 @@ TEST(Body, WhatIsNoConvexBodyIsRefusedByName) {
     expect_refused([] { make_wedge(10.0, 10.0, 1.0, 0.5, glass); }, "wedge angle");
     expect_refused([] { make_prism(10.0, 10.0, 4.0, glass); }, "apex");
     expect_refused([] { make_corner_cube(-1.0, glass); }, "depth");
+    expect_refused([] { make_cube_splitter(0.0, glass); }, "edge");
+    expect_refused([] { make_cube_splitter(10.0, glass, 0.7, 0.4); }, "together");
+    expect_refused([] { make_cube_splitter(10.0, glass, -0.1); }, "reflectance");
+    expect_refused([] { make_mirror(10.0, std::nan("")); }, "height");
+    expect_refused([] { make_mirror(10.0, 10.0, 1.1); }, "reflectance");
+    expect_refused([] { make_screen(-1.0, 10.0); }, "width");
+    expect_refused([&] { make_body(cube, std::vector<std::vector<int>>(1'000'000, sides[0]), glass); }, "20000");
 }
 
 }  // namespace

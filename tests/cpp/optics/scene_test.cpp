@@ -52,6 +52,12 @@ TEST(Scene, RayThatMeetsNothingIsAMiss) {
     EXPECT_FALSE(scene.first_hit({{0.0, -10.1, 0.0}, {0.0, 0.0, 1.0}}));
     EXPECT_TRUE(scene.first_hit({{19.9, 9.9, 0.0}, {0.0, 0.0, 1.0}}));
     EXPECT_FALSE(Scene({}).first_hit({{0.0, 0.0, 0.0}, {0.0, 0.0, 1.0}}));
+    const Scene added = Scene({}).with({mirror_at(300.0)});
+    EXPECT_TRUE(added.first_hit({{0.0, 0.0, 0.0}, {0.0, 0.0, 1.0}}));
+    EXPECT_FALSE(added.first_hit({{0.0, 0.0, 0.0}, {0.0, 0.0, -1.0}}));
+    EXPECT_FALSE(added.first_hit({{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0}}));
+    EXPECT_FALSE(added.first_hit({{0.0, 0.0, 300.0}, {1.0, 0.0, 0.0}}));  // within its plane
+    EXPECT_FALSE(added.first_hit({{20.1, 0.0, 0.0}, {0.0, 0.0, 1.0}}));
 }
 
 TEST(Scene, OutlineOfAPolygonIsRespected) {
@@ -129,6 +135,52 @@ TEST(Scene, RayNeverMeetsAgainTheFaceItJustLeft) {
     EXPECT_LT(grazing, 200);
 }
 
+TEST(Scene, FacesAddedAreMetAsIfTheSceneWereMadeWithThem) {
+    Random random;
+    std::vector<Face> fixed, added;
+    for (int i = 0; i < 30; ++i) {
+        const Vector3d centre(random.uniform(-100.0, 100.0), random.uniform(-100.0, 100.0),
+                              random.uniform(-100.0, 100.0));
+        (i % 5 ? fixed : added)
+            .push_back(make_rectangle(centre, stepdiag::rotation_exp(2.0 * random.direction()), {60.0, 40.0},
+                                      Surface::reflecting));
+    }
+    std::vector<Face> all = fixed;
+    all.insert(all.end(), added.begin(), added.end());
+    const Scene whole(all), base(fixed),
+        composite = base.with({added[0], added[1]}).with({added.begin() + 2, added.end()});
+    ASSERT_EQ(composite.face_count(), 30);
+    EXPECT_EQ(base.face_count(), 24);
+    for (int i = 0; i < 30; ++i) EXPECT_EQ(composite.face(i).point, all[i].point);
+    int met = 0, different = 0;
+    for (int i = 0; i < 20'000; ++i) {
+        const stepdiag::Ray ray{150.0 * random.direction(), random.direction()};
+        const auto expected = whole.first_hit(ray), hit = composite.first_hit(ray);
+        if (hit.has_value() != expected.has_value() || (hit && hit->face != expected->face)) {
+            ++different;
+            continue;
+        }
+        if (!hit) continue;
+        ++met;
+        EXPECT_EQ(hit->distance, expected->distance);
+        EXPECT_EQ(hit->point, expected->point);
+    }
+    EXPECT_GT(met, 2000);
+    EXPECT_LE(different, 2);  // rays within single precision of an edge
+}
+
+TEST(Scene, AddedFacesOfABodyLetNoRaySlipBetweenThem) {
+    const stepdiag::Placement placement{{100.0, 50.0, -30.0}, stepdiag::rotation_exp({0.3, -0.1, 0.2})};
+    const auto cube = stepdiag::make_corner_cube(20.0, {1.5}, placement);
+    const Scene scene = Scene({}).with(cube);
+    for (int i = 0; i < 1000; ++i) {  // at the three edges that meet in the origin
+        const Vector3d edge = cube[1 + i % 3].outline[1] - cube[1].outline[0];
+        const Vector3d target = cube[1].outline[0] + (i + 1) / 1001.0 * edge;
+        const Vector3d origin = placement.position + placement.rotation * Vector3d(0.0, 0.0, 19.0);
+        EXPECT_TRUE(scene.first_hit({origin, (target - origin).normalized()}));
+    }
+}
+
 TEST(Scene, FaceThatMakesNoSenseIsRefusedByItsNumber) {
     const auto change = [](auto edit) {
         Face face = mirror_at(10.0);
@@ -147,4 +199,11 @@ TEST(Scene, FaceThatMakesNoSenseIsRefusedByItsNumber) {
     expect_refused(change([](Face& f) { f.normal *= 1.001; }), "face 1");
     expect_refused(change([](Face& f) { f.normal.setZero(); }), "face 1");
     expect_refused(change([](Face& f) { f.normal.y() = undefined; }), "face 1");
+    expect_refused(change([](Face& f) { f.reflectance = 1.1; }), "face 1");
+    expect_refused(change([](Face& f) { f.reflectance = undefined; }), "face 1");
+    expect_refused(change([](Face& f) { f.absorptance = -0.1; }), "face 1");
+    expect_refused(change([](Face& f) { f.surface = Surface::splitting, f.absorptance = 0.1; }), "together");
+    expect_refused(change([](Face& f) { f.behind.index = 0.9; }), "face 1: expected an index");
+    expect_refused(change([](Face& f) { f.before = stepdiag::Medium{undefined}; }), "face 1: expected an index");
+    expect_refused([] { Scene({mirror_at(20.0)}).with({mirror_at(10.0), Face{}}); }, "face 2");
 }

@@ -26,11 +26,11 @@ enum class SegmentEnd {
 };
 
 struct Segment {
-    int parent;               // index of the segment that it comes from; -1: the source
-    Ray ray;                  // where it starts
-    double index;             // of the medium it runs in
-    double power;             // share of the source's power, at its start
-    std::optional<Hit> hit;   // where it meets a face
+    int parent;                  // index of the segment that it comes from; -1: the source
+    Ray ray;                     // where it starts
+    double index;                // of the medium it runs in
+    double power;                // share of the source's power, at its start
+    std::optional<Hit> hit;      // where it meets a face
     std::optional<Event> event;  // how it came out of its parent's hit; none for the source
     SegmentEnd end;
 };
@@ -43,12 +43,13 @@ struct RayTree {
 
     // Segments absorbed at this face, strongest first.
     std::vector<int> arrivals(int face) const;
-    // The way from the source to the end of a segment.
+    // The way from the source to the end of a segment. Throws InvalidArgument for one that goes on: its way ends with
+    // another one.
     Path path_to(int segment) const;
 };
 
 // A source of power 1 in the ambient medium. The strongest branches are followed first, so that a limit on the number
-// of segments cuts the weakest.
+// of segments cuts the weakest. Throws InvalidArgument for limits that make no sense.
 RayTree trace_tree(const Scene& scene, const Medium& ambient, const Ray& ray, const TreeLimits& limits = {});
 
 }  // namespace stepdiag

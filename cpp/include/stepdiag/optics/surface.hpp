@@ -11,7 +11,8 @@ enum class Surface {
     reflecting,  // reflects the share `reflectance`, absorbs the rest
     absorbing,
     refracting,  // all light goes on, refracted or else totally reflected
-    splitting,   // light goes both ways: `reflectance` back, `absorptance` lost, the rest on by Snell's law
+    splitting,   // light goes both ways: `reflectance` back, `absorptance` lost, the rest on by Snell's law; where that
+                 // has no solution, all that is not lost is totally reflected
 };
 
 // Law of reflection, r = d - 2(n.d)n, for a unit normal of either side.
