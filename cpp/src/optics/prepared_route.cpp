@@ -8,10 +8,16 @@
 namespace stepdiag {
 namespace {
 
-bool varies(const LaneValue& value) {
-    if (value.stride != 0 && value.stride != 1)
-        throw InvalidArgument("replay: expected a stride of 0 or 1, got " + std::to_string(value.stride));
-    return value.stride != 0;
+// Whether one of them varies.
+template <std::size_t size>
+bool vary(const std::array<LaneValue, size>& values) {
+    bool any = false;
+    for (const LaneValue& value : values) {
+        if (value.stride != 0 && value.stride != 1)
+            throw InvalidArgument("replay: expected a stride of 0 or 1, got " + std::to_string(value.stride));
+        any |= value.stride != 0;
+    }
+    return any;
 }
 
 bool reads_both_indices(const Encounter& encounter) {
@@ -24,46 +30,54 @@ PreparedRoute::PreparedRoute(const std::vector<Encounter>& route, const LaneRays
                              std::size_t width, std::size_t padded_below)
     : lanes_(lanes),
       width_(width),
+      size_(route.size()),
       padded_(lanes < padded_below),
-      rows_(new double[(14 * route.size() + 8) * width]),
+      encounters_(new PreparedEncounter[size_]),
+      rows_(new double[(14 * size_ + 8) * width]),
       next_row_(rows_.get()) {
+    vary(rays.origin), vary(rays.direction), vary(std::array{rays.optical_length, rays.reduced_length});
     for (int k = 0; k < 3; ++k) start[k] = source(rays.origin[k]), start[3 + k] = source(rays.direction[k]);
     start[6] = source(rays.optical_length);
     start[7] = source(rays.reduced_length);
+    for (std::size_t i = 0; i < size_; ++i) prepare(route[i], encounters_[i]);
+}
 
-    encounters.resize(route.size());
-    for (std::size_t i = 0; i < route.size(); ++i) {
-        const Encounter& encounter = route[i];
-        PreparedEncounter& made = encounters[i];
-        made.event = encounter.event;
-        made.deflects = encounter.deflects;
-        made.outline = encounter.outline;
+void PreparedRoute::prepare(const Encounter& encounter, PreparedEncounter& made) {
+    made.event = encounter.event;
+    made.deflects = encounter.deflects;
+    made.outline = encounter.outline;
 
-        made.plane_by_lane = false;
-        const auto plane = [&](int k) { return k < 9 ? encounter.rotation[k] : encounter.translation[k - 9]; };
-        for (int k = 0; k < 12; ++k) made.plane_by_lane |= varies(plane(k));
-        for (int k = 0; k < 12; ++k)
-            if (made.plane_by_lane) made.numbers[k] = source(plane(k));
-            else made.plane[k] = *plane(k).value;
+    const bool rotation_varies = vary(encounter.rotation), translation_varies = vary(encounter.translation);
+    made.plane_by_lane = rotation_varies || translation_varies;
+    if (made.plane_by_lane) {
+        for (int k = 0; k < 9; ++k) made.plane_from[k] = source(encounter.rotation[k]);
+        for (int k = 0; k < 3; ++k) made.plane_from[9 + k] = source(encounter.translation[k]);
+    } else {
+        for (int k = 0; k < 9; ++k) made.plane[k] = *encounter.rotation[k].value;
+        for (int k = 0; k < 3; ++k) made.plane[9 + k] = *encounter.translation[k].value;
+    }
 
-        const LaneValue& before = encounter.index_before;
-        const LaneValue& after = reads_both_indices(encounter) ? encounter.index_after : before;
-        made.indices_by_lane = varies(before) || varies(after);
-        if (made.indices_by_lane) {
-            made.numbers[PreparedEncounter::index_before] = source(before);
-            made.numbers[PreparedEncounter::index_after] = source(after);
-        } else {
-            made.index_before_after[0] = *before.value;
-            made.index_before_after[1] = *after.value;
-        }
+    const LaneValue& before = encounter.index_before;
+    const LaneValue& after = reads_both_indices(encounter) ? encounter.index_after : before;
+    made.indices_by_lane = vary(std::array{before, after});
+    if (made.indices_by_lane) {
+        made.index_before_from = source(before);
+        made.index_after_from = source(after);
+    } else {
+        made.index_before = *before.value;
+        made.index_after = *after.value;
+        made.inverse_index = 1.0 / made.index_before;
+        made.index_ratio = made.index_before / made.index_after;
     }
 }
 
 LaneSource PreparedRoute::source(const LaneValue& value) {
-    if (varies(value) && !padded_) return {value.value, ~std::size_t(0)};
+    if (value.stride != 0 && !padded_) return {value.value, ~std::size_t(0)};
     double* const row = next_row_;
     next_row_ += width_;
-    for (std::size_t i = 0; i < width_; ++i) row[i] = value.value[value.stride ? std::min(i, lanes_ - 1) : 0];
+    const std::size_t given = value.stride != 0 ? std::min(lanes_, width_) : 1;
+    for (std::size_t i = 0; i < given; ++i) row[i] = value.value[i];
+    for (std::size_t i = given; i < width_; ++i) row[i] = row[given - 1];
     return {row, 0};
 }
 

@@ -1,4 +1,4 @@
-// A route as replay.cpp walks it: what is common to all lanes copied beside each other, the rest as pointers.
+// A route as replay.cpp walks it: what is common to all lanes copied side by side, the rest as pointers.
 #pragma once
 
 #include <cstddef>
@@ -17,16 +17,15 @@ struct LaneSource {
 };
 
 struct PreparedEncounter {
-    static constexpr int index_before = 12, index_after = 13;  // among `numbers`, behind rotation and translation
-
     Event event;
     bool deflects;
     bool plane_by_lane, indices_by_lane;
     const Outline* outline;
-    double plane[12];  // where common: rotation and translation,
-    double index_before_after[2];
-    double inverse_index, index_ratio, one_less_ratio2;  // and of the indices 1/n1, mu = n1/n2, 1 - mu^2
-    LaneSource numbers[14];                              // where by lane
+    double plane[12];                                   // where common: rotation and translation,
+    double index_before, index_after, one_less_ratio2;  // and of the indices n1, n2, 1 - (n1/n2)^2
+    double inverse_index, index_ratio;                  // 1/n1, n1/n2
+    LaneSource plane_from[12];                          // where by lane
+    LaneSource index_before_from, index_after_from;
 };
 
 class PreparedRoute {
@@ -37,14 +36,18 @@ public:
     PreparedRoute(const std::vector<Encounter>& route, const LaneRays& rays, std::size_t lanes, std::size_t width,
                   std::size_t padded_below);
 
-    std::vector<PreparedEncounter> encounters;
     LaneSource start[8];  // origin, direction, optical and reduced length
+    PreparedEncounter* begin() const { return encounters_.get(); }
+    PreparedEncounter* end() const { return encounters_.get() + size_; }
 
 private:
+    void prepare(const Encounter& encounter, PreparedEncounter& made);
     LaneSource source(const LaneValue& value);
 
-    std::size_t lanes_, width_;
+    std::size_t lanes_, width_, size_;
     bool padded_;
+    // Both without initial values: a call for one lane should not cost that of hundreds.
+    std::unique_ptr<PreparedEncounter[]> encounters_;
     std::unique_ptr<double[]> rows_;
     double* next_row_;
 };

@@ -24,12 +24,10 @@ struct CommonFace {
     std::size_t lane;
 
     HWY_INLINE N common(double value) const { return broadcast(Type<N>(), value); }
-    HWY_INLINE N by_lane(int k) const {
-        return load(Type<N>(), encounter.numbers[k].from + (lane & encounter.numbers[k].mask));
-    }
+    HWY_INLINE N by_lane(const LaneSource& source) const { return load(Type<N>(), source.from + (lane & source.mask)); }
     HWY_INLINE N rotation(int k) const { return common(encounter.plane[k]); }
     HWY_INLINE N translation(int k) const { return common(encounter.plane[9 + k]); }
-    HWY_INLINE N index() const { return common(encounter.index_before_after[0]); }
+    HWY_INLINE N index() const { return common(encounter.index_before); }
     HWY_INLINE N inverse_index() const { return common(encounter.inverse_index); }
     HWY_INLINE N index_ratio() const { return common(encounter.index_ratio); }
     HWY_INLINE N one_less_ratio2() const { return common(encounter.one_less_ratio2); }
@@ -38,32 +36,28 @@ struct CommonFace {
 // ... where the plane is that of each lane ...
 template <class N>
 struct FaceByLane : CommonFace<N> {
-    HWY_INLINE N rotation(int k) const { return this->by_lane(k); }
-    HWY_INLINE N translation(int k) const { return this->by_lane(9 + k); }
+    HWY_INLINE N rotation(int k) const { return this->by_lane(this->encounter.plane_from[k]); }
+    HWY_INLINE N translation(int k) const { return this->by_lane(this->encounter.plane_from[9 + k]); }
 };
 
 // ... and where the indices are.
 template <class N, class Plane>
 struct IndicesByLane : Plane {
-    HWY_INLINE N index() const { return this->by_lane(PreparedEncounter::index_before); }
+    HWY_INLINE N index() const { return this->by_lane(this->encounter.index_before_from); }
     HWY_INLINE N inverse_index() const { return this->common(1.0) / index(); }
-    HWY_INLINE N index_ratio() const { return index() / this->by_lane(PreparedEncounter::index_after); }
+    HWY_INLINE N index_ratio() const { return index() / this->by_lane(this->encounter.index_after_from); }
     HWY_INLINE N one_less_ratio2() const {
         const N ratio = index_ratio();
         return sub_mul(ratio, ratio, this->common(1.0));
     }
 };
 
-// The same numbers by the same operations, once for all lanes: the same bits.
-void prepare_indices(PreparedRoute& route) {
-    const Vector one = broadcast(Type<Vector>(), 1.0);
-    for (PreparedEncounter& encounter : route.encounters) {
-        if (encounter.indices_by_lane) continue;
-        const Vector index = broadcast(Type<Vector>(), encounter.index_before_after[0]);
-        const Vector ratio = index / broadcast(Type<Vector>(), encounter.index_before_after[1]);
-        encounter.inverse_index = hn::GetLane(one / index);
-        encounter.index_ratio = hn::GetLane(ratio);
-        encounter.one_less_ratio2 = hn::GetLane(sub_mul(ratio, ratio, one));
+// By the operation that IndicesByLane takes, so that the bits are the same.
+void prepare_indices(const PreparedRoute& route) {
+    for (PreparedEncounter& encounter : route) {
+        const Vector ratio = broadcast(Type<Vector>(), encounter.index_ratio);
+        if (!encounter.indices_by_lane)
+            encounter.one_less_ratio2 = hn::GetLane(sub_mul(ratio, ratio, broadcast(Type<Vector>(), 1.0)));
     }
 }
 
@@ -75,7 +69,7 @@ HWY_INLINE void follow(const PreparedRoute& route, std::size_t lane, double gap,
     for (int k = 0; k < 8; ++k) start[k] = load(n, route.start[k].from + (lane & route.start[k].mask));
     const N zero = broadcast(n, 0.0), nearest = broadcast(n, gap);
     Light<N> light{{start[0], start[1], start[2]}, {start[3], start[4], start[5]}, start[6], start[7], zero <= zero};
-    for (const PreparedEncounter& encounter : route.encounters) {
+    for (const PreparedEncounter& encounter : route) {
         const CommonFace<N> face{encounter, lane};
         if (encounter.indices_by_lane && encounter.plane_by_lane)
             meet(encounter, IndicesByLane<N, FaceByLane<N>>{{face}}, nearest, light);
