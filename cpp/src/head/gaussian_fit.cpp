@@ -1,0 +1,122 @@
+#include "head/gaussian_fit.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "head/spot_profile.hpp"
+
+namespace stepdiag {
+namespace {
+
+using Vector5 = Eigen::Matrix<double, 5, 1>;
+using Matrix5 = Eigen::Matrix<double, 5, 5>;
+
+constexpr double window_radii = 2.5;     // beyond it lies 4e-6 of the light
+constexpr double smallest_radius = 0.3;  // pixels; below, shares tell nothing of radius nor of position
+
+PixelWindow window_around(const PixelSpot& spot, const Eigen::MatrixXd& image) {
+    const double half = window_radii * spot.radius + 1.5;
+    const auto part = [half](double centre, Eigen::Index size) {
+        const double first = std::clamp(std::floor(centre - half), 0.0, double(size));
+        const double end = std::clamp(std::ceil(centre + half), 0.0, double(size));
+        return std::pair(int(first), int(end - first));
+    };
+    const auto [column, columns] = part(spot.x, image.cols());
+    const auto [row, rows] = part(spot.y, image.rows());
+    return {column, row, columns, rows};
+}
+
+// Half a radius sideways, and a third of the radius, is as far as the derivatives are good for.
+double step_share(const PixelSpot& spot, const Vector5& step) {
+    const double sideways = std::max(std::abs(step[0]), std::abs(step[1])) / (0.5 * spot.radius);
+    return 1.0 / std::max({1.0, sideways, std::abs(step[2]) / (0.3 * spot.radius)});
+}
+
+PixelSpot moved(const PixelSpot& spot, const Vector5& step, const Eigen::MatrixXd& image) {
+    const double largest_radius = 2.0 * double(std::max(image.rows(), image.cols()));
+    return {spot.x + step[0], spot.y + step[1], std::clamp(spot.radius + step[2], smallest_radius, largest_radius),
+            std::max(spot.electrons + step[3], 0.1 * spot.electrons), spot.background + step[4]};
+}
+
+bool inside(const PixelSpot& spot, const Eigen::MatrixXd& image) {
+    return spot.x >= 0.0 && spot.x <= double(image.cols()) && spot.y >= 0.0 && spot.y <= double(image.rows());
+}
+
+// Steps until one is below a thousandth of the standard deviation that the noise leaves anyway.
+std::optional<PixelSpot> climb(const Eigen::MatrixXd& image, const PixelWindow& window, const PixelNoise& noise,
+                               PixelSpot spot) {
+    constexpr int most_steps = 50;
+    constexpr double least_step = 1e-3;
+    for (int i = 0; i < most_steps; ++i) {
+        const FisherScoring at = score(image, window, noise, spot);
+        const auto step = solve(at.information, at.score);
+        if (!step) return std::nullopt;
+        const double share = step_share(spot, *step);
+        spot = moved(spot, share * *step, image);
+        if (share == 1.0 && step->dot(at.score) < least_step * least_step) return spot;
+    }
+    return std::nullopt;
+}
+
+}  // namespace
+
+FisherScoring score(const Eigen::MatrixXd& image, const PixelWindow& window, const PixelNoise& noise,
+                    const PixelSpot& spot) {
+    FisherScoring sum;
+    const Eigen::ArrayX3d X = pixel_shares_and_derivatives(spot.x, spot.radius, window.column, 1.0, window.columns);
+    // A column's derivatives are made of these: Y, its derivatives and 1.
+    Eigen::Matrix<double, Eigen::Dynamic, 4> basis(window.rows, 4);
+    basis << pixel_shares_and_derivatives(spot.y, spot.radius, window.row, 1.0, window.rows).matrix(),
+        Eigen::VectorXd::Ones(window.rows);
+    Eigen::Matrix<double, Eigen::Dynamic, 4> weighted(window.rows, 4);
+    Eigen::ArrayXd mean(window.rows), weight(window.rows);
+
+    for (int j = 0; j < window.columns; ++j) {
+        const auto electrons = image.col(window.column + j).segment(window.row, window.rows).array();
+        const double A = spot.electrons, share = X(j, 0);
+        mean = A * share * basis.col(0).array() + spot.background;
+        weight = noise.shot ? (1.0 / (mean.max(0.0) + noise.variance)).eval()
+                            : Eigen::ArrayXd::Constant(window.rows, 1.0 / noise.variance);
+        weight = (electrons < noise.saturation).select(weight, 0.0);
+        weighted = basis.array().colwise() * weight;
+
+        Eigen::Matrix<double, 5, 4> from_basis = Eigen::Matrix<double, 5, 4>::Zero();
+        from_basis(0, 0) = A * X(j, 1);
+        from_basis(1, 1) = A * share;
+        from_basis(2, 0) = A * X(j, 2);
+        from_basis(2, 2) = A * share;
+        from_basis(3, 0) = share;
+        from_basis(4, 3) = 1.0;
+        const Eigen::Matrix4d products = weighted.transpose().lazyProduct(basis);
+        const Eigen::Vector4d residuals = weighted.transpose().lazyProduct((electrons - mean).matrix());
+        sum.information.noalias() += from_basis * products * from_basis.transpose();
+        sum.score.noalias() += from_basis * residuals;
+    }
+    return sum;
+}
+
+std::optional<Vector5> solve(const Matrix5& information, const Vector5& b) {
+    if (!(information.diagonal().minCoeff() > 0.0) || !information.allFinite()) return std::nullopt;
+    const Vector5 scale = information.diagonal().cwiseSqrt().cwiseInverse();  // electrons and pixels in one matrix
+    const Eigen::LLT<Matrix5> factor(scale.asDiagonal() * information * scale.asDiagonal());
+    if (factor.info() != Eigen::Success) return std::nullopt;
+    const Vector5 x = scale.asDiagonal() * factor.solve(scale.asDiagonal() * b);
+    return x.allFinite() ? std::optional(x) : std::nullopt;
+}
+
+std::optional<PixelSpot> fit_gaussian(const Eigen::MatrixXd& image, const PixelNoise& noise, PixelSpot start) {
+    constexpr int most_windows = 5;
+    for (int i = 0; i < most_windows; ++i) {
+        const auto spot = climb(image, window_around(start, image), noise, start);
+        if (!spot || !inside(*spot, image)) return std::nullopt;
+        // The window is good enough for a spot that is a tenth off what it was made for.
+        const double off =
+            std::max({std::abs(spot->x - start.x), std::abs(spot->y - start.y), std::abs(spot->radius - start.radius)});
+        start = *spot;
+        if (off < 0.1 * start.radius) break;
+    }
+    return start;
+}
+
+}  // namespace stepdiag
