@@ -1,4 +1,5 @@
-// From one Embree query to a traced reading, and the closed definition of the same reading beside it.
+// From one Embree query to a traced reading, and the closed definition of the same reading beside it; and what a mirror
+// costs that moves in front of a head of many faces.
 #include <benchmark/benchmark.h>
 
 #include <vector>
@@ -93,6 +94,61 @@ void closed_definition_of_a_reading(benchmark::State& state) {
     for (auto _ : state) benchmark::DoNotOptimize(bench.closed(i++ % poses));
 }
 
+// Squares in rows of ten along z, each row a plane.
+std::vector<stepdiag::Face> squares(int count) {
+    std::vector<stepdiag::Face> faces;
+    for (int i = 0; i < count; ++i)
+        faces.push_back(make_rectangle({2.0 * (i % 10) - 9.0, 0.0, -1.0 * (i / 10)}, Matrix3d::Identity(), {1.5, 1.5},
+                                       Surface::absorbing));
+    return faces;
+}
+
+stepdiag::Face moving_mirror(int i) {
+    return make_rectangle({0.0, 0.0, 300.0 + i % poses}, stepdiag::rotation_exp({1e-6 * (i % poses), 0.0, 0.0}),
+                          {80, 80}, Surface::reflecting);
+}
+
+void new_scene(benchmark::State& state) {
+    const auto fixed = squares(int(state.range(0)));
+    int i = 0;
+    for (auto _ : state) {
+        auto faces = fixed;
+        faces.push_back(moving_mirror(i++));
+        benchmark::DoNotOptimize(stepdiag::Scene(std::move(faces)));
+    }
+}
+
+void scene_with_another_mirror(benchmark::State& state) {
+    const stepdiag::Scene fixed(squares(int(state.range(0))));
+    int i = 0;
+    for (auto _ : state) benchmark::DoNotOptimize(fixed.with({moving_mirror(i++)}));
+}
+
+// A query that the mirror answers, and one that the fixed faces do.
+void query_of(benchmark::State& state, const stepdiag::Scene& scene) {
+    const stepdiag::Ray out{{1.0, 0.0, 5.0}, Vector3d::UnitZ()}, back{{1.0, 0.0, 5.0}, -Vector3d::UnitZ()};
+    expect_near(scene.first_hit(out)->distance, 295.0, 1e-12, "distance of the mirror");
+    expect_near(scene.first_hit(back)->distance, 5.0, 1e-12, "distance of a square");
+    for (auto _ : state) {
+        benchmark::DoNotOptimize(scene.first_hit(out));
+        benchmark::DoNotOptimize(scene.first_hit(back));
+    }
+}
+
+void two_queries(benchmark::State& state) {
+    auto faces = squares(int(state.range(0)));
+    faces.push_back(moving_mirror(0));
+    query_of(state, stepdiag::Scene(faces));
+}
+
+void two_queries_with_the_mirror_added(benchmark::State& state) {
+    query_of(state, stepdiag::Scene(squares(int(state.range(0)))).with({moving_mirror(0)}));
+}
+
+BENCHMARK(new_scene)->Arg(10)->Arg(40)->Arg(1000);
+BENCHMARK(scene_with_another_mirror)->Arg(10)->Arg(40)->Arg(1000);
+BENCHMARK(two_queries)->Arg(10)->Arg(40)->Arg(1000);
+BENCHMARK(two_queries_with_the_mirror_added)->Arg(10)->Arg(40)->Arg(1000);
 BENCHMARK(embree_query);
 BENCHMARK(scene_of_two_faces);
 BENCHMARK(path_through_a_scene);

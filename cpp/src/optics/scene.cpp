@@ -200,7 +200,15 @@ struct Scene::Tree {
 
 Scene::Scene(std::vector<Face> faces) {
     check(faces, 0);
-    tree_ = std::make_shared<const Tree>(std::move(faces));
+    const std::size_t count = faces.size(), triangles = count_corners(faces) - 2 * count;
+    try {
+        tree_ = std::make_shared<const Tree>(std::move(faces));
+    } catch (const std::bad_alloc&) {
+        const double need = 150.0 * double(triangles) / 1e6;  // measured with 1e5, 1e6 and 4e6 faces of four corners
+        throw InvalidArgument("scene: " + std::to_string(count) + " faces need about " +
+                              std::to_string(std::lround(need) + 1) +
+                              " MB of memory beside their own, more than there is");
+    }
     gap_ = tree_->gap;
 }
 

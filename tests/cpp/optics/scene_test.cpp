@@ -7,6 +7,7 @@
 #include <random>
 
 #include "refuses.hpp"
+#include "sphere.hpp"
 #include "stepdiag/core/rotation.hpp"
 
 namespace {
@@ -133,6 +134,23 @@ TEST(Scene, RayNeverMeetsAgainTheFaceItJustLeft) {
         EXPECT_GT(hit->distance, 9.0);
     }
     EXPECT_LT(grazing, 200);
+}
+
+TEST(Scene, HitOnABodyOfAThousandFacesIsOnItsSphere) {
+    const double radius = 100.0;
+    const auto sphere = make_sphere(radius, 24, 42);
+    ASSERT_EQ(sphere.size(), 1008u);
+    const Scene scene(sphere);
+    Random random;
+    for (int i = 0; i < 2000; ++i) {
+        const Vector3d direction = random.direction();
+        const auto hit = scene.first_hit({Vector3d::Zero(), direction});
+        ASSERT_TRUE(hit);
+        EXPECT_LE(hit->distance, radius * (1.0 + 1e-12));
+        EXPECT_GT(hit->distance, radius * std::cos(0.5 * stepdiag::pi / 12.0));  // half a ring's chord below it
+        for (const Face& face : sphere)                                   // the nearest plane, as this body is convex
+            EXPECT_LE((hit->point - face.point).dot(face.normal), 1e-4);  // but for edges in single precision
+    }
 }
 
 TEST(Scene, FacesAddedAreMetAsIfTheSceneWereMadeWithThem) {

@@ -39,7 +39,7 @@ std::vector<Face> placed(std::vector<Face> faces, const Placement& placement);
 // A convex polyhedron with refracting faces. `faces`: corners by index, in order around each face, either way round.
 // Throws InvalidArgument for fewer than four faces, an index out of range, a face that is not planar (to 1e-9 of the
 // body's size), an edge that does not join exactly two faces (an open body), a body that is not convex, an index
-// below 1, more faces than `most_faces_of_a_body` (each is held against every corner: some seconds at that number).
+// below 1, more faces than `most_faces_of_a_body` (each is held against every corner: 0.6 s at that number).
 constexpr int most_faces_of_a_body = 20000;
 std::vector<Face> make_body(const std::vector<Eigen::Vector3d>& corners, const std::vector<std::vector<int>>& faces,
                             Medium glass, const Placement& placement = {});

