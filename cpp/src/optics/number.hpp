@@ -6,6 +6,8 @@
 
 #include <utility>
 
+#include "stepdiag/optics/dual.hpp"
+
 namespace stepdiag {
 
 template <class N>
@@ -14,5 +16,14 @@ struct Type {};
 // What a comparison gives: bool, or a mask of lanes.
 template <class N>
 using Truth = decltype(std::declval<N>() > std::declval<N>());
+
+inline Dual mul_add(Dual a, Dual b, Dual c) { return a * b + c; }
+inline Dual sub_mul(Dual a, Dual b, Dual c) { return c - a * b; }
+inline Dual root(Dual a) { return sqrt(a); }
+inline Dual magnitude(Dual a) { return abs(a); }
+inline Dual negative(Dual a) { return -a; }
+inline Dual with_sign(Dual a, Dual sign) { return std::signbit(sign.value) ? -a : a; }
+inline bool both(bool p, bool q) { return p && q; }
+inline Dual broadcast(Type<Dual>, double value) { return {value}; }
 
 }  // namespace stepdiag

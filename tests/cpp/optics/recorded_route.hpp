@@ -1,9 +1,14 @@
-// A traced path as a route to replay, and its lanes.
+// A bench of glass and mirrors, its traced path as a route to replay, and lanes of rays.
 #pragma once
 
+#include <Eigen/Geometry>
+#include <cmath>
 #include <deque>
+#include <random>
 #include <vector>
 
+#include "stepdiag/core/rotation.hpp"
+#include "stepdiag/core/units.hpp"
 #include "stepdiag/optics/path.hpp"
 #include "stepdiag/optics/replay.hpp"
 
@@ -13,7 +18,9 @@ struct RecordedRoute {
     std::deque<stepdiag::Outline> outlines;
     std::deque<double> indices;
     std::vector<stepdiag::Encounter> route;
+    std::vector<int> faces;  // of the scene
 
+    RecordedRoute() = default;
     RecordedRoute(const stepdiag::Scene& scene, const stepdiag::Medium& ambient, const stepdiag::Ray& ray,
                   const stepdiag::Path& path) {
         Eigen::Vector3d from = ray.origin;
@@ -25,6 +32,7 @@ struct RecordedRoute {
             const bool refracts = face.surface == stepdiag::Surface::refracting;
             const double beyond = refracts ? (enters ? face.behind.index : outside) : index;
             meet(path.events[i], face, index, beyond);
+            faces.push_back(path.hits[i].face);
             if (path.events[i] == stepdiag::Event::refracted) index = beyond;
             from = path.hits[i].point;
         }
@@ -78,3 +86,73 @@ struct RayLanes {
     Eigen::Vector3d point(std::size_t lane) const { return {end[0][lane], end[1][lane], end[2][lane]}; }
     Eigen::Vector3d direction(std::size_t lane) const { return {end[3][lane], end[4][lane], end[5][lane]}; }
 };
+
+// Through a plate and a wedge, by a right-angle prism to a mirror and back the same way; all a little out of place.
+struct Bench {
+    static constexpr int plate = 0, wedge = 6, prism = 12, mirror = 17, screen = 18, faces = 19;  // where theirs start
+    stepdiag::Medium air{1.00027}, glass{1.5009};
+    stepdiag::Ray ray{{0, 0, 0}, {0, 0, 1}};
+    stepdiag::Scene scene;
+
+    explicit Bench(unsigned seed = 1) : scene(made(seed)) {}
+
+    stepdiag::Path path() const { return trace(scene, air, ray); }
+    RecordedRoute record() const { return RecordedRoute(scene, air, ray, path()); }
+
+private:
+    std::vector<stepdiag::Face> made(unsigned seed) const {
+        std::mt19937 random(seed);
+        std::uniform_real_distribution<double> turn(-0.01, 0.01);
+        const auto rotation = [&](double about_y) {
+            const double x = turn(random), y = turn(random), z = turn(random);
+            return Eigen::Matrix3d(stepdiag::rotation_exp({x, y, z}) * stepdiag::rotation_exp({0, about_y, 0}));
+        };
+        std::vector<stepdiag::Face> faces;
+        const auto add = [&](const std::vector<stepdiag::Face>& body) {
+            faces.insert(faces.end(), body.begin(), body.end());
+        };
+        constexpr double pi = stepdiag::pi;
+        add(stepdiag::make_plate(40, 40, 6, glass, {{0, 0, 60}, rotation(0)}));
+        add(stepdiag::make_wedge(40, 40, 8, 0.01, glass, {{0, 0, 120}, rotation(0)}));
+        // Legs square to z and x, the hypotenuse turns z into x.
+        add(stepdiag::make_prism(60, 60, 0.5 * pi, glass, {{-1, 0, 201}, rotation(0.75 * pi)}));
+        faces.push_back(make_rectangle({700, 0, 200}, rotation(0.5 * pi), {200, 200}, stepdiag::Surface::reflecting));
+        faces.push_back(make_rectangle({0, 0, -50}, rotation(0), {500, 500}, stepdiag::Surface::absorbing));
+        return faces;
+    }
+};
+
+// All numbers of an encounter that its event uses.
+inline std::vector<stepdiag::LaneValue*> numbers(stepdiag::Encounter& encounter) {
+    std::vector<stepdiag::LaneValue*> all{&encounter.index_before};
+    for (auto& value : encounter.rotation) all.push_back(&value);
+    for (auto& value : encounter.translation) all.push_back(&value);
+    if (encounter.event == stepdiag::Event::totally_reflected ||
+        (encounter.event == stepdiag::Event::refracted && encounter.deflects))
+        all.push_back(&encounter.index_after);
+    return all;
+}
+
+// Every number of a route as an array of lanes.
+struct ByLane {
+    std::deque<std::vector<double>> arrays;
+
+    void spread(std::vector<stepdiag::Encounter>& route, std::size_t lanes) {
+        for (stepdiag::Encounter& encounter : route)
+            for (stepdiag::LaneValue* value : numbers(encounter)) {
+                arrays.emplace_back(lanes, *value->value);
+                *value = {arrays.back().data(), 1};
+            }
+    }
+};
+
+// Lanes that start a little beside each other.
+inline RayLanes fan(const Bench& bench, std::size_t lanes) {
+    RayLanes fan(lanes, bench.ray);
+    for (std::size_t i = 0; i < lanes; ++i) {
+        fan.start[0][i] = 0.01 * double(i % 17);
+        fan.start[1][i] = 0.013 * double(i % 13);
+        fan.start[6][i] = double(i);
+    }
+    return fan;
+}

@@ -1,0 +1,30 @@
+// A number with its derivative by one parameter: (a + a' e)(b + b' e) = ab + (a'b + ab') e with e^2 = 0. Calculating
+// with such numbers gives exact derivatives (forward mode). Comparisons are those of the values.
+#pragma once
+
+#include <cmath>
+
+namespace stepdiag {
+
+struct Dual {
+    double value = 0.0;
+    double slope = 0.0;
+};
+
+inline Dual operator-(Dual a) { return {-a.value, -a.slope}; }
+inline Dual operator+(Dual a, Dual b) { return {a.value + b.value, a.slope + b.slope}; }
+inline Dual operator-(Dual a, Dual b) { return {a.value - b.value, a.slope - b.slope}; }
+inline Dual operator*(Dual a, Dual b) { return {a.value * b.value, a.slope * b.value + a.value * b.slope}; }
+inline Dual operator/(Dual a, Dual b) {
+    const double quotient = a.value / b.value;
+    return {quotient, (a.slope - quotient * b.slope) / b.value};
+}
+inline Dual sqrt(Dual a) {
+    const double root = std::sqrt(a.value);
+    return {root, 0.5 * a.slope / root};
+}
+inline Dual abs(Dual a) { return std::signbit(a.value) ? -a : a; }
+inline bool operator>(Dual a, Dual b) { return a.value > b.value; }
+inline bool operator<=(Dual a, Dual b) { return a.value <= b.value; }
+
+}  // namespace stepdiag
