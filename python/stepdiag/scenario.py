@@ -74,7 +74,7 @@ def simulate_scenario(scenario: Scenario) -> _core.Measurement:
             scenario.head,
             misalignment=dict(scenario.misalignment),
             noise=scenario.noise,
-            refractive_index=scenario.refractive_index,
+            environment=_core.Environment(scenario.refractive_index),
         )
 
 

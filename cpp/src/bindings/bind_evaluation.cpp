@@ -1,12 +1,11 @@
 #include "bindings.hpp"
 #include "stepdiag/evaluation/conventional.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
-#include "stepdiag/head/head.hpp"
 
 namespace stepdiag::bindings {
 namespace {
 
-Calibration evaluate(const Measurement& measurement, const Plan& plan, const Head& head, const ChainLike& chain,
+Calibration evaluate(const Measurement& measurement, const Plan& plan, const HeadLike& head, const ChainLike& chain,
                      const ArrayLike& tool, const std::string& method, const ReadingUncertainty& uncertainty,
                      bool full_covariance) {
     const auto evaluator = method == "enhanced"       ? &evaluate_enhanced
@@ -15,8 +14,9 @@ Calibration evaluate(const Measurement& measurement, const Plan& plan, const Hea
     if (!evaluator) throw InvalidArgument("method: expected \"conventional\" or \"enhanced\", got \"" + method + "\"");
     const Eigen::Vector3d offset = to_vector3(tool, "tool");
     const Chain kinematics = to_chain(chain);
+    const HeadCalibrations heads = to_heads(head, plan).calibration();
     py::gil_scoped_release release;
-    return evaluator(measurement, plan, kinematics, offset, head.calibration(), {uncertainty, full_covariance});
+    return evaluator(measurement, plan, kinematics, offset, heads, {uncertainty, full_covariance});
 }
 
 std::vector<std::pair<std::string, std::optional<double>>> covariance_labels(const Calibration& calibration) {
@@ -117,7 +117,7 @@ void bind_evaluation(py::module_& m) {
     m.def("evaluate", &evaluate, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
           py::arg("tool") = zeros(3), py::kw_only(), py::arg("method") = "enhanced",
           py::arg("uncertainty") = ReadingUncertainty{}, py::arg("full_covariance") = false,
-          "Calibration from a run. Of the head only psd_distance and beam_offsets are used, of the machine only chain "
+          "Calibration from a run. Of the head only its calibration is used, of the machine only chain "
           "and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan.");
 }
 

@@ -12,14 +12,34 @@ Eigen::Vector2d to_finite_pair(const ArrayLike& array, const char* key) {
 
 }  // namespace
 
+Heads to_heads(const HeadLike& heads, const Plan& plan) {
+    if (py::isinstance<Head>(heads)) return heads.cast<Head>();
+    if (!py::isinstance<py::dict>(heads))
+        throw InvalidArgument("head: expected a Head, or a dict with one for each line, got " +
+                              std::string(py::str(py::type::handle_of(heads))));
+    auto by_line = heads.cast<std::map<std::string, Head>>();
+    std::vector<Line> lines = plan.lines();
+    lines.insert(lines.end(), plan.scale_lines().begin(), plan.scale_lines().end());
+    for (const Line& line : lines)
+        if (!by_line.count(line.name())) throw InvalidArgument("head: line \"" + line.name() + "\" has none");
+    Head first = by_line.begin()->second;
+    return {std::move(first), std::move(by_line)};
+}
+
 void bind_simulation(py::module_& m) {
     py::class_<Head>(
         m, "Head",
-        "A laser head: layout \"ideal\" (ray-traced), \"psd\" or \"multi_beam\"; lengths in mm, wavelength in nm.")
+        "A laser head by the closed definition of its layout's readings: \"ideal\" (ray-traced), \"psd\" or "
+        "\"multi_beam\"; from_design makes a traced one. Lengths in mm, wavelength in nm.")
         .def(py::init([](const std::string& layout, double standoff, double psd_distance,
                          const std::vector<ArrayLike>& beam_offsets, double wavelength, double aperture,
                          const std::optional<ArrayLike>& mirror) {
-                 Head head{parse_head_layout(layout), standoff, psd_distance, {}, wavelength, aperture, std::nullopt};
+                 Head head;
+                 head.layout = parse_head_layout(layout);
+                 head.standoff = standoff;
+                 head.psd_distance = psd_distance;
+                 head.wavelength = wavelength;
+                 head.aperture = aperture;
                  for (const auto& offset : beam_offsets)
                      head.beam_offsets.push_back(to_vector2(offset, "beam_offsets"));
                  if (mirror) head.mirror = to_vector2(*mirror, "mirror");
@@ -32,6 +52,29 @@ void bind_simulation(py::module_& m) {
              py::arg("mirror") = std::nullopt,
              "mirror: (width, height); none: as large as the plan needs. Raises InvalidArgument for lengths that are "
              "not positive and for beams on one line.")
+        .def_static(
+            "from_design",
+            [](const HeadDesign& design, double standoff, const std::optional<ArrayLike>& mirror,
+               const std::map<std::string, std::pair<ArrayLike, ArrayLike>>& pose_errors,
+               const std::optional<std::string>& reading_model) {
+                PoseErrors errors;
+                for (const auto& [component, error] : pose_errors)
+                    errors[component] = {to_vector3(error.first, "pose_errors"),
+                                         to_vector3(error.second, "pose_errors")};
+                return make_head(design, standoff, mirror ? std::optional(to_vector2(*mirror, "mirror")) : std::nullopt,
+                                 std::move(errors),
+                                 reading_model ? std::optional(parse_reading_model(*reading_model)) : std::nullopt);
+            },
+            py::arg("design"), py::kw_only(), py::arg("standoff") = Head{}.standoff, py::arg("mirror") = std::nullopt,
+            py::arg("pose_errors") = py::dict(), py::arg("reading_model") = std::nullopt,
+            "A traced head. pose_errors: component name -> (shift in mm, rotation vector in rad about its own origin), "
+            "both along the head's axes. reading_model: of all interferometers instead of the design's. Raises "
+            "InvalidArgument.")
+        .def_property_readonly(
+            "design",
+            [](const Head& head) { return head.design ? std::optional<HeadDesign>(*head.design) : std::nullopt; })
+        .def_property_readonly("calibration", &Head::calibration,
+                               "What evaluators know of the head, by a nominal trace where it has a design.")
         .def_property_readonly("layout", [](const Head& head) { return name(head.layout); })
         .def_readonly("standoff", &Head::standoff)
         .def_readonly("psd_distance", &Head::psd_distance)
@@ -51,46 +94,58 @@ void bind_simulation(py::module_& m) {
 
     py::class_<Misalignment>(
         m, "Misalignment",
-        "How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm.")
-        .def(py::init([](const ArrayLike& reflector, const ArrayLike& laser, const ArrayLike& psd_zero) {
+        "How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm, "
+        "a constant of all distances and one of each beam d1 ... dn in mm.")
+        .def(py::init([](const ArrayLike& reflector, const ArrayLike& laser, const ArrayLike& psd_zero,
+                         double distance_constant, const std::vector<double>& beam_constants) {
                  return Misalignment{to_finite_pair(reflector, "reflector"), to_finite_pair(laser, "laser"),
-                                     to_finite_pair(psd_zero, "psd_zero")};
+                                     to_finite_pair(psd_zero, "psd_zero"), distance_constant, beam_constants};
              }),
              py::arg("reflector") = zeros(2), py::arg("laser") = zeros(2), py::arg("psd_zero") = zeros(2),
+             py::arg("distance_constant") = 0.0, py::arg("beam_constants") = std::vector<double>{},
              "Raises InvalidArgument for what is no pair of finite numbers.")
+        .def_readonly("distance_constant", &Misalignment::distance_constant)
+        .def_readonly("beam_constants", &Misalignment::beam_constants)
         .def_property_readonly("reflector", [](const Misalignment& m) { return to_numpy_vector(m.reflector); })
         .def_property_readonly("laser", [](const Misalignment& m) { return to_numpy_vector(m.laser); })
         .def_property_readonly("psd_zero", [](const Misalignment& m) { return to_numpy_vector(m.psd_zero); });
 
     py::class_<Noise>(m, "Noise",
                       "Standard deviations of an independent Gaussian per reading: distance (mm; also d1 ...), tilt "
-                      "(rad), spot (mm).")
-        .def(py::init([](double distance, double tilt, double spot, const IntegerLike& seed) {
-                 const Noise noise{distance, tilt, spot, to_seed(seed)};
+                      "(rad), spot (mm); common (mm): one draw a row, added to all of its distances.")
+        .def(py::init([](double distance, double tilt, double spot, const IntegerLike& seed, double common) {
+                 const Noise noise{distance, tilt, spot, to_seed(seed), common};
                  check_noise(noise);
                  return noise;
              }),
              py::arg("distance") = 0.0, py::arg("tilt") = 0.0, py::arg("spot") = 0.0, py::arg("seed") = integer(0),
+             py::arg("common") = 0.0,
              "Raises InvalidArgument for a deviation that is negative or not finite, and for a seed outside 0 .. 2^64 "
              "- 1.")
         .def_readonly("distance", &Noise::distance)
         .def_readonly("tilt", &Noise::tilt)
         .def_readonly("spot", &Noise::spot)
+        .def_readonly("common", &Noise::common)
         .def_readonly("seed", &Noise::seed);
 
     m.def(
         "simulate",
-        [](const Machine& machine, const Plan& plan, const Head& head,
-           const std::map<std::string, Misalignment>& misalignment, const Noise& noise, double refractive_index) {
+        [](const Machine& machine, const Plan& plan, const HeadLike& head,
+           const std::map<std::string, Misalignment>& misalignment, const Noise& noise, const Environment& environment,
+           const std::optional<Environment>& assumed, double verified_share) {
+            const Heads heads = to_heads(head, plan);
             py::gil_scoped_release release;
-            return simulate(machine, plan, head, {misalignment, noise, Medium{refractive_index}});
+            return simulate(machine, plan, heads, {misalignment, noise, environment, assumed, verified_share});
         },
         py::arg("machine"), py::arg("plan"), py::arg("head"), py::kw_only(),
         py::arg("misalignment") = std::map<std::string, Misalignment>{}, py::arg("noise") = Noise{},
-        py::arg("refractive_index") = 1.0,
-        "A run on the virtual machine: lines of the plan, then its scale lines. misalignment: by line name; a line "
-        "without an entry is aligned. "
-        "Readings whose beam misses the mirror or does not come back are lost (NaN). Raises InvalidArgument.");
+        py::arg("environment") = Environment{}, py::arg("assumed_environment") = std::nullopt,
+        py::arg("verified_share") = SimulationOptions{}.verified_share,
+        "A run on the virtual machine: lines of the plan, then its scale lines. head: one, or a dict with one for each "
+        "line. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace; "
+        "assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's "
+        "replayed poses, traced again and compared. Readings whose beam misses the mirror or does not come back are "
+        "lost (NaN). Raises InvalidArgument; RuntimeError where a replay and its trace differ.");
 }
 
 }  // namespace stepdiag::bindings

@@ -13,6 +13,8 @@
 
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/machine/chain.hpp"
+#include "stepdiag/optics/body.hpp"
+#include "stepdiag/simulation/simulate.hpp"
 
 namespace py = pybind11;
 
@@ -32,6 +34,12 @@ class IntegerLike : public py::object {
 class ChainLike : public py::object {
     PYBIND11_OBJECT_DEFAULT(ChainLike, py::object, PyObject_Type)
 };
+class HeadLike : public py::object {
+    PYBIND11_OBJECT_DEFAULT(HeadLike, py::object, PyObject_Type)
+};
+class MaterialLike : public py::object {
+    PYBIND11_OBJECT_DEFAULT(MaterialLike, py::object, PyObject_Type)
+};
 class PathLike : public py::object {
     PYBIND11_OBJECT_DEFAULT(PathLike, py::object, PyObject_Type)
 };
@@ -49,6 +57,8 @@ std::uint64_t to_seed(const IntegerLike& number);
 std::string to_path(const PathLike& path);
 Chain to_chain(const ChainLike& chain);  // a Chain, or its text
 Axis to_axis(const std::string& name);
+Placement to_placement(const ArrayLike& position, const ArrayLike& rotation);  // a rotation vector
+Heads to_heads(const HeadLike& heads, const Plan& plan);                      // a Head, or one for each line
 
 DoubleArray to_numpy(const std::vector<double>& values);
 DoubleArray to_numpy(const std::vector<std::optional<double>>& values);  // NaN where there is none
@@ -63,6 +73,9 @@ inline ArrayLike zeros(int size) {
 void bind_machine(py::module_& m);
 void bind_plan(py::module_& m);
 void bind_measurement(py::module_& m);
+void bind_body(py::module_& m);
+void bind_head(py::module_& m);
+void bind_traced_head(py::module_& m);
 void bind_simulation(py::module_& m);
 void bind_evaluation(py::module_& m);
 
@@ -80,6 +93,14 @@ struct handle_type_name<stepdiag::bindings::IntegerLike> {
 template <>
 struct handle_type_name<stepdiag::bindings::ChainLike> {
     static constexpr auto name = const_name("Chain | str");
+};
+template <>
+struct handle_type_name<stepdiag::bindings::HeadLike> {
+    static constexpr auto name = const_name("Head | collections.abc.Mapping[str, Head]");
+};
+template <>
+struct handle_type_name<stepdiag::bindings::MaterialLike> {
+    static constexpr auto name = const_name("str | float");
 };
 template <>
 struct handle_type_name<stepdiag::bindings::PathLike> {

@@ -152,6 +152,8 @@ PYBIND11_MODULE(_core, m) {
     bind_machine(m);
     bind_plan(m);
     bind_measurement(m);
+    bind_head(m);
     bind_simulation(m);
+    bind_traced_head(m);
     bind_evaluation(m);
 }

@@ -61,10 +61,10 @@ private:
 }  // namespace
 
 Calibration evaluate_conventional(const Measurement& measurement, const Plan& plan, const Chain& chain,
-                                  const Eigen::Vector3d& tool, const HeadCalibration& head,
+                                  const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                                   const EvaluationOptions& options) {
     if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
-    const auto visits = collect_visits(measurement, plan, head, options.uncertainty, LengthKind::distance);
+    const auto visits = collect_visits(measurement, plan, heads, options.uncertainty, LengthKind::distance);
     std::vector<bool> usable;
     for (const Visit& visit : visits) usable.push_back(visit.line.is_body_diagonal());
     const auto diagonals = std::count(usable.begin(), usable.end(), true);

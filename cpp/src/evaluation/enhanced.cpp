@@ -223,10 +223,10 @@ std::vector<std::string> explain(const EnhancedMap& map, const Plan& plan) {
 }  // namespace
 
 Calibration evaluate_enhanced(const Measurement& measurement, const Plan& plan, const Chain& chain,
-                              const Eigen::Vector3d& tool, const HeadCalibration& head,
+                              const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                               const EvaluationOptions& options) {
     if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
-    const auto visits = collect_visits(measurement, plan, head, options.uncertainty, LengthKind::lever_arm_corrected);
+    const auto visits = collect_visits(measurement, plan, heads, options.uncertainty, LengthKind::lever_arm_corrected);
     const EnhancedMap map(visits, plan, chain, tool);
     Calibration calibration{"enhanced", chain, plan.volume(), tool, {}, {}, explain(map, plan), {}};
     evaluate_linear(map, visits, plan, options.full_covariance, calibration);

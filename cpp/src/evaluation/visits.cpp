@@ -49,10 +49,10 @@ struct Reduced {
 class Reducer {
 public:
     // Tilts and spots are not looked at where only distances count.
-    Reducer(const Measurement& measurement, const HeadCalibration& head, const ReadingUncertainty& uncertainty,
+    Reducer(const Measurement& measurement, const HeadCalibrations& heads, const ReadingUncertainty& uncertainty,
             LengthKind kind)
         : measurement_(measurement),
-          head_(head),
+          heads_(heads),
           uncertainty_(uncertainty),
           distance_(measurement.find("distance")),
           alpha_(kind == LengthKind::distance ? nullptr : measurement.find("alpha")),
@@ -60,13 +60,9 @@ public:
           spot_x_(kind == LengthKind::distance ? nullptr : measurement.find("spot_x")),
           spot_y_(kind == LengthKind::distance ? nullptr : measurement.find("spot_y")) {
         const int beams = measurement.beam_count();
-        if (beams > 0 && beams != int(head.beam_offsets.size()))
-            throw InvalidArgument("measurement: has " + std::to_string(beams) + " beams d1 ... d" +
-                                  std::to_string(beams) + ", but the head's beam_offsets name " +
-                                  std::to_string(head.beam_offsets.size()));
+        check(heads.head, beams);
+        for (const auto& entry : heads.by_line) check(entry.second, beams);
         for (int i = 1; i <= beams; ++i) beams_.push_back(measurement.find("d" + std::to_string(i)));
-        if (spot_x_ && !head.psd_distance)
-            throw InvalidArgument("measurement: has spot readings, but the head has no psd_distance (layout \"psd\")");
     }
 
     Reduced reduce(std::size_t row) const {
@@ -74,6 +70,16 @@ public:
     }
 
 private:
+    void check(const HeadCalibration& head, int beams) const {
+        if (beams > 0 && beams != int(head.beam_offsets.size()))
+            throw InvalidArgument("measurement: has " + std::to_string(beams) + " beams d1 ... d" +
+                                  std::to_string(beams) + ", but the head's beam_offsets name " +
+                                  std::to_string(head.beam_offsets.size()));
+        if (spot_x_ && !head.psd_distance)
+            throw InvalidArgument("measurement: has spot readings, but the head has no psd_distance (layout \"psd\")");
+    }
+    const HeadCalibration& head(std::size_t row) const { return heads_.of(measurement_.stations()[row].line.name()); }
+
     [[noreturn]] void refuse(std::size_t row, const std::string& what) const {
         throw InvalidArgument(row_name(measurement_, row) + ": " + what);
     }
@@ -111,23 +117,25 @@ private:
             result.effects.push_back({distance->standard_uncertainty, 0.0, 0.0});
             return result;
         }
-        const auto reduced = reduce_spot(distance->value, {x->value, y->value}, *head_.psd_distance,
-                                         head_.spot_beam);
+        const HeadCalibration& calibration = head(row);
+        const auto reduced =
+            reduce_spot(distance->value, {x->value, y->value}, *calibration.psd_distance, calibration.spot_beam);
         if (!reduced)
             refuse(row, "no mirror gives this distance and spot with psd_distance " +
-                            std::to_string(*head_.psd_distance) + " mm");
+                            std::to_string(*calibration.psd_distance) + " mm");
         result.take(*reduced, {distance->standard_uncertainty, x->standard_uncertainty, y->standard_uncertainty});
         return result;
     }
 
     Reduced reduce_beam_row(std::size_t row) const {
+        const HeadCalibration& calibration = head(row);
         std::vector<double> distances, standard_uncertainties;
         std::vector<Eigen::Vector2d> offsets;
         for (std::size_t i = 0; i < beams_.size(); ++i)
             if (const auto beam = raw_value(beams_[i], row, uncertainty_.distance)) {
                 distances.push_back(beam->value);
                 standard_uncertainties.push_back(beam->standard_uncertainty);
-                offsets.push_back(head_.beam_offsets[i]);
+                offsets.push_back(calibration.beam_offsets[i]);
             }
         Reduced result;
         const auto reduced =
@@ -137,7 +145,7 @@ private:
     }
 
     const Measurement& measurement_;
-    const HeadCalibration& head_;
+    const HeadCalibrations& heads_;
     const ReadingUncertainty& uncertainty_;
     const Channel *distance_, *alpha_, *beta_, *spot_x_, *spot_y_;
     std::vector<const Channel*> beams_;
@@ -183,14 +191,14 @@ Eigen::Vector3d VisitPoint::variance() const {
     return variance;
 }
 
-std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& plan, const HeadCalibration& head,
+std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& plan, const HeadCalibrations& heads,
                                   const ReadingUncertainty& uncertainty, LengthKind kind) {
     for (const auto& [key, u] : {std::pair("distance", uncertainty.distance), std::pair("tilt", uncertainty.tilt),
                                  std::pair("spot", uncertainty.spot)})
         if (!(u > 0.0 && std::isfinite(u)))
             throw InvalidArgument(std::string("uncertainty.") + key +
                                   ": expected a positive finite standard uncertainty");
-    const Reducer reducer(measurement, head, uncertainty, kind);
+    const Reducer reducer(measurement, heads, uncertainty, kind);
     std::map<std::pair<int, std::string>, std::vector<std::size_t>> rows;
     for (std::size_t i = 0; i < measurement.size(); ++i)
         rows[{measurement.stations()[i].run, measurement.stations()[i].line.name()}].push_back(i);

@@ -43,7 +43,7 @@ enum class LengthKind {
 
 // Throws InvalidArgument naming the row for a line or point that is not the plan's, a commanded position more than 1 um
 // off the plan's, channels that do not fit the head, or readings that no mirror gives.
-std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& plan, const HeadCalibration& head,
+std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& plan, const HeadCalibrations& heads,
                                   const ReadingUncertainty& uncertainty, LengthKind kind);
 
 // A step of one axis over one of its intervals, as one visit made it; scale lines make none.

@@ -19,8 +19,8 @@ std::size_t sensor_of(const HeadDesign& design, const HeadBeam& beam);  // its i
 // the light that comes back to it, then the sensors.
 struct Assembly {
     std::vector<Face> faces;
-    std::vector<int> component;   // of each face: bodies, beams, sensors counted through
-    std::vector<int> beam_face;   // by beam: the square around the source
+    std::vector<int> component;    // of each face: bodies, beams, sensors counted through
+    std::vector<int> beam_face;    // by beam: the square around the source
     std::vector<int> sensor_face;  // by sensor
 };
 

@@ -4,6 +4,7 @@
 
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/core/rotation.hpp"
+#include "stepdiag/head/nominal_head.hpp"
 #include "stepdiag/optics/path.hpp"
 
 namespace stepdiag {
@@ -40,10 +41,30 @@ void check_head(const Head& head) {
     }
 }
 
+Head make_head(HeadDesign design, double standoff, const std::optional<Eigen::Vector2d>& mirror, PoseErrors pose_errors,
+               std::optional<ReadingModel> reading_model) {
+    check_design(design);
+    for (HeadBeam& beam : design.beams)
+        if (beam.interferometer && reading_model) beam.interferometer->model = *reading_model;
+    Head head;
+    head.layout = design.layout;
+    head.standoff = standoff;
+    head.mirror = mirror;
+    head.wavelength = design.beams.front().mode.wavelength;
+    head.nominal = nominal_head(design, standoff).calibration;
+    head.psd_distance = head.nominal.psd_distance.value_or(0.0);
+    head.beam_offsets = head.nominal.beam_offsets;
+    head.pose_errors = std::move(pose_errors);
+    head.design = std::make_shared<const HeadDesign>(std::move(design));
+    check_head(head);
+    TracedHead(*head.design, head.pose_errors, {}, {1.0, 1.0});  // checks the pose errors
+    return head;
+}
+
 HeadSetup set_up(const Head& head, const Eigen::Matrix3d& machine_R_line, const Eigen::Vector3d& first_point,
                  const Eigen::Vector2d& mirror, const Misalignment& misalignment) {
     return {first_point - head.standoff * machine_R_line.col(2), turned(machine_R_line, misalignment.laser),
-            turned(machine_R_line, misalignment.reflector), mirror, misalignment.psd_zero};
+            turned(machine_R_line, misalignment.reflector), mirror};
 }
 
 std::optional<Reading> trace_reading(const Head& head, const HeadSetup& setup, const Eigen::Vector3d& functional_point,
@@ -69,6 +90,13 @@ std::optional<Reading> define_reading(const HeadSetup& setup, const Eigen::Vecto
     return read_mirror(sensor_R_machine * (functional_point - setup.origin), sensor_R_machine * normal);
 }
 
+MirrorPose mirror_in_sensor_frame(const HeadSetup& setup, const Eigen::Vector3d& functional_point,
+                                  const Eigen::Matrix3d& machine_R_tool) {
+    const Eigen::Matrix3d sensor_R_machine = setup.machine_R_sensor.transpose();
+    return {sensor_R_machine * (functional_point - setup.origin),
+            sensor_R_machine * machine_R_tool * setup.tool_R_mirror};
+}
+
 std::vector<std::string> signal_names(const Head& head) {
     switch (head.layout) {
         case HeadLayout::ideal: return {"distance", "alpha", "beta"};
@@ -80,11 +108,11 @@ std::vector<std::string> signal_names(const Head& head) {
     return names;
 }
 
-Eigen::VectorXd signals(const Head& head, const HeadSetup& setup, const Reading& reading) {
+Eigen::VectorXd signals(const Head& head, const Reading& reading) {
     switch (head.layout) {
         case HeadLayout::ideal: return Eigen::Vector3d(reading.distance, reading.alpha, reading.beta);
         case HeadLayout::psd: {
-            const Eigen::Vector2d spot = spot_position(reading, head.psd_distance) + setup.psd_zero;
+            const Eigen::Vector2d spot = spot_position(reading, head.psd_distance);
             return Eigen::Vector3d(reading.distance, spot.x(), spot.y());
         }
         case HeadLayout::multi_beam: break;

@@ -12,7 +12,7 @@ namespace stepdiag {
 // Throws InvalidArgument for fewer than three body diagonals, or readings that do not belong to the plan.
 // Rotations are absent from the result. Scale lines and other lines are not used.
 Calibration evaluate_conventional(const Measurement& measurement, const Plan& plan, const Chain& chain,
-                                  const Eigen::Vector3d& tool, const HeadCalibration& head,
+                                  const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                                   const EvaluationOptions& options = {});
 
 }  // namespace stepdiag

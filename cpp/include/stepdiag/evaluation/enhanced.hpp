@@ -21,7 +21,7 @@ namespace stepdiag {
 
 // Throws InvalidArgument for readings that do not belong to the plan, or where nothing at all can be determined.
 Calibration evaluate_enhanced(const Measurement& measurement, const Plan& plan, const Chain& chain,
-                              const Eigen::Vector3d& tool, const HeadCalibration& head,
+                              const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                               const EvaluationOptions& options = {});
 
 }  // namespace stepdiag

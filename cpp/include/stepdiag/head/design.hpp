@@ -1,5 +1,5 @@
-// The design of a laser head: bodies of glass, beams and detectors, as drawn. Everything stands in the head's frame: origin
-// in the reference plane (z = 0), where the beam of d1 or of the distance starts, the mirror at +z.
+// The design of a laser head: bodies of glass, beams and detectors, as drawn. Everything stands in the head's frame:
+// origin in the reference plane (z = 0), where the beam of d1 or of the distance starts, the mirror at +z.
 #pragma once
 
 #include <Eigen/Core>
@@ -38,7 +38,7 @@ struct HeadBeam {
     GaussianMode mode;
     std::optional<Interferometer> interferometer;  // or
     std::string sensor;                            // the sensor that the beam comes to
-    double housing = 10.0;                         // edge of the square around the source that stops light, mm; spot beams
+    double housing = 10.0;  // edge of the square around the source that stops light, mm; spot beams
 };
 
 // Sensor in the x-y plane of its own frame, light from either side.
@@ -58,8 +58,8 @@ struct HeadDesign {
     TreeLimits limits;
 };
 
-// How a component stands out of its place: turned about its own origin by a rotation vector, then shifted, both along the
-// head's axes.
+// How a component stands out of its place: turned about its own origin by a rotation vector, then shifted, both along
+// the head's axes.
 struct PoseError {
     Eigen::Vector3d shift = Eigen::Vector3d::Zero();     // mm
     Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  // rad

@@ -1,17 +1,19 @@
-// Laser heads: what stands before the mirror and what it reads.
-//   ideal       one interferometer beam that also senses the mirror's two tilts; ray-traced
-//   psd         layout b: interferometer and position sensing device (by the closed definition of its readings)
-//   multi_beam  layout a: three or more parallel interferometer beams (by the closed definition of their readings)
-// The head is fixed in the machine frame, the mirror on the tool. Its reference plane holds the beam's origin o and is
-// normal to the beam; o lies `standoff` before the line's first commanded functional point.
+// Laser heads: what stands before the mirror and what it reads. A head of the layout psd or multi_beam reads by the
+// closed definition of its readings, or is made of bodies, beams and detectors (a design) and ray-traced; the ideal
+// head is traced to its mirror and back. The head is fixed in the machine frame, the mirror on the tool. Its reference
+// plane holds the beam's origin o and is normal to the beam; o lies `standoff` before the line's first commanded
+// functional point.
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "stepdiag/head/design.hpp"
 #include "stepdiag/head/head_layout.hpp"
+#include "stepdiag/head/traced_head.hpp"
 #include "stepdiag/measurement/head_calibration.hpp"
 #include "stepdiag/measurement/reading.hpp"
 #include "stepdiag/optics/medium.hpp"
@@ -29,10 +31,22 @@ struct Head {
 
     static constexpr double mirror_margin = 25.0;  // on every side, mm
 
+    // A head of bodies and beams, its components out of place, and what it is calibrated with. Made by make_head.
+    std::shared_ptr<const HeadDesign> design = {};
+    PoseErrors pose_errors = {};
+    HeadCalibration nominal = {};
+
     HeadCalibration calibration() const {
-    return {layout == HeadLayout::psd ? std::optional(psd_distance) : std::nullopt, beam_offsets};
+        if (design) return nominal;
+        return {layout == HeadLayout::psd ? std::optional(psd_distance) : std::nullopt, beam_offsets};
     }
 };
+
+// A traced head; its layout, wavelength and calibration come from the design (nominal_head). `reading_model`: of all
+// its interferometers, instead of the design's. Throws InvalidArgument for a design that makes no sense (check_design),
+// a standoff within the head, pose errors of components that it does not have.
+Head make_head(HeadDesign design, double standoff, const std::optional<Eigen::Vector2d>& mirror = std::nullopt,
+               PoseErrors pose_errors = {}, std::optional<ReadingModel> reading_model = std::nullopt);
 
 // Throws InvalidArgument for lengths that are not positive or finite, and for beams on one line.
 void check_head(const Head& head);
@@ -42,6 +56,8 @@ struct Misalignment {
     Eigen::Vector2d reflector = Eigen::Vector2d::Zero();  // (a, b): mirror normal R_tool F Exp(a, b, 0) z, rad
     Eigen::Vector2d laser = Eigen::Vector2d::Zero();      // (a, b): sensor axes F Exp(a, b, 0), turned about o, rad
     Eigen::Vector2d psd_zero = Eigen::Vector2d::Zero();   // layout psd: what a centred spot reads, mm
+    double distance_constant = 0.0;                       // of all distances, mm
+    std::vector<double> beam_constants = {};              // layout multi_beam: of d1 ... dn each, mm; empty: none
 };
 
 // A head and its mirror set up on one line.
@@ -50,7 +66,6 @@ struct HeadSetup {
     Eigen::Matrix3d machine_R_sensor;  // F Exp(laser)
     Eigen::Matrix3d tool_R_mirror;     // F Exp(reflector)
     Eigen::Vector2d mirror;            // width and height, mm
-    Eigen::Vector2d psd_zero;          // mm
 };
 
 // `machine_R_line`: the line's frame F; `first_point`: its first commanded functional point P0 (tool offset included),
@@ -66,8 +81,12 @@ std::optional<Reading> trace_reading(const Head& head, const HeadSetup& setup, c
 std::optional<Reading> define_reading(const HeadSetup& setup, const Eigen::Vector3d& functional_point,
                                       const Eigen::Matrix3d& machine_R_tool);
 
+// The mirror in the sensor frame: centre and axes.
+MirrorPose mirror_in_sensor_frame(const HeadSetup& setup, const Eigen::Vector3d& functional_point,
+                                  const Eigen::Matrix3d& machine_R_tool);
+
 // Names of the signals a head gives (channels of a Measurement), and their values for a reading.
 std::vector<std::string> signal_names(const Head& head);
-Eigen::VectorXd signals(const Head& head, const HeadSetup& setup, const Reading& reading);
+Eigen::VectorXd signals(const Head& head, const Reading& reading);
 
 }  // namespace stepdiag

@@ -1,6 +1,7 @@
-// A head as its design says, with its components out of their places: which light of its beams comes back from a mirror.
-// Two ways to the same answer: the Embree trace of a pose's whole ray tree, which finds the faces, and the replay of the
-// paths it found, for many poses at once. Everything is in the sensor frame: beam along +z, reference plane z = 0.
+// A head as its design says, with its components out of their places: which light of its beams comes back from a
+// mirror. Two ways to the same answer: the Embree trace of a pose's whole ray tree, which finds the faces, and the
+// replay of the paths it found, for many poses at once. Everything is in the sensor frame: beam along +z, reference
+// plane z = 0.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,6 +21,9 @@ struct MirrorPose {
     Eigen::Vector3d point;
     Eigen::Matrix3d rotation;
 };
+
+// The mirror with this centre and the tilts alpha and beta: its normal is along (beta, -alpha, 1).
+MirrorPose tilted_mirror(const Eigen::Vector3d& point, double alpha, double beta);
 
 // Light of a beam where it belongs: on its collimator's plane, or on its sensor; in the frame of that component.
 struct Arrival {

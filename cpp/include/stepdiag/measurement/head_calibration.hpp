@@ -2,7 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace stepdiag {
@@ -17,6 +20,19 @@ struct HeadCalibration {
     Eigen::Vector2d spot_beam = Eigen::Vector2d::Zero();
     // What windows and splitters add to each distance of a nominal head, mm; the head has taken it off its readings.
     std::vector<double> head_constants = {};
+};
+
+// Of all lines' heads.
+struct HeadCalibrations {
+    HeadCalibration head;
+    std::map<std::string, HeadCalibration> by_line;  // of the lines that have another one, by name
+
+    HeadCalibrations(HeadCalibration head = {}, std::map<std::string, HeadCalibration> by_line = {})
+        : head(std::move(head)), by_line(std::move(by_line)) {}
+    const HeadCalibration& of(const std::string& line) const {
+        const auto found = by_line.find(line);
+        return found == by_line.end() ? head : found->second;
+    }
 };
 
 }  // namespace stepdiag

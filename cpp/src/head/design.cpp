@@ -1,0 +1,143 @@
+#include "stepdiag/head/design.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <sstream>
+
+#include "head/assembly.hpp"
+#include "stepdiag/core/error.hpp"
+#include "stepdiag/head/nominal_head.hpp"
+
+namespace stepdiag {
+namespace {
+
+void check_placement(const Placement& placement, const std::string& name) {
+    const Eigen::Matrix3d& R = placement.rotation;
+    if (!placement.position.allFinite() || !R.allFinite() ||
+        !((R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < 1e-9) || !(R.determinant() > 0.0))
+        throw InvalidArgument(name + ": expected a finite position and a rotation");
+}
+
+void check_beam(const HeadDesign& design, const HeadBeam& beam) {
+    check_placement(beam.placement, beam.name);
+    const auto require_positive = [&](double value, const char* key) {
+        if (!(std::isfinite(value) && value > 0.0))
+            throw InvalidArgument(beam.name + ": " + key + ": expected a finite value above 0");
+    };
+    require_positive(beam.mode.wavelength, "wavelength");
+    require_positive(beam.mode.waist_radius, "waist_radius");
+    if (!std::isfinite(beam.mode.waist_position))
+        throw InvalidArgument(beam.name + ": waist_position: expected a finite value");
+    if (beam.interferometer) {
+        check_interferometer(*beam.interferometer);
+        return;
+    }
+    require_positive(beam.housing, "housing");
+    sensor_of(design, beam);
+}
+
+void check_layout(const HeadDesign& design) {
+    const auto is_interferometer = [](const HeadBeam& beam) { return beam.interferometer.has_value(); };
+    const auto interferometers = std::count_if(design.beams.begin(), design.beams.end(), is_interferometer);
+    const auto others = std::ptrdiff_t(design.beams.size()) - interferometers;
+    const std::string found = ", got " + std::to_string(interferometers) + " interferometer beam(s), " +
+                              std::to_string(others) + " other beam(s) and " + std::to_string(design.sensors.size()) +
+                              " sensor(s)";
+    if (design.layout == HeadLayout::multi_beam && (interferometers < 3 || others > 0 || !design.sensors.empty()))
+        throw InvalidArgument("layout multi_beam: expected three or more interferometer beams and nothing else" +
+                              found);
+    if (design.layout == HeadLayout::psd && (interferometers != 1 || others != 1 || design.sensors.size() != 1))
+        throw InvalidArgument("layout psd: expected one interferometer beam, one beam to a sensor, and that sensor" +
+                              found);
+    if (design.layout == HeadLayout::ideal)
+        throw InvalidArgument("layout: a head of bodies and beams is \"psd\" or \"multi_beam\", got \"ideal\"");
+}
+
+// Pieces that stand in the same place, by name.
+struct Piece {
+    std::string name;
+    std::vector<Face> faces;
+};
+
+constexpr double smallest_gap = 0.01;
+double separation(const std::vector<Face>&, const std::vector<Face>&) { return 1.0; }
+
+void check_gaps(const std::vector<Piece>& pieces) {
+    for (std::size_t i = 0; i < pieces.size(); ++i)
+        for (std::size_t j = i + 1; j < pieces.size(); ++j)
+            if (const double gap = separation(pieces[i].faces, pieces[j].faces); !(gap >= smallest_gap)) {
+                std::ostringstream text;
+                text << pieces[i].name << " and " << pieces[j].name << ": overlap or touch; expected a gap of at least "
+                     << smallest_gap << " mm, got " << gap << " mm";
+                throw InvalidArgument(text.str());
+            }
+}
+
+}  // namespace
+
+double refractive_index(const Material& material, double wavelength) {
+    // Catalogue glasses are relative to air at 20 degrees Celsius and 101325 Pa, dry as the catalogue says nothing
+    // else.
+    if (const Glass* glass = std::get_if<Glass>(&material))
+        return refractive_index(*glass, wavelength) * refractive_index(Air{20.0, 101325.0, 0.0, 450.0}, wavelength);
+    const double index = std::get<double>(material);
+    if (!(std::isfinite(index) && index >= 1.0))
+        throw InvalidArgument("material: expected a glass or an index of at least 1");
+    return index;
+}
+
+Eigen::Vector2d SpotSensor::size() const {
+    if (const Camera* camera = std::get_if<Camera>(&device))
+        return camera->pixel * Eigen::Vector2d(camera->columns, camera->rows);
+    return std::get<LateralEffect>(device).size;
+}
+
+std::vector<std::string> component_names(const HeadDesign& design) {
+    std::vector<std::string> names;
+    for (const auto& body : design.bodies) names.push_back(body.name);
+    for (const auto& beam : design.beams) names.push_back(beam.name);
+    for (const auto& sensor : design.sensors) names.push_back(sensor.name);
+    return names;
+}
+
+std::size_t sensor_of(const HeadDesign& design, const HeadBeam& beam) {
+    for (std::size_t s = 0; s < design.sensors.size(); ++s)
+        if (design.sensors[s].name == beam.sensor) return s;
+    throw InvalidArgument(beam.name + ": there is no sensor \"" + beam.sensor + "\"");
+}
+
+double reach(const HeadDesign& design) {
+    double highest = 0.0;
+    for (const HeadBeam& beam : design.beams)
+        for (const Face& face : assemble(design, {}, beam.mode.wavelength).faces)
+            for (const auto& corner : face.outline) highest = std::max(highest, corner.z());
+    return highest;
+}
+
+void check_design(const HeadDesign& design) {
+    std::set<std::string> names;
+    for (const std::string& name : component_names(design)) {
+        if (name.empty()) throw InvalidArgument("component: expected a name");
+        if (!names.insert(name).second) throw InvalidArgument("component " + name + ": given twice");
+    }
+    check_layout(design);
+    for (const HeadBody& body : design.bodies) check_placement(body.placement, body.name);
+    for (const HeadBeam& beam : design.beams) check_beam(design, beam);
+    for (const SpotSensor& sensor : design.sensors) {
+        check_placement(sensor.placement, sensor.name);
+        if (const Camera* camera = std::get_if<Camera>(&sensor.device)) check_camera(*camera);
+        else check_lateral_effect(std::get<LateralEffect>(sensor.device));
+    }
+
+    const Assembly assembly = assemble(design, {}, design.beams.front().mode.wavelength);
+    std::vector<Piece> pieces;
+    for (const std::string& name : component_names(design)) pieces.push_back({name, {}});
+    for (std::size_t f = 0; f < assembly.faces.size(); ++f)
+        pieces[assembly.component[f]].faces.push_back(assembly.faces[f]);
+    check_gaps(pieces);
+    nominal_head(design, reach(design) + 100.0);
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,112 @@
+#include "stepdiag/head/nominal_head.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <sstream>
+
+#include "head/assembly.hpp"
+#include "stepdiag/core/error.hpp"
+#include "stepdiag/head/traced_head.hpp"
+
+namespace stepdiag {
+namespace {
+
+// Large enough that rounding of a path (1e-13 mm) does not matter, small enough that third orders in glass do not.
+constexpr double distance_tilt = 1e-3;
+constexpr double spot_tilt = 1e-5;
+
+// Why a beam of the nominal head did not arrive.
+[[noreturn]] void refuse(const TracedHead& head, int beam, double distance, const MirrorPose& mirror) {
+    const RayTree tree = head.trace(beam, mirror);
+    const bool saw_mirror = std::any_of(tree.segments.begin(), tree.segments.end(), [&](const Segment& segment) {
+        return segment.hit && segment.hit->face == head.mirror_face();
+    });
+    const HeadBeam& design = head.design().beams[beam];
+    std::ostringstream text;
+    text << "beam " << design.name << ": " << (saw_mirror ? "does not come back from" : "does not meet")
+         << " a mirror square to the beam at " << distance << " mm";
+    if (saw_mirror) text << (design.interferometer ? " to its collimator" : " to its sensor " + design.sensor);
+    throw InvalidArgument(text.str());
+}
+
+// Reads the nominal head at one mirror.
+class NominalReader {
+public:
+    NominalReader(const HeadDesign& design, const Environment& environment, const Eigen::Vector2d& mirror)
+        : head_(design, {}, environment, mirror) {}
+
+    ReturnedBeam read(int beam, double distance, double alpha, double beta) const {
+        const MirrorPose mirror = tilted_mirror({0.0, 0.0, distance}, alpha, beta);
+        const Arrivals arrivals = head_.arrivals(beam, mirror);
+        if (arrivals.empty()) refuse(head_, beam, distance, mirror);
+        return arrivals.front().beam;
+    }
+    double half_path(int beam, double distance, double alpha, double beta) const {
+        return read(beam, distance, alpha, beta).optical_length / (2.0 * head_.air_index(beam));
+    }
+    // Where a beam meets a mirror that it is square to.
+    Eigen::Vector2d outgoing(int beam, double distance) const {
+        const RayTree tree = head_.trace(beam, tilted_mirror({0.0, 0.0, distance}, 0.0, 0.0));
+        for (const Segment& segment : tree.segments)
+            if (segment.hit && segment.hit->face == head_.mirror_face()) return segment.hit->point.head<2>();
+        return Eigen::Vector2d::Zero();
+    }
+
+private:
+    TracedHead head_;
+};
+
+Eigen::Vector2d beam_offset(const NominalReader& reader, int beam, double distance) {
+    const double h = distance_tilt;
+    const auto slope = [&](double alpha, double beta) {  // odd part, so that (1 - t) drops out exactly
+        return (reader.half_path(beam, distance, alpha, beta) - reader.half_path(beam, distance, -alpha, -beta)) *
+               (1.0 - h * h) / (2.0 * h);
+    };
+    return {-slope(0.0, h), slope(h, 0.0)};
+}
+
+// d(raw spot)/d(-beta, alpha)
+Eigen::Matrix2d spot_slopes(const NominalReader& reader, int beam, double distance) {
+    const double h = spot_tilt;
+    Eigen::Matrix2d slopes;
+    slopes.col(0) = reader.read(beam, distance, 0.0, -h).position - reader.read(beam, distance, 0.0, h).position;
+    slopes.col(1) = reader.read(beam, distance, h, 0.0).position - reader.read(beam, distance, -h, 0.0).position;
+    return slopes / (2.0 * h);
+}
+
+}  // namespace
+
+NominalHead nominal_head(const HeadDesign& design, double distance, const Environment& environment) {
+    if (!(distance > reach(design))) {
+        std::ostringstream text;
+        text << "standoff: the head reaches " << reach(design) << " mm beyond its reference plane; expected more, got "
+             << distance << " mm";
+        throw InvalidArgument(text.str());
+    }
+    double widest = 100.0;
+    for (const HeadBeam& beam : design.beams)
+        widest = std::max(widest, 100.0 + 4.0 * beam.placement.position.head<2>().norm());
+    const NominalReader reader(design, environment, Eigen::Vector2d::Constant(widest));
+
+    NominalHead nominal;
+    for (int b = 0; b < int(design.beams.size()); ++b) {
+        if (design.beams[b].interferometer) {
+            nominal.calibration.head_constants.push_back(reader.half_path(b, distance, 0.0, 0.0) - distance);
+            if (design.layout == HeadLayout::multi_beam)
+                nominal.calibration.beam_offsets.push_back(beam_offset(reader, b, distance));
+            continue;
+        }
+        const double farther = distance + 1000.0;
+        const Eigen::Matrix2d near_slopes = spot_slopes(reader, b, distance);
+        const Eigen::Matrix2d gained = (spot_slopes(reader, b, farther) - near_slopes) / (2.0 * (farther - distance));
+        if (!(std::abs(gained.determinant()) > 1e-6))
+            throw InvalidArgument("beam " + design.beams[b].name + ": its spot does not follow the mirror's tilts");
+        nominal.spot_axes = gained.inverse();
+        nominal.spot_zero = reader.read(b, distance, 0.0, 0.0).position;
+        nominal.calibration.psd_distance = 0.25 * (nominal.spot_axes * near_slopes).trace() - distance;
+        nominal.calibration.spot_beam = reader.outgoing(b, distance);
+    }
+    return nominal;
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,185 @@
+#include "stepdiag/head/traced_head.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "head/assembly.hpp"
+#include "head/recorded_route.hpp"
+#include "stepdiag/core/error.hpp"
+#include "stepdiag/core/random.hpp"
+
+namespace stepdiag {
+namespace {
+
+constexpr double rounding = 1e-9;  // mm: far above that of a path of metres, far below what another path would do
+
+void check_errors(const HeadDesign& design, const PoseErrors& errors) {
+    const std::vector<std::string> names = component_names(design);
+    for (const auto& [component, error] : errors) {
+        if (std::find(names.begin(), names.end(), component) == names.end()) {
+            std::string known;
+            for (const auto& name : names) known += (known.empty() ? "" : ", ") + name;
+            throw InvalidArgument("pose error: the head has no component \"" + component + "\"; it has " + known);
+        }
+        if (!error.shift.allFinite() || !(error.rotation.cwiseAbs().maxCoeff() < 1.0))
+            throw InvalidArgument("pose error of " + component + ": expected a finite shift and angles below 1 rad");
+    }
+}
+
+// Where two answers for the same pose differ by more than rounding.
+bool differ(const Arrivals& a, const Arrivals& b) {
+    if (a.size() != b.size()) return true;
+    for (std::size_t i = 0; i < a.size(); ++i)
+        if (!((a[i].beam.position - b[i].beam.position).norm() <= rounding &&
+              std::abs(a[i].beam.optical_length - b[i].beam.optical_length) <= rounding))
+            return true;
+    return false;
+}
+
+}  // namespace
+
+MirrorPose tilted_mirror(const Eigen::Vector3d& point, double alpha, double beta) {
+    const Eigen::Vector3d normal = Eigen::Vector3d(beta, -alpha, 1.0).normalized();
+    MirrorPose pose{point, {}};
+    pose.rotation.col(2) = normal;
+    pose.rotation.col(0) = (Eigen::Vector3d::UnitX() - normal.x() * normal).normalized();
+    pose.rotation.col(1) = normal.cross(pose.rotation.col(0));
+    return pose;
+}
+
+TracedHead::TracedHead(HeadDesign design, PoseErrors errors, const Environment& environment,
+                       const Eigen::Vector2d& mirror)
+    : design_(std::move(design)), mirror_(mirror) {
+    check_errors(design_, errors);
+    for (std::size_t b = 0; b < design_.beams.size(); ++b) {
+        const HeadBeam& beam = design_.beams[b];
+        const Assembly assembly = assemble(design_, errors, beam.mode.wavelength);
+        const Placement source = moved(beam.placement, error_of(errors, beam.name));
+        BeamOptics optics{{refractive_index(environment, beam.mode.wavelength)},
+                          Scene(assembly.faces),
+                          {},
+                          {},
+                          {source.position, source.rotation.col(2)},
+                          assembly.beam_face[b],
+                          source};
+        if (!beam.interferometer) {
+            const std::size_t s = sensor_of(design_, beam);
+            optics.detector_face = assembly.sensor_face[s];
+            optics.detector = moved(design_.sensors[s].placement, error_of(errors, design_.sensors[s].name));
+        }
+        for (const Face& face : assembly.faces) {
+            optics.frames.push_back(frame_of(face));
+            optics.outlines.push_back(outline_of(face, optics.frames.back()));
+        }
+        const Face mirror_face = mirror_at({Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity()});
+        optics.outlines.push_back(outline_of(mirror_face, {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}}));
+        optics_.push_back(std::move(optics));
+    }
+}
+
+Face TracedHead::mirror_at(const MirrorPose& pose) const {
+    return make_rectangle(pose.point, pose.rotation, mirror_, Surface::reflecting);
+}
+
+int TracedHead::mirror_face() const { return int(optics_.front().fixed.faces().size()); }
+
+RayTree TracedHead::trace(int beam, const MirrorPose& mirror) const {
+    const BeamOptics& optics = optics_[beam];
+    return trace_tree(optics.fixed.with({mirror_at(mirror)}), optics.air, optics.source, design_.limits);
+}
+
+Arrival TracedHead::arrival(int beam, const Eigen::Vector3d& point, const Eigen::Vector3d& direction,
+                            double optical_length, double reduced_length, double power) const {
+    const Placement& detector = optics_[beam].detector;
+    const Eigen::Vector3d position = detector.rotation.transpose() * (point - detector.position);
+    return {{position.head<2>(), detector.rotation.transpose() * direction, optical_length, reduced_length}, power};
+}
+
+Arrivals TracedHead::arrivals(int beam, const MirrorPose& mirror) const {
+    const RayTree tree = trace(beam, mirror);
+    Arrivals arrivals;
+    for (const int segment : wanted_segments(tree, beam)) {
+        const Path path = tree.path_to(segment);
+        arrivals.push_back(arrival(beam, path.hits.back().point, path.direction, path.optical_length,
+                                   path.reduced_length, tree.segments[segment].power));
+    }
+    return arrivals;
+}
+
+// Light that never saw the mirror is straylight: a sensor sees it, an interferometer does not count it.
+std::vector<int> TracedHead::wanted_segments(const RayTree& tree, int beam) const {
+    std::vector<int> segments = tree.arrivals(optics_[beam].detector_face);
+    if (!design_.beams[beam].interferometer) return segments;
+    const auto saw_mirror = [&](int segment) {
+        for (; segment >= 0; segment = tree.segments[segment].parent)
+            if (tree.segments[segment].hit && tree.segments[segment].hit->face == mirror_face()) return true;
+        return false;
+    };
+    const auto first = std::find_if(segments.begin(), segments.end(), saw_mirror);
+    return first == segments.end() ? std::vector<int>{} : std::vector<int>{*first};
+}
+
+std::vector<Arrivals> TracedHead::replay(int beam, const std::vector<MirrorPose>& mirrors, const ReplayOptions& options,
+                                         ReplayCount* count) const {
+    const BeamOptics& optics = optics_[beam];
+    const std::size_t n = mirrors.size();
+    std::vector<Arrivals> result(n);
+    ReplayCount counted;
+
+    // Record.
+    std::vector<RecordedRoute> routes;
+    bool alike = true;
+    for (const std::size_t pose : {std::size_t(0), n / 2, n - 1}) {
+        if (pose >= n) continue;
+        const RayTree tree = trace(beam, mirrors[pose]);
+        std::vector<RecordedRoute> found;
+        for (const int segment : wanted_segments(tree, beam)) found.push_back(record_route(tree, segment));
+        if (found.empty()) continue;  // a lost beam says nothing of the others
+        if (routes.empty()) routes = found;
+        alike = alike && same_faces(routes, found);
+    }
+
+    // Replay: what comes before the mirror once, the rest for all poses.
+    std::vector<std::uint8_t> followed(n, alike && !routes.empty());
+    if (alike)
+        for (const RecordedRoute& route : routes) {
+            const RouteReplay replayed = replay_route(route, optics.frames, optics.outlines, optics.source, mirrors,
+                                                      optics.fixed.self_intersection_gap());
+            for (std::size_t i = 0; i < n; ++i) {
+                followed[i] = followed[i] && replayed.followed[i];
+                if (followed[i])
+                    result[i].push_back(arrival(beam, replayed.point(i), replayed.direction(i),
+                                                replayed.optical_length[i], replayed.reduced_length[i], route.power));
+            }
+        }
+
+    // Verify, and fall back.
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!followed[i]) {
+            result[i] = arrivals(beam, mirrors[i]);
+            ++counted.traced;
+            continue;
+        }
+        ++counted.replayed;
+        if (uniform_pair(options.seed, RandomStream::verification, i)[0] >= options.verified_share) continue;
+        ++counted.verified;
+        if (differ(result[i], arrivals(beam, mirrors[i]))) {
+            std::ostringstream text;
+            text << "replay: beam " << design_.beams[beam].name << " at pose " << i << " (mirror at "
+                 << mirrors[i].point.transpose()
+                 << " mm in the sensor frame) differs from its trace; another face came "
+                 << "into its way: verify all poses (share 1) to trace them";
+            throw ReplayMismatch(text.str());
+        }
+    }
+    if (count) {
+        count->replayed += counted.replayed;
+        count->traced += counted.traced;
+        count->verified += counted.verified;
+    }
+    return result;
+}
+
+}  // namespace stepdiag
