@@ -1,4 +1,5 @@
 #include "bindings.hpp"
+#include "stepdiag/head/sensitivity.hpp"
 #include "stepdiag/head/traced_reading.hpp"
 
 namespace stepdiag::bindings {
@@ -105,6 +106,28 @@ void bind_traced_head(py::module_& m) {
           py::arg("lateral") = zeros(2), py::arg("environment") = Environment{},
           "All light of a traced head, as segments: the mirror's centre at (lateral, distance) in the sensor frame, "
           "mm, its tilts (alpha, beta) in rad. A parent stands before its children. Raises InvalidArgument.");
+    py::class_<Sensitivity>(m, "Sensitivity",
+                            "First derivatives of a head's readings by one parameter: signals (n,) in mm by its unit, "
+                            "and reading (3,): distance (mm), alpha and beta (rad).")
+        .def_readonly("component", &Sensitivity::component)
+        .def_readonly("quantity", &Sensitivity::quantity)
+        .def_readonly("unit", &Sensitivity::unit)
+        .def_property_readonly("signals", [](const Sensitivity& s) { return to_numpy_vector(s.signals); })
+        .def_property_readonly("reading", [](const Sensitivity& s) { return to_numpy_vector(s.reading); });
+    m.def(
+        "head_sensitivities",
+        [](const Head& head, double distance, const ArrayLike& tilt, const ArrayLike& lateral,
+           const Environment& environment) {
+            const MirrorPose mirror = to_mirror(distance, tilt, lateral);
+            const Eigen::Vector2d size = mirror_of(head);
+            py::gil_scoped_release release;
+            return head_sensitivities(head, mirror, size, environment);
+        },
+        py::arg("head"), py::kw_only(), py::arg("distance"), py::arg("tilt") = zeros(2), py::arg("lateral") = zeros(2),
+        py::arg("environment") = Environment{},
+        "Derivatives of a traced head's readings by the six degrees of freedom of every component (along the head's "
+        "axes, rotations about its own origin) and of the mirror, by indices, and by the state of the air: exact, by "
+        "forward mode through the replay. Raises InvalidArgument where a beam is lost.");
     m.def("read_head", &read_head, py::arg("head"), py::kw_only(), py::arg("distance"), py::arg("tilt") = zeros(2),
           py::arg("lateral") = zeros(2), py::arg("environment") = Environment{},
           py::arg("assumed_environment") = std::nullopt,

@@ -1,7 +1,9 @@
 #include "head/assembly.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 
+#include "stepdiag/core/error.hpp"
 #include "stepdiag/core/rotation.hpp"
 
 namespace stepdiag {
@@ -13,6 +15,42 @@ Placement moved(const Placement& nominal, const PoseError& error) {
 PoseError error_of(const PoseErrors& errors, const std::string& component) {
     const auto found = errors.find(component);
     return found == errors.end() ? PoseError{} : found->second;
+}
+
+std::vector<std::string> component_names(const HeadDesign& design) {
+    std::vector<std::string> names;
+    for (const auto& body : design.bodies) names.push_back(body.name);
+    for (const auto& beam : design.beams) names.push_back(beam.name);
+    for (const auto& sensor : design.sensors) names.push_back(sensor.name);
+    return names;
+}
+
+std::vector<Placement> component_placements(const HeadDesign& design) {
+    std::vector<Placement> placements;
+    for (const auto& body : design.bodies) placements.push_back(body.placement);
+    for (const auto& beam : design.beams) placements.push_back(beam.placement);
+    for (const auto& sensor : design.sensors) placements.push_back(sensor.placement);
+    return placements;
+}
+
+bool is_transparent(const HeadBody& body) {
+    return std::any_of(body.faces.begin(), body.faces.end(), [](const Face& face) {
+        return face.surface == Surface::refracting || face.surface == Surface::splitting;
+    });
+}
+
+std::size_t sensor_of(const HeadDesign& design, const HeadBeam& beam) {
+    for (std::size_t s = 0; s < design.sensors.size(); ++s)
+        if (design.sensors[s].name == beam.sensor) return s;
+    throw InvalidArgument(beam.name + ": there is no sensor \"" + beam.sensor + "\"");
+}
+
+std::vector<int> signal_order(const HeadDesign& design) {
+    std::vector<int> order;
+    for (const bool interferometer : {true, false})
+        for (std::size_t b = 0; b < design.beams.size(); ++b)
+            if (design.beams[b].interferometer.has_value() == interferometer) order.push_back(int(b));
+    return order;
 }
 
 Assembly assemble(const HeadDesign& design, const PoseErrors& errors, double wavelength) {

@@ -12,7 +12,12 @@ namespace stepdiag {
 Placement moved(const Placement& nominal, const PoseError& error);
 PoseError error_of(const PoseErrors& errors, const std::string& component);
 
+// Components in one order: bodies, beams, sensors.
 std::vector<std::string> component_names(const HeadDesign& design);
+std::vector<Placement> component_placements(const HeadDesign& design);
+bool is_transparent(const HeadBody& body);
+// Beams in the order of the signals: interferometers, then the beam to the sensor.
+std::vector<int> signal_order(const HeadDesign& design);
 std::size_t sensor_of(const HeadDesign& design, const HeadBeam& beam);  // its index
 
 // All faces in the head's frame for light of one wavelength: the bodies', then a square around each source that stops

@@ -9,6 +9,7 @@
 #include "head/assembly.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/head/nominal_head.hpp"
+#include "stepdiag/optics/separation.hpp"
 
 namespace stepdiag {
 namespace {
@@ -55,24 +56,32 @@ void check_layout(const HeadDesign& design) {
         throw InvalidArgument("layout: a head of bodies and beams is \"psd\" or \"multi_beam\", got \"ideal\"");
 }
 
-// Pieces that stand in the same place, by name.
+// A component with the box around it.
 struct Piece {
     std::string name;
-    std::vector<Face> faces;
+    std::vector<Face> faces = {};
+    Eigen::Vector3d low = Eigen::Vector3d::Constant(INFINITY), high = -low;
 };
 
-constexpr double smallest_gap = 0.01;
-double separation(const std::vector<Face>&, const std::vector<Face>&) { return 1.0; }
+// Nearer than this, and a scene of metres in single precision may lose a face (Scene::smallest_separation).
+constexpr double smallest_gap = 0.01;  // mm
+
+// Of the boxes around them, which is cheap and never more than that of the pieces.
+double box_separation(const Piece& a, const Piece& b) {
+    return (a.low - b.high).cwiseMax(b.low - a.high).cwiseMax(0.0).norm();
+}
 
 void check_gaps(const std::vector<Piece>& pieces) {
     for (std::size_t i = 0; i < pieces.size(); ++i)
-        for (std::size_t j = i + 1; j < pieces.size(); ++j)
-            if (const double gap = separation(pieces[i].faces, pieces[j].faces); !(gap >= smallest_gap)) {
-                std::ostringstream text;
-                text << pieces[i].name << " and " << pieces[j].name << ": overlap or touch; expected a gap of at least "
-                     << smallest_gap << " mm, got " << gap << " mm";
-                throw InvalidArgument(text.str());
-            }
+        for (std::size_t j = i + 1; j < pieces.size(); ++j) {
+            if (box_separation(pieces[i], pieces[j]) >= smallest_gap) continue;
+            const double gap = separation(pieces[i].faces, pieces[j].faces);
+            if (gap >= smallest_gap) continue;
+            std::ostringstream text;
+            text << pieces[i].name << " and " << pieces[j].name << ": overlap or touch; expected a gap of at least "
+                 << smallest_gap << " mm, got " << gap << " mm";
+            throw InvalidArgument(text.str());
+        }
 }
 
 }  // namespace
@@ -92,20 +101,6 @@ Eigen::Vector2d SpotSensor::size() const {
     if (const Camera* camera = std::get_if<Camera>(&device))
         return camera->pixel * Eigen::Vector2d(camera->columns, camera->rows);
     return std::get<LateralEffect>(device).size;
-}
-
-std::vector<std::string> component_names(const HeadDesign& design) {
-    std::vector<std::string> names;
-    for (const auto& body : design.bodies) names.push_back(body.name);
-    for (const auto& beam : design.beams) names.push_back(beam.name);
-    for (const auto& sensor : design.sensors) names.push_back(sensor.name);
-    return names;
-}
-
-std::size_t sensor_of(const HeadDesign& design, const HeadBeam& beam) {
-    for (std::size_t s = 0; s < design.sensors.size(); ++s)
-        if (design.sensors[s].name == beam.sensor) return s;
-    throw InvalidArgument(beam.name + ": there is no sensor \"" + beam.sensor + "\"");
 }
 
 double reach(const HeadDesign& design) {
@@ -133,9 +128,15 @@ void check_design(const HeadDesign& design) {
 
     const Assembly assembly = assemble(design, {}, design.beams.front().mode.wavelength);
     std::vector<Piece> pieces;
-    for (const std::string& name : component_names(design)) pieces.push_back({name, {}});
-    for (std::size_t f = 0; f < assembly.faces.size(); ++f)
-        pieces[assembly.component[f]].faces.push_back(assembly.faces[f]);
+    for (const std::string& name : component_names(design)) pieces.push_back({name});
+    for (std::size_t f = 0; f < assembly.faces.size(); ++f) {
+        Piece& piece = pieces[assembly.component[f]];
+        piece.faces.push_back(assembly.faces[f]);
+        for (const Eigen::Vector3d& corner : assembly.faces[f].outline) {
+            piece.low = piece.low.cwiseMin(corner);
+            piece.high = piece.high.cwiseMax(corner);
+        }
+    }
     check_gaps(pieces);
     nominal_head(design, reach(design) + 100.0);
 }

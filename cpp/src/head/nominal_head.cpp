@@ -65,13 +65,13 @@ Eigen::Vector2d beam_offset(const NominalReader& reader, int beam, double distan
     return {-slope(0.0, h), slope(h, 0.0)};
 }
 
-// d(raw spot)/d(-beta, alpha)
+// d(raw spot)/d(-beta, alpha) at zero tilt; the spot grows as 1/(1 - t), which drops out.
 Eigen::Matrix2d spot_slopes(const NominalReader& reader, int beam, double distance) {
     const double h = spot_tilt;
     Eigen::Matrix2d slopes;
     slopes.col(0) = reader.read(beam, distance, 0.0, -h).position - reader.read(beam, distance, 0.0, h).position;
     slopes.col(1) = reader.read(beam, distance, h, 0.0).position - reader.read(beam, distance, -h, 0.0).position;
-    return slopes / (2.0 * h);
+    return slopes * (1.0 - h * h) / (2.0 * h);
 }
 
 }  // namespace

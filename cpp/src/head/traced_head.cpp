@@ -61,6 +61,7 @@ TracedHead::TracedHead(HeadDesign design, PoseErrors errors, const Environment& 
                           Scene(assembly.faces),
                           {},
                           {},
+                          assembly.component,
                           {source.position, source.rotation.col(2)},
                           assembly.beam_face[b],
                           source};

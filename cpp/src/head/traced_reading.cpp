@@ -1,19 +1,12 @@
 #include "stepdiag/head/traced_reading.hpp"
 
+#include "head/assembly.hpp"
+
 namespace stepdiag {
 namespace {
 
 // The spot of a beam's axis alone: so small that no edge of a sensor clips it.
 constexpr double point_radius = 1e-9;  // mm
-
-// Beams in the order of the signals: interferometers, then the beam to the sensor.
-std::vector<int> signal_order(const HeadDesign& design) {
-    std::vector<int> order;
-    for (const bool interferometer : {true, false})
-        for (std::size_t b = 0; b < design.beams.size(); ++b)
-            if (design.beams[b].interferometer.has_value() == interferometer) order.push_back(int(b));
-    return order;
-}
 
 }  // namespace
 

@@ -69,20 +69,25 @@ public:
     std::vector<Arrivals> replay(int beam, const std::vector<MirrorPose>& mirrors, const ReplayOptions& options = {},
                                  ReplayCount* count = nullptr) const;
 
-private:
+    // A beam's own scene: glass has another index at another wavelength.
     struct BeamOptics {
         Medium air;
-        Scene fixed;  // without the mirror
-        std::vector<FaceFrame> frames;
-        std::vector<Outline> outlines;
+        Scene fixed;                    // without the mirror
+        std::vector<FaceFrame> frames;  // of its faces
+        std::vector<Outline> outlines;  // of its faces, and the mirror
+        std::vector<int> component;     // of its faces: bodies, beams, sensors counted through
         Ray source;
         int detector_face;
         Placement detector;  // where the light is wanted
     };
+    const BeamOptics& optics(int beam) const { return optics_[beam]; }
+    // Segments that end where the beam's light is wanted, strongest first.
+    std::vector<int> wanted_segments(const RayTree& tree, int beam) const;
+
+private:
     Face mirror_at(const MirrorPose& pose) const;
     Arrival arrival(int beam, const Eigen::Vector3d& point, const Eigen::Vector3d& direction, double optical_length,
                     double reduced_length, double power) const;
-    std::vector<int> wanted_segments(const RayTree& tree, int beam) const;
 
     HeadDesign design_;
     Eigen::Vector2d mirror_;
