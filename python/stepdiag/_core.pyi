@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['Calibration', 'Chain', 'ErrorMap', 'Head', 'InvalidArgument', 'Machine', 'Measurement', 'Misalignment', 'Noise', 'Plan', 'ReadingUncertainty', 'evaluate', 'random_error_map', 'read_calibration', 'read_error_map', 'read_measurement', 'simulate']
+__all__: list[str] = ['BeamSegment', 'BeamSpot', 'Calibration', 'Camera', 'Chain', 'Environment', 'ErrorMap', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'Noise', 'Plan', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SpotSensor', 'beam_radius', 'couple', 'cramer_rao_bound', 'evaluate', 'expose', 'locate', 'power_inside', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'simulate', 'trace_beams']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -177,10 +177,204 @@ class Measurement:
     @property
     def standard_uncertainty(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
         ...
+class Environment:
+    """
+    The air around machine and head: a constant refractive index.
+    """
+    @staticmethod
+    def from_air(*, temperature: typing.SupportsFloat | typing.SupportsIndex = 20.0, pressure: typing.SupportsFloat | typing.SupportsIndex = 101325.0, relative_humidity: typing.SupportsFloat | typing.SupportsIndex = 0.5, carbon_dioxide: typing.SupportsFloat | typing.SupportsIndex = 450.0, equation: str = 'ciddor') -> Environment:
+        """
+        From the state of the air: degrees Celsius, Pa, 0..1, ppm; equation: "ciddor", "modified_edlen" or "edlen_1966". Raises InvalidArgument outside their ranges.
+        """
+    def __init__(self, refractive_index: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        ...
+    def refractive_index(self, wavelength: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Phase index at a vacuum wavelength (nm).
+        """
+class HeadCalibration:
+    """
+    What evaluators know of a head: the constants that its readings are reduced with, mm.
+    """
+    @property
+    def beam_offsets(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def head_constants(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def psd_distance(self) -> float | None:
+        ...
+    @property
+    def spot_beam(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+class HeadBody:
+    """
+    A body of a head: flat faces in its own frame, placed in the head's. Lengths in mm; rotation: a rotation vector in rad about the body's origin; material: a glass by name or an absolute index; reflectance: share of the power that each of its faces sends back (0: coated so that none is). All raise InvalidArgument.
+    """
+    @staticmethod
+    def corner_cube(name: str, *, depth: typing.SupportsFloat | typing.SupportsIndex, material: str | float, position: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), rotation: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), reflectance: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> HeadBody:
+        """
+        Corner cube: origin in the corner, light enters at z = depth along -z.
+        """
+    @staticmethod
+    def cube_splitter(name: str, *, edge: typing.SupportsFloat | typing.SupportsIndex, material: str | float, reflectance: typing.SupportsFloat | typing.SupportsIndex = 0.5, absorptance: typing.SupportsFloat | typing.SupportsIndex = 0.0, position: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), rotation: numpy.typing.ArrayLike = (0.0, 0.0, 0.0)) -> HeadBody:
+        """
+        Two prisms with a splitting face between them: origin in the middle; see make_cube_splitter for the way it sends light. reflectance, absorptance: of the splitting face.
+        """
+    @staticmethod
+    def mirror(name: str, *, width: typing.SupportsFloat | typing.SupportsIndex, height: typing.SupportsFloat | typing.SupportsIndex, reflectance: typing.SupportsFloat | typing.SupportsIndex = 1.0, position: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), rotation: numpy.typing.ArrayLike = (0.0, 0.0, 0.0)) -> HeadBody:
+        """
+        A mirror in its own x-y plane, reflecting on both sides.
+        """
+    @staticmethod
+    def plate(name: str, *, width: typing.SupportsFloat | typing.SupportsIndex, height: typing.SupportsFloat | typing.SupportsIndex, thickness: typing.SupportsFloat | typing.SupportsIndex, material: str | float, position: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), rotation: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), reflectance: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> HeadBody:
+        """
+        Plate: origin in the middle, thickness along z.
+        """
+    @staticmethod
+    def polyhedron(name: str, *, corners: numpy.typing.ArrayLike, faces: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]], material: str | float, position: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), rotation: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), reflectance: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> HeadBody:
+        """
+        A convex polyhedron: corners (n, 3), faces as lists of corner indices in order around each face. It must be closed, its faces planar.
+        """
+    @staticmethod
+    def right_angle_prism(name: str, *, side: typing.SupportsFloat | typing.SupportsIndex, height: typing.SupportsFloat | typing.SupportsIndex, material: str | float, position: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), rotation: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), reflectance: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> HeadBody:
+        """
+        Right-angle prism: origin in the middle of the hypotenuse, the right angle on +z.
+        """
+    @staticmethod
+    def screen(name: str, *, width: typing.SupportsFloat | typing.SupportsIndex, height: typing.SupportsFloat | typing.SupportsIndex, position: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), rotation: numpy.typing.ArrayLike = (0.0, 0.0, 0.0)) -> HeadBody:
+        """
+        A screen in its own x-y plane that absorbs all light.
+        """
+    @staticmethod
+    def wedge(name: str, *, width: typing.SupportsFloat | typing.SupportsIndex, height: typing.SupportsFloat | typing.SupportsIndex, thickness: typing.SupportsFloat | typing.SupportsIndex, angle: typing.SupportsFloat | typing.SupportsIndex, material: str | float, position: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), rotation: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), reflectance: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> HeadBody:
+        """
+        Wedge: a plate whose face at +z is turned by `angle` (rad) about y, thicker at +x.
+        """
+    @property
+    def material(self) -> str | float:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def outlines(self) -> list[numpy.typing.NDArray[numpy.float64]]:
+        """
+        The faces' corners in the head's frame, a (k, 3) array each.
+        """
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def rotation(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        head_R_body, (3, 3).
+        """
+    @property
+    def surfaces(self) -> list[str]:
+        ...
+class HeadBeam:
+    """
+    A light source of a head, its beam along +z of its own frame. Lengths in mm, wavelength (in vacuum) in nm, rotation vector in rad.
+    """
+    @staticmethod
+    def interferometer(name: str, *, position: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), rotation: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), wavelength: typing.SupportsFloat | typing.SupportsIndex = 1530.0, waist_radius: typing.SupportsFloat | typing.SupportsIndex = 0.8, waist_position: typing.SupportsFloat | typing.SupportsIndex = 0.0, aperture: typing.SupportsFloat | typing.SupportsIndex = 10.0, acceptance: typing.SupportsFloat | typing.SupportsIndex = 0.1, least_coupling: typing.SupportsFloat | typing.SupportsIndex = 0.0, resolution: typing.SupportsFloat | typing.SupportsIndex = 0.0, periodic_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.0, dead_path: typing.SupportsFloat | typing.SupportsIndex = 0.0, index_error: typing.SupportsFloat | typing.SupportsIndex = 0.0, reading_model: str = 'chief_ray') -> HeadBeam:
+        """
+        A beam that an interferometer measures with: it is taken back by a square of edge `aperture` around the source, within the angle `acceptance` (rad). reading_model: "chief_ray" or "coupled_mode".
+        """
+    @staticmethod
+    def spot(name: str, *, sensor: str, position: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), rotation: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), wavelength: typing.SupportsFloat | typing.SupportsIndex = 635.0, waist_radius: typing.SupportsFloat | typing.SupportsIndex = 0.8, waist_position: typing.SupportsFloat | typing.SupportsIndex = 0.0, housing: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> HeadBeam:
+        """
+        A conventional laser whose beam comes to a sensor; `housing`: edge of the square around it that stops light.
+        """
+    @property
+    def is_interferometer(self) -> bool:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def rotation(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def sensor(self) -> str:
+        ...
+    @property
+    def size(self) -> float:
+        """
+        Edge of the square around the source, mm.
+        """
+    @property
+    def waist_position(self) -> float:
+        ...
+    @property
+    def waist_radius(self) -> float:
+        ...
+    @property
+    def wavelength(self) -> float:
+        ...
+class SpotSensor:
+    """
+    A sensor in the x-y plane of its own frame; mm, rotation vector in rad.
+    """
+    @staticmethod
+    def camera(name: str, *, position: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), rotation: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), pixel: typing.SupportsFloat | typing.SupportsIndex = 0.01, columns: typing.SupportsInt | typing.SupportsIndex = 512, rows: typing.SupportsInt | typing.SupportsIndex = 512, electrons: typing.SupportsFloat | typing.SupportsIndex = 1000000.0, background: typing.SupportsFloat | typing.SupportsIndex = 0.0, read_noise: typing.SupportsFloat | typing.SupportsIndex = 0.0, shot_noise: bool = False, full_well: typing.SupportsFloat | typing.SupportsIndex = 1000000000.0, bits: typing.SupportsInt | typing.SupportsIndex = 0, centroid: str = 'gaussian_fit', threshold: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> SpotSensor:
+        """
+        A pixel array; centroid: "gaussian_fit" or "centre_of_gravity".
+        """
+    @staticmethod
+    def lateral_effect(name: str, *, position: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), rotation: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), size: numpy.typing.ArrayLike = (10.0, 10.0), noise: typing.SupportsFloat | typing.SupportsIndex = 0.0, resolution: typing.SupportsFloat | typing.SupportsIndex = 0.0, least_power: typing.SupportsFloat | typing.SupportsIndex = 1e-06) -> SpotSensor:
+        """
+        A lateral-effect position sensing device.
+        """
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def rotation(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def size(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+class HeadDesign:
+    """
+    A laser head as drawn: bodies, beams and sensors in the head's frame.
+    """
+    def __init__(self, name: str, layout: str, bodies: collections.abc.Sequence[HeadBody], beams: collections.abc.Sequence[HeadBeam], sensors: collections.abc.Sequence[SpotSensor] = [], *, most_hits: typing.SupportsInt | typing.SupportsIndex = 64, least_power: typing.SupportsFloat | typing.SupportsIndex = 1e-06) -> None:
+        """
+        Raises InvalidArgument for names given twice, a layout without its beams or sensor, components that overlap or touch, a beam that does not come back from a mirror square to it.
+        """
+    @property
+    def beams(self) -> list[HeadBeam]:
+        ...
+    @property
+    def bodies(self) -> list[HeadBody]:
+        ...
+    @property
+    def layout(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def sensors(self) -> list[SpotSensor]:
+        ...
 class Head:
     """
-    A laser head: layout "ideal" (ray-traced), "psd" or "multi_beam"; lengths in mm, wavelength in nm.
+    A laser head by the closed definition of its layout's readings: "ideal" (ray-traced), "psd" or "multi_beam"; from_design makes a traced one. Lengths in mm, wavelength in nm.
     """
+    @staticmethod
+    def from_design(design: HeadDesign, *, standoff: typing.SupportsFloat | typing.SupportsIndex = 100.0, mirror: numpy.typing.ArrayLike | None = None, pose_errors: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reading_model: str | None = None) -> Head:
+        """
+        A traced head. pose_errors: component name -> (shift in mm, rotation vector in rad about its own origin), both along the head's axes. reading_model: of all interferometers instead of the design's. Raises InvalidArgument.
+        """
     def __init__(self, layout: str = 'ideal', *, standoff: typing.SupportsFloat | typing.SupportsIndex = 100.0, psd_distance: typing.SupportsFloat | typing.SupportsIndex = 0.0, beam_offsets: collections.abc.Sequence[numpy.typing.ArrayLike] = [], wavelength: typing.SupportsFloat | typing.SupportsIndex = 1530.0, aperture: typing.SupportsFloat | typing.SupportsIndex = 50.0, mirror: numpy.typing.ArrayLike | None = None) -> None:
         """
         mirror: (width, height); none: as large as the plan needs. Raises InvalidArgument for lengths that are not positive and for beams on one line.
@@ -190,6 +384,14 @@ class Head:
         ...
     @property
     def beam_offsets(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def calibration(self) -> HeadCalibration:
+        """
+        What evaluators know of the head, by a nominal trace where it has a design.
+        """
+    @property
+    def design(self) -> HeadDesign | None:
         ...
     @property
     def layout(self) -> str:
@@ -213,12 +415,18 @@ class Head:
         ...
 class Misalignment:
     """
-    How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm.
+    How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm, a constant of all distances and one of each beam d1 ... dn in mm.
     """
-    def __init__(self, reflector: numpy.typing.ArrayLike = (0.0, 0.0), laser: numpy.typing.ArrayLike = (0.0, 0.0), psd_zero: numpy.typing.ArrayLike = (0.0, 0.0)) -> None:
+    def __init__(self, reflector: numpy.typing.ArrayLike = (0.0, 0.0), laser: numpy.typing.ArrayLike = (0.0, 0.0), psd_zero: numpy.typing.ArrayLike = (0.0, 0.0), distance_constant: typing.SupportsFloat | typing.SupportsIndex = 0.0, beam_constants: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
         """
         Raises InvalidArgument for what is no pair of finite numbers.
         """
+    @property
+    def beam_constants(self) -> list[float]:
+        ...
+    @property
+    def distance_constant(self) -> float:
+        ...
     @property
     def laser(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
@@ -230,12 +438,15 @@ class Misalignment:
         ...
 class Noise:
     """
-    Standard deviations of an independent Gaussian per reading: distance (mm; also d1 ...), tilt (rad), spot (mm).
+    Standard deviations of an independent Gaussian per reading: distance (mm; also d1 ...), tilt (rad), spot (mm); common (mm): one draw a row, added to all of its distances.
     """
-    def __init__(self, distance: typing.SupportsFloat | typing.SupportsIndex = 0.0, tilt: typing.SupportsFloat | typing.SupportsIndex = 0.0, spot: typing.SupportsFloat | typing.SupportsIndex = 0.0, seed: typing.SupportsIndex = 0) -> None:
+    def __init__(self, distance: typing.SupportsFloat | typing.SupportsIndex = 0.0, tilt: typing.SupportsFloat | typing.SupportsIndex = 0.0, spot: typing.SupportsFloat | typing.SupportsIndex = 0.0, seed: typing.SupportsIndex = 0, common: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
         Raises InvalidArgument for a deviation that is negative or not finite, and for a seed outside 0 .. 2^64 - 1.
         """
+    @property
+    def common(self) -> float:
+        ...
     @property
     def distance(self) -> float:
         ...
@@ -247,6 +458,195 @@ class Noise:
         ...
     @property
     def tilt(self) -> float:
+        ...
+class GaussianMode:
+    """
+    A collimator's Gaussian mode: vacuum wavelength in nm, waist radius (1/e^2 of power) and the waist's place along the beam from the collimator's plane (t/n) in mm.
+    """
+    def __init__(self, wavelength: typing.SupportsFloat | typing.SupportsIndex, waist_radius: typing.SupportsFloat | typing.SupportsIndex, waist_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        """
+        Raises InvalidArgument for what is not positive or not finite.
+        """
+    @property
+    def rayleigh_length(self) -> float:
+        """
+        pi w0^2 / wavelength, mm (reduced: t/n).
+        """
+    @property
+    def waist_position(self) -> float:
+        ...
+    @property
+    def waist_radius(self) -> float:
+        ...
+    @property
+    def wavelength(self) -> float:
+        ...
+class ReturnedBeam:
+    """
+    A beam that has come back, in the collimator's frame (beam out along +z, its plane z = 0).
+    """
+    def __init__(self, position: numpy.typing.ArrayLike, direction: numpy.typing.ArrayLike, optical_length: typing.SupportsFloat | typing.SupportsIndex, reduced_length: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        position: (2,), where the axis meets the collimator's plane, mm; direction: (3,), unit, z < 0; optical_length and reduced_length: sums of n t and of t / n out and back, mm. Raises InvalidArgument naming what makes no sense.
+        """
+    @property
+    def direction(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def optical_length(self) -> float:
+        ...
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def reduced_length(self) -> float:
+        ...
+class Interferometer:
+    """
+    What an interferometer makes of the light that comes back to its collimator.
+    """
+    def __init__(self, *, aperture: typing.SupportsFloat | typing.SupportsIndex = 10.0, acceptance: typing.SupportsFloat | typing.SupportsIndex = 0.1, least_coupling: typing.SupportsFloat | typing.SupportsIndex = 0.0, resolution: typing.SupportsFloat | typing.SupportsIndex = 0.0, periodic_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.0, dead_path: typing.SupportsFloat | typing.SupportsIndex = 0.0, index_error: typing.SupportsFloat | typing.SupportsIndex = 0.0, reading_model: str = 'chief_ray') -> None:
+        """
+        aperture: edge of the square that takes the beam back, mm; acceptance: largest angle of the returned beam, rad; least_coupling: share of the light; resolution, periodic_amplitude, dead_path: mm; index_error: relative; reading_model: "chief_ray" or "coupled_mode". Raises InvalidArgument naming the value.
+        """
+    @property
+    def acceptance(self) -> float:
+        ...
+    @property
+    def aperture(self) -> float:
+        ...
+    @property
+    def dead_path(self) -> float:
+        ...
+    @property
+    def index_error(self) -> float:
+        ...
+    @property
+    def least_coupling(self) -> float:
+        ...
+    @property
+    def periodic_amplitude(self) -> float:
+        ...
+    @property
+    def reading_model(self) -> str:
+        ...
+    @property
+    def resolution(self) -> float:
+        ...
+class BeamSpot:
+    """
+    A beam's spot on a sensor: centre (2,) and radius (1/e^2 of power) in mm, share of the source's power.
+    """
+    def __init__(self, centre: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, power: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        """
+        Raises InvalidArgument for what is not finite, no radius or a negative power.
+        """
+    @property
+    def centre(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def power(self) -> float:
+        ...
+    @property
+    def radius(self) -> float:
+        ...
+class Camera:
+    """
+    A pixel array and how a spot is located on it.
+    """
+    def __init__(self, *, pixel: typing.SupportsFloat | typing.SupportsIndex = 0.01, columns: typing.SupportsIndex = 512, rows: typing.SupportsIndex = 512, electrons: typing.SupportsFloat | typing.SupportsIndex = 1000000.0, background: typing.SupportsFloat | typing.SupportsIndex = 0.0, read_noise: typing.SupportsFloat | typing.SupportsIndex = 0.0, shot_noise: bool = False, full_well: typing.SupportsFloat | typing.SupportsIndex = 1000000000.0, bits: typing.SupportsIndex = 0, centroid: str = 'gaussian_fit', threshold: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> None:
+        """
+        pixel: pitch, mm; electrons: of a whole spot of power 1; background (a pixel), read_noise (standard deviation), full_well: electrons; bits: of the converter over the full well, 0: not quantised; centroid: "gaussian_fit" or "centre_of_gravity", the latter of what exceeds the threshold, a share of the brightest pixel above background. Raises InvalidArgument naming the value.
+        """
+    @property
+    def background(self) -> float:
+        ...
+    @property
+    def bits(self) -> int:
+        ...
+    @property
+    def centroid(self) -> str:
+        ...
+    @property
+    def columns(self) -> int:
+        ...
+    @property
+    def electrons(self) -> float:
+        ...
+    @property
+    def full_well(self) -> float:
+        ...
+    @property
+    def pixel(self) -> float:
+        ...
+    @property
+    def read_noise(self) -> float:
+        ...
+    @property
+    def rows(self) -> int:
+        ...
+    @property
+    def shot_noise(self) -> bool:
+        ...
+    @property
+    def threshold(self) -> float:
+        ...
+class LateralEffect:
+    """
+    A lateral-effect position sensing device: it gives the power centroid of what falls on it.
+    """
+    def __init__(self, *, size: numpy.typing.ArrayLike = (10.0, 10.0), noise: typing.SupportsFloat | typing.SupportsIndex = 0.0, resolution: typing.SupportsFloat | typing.SupportsIndex = 0.0, least_power: typing.SupportsFloat | typing.SupportsIndex = 1e-06) -> None:
+        """
+        size: (2,) of the active area, mm; noise: standard deviation at full power, mm, growing as 1 / power; resolution: mm; least_power: share of the source's power, below which a reading is lost. Raises InvalidArgument naming the value.
+        """
+    @property
+    def least_power(self) -> float:
+        ...
+    @property
+    def noise(self) -> float:
+        ...
+    @property
+    def resolution(self) -> float:
+        ...
+    @property
+    def size(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+class ReplayMismatch(RuntimeError):
+    pass
+class BeamSegment:
+    """
+    A straight piece of a beam's way, in the sensor frame, mm.
+    """
+    @property
+    def arrives(self) -> str | None:
+        """
+        Name of the detector that it arrives at, or None.
+        """
+    @property
+    def beam(self) -> str:
+        ...
+    @property
+    def end(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Where it meets a face; 50 mm on where it leaves.
+        """
+    @property
+    def fate(self) -> str:
+        """
+        "goes_on", "absorbed", "left" or "cut".
+        """
+    @property
+    def parent(self) -> int:
+        """
+        Index of the segment it comes from; -1: the source.
+        """
+    @property
+    def power(self) -> float:
+        """
+        Share of the source's power.
+        """
+    @property
+    def start(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
 class ReadingUncertainty:
     """
@@ -323,9 +723,39 @@ class Calibration:
     @property
     def volume(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
-def evaluate(measurement: Measurement, plan: Plan, head: Head, chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'enhanced', uncertainty: ReadingUncertainty = ..., full_covariance: bool = False) -> Calibration:
+def beam_radius(mode: GaussianMode, reduced_length: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
-    Calibration from a run. Of the head only psd_distance and beam_offsets are used, of the machine only chain and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan.
+    Radius (1/e^2 of power, mm) of a beam after a reduced length (sum of t/n, mm) from the collimator's plane.
+    """
+def couple(mode: GaussianMode, beam: ReturnedBeam, index: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> tuple[float, float]:
+    """
+    Round trip as the fibre's phase has it (mm) and share of the light that couples: the overlap integral of the returned beam with the mode in a medium of this index, in closed form (Joyce and DeLoach, Appl. Opt. 23 (1984) 4187); the phase that an aligned beam gains by diffraction is taken off.
+    """
+def cramer_rao_bound(camera: Camera, spot: BeamSpot) -> float:
+    """
+    Smallest standard deviation (mm) of the spot's x that an unbiased estimate can have with position, radius, brightness and background unknown (Winick, J. Opt. Soc. Am. A 3 (1986) 1809); 0 without noise, inf where x is not observable.
+    """
+def evaluate(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'enhanced', uncertainty: ReadingUncertainty = ..., full_covariance: bool = False) -> Calibration:
+    """
+    Calibration from a run. Of the head only its calibration is used, of the machine only chain and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan.
+    """
+def expose(camera: Camera, spots: collections.abc.Sequence[BeamSpot], *, seed: typing.SupportsIndex = 0, counter: typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Image in electrons, shape (rows, columns), pixel (0, 0) at the lowest x and y; the array is centred on the sensor's origin. The noise depends on seed and counter alone. Raises InvalidArgument for a seed outside 0 .. 2^64 - 1.
+    """
+@typing.overload
+def locate(camera: Camera, image: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64] | None:
+    """
+    Position (2,) of the spot in an image (rows, columns) of electrons, mm from the sensor's origin; None where nothing can be located. Raises InvalidArgument for an image of another shape or not finite.
+    """
+@typing.overload
+def locate(device: LateralEffect, spots: collections.abc.Sequence[BeamSpot], *, seed: typing.SupportsIndex = 0, counter: typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64] | None:
+    """
+    Position (2,) that the device gives for these spots, mm from its centre; None below its least power.
+    """
+def power_inside(spot: BeamSpot, low: numpy.typing.ArrayLike, high: numpy.typing.ArrayLike) -> float:
+    """
+    Share of the source's power that a spot has in the rectangle between two corners (2,), mm.
     """
 def random_error_map(volume: numpy.typing.ArrayLike, *, seed: typing.SupportsIndex, translation: typing.SupportsFloat | typing.SupportsIndex = 0.02, rotation: typing.SupportsFloat | typing.SupportsIndex = 6e-05, squareness: typing.SupportsFloat | typing.SupportsIndex = 6e-05, intervals: typing.SupportsIndex = 50, screw_pitch: typing.SupportsFloat | typing.SupportsIndex = 0.0, screw_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> ErrorMap:
     """
@@ -335,16 +765,28 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
     """
     Reads a calibration CSV. Raises InvalidArgument naming file and line.
     """
+def read_distance(interferometer: Interferometer, mode: GaussianMode, beam: ReturnedBeam, *, true_index: typing.SupportsFloat | typing.SupportsIndex = 1.0, assumed_index: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float | None:
+    """
+    The distance that the instrument gives, mm; None where the beam is outside aperture, acceptance or least coupling.
+    """
 def read_error_map(path: str | os.PathLike[str]) -> ErrorMap:
     """
     Reads an error map or calibration CSV. Raises InvalidArgument naming file and line.
+    """
+def read_head(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment = ..., assumed_environment: Environment | None = None) -> dict[str, float | None]:
+    """
+    The signals of a traced head for one mirror pose, by the trace of all its light; None for a lost one.
     """
 def read_measurement(path: str | os.PathLike[str]) -> Measurement:
     """
     Reads a measurement CSV. Raises InvalidArgument naming file and line.
     """
-def simulate(machine: Machine, plan: Plan, head: Head, *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., refractive_index: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> Measurement:
+def simulate(machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[str, Head], *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment = ..., assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> Measurement:
     """
-    A run on the virtual machine: lines of the plan, then its scale lines. misalignment: by line name; a line without an entry is aligned. Readings whose beam misses the mirror or does not come back are lost (NaN). Raises InvalidArgument.
+    A run on the virtual machine: lines of the plan, then its scale lines. head: one, or a dict with one for each line. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace; assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's replayed poses, traced again and compared. Readings whose beam misses the mirror or does not come back are lost (NaN). Raises InvalidArgument; RuntimeError where a replay and its trace differ.
+    """
+def trace_beams(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment = ...) -> list[BeamSegment]:
+    """
+    All light of a traced head, as segments: the mirror's centre at (lateral, distance) in the sensor frame, mm, its tilts (alpha, beta) in rad. A parent stands before its children. Raises InvalidArgument.
     """
 __version__: str = '0.1.0'

@@ -154,6 +154,7 @@ PYBIND11_MODULE(_core, m) {
     bind_measurement(m);
     bind_head(m);
     bind_simulation(m);
+    bind_detectors(m);
     bind_traced_head(m);
     bind_evaluation(m);
 }

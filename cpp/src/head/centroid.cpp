@@ -4,6 +4,7 @@
 
 #include "head/camera_noise.hpp"
 #include "head/gaussian_fit.hpp"
+#include "head/pixel_information.hpp"
 #include "head/spot_search.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/head/spot_sensor.hpp"
@@ -64,18 +65,14 @@ std::optional<Eigen::Vector2d> locate(const Camera& camera, const Eigen::MatrixX
 double cramer_rao_bound(const Camera& camera, const BeamSpot& spot) {
     check_camera(camera);
     check_spot(spot);
-    PixelNoise noise{camera.shot_noise, read_variance(camera), saturation(camera)};
-    if (!noise.shot && noise.variance == 0.0) return 0.0;
-    noise.variance = std::max(noise.variance, 1e-9);  // finite where pixels are dark and only light is noisy
+    if (!camera.shot_noise && read_variance(camera) == 0.0) return 0.0;
+    const PixelInformation of_pixel(camera.shot_noise, read_variance(camera));
     const PixelSpot pixels{spot.centre.x() / camera.pixel + 0.5 * camera.columns,
                            spot.centre.y() / camera.pixel + 0.5 * camera.rows, spot.radius / camera.pixel,
                            spot.power * camera.electrons, camera.background};
-
-    Camera quiet = camera;
-    quiet.shot_noise = false, quiet.read_noise = 0.0, quiet.bits = 0;
-    const Eigen::MatrixXd mean = expose(quiet, {spot}, 0, 0);
-    const auto information = score(mean, {0, 0, camera.columns, camera.rows}, noise, pixels).information;
-    const auto column = solve(information, Eigen::Matrix<double, 5, 1>::Unit(0));
+    const Eigen::Matrix<double, 5, 5> all =
+        information({0, 0, camera.columns, camera.rows}, of_pixel, saturation(camera), pixels);
+    const auto column = solve(all, Eigen::Matrix<double, 5, 1>::Unit(0));
     return column ? camera.pixel * std::sqrt((*column)[0]) : std::numeric_limits<double>::infinity();
 }
 

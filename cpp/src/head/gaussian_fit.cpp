@@ -15,6 +15,42 @@ using Matrix5 = Eigen::Matrix<double, 5, 5>;
 constexpr double window_radii = 2.5;     // beyond it lies 4e-6 of the light
 constexpr double smallest_radius = 0.3;  // pixels; below, shares tell nothing of radius nor of position
 
+// Mean of the pixels in a window and its derivatives, column by column.
+class SpotModel {
+public:
+    SpotModel(const PixelWindow& window, const PixelSpot& spot)
+        : spot_(spot), X_(pixel_shares_and_derivatives(spot.x, spot.radius, window.column, 1.0, window.columns)) {
+        Y_.resize(window.rows, 4);
+        Y_ << pixel_shares_and_derivatives(spot.y, spot.radius, window.row, 1.0, window.rows).matrix(),
+            Eigen::VectorXd::Ones(window.rows);
+    }
+
+    Eigen::ArrayXd mean(int j) const { return spot_.electrons * X_(j, 0) * Y_.col(0).array() + spot_.background; }
+
+    // A column's derivatives are combinations of Y, its derivatives and 1, so that sums of 4 x 4 products suffice.
+    void add(int j, const Eigen::ArrayXd& weight, const Eigen::ArrayXd& residual, FisherScoring& sum) const {
+        const double A = spot_.electrons, share = X_(j, 0);
+        Eigen::Matrix<double, 5, 4> from_Y = Eigen::Matrix<double, 5, 4>::Zero();
+        from_Y(0, 0) = A * X_(j, 1);
+        from_Y(1, 1) = A * share;
+        from_Y(2, 0) = A * X_(j, 2);
+        from_Y(2, 2) = A * share;
+        from_Y(3, 0) = share;
+        from_Y(4, 3) = 1.0;
+        const Basis weighted = Y_.array().colwise() * weight;
+        const Eigen::Matrix4d products = weighted.transpose().lazyProduct(Y_);
+        const Eigen::Vector4d residuals = weighted.transpose().lazyProduct(residual.matrix());
+        sum.information += from_Y * products * from_Y.transpose();
+        sum.score += from_Y * residuals;
+    }
+
+private:
+    using Basis = Eigen::Matrix<double, Eigen::Dynamic, 4>;
+    PixelSpot spot_;
+    Eigen::ArrayX3d X_;
+    Basis Y_;
+};
+
 PixelWindow window_around(const PixelSpot& spot, const Eigen::MatrixXd& image) {
     const double half = window_radii * spot.radius + 1.5;
     const auto part = [half](double centre, Eigen::Index size) {
@@ -63,37 +99,30 @@ std::optional<PixelSpot> climb(const Eigen::MatrixXd& image, const PixelWindow& 
 
 FisherScoring score(const Eigen::MatrixXd& image, const PixelWindow& window, const PixelNoise& noise,
                     const PixelSpot& spot) {
+    const SpotModel model(window, spot);
     FisherScoring sum;
-    const Eigen::ArrayX3d X = pixel_shares_and_derivatives(spot.x, spot.radius, window.column, 1.0, window.columns);
-    // A column's derivatives are made of these: Y, its derivatives and 1.
-    Eigen::Matrix<double, Eigen::Dynamic, 4> basis(window.rows, 4);
-    basis << pixel_shares_and_derivatives(spot.y, spot.radius, window.row, 1.0, window.rows).matrix(),
-        Eigen::VectorXd::Ones(window.rows);
-    Eigen::Matrix<double, Eigen::Dynamic, 4> weighted(window.rows, 4);
-    Eigen::ArrayXd mean(window.rows), weight(window.rows);
-
     for (int j = 0; j < window.columns; ++j) {
         const auto electrons = image.col(window.column + j).segment(window.row, window.rows).array();
-        const double A = spot.electrons, share = X(j, 0);
-        mean = A * share * basis.col(0).array() + spot.background;
-        weight = noise.shot ? (1.0 / (mean.max(0.0) + noise.variance)).eval()
-                            : Eigen::ArrayXd::Constant(window.rows, 1.0 / noise.variance);
+        const Eigen::ArrayXd mean = model.mean(j);
+        Eigen::ArrayXd weight(window.rows);
+        if (noise.shot) weight = 1.0 / (mean.max(0.0) + noise.variance);
+        else weight.setConstant(1.0 / noise.variance);
         weight = (electrons < noise.saturation).select(weight, 0.0);
-        weighted = basis.array().colwise() * weight;
-
-        Eigen::Matrix<double, 5, 4> from_basis = Eigen::Matrix<double, 5, 4>::Zero();
-        from_basis(0, 0) = A * X(j, 1);
-        from_basis(1, 1) = A * share;
-        from_basis(2, 0) = A * X(j, 2);
-        from_basis(2, 2) = A * share;
-        from_basis(3, 0) = share;
-        from_basis(4, 3) = 1.0;
-        const Eigen::Matrix4d products = weighted.transpose().lazyProduct(basis);
-        const Eigen::Vector4d residuals = weighted.transpose().lazyProduct((electrons - mean).matrix());
-        sum.information.noalias() += from_basis * products * from_basis.transpose();
-        sum.score.noalias() += from_basis * residuals;
+        model.add(j, weight, electrons - mean, sum);
     }
     return sum;
+}
+
+Matrix5 information(const PixelWindow& window, const PixelInformation& of_pixel, double saturation,
+                    const PixelSpot& spot) {
+    const SpotModel model(window, spot);
+    FisherScoring sum;
+    for (int j = 0; j < window.columns; ++j) {
+        const Eigen::ArrayXd mean = model.mean(j);
+        const Eigen::ArrayXd weight = mean.unaryExpr([&](double m) { return m < saturation ? of_pixel(m) : 0.0; });
+        model.add(j, weight, Eigen::ArrayXd::Zero(window.rows), sum);
+    }
+    return sum.information;
 }
 
 std::optional<Vector5> solve(const Matrix5& information, const Vector5& b) {

@@ -78,6 +78,21 @@ TEST(CramerRaoBound, OfALargeSpotInTheDarkIsAQuarterOfItsDiameterOverTheRootOfIt
     EXPECT_EQ(cramer_rao_bound(camera, {{99.0, 0.0}, 0.2, 1.0}), std::numeric_limits<double>::infinity());
 }
 
+TEST(CramerRaoBound, APixelTellsMoreThanItsVarianceAndLessThanItsElectronsCounted) {
+    for (const double sigma : {0.05, 0.3, 1.0, 3.0, 20.0}) {
+        const stepdiag::PixelInformation of_pixel(true, sigma * sigma);
+        for (const double mean : {1e-5, 1e-3, 0.1, 2.0, 50.0, 99.0, 101.0, 1e5}) {
+            EXPECT_GE(of_pixel(mean) * (mean + sigma * sigma), 1.0 - 1e-6);  // the trapezoidal rule
+            EXPECT_LE(of_pixel(mean) * mean, 1.0 + 1e-6);
+        }
+        // In the dark, the next electron against none: exp(1/sigma^2) - 1.
+        if (sigma >= 1.0) {
+            EXPECT_NEAR(of_pixel(0.0) / (std::exp(1.0 / (sigma * sigma)) - 1.0), 1.0, 1e-3);  // 1e-4 electrons
+        }
+    }
+    EXPECT_EQ(stepdiag::PixelInformation(false, 4.0)(7.0), 0.25);
+}
+
 TEST(CramerRaoBound, IsTheInverseOfTheInformationByDifferences) {
     Camera camera = camera_for(3.0, 5000.0);
     camera.background = 2.0;
@@ -98,7 +113,8 @@ TEST(CramerRaoBound, IsTheInverseOfTheInformationByDifferences) {
         return expose(c, {s}, 0, 0);
     };
     const double step = 4000.0 / 1023.0;
-    const Eigen::ArrayXXd weight = 1.0 / (mean(0, 0.0).array() + 1.5 * 1.5 + step * step / 12.0);
+    const stepdiag::PixelInformation of_pixel(true, 1.5 * 1.5 + step * step / 12.0);
+    const Eigen::ArrayXXd weight = mean(0, 0.0).array().unaryExpr(of_pixel);
     Eigen::Matrix<double, 5, 5> information;
     const auto derivative = [&](int i) {
         const double h = i < 3 ? 1e-6 : 1e-4;

@@ -81,9 +81,9 @@ std::optional<Eigen::Vector2d> locate(const LateralEffect& device, const std::ve
                                       std::uint64_t seed, std::uint64_t counter);
 
 // Smallest standard deviation of the position's x that any unbiased estimate can have (Cramer-Rao) for this image's
-// expectation, all of position, radius, brightness and background being unknown; mm. The information of a pixel of mean
-// m and variance m + (read noise)^2 + (converter's step)^2/12 is taken as 1/variance; 0 for a camera without noise,
-// infinite where position is not observable.
+// expectation, all of position, radius, brightness and background being unknown; mm. Pixels have the exact information
+// of a Poisson number plus Gaussian read noise, which the converter's step^2/12 adds to; saturated ones have none. 0
+// for a camera without noise, infinite where position is not observable.
 double cramer_rao_bound(const Camera& camera, const BeamSpot& spot);
 
 }  // namespace stepdiag
