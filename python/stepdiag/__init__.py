@@ -14,41 +14,37 @@ Bad input raises InvalidArgument, a ValueError.
 from typing import TYPE_CHECKING, Any
 
 from stepdiag._core import (
-    BeamSpot,
     Calibration,
-    Camera,
     Chain,
+    Environment,
     ErrorMap,
-    GaussianMode,
     Head,
-    Interferometer,
+    HeadBeam,
+    HeadBody,
+    HeadCalibration,
+    HeadDesign,
     InvalidArgument,
-    LateralEffect,
     Machine,
     Measurement,
     Misalignment,
     Noise,
     Plan,
     ReadingUncertainty,
-    ReturnedBeam,
+    SpotSensor,
     __version__,
-    beam_radius,
-    couple,
-    cramer_rao_bound,
     evaluate,
-    expose,
-    locate,
-    power_inside,
     random_error_map,
     read_calibration,
-    read_distance,
     read_error_map,
+    read_head,
     read_measurement,
     simulate,
+    trace_beams,
 )
 from stepdiag.comparison import Deviation, largest_deviations
 
 if TYPE_CHECKING:
+    from stepdiag.head_description import parse_head_design, read_head_design, shipped_head
     from stepdiag.scenario import (
         Scenario,
         evaluate_scenario,
@@ -58,55 +54,63 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
-    "BeamSpot",
     "Calibration",
-    "Camera",
     "Chain",
     "Deviation",
+    "Environment",
     "ErrorMap",
-    "GaussianMode",
     "Head",
-    "Interferometer",
+    "HeadBeam",
+    "HeadBody",
+    "HeadCalibration",
+    "HeadDesign",
     "InvalidArgument",
-    "LateralEffect",
     "Machine",
     "Measurement",
     "Misalignment",
     "Noise",
     "Plan",
     "ReadingUncertainty",
-    "ReturnedBeam",
     "Scenario",
+    "SpotSensor",
     "__version__",
-    "beam_radius",
-    "couple",
-    "cramer_rao_bound",
     "evaluate",
     "evaluate_scenario",
-    "expose",
     "largest_deviations",
-    "locate",
+    "parse_head_design",
     "parse_scenario",
-    "power_inside",
     "random_error_map",
     "read_calibration",
-    "read_distance",
     "read_error_map",
+    "read_head",
+    "read_head_design",
     "read_measurement",
     "read_scenario",
+    "shipped_head",
     "simulate",
     "simulate_scenario",
+    "trace_beams",
 ]
 
-_IN_SCENARIO = {"Scenario", "evaluate_scenario", "parse_scenario", "read_scenario", "simulate_scenario"}
+# Where to find what has to do with our TOML files.
+_LATER = {
+    "Scenario": "scenario",
+    "evaluate_scenario": "scenario",
+    "parse_scenario": "scenario",
+    "read_scenario": "scenario",
+    "simulate_scenario": "scenario",
+    "parse_head_design": "head_description",
+    "read_head_design": "head_description",
+    "shipped_head": "head_description",
+}
 
 
 def __getattr__(name: str) -> Any:
-    """Imports what has to do with scenario files on first use: it brings pydantic along."""
-    if name in _IN_SCENARIO:
-        from stepdiag import scenario
+    """Imports what has to do with TOML files on first use: it brings pydantic along."""
+    if name in _LATER:
+        from importlib import import_module
 
-        return getattr(scenario, name)
+        return getattr(import_module(f"stepdiag.{_LATER[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

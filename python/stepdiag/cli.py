@@ -5,13 +5,13 @@ What is imported inside a command keeps the others fast.
 
 import io
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
 
 import click
 
 from stepdiag._core import InvalidArgument, __version__
+from stepdiag.cli_head import head
+from stepdiag.cli_options import PATH, InOrder, out_file, tell
 
 EPILOG = """\b
 See it all at once:
@@ -30,21 +30,8 @@ SHORT = {
     "simulate": "Simulate the run of a scenario.",
     "evaluate": "Calibrate the machine from a run.",
     "check": "Tell what a file is, and whether it is sound.",
+    "head": "Look at the description of a laser head.",
 }
-
-Command = TypeVar("Command", bound=Callable[..., None])
-PATH = click.Path(path_type=Path)
-
-
-def out_file(meaning: str) -> Callable[[Command], Command]:
-    return click.option("-o", "output", required=True, type=PATH, metavar="FILE", help=meaning)
-
-
-class InOrder(click.Group):
-    """Lists the commands in the order above, not by the alphabet."""
-
-    def list_commands(self, context: click.Context) -> list[str]:
-        return list(SHORT)
 
 
 @click.group(
@@ -73,7 +60,7 @@ def simulate(scenario: Path, output: Path) -> None:
     described = read_scenario(scenario)
     _keep_map(output, described.error_map)
     for warning in scenario_warnings(described):
-        _tell("warning", warning)
+        tell("warning", warning)
     simulate_scenario(described).write(output)
 
 
@@ -177,30 +164,47 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
     metavar="SCENARIO",
     help="Write only measurement.csv, for the plan and head of this scenario.",
 )
-def init(folder: Path, scenario: Path | None) -> None:
+@click.option("--head", "head_name", metavar="NAME", help="Begin with a copy of this shipped head (see head list).")
+def init(folder: Path, scenario: Path | None, head_name: str | None) -> None:
     """Begin with your own machine: a scenario to edit and a sheet to fill in.
 
     Writes scenario.toml, with a comment on every key, and measurement.csv with all commanded points and empty
     fields for the readings of your instrument. Existing files are never overwritten. After changing the plan
-    in the scenario, make a new sheet with --sheet-for.
+    in the scenario, make a new sheet with --sheet-for. With --head the scenario's head is head.toml, a copy of a
+    shipped description, in place of a layout.
     """
-    from stepdiag.files import make_folder, write_whole
+    from stepdiag.files import make_folder, read_text, write_whole
+    from stepdiag.head_description import find_shipped_head
     from stepdiag.scenario import parse_scenario, read_scenario
     from stepdiag.scenario_text import template
     from stepdiag.sheet import empty_sheet
 
-    text = template()
-    plan = parse_scenario(text) if scenario is None else read_scenario(scenario)
-    written = [folder / "measurement.csv"] if scenario else [folder / "scenario.toml", folder / "measurement.csv"]
+    if scenario is not None and head_name is not None:
+        raise InvalidArgument("--head: goes with a new scenario, not with --sheet-for")
+    texts = {}
+    if scenario is not None:
+        plan = read_scenario(scenario)
+    else:
+        texts["scenario.toml"] = template("head.toml" if head_name else None)
+        shipped = find_shipped_head(head_name) if head_name else None
+        if shipped is not None:
+            texts["head.toml"] = read_text(shipped)
+        # As it is read in its new folder, where the head's copy is not yet.
+        plan = parse_scenario(template(head_name))
+    written = [folder / name for name in (*texts, "measurement.csv")]
     for path in written:
         if path.exists() or path.is_symlink():
             raise InvalidArgument(f"{path}: exists already, and is not overwritten")
     make_folder(folder)
-    if scenario is None:
-        write_whole(folder / "scenario.toml", text)
+    for name, text in texts.items():
+        write_whole(folder / name, text)
     empty_sheet(plan.plan, plan.head).write(folder / "measurement.csv")
     for path in written:
         click.echo(f"wrote {path}")
+
+
+cli.add_command(head)
+cli.commands = {name: cli.commands[name] for name in SHORT}  # the order in which help lists them
 
 
 def _keep_apart(output: Path, *inputs: Path) -> None:
@@ -220,12 +224,7 @@ def _same_file(one: Path, other: Path) -> bool:
 
 
 def _complain(message: str) -> None:
-    _tell("error", message)
-
-
-def _tell(what: str, message: str) -> None:
-    line = " ".join(message.split())
-    click.echo(f"stepdiag: {what}: {line}", err=True)
+    tell("error", message)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -26,7 +26,7 @@ def examine(path: Path) -> Finding:
     """Reads a file as the kind that its first lines show. Raises InvalidArgument where it is not sound."""
     check_input(path)
     if path.suffix.lower() == ".toml":
-        return _scenario(path)
+        return _toml(path)
     comments, header = _head_of(read_beginning(path))
     leading = dict(re.findall(r"(?m)^#\s*(\w+)\s*=\s*(.*?)\s*$", "\n".join(comments)))
     columns = {column.strip().strip('"') for column in header.split(",")}
@@ -39,11 +39,11 @@ def examine(path: Path) -> Finding:
     if {"line", "point"} & columns:
         return _measurement(path)
     if header.lstrip().startswith("[") or "=" in header:
-        return _scenario(path)
+        return _toml(path)
     if not header.strip():
         raise InvalidArgument(f"{path}: the file is empty, or has only comments")
     raise InvalidArgument(
-        f"{path}: expected a scenario (TOML), a measurement, an error map or a calibration (CSV); "
+        f"{path}: expected a scenario or a head (TOML), a measurement, an error map or a calibration (CSV); "
         f'a CSV file begins with "line,point,..." or "parameter,position_mm,..."'
     )
 
@@ -55,6 +55,23 @@ def _head_of(text: str) -> tuple[list[str], str]:
             return comments, line
         comments.append(line)
     return comments, ""
+
+
+def _toml(path: Path) -> Finding:
+    """A head where nothing but a head has such sections, else a scenario."""
+    from stepdiag.files import read_text
+    from stepdiag.toml_text import parse_toml
+
+    content = parse_toml(read_text(path), str(path))
+    return _head(path) if {"beam", "body", "sensor"} & content.keys() else _scenario(path)
+
+
+def _head(path: Path) -> Finding:
+    from stepdiag.head_description import read_head_design
+
+    design = read_head_design(path)
+    counts = f"{len(design.bodies)} bodies, {len(design.beams)} beams, {len(design.sensors)} sensors"
+    return Finding("head", f"{design.name}, layout {design.layout}, {counts}")
 
 
 def _scenario(path: Path) -> Finding:

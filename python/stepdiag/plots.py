@@ -1,10 +1,8 @@
 """The picture of the demonstration, after Figure 5 of the paper."""
 
-import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import matplotlib
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
@@ -13,6 +11,7 @@ from matplotlib.lines import Line2D
 
 from stepdiag._core import ErrorMap
 from stepdiag.demo import POSITIONING, Result
+from stepdiag.figures import own_style, save
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -25,25 +24,6 @@ METHODS: Mapping[str, Mapping[str, Any]] = {"enhanced": ENHANCED, "conventional"
 
 STRAIGHTNESS = ("EYX", "EZY", "EXZ")
 ANGLES = ("ECX", "EAY", "EBZ")
-
-STYLE: Any = {
-    "font.size": 8.5,
-    "axes.titlesize": 8.5,
-    "axes.titlelocation": "left",
-    "axes.labelsize": 8.5,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.linewidth": 0.6,
-    "xtick.labelsize": 7.5,
-    "ytick.labelsize": 7.5,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "axes.grid": True,
-    "grid.color": "#e4e4e4",
-    "grid.linewidth": 0.6,
-    "legend.frameon": False,
-    "svg.hashsalt": "stepdiag",  # the same names inside the file, run after run
-}
 
 # Panel: title, case, functions, methods.
 PANELS: Mapping[str, tuple[str, str, Sequence[str], Sequence[str]]] = {
@@ -70,9 +50,7 @@ YLABEL = {
 def draw_figure(results: Sequence[Result]) -> dict[str, bytes]:
     """The figure as files: figure.png and figure.svg. Same results, same bytes."""
     by_name = {result.case.name: result for result in results}
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()  # not the user's own style
-        matplotlib.rcParams.update(STYLE)
+    with own_style():
         figure = Figure(figsize=(10.0, 8.0), layout="constrained")
         panels = figure.subplot_mosaic([["1a", "1b", "1c", "1d"], ["2a", "2b", "2c", "2d"], ["3a", "3b", "4", "4"]])
         for name, (title, case, functions, methods) in PANELS.items():
@@ -85,14 +63,7 @@ def draw_figure(results: Sequence[Result]) -> dict[str, bytes]:
         for name in ("3a", "3b", "4"):
             panels[name].set_xlabel("position (mm)")
         figure.legend(handles=legend_handles(), loc="outside upper center", ncols=3, handlelength=3.0)
-        return {"figure.png": save(figure, "png", "Software"), "figure.svg": save(figure, "svg", "Date")}
-
-
-def save(figure: Figure, suffix: str, unwanted: str) -> bytes:
-    """The figure in a format, without the metadata that would differ from run to run."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=suffix, dpi=160, metadata={unwanted: None})
-    return buffer.getvalue()
+        return {"figure.png": save(figure, "png"), "figure.svg": save(figure, "svg")}
 
 
 def set_title(axes: Axes, name: str, title: str) -> None:

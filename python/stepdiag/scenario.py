@@ -1,30 +1,26 @@
 """A scenario: one TOML file that says which machine, plan and head a run is made with.
 
-docs/scenario.md lists every key. An evaluator may ask a scenario for `chain`, `tool`, `plan`, `head` and
-`uncertainty` only; the truth behind a simulated run (`machine()`, `misalignment`, `noise`) is not touched, and
-need not exist.
+docs/scenario.md lists every key. An evaluator may ask a scenario for `chain`, `tool`, `plan`, `heads` and
+`uncertainty` only; the truth behind a simulated run (`machine()`, `actual_heads()`, `misalignment`, `noise`,
+`environment`) is not touched, and need not exist.
 """
 
-import math
-import tomllib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
-from pydantic import ValidationError
-
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.files import check_input, read_text
-from stepdiag.scenario_errors import explain, show, suggest
-from stepdiag.scenario_keys import BY_LINE, SECTIONS_BY_LINE, HeadSection, RandomSection, ScenarioKeys
-
-MICROMETRE = 1e-3  # mm
-MICRORADIAN = 1e-6  # rad
+from stepdiag.key_errors import models_of, show
+from stepdiag.scenario_heads import DescribedHead, actual_heads, heads_by_line, nominal_heads, of_run
+from stepdiag.scenario_keys import TABLES_BY_NAME, RandomSection, ScenarioKeys
+from stepdiag.scenario_setup import environments, misalignments, noise_of, weights
+from stepdiag.sections import MICROMETRE, MICRORADIAN
+from stepdiag.toml_text import check_keys, located, parse_toml
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +32,18 @@ class Scenario:
     chain: _core.Chain
     tool: tuple[float, float, float]
     plan: _core.Plan
-    head: _core.Head
+    described_heads: Mapping[str, DescribedHead]
+    heads: Mapping[str, _core.Head]
     misalignment: Mapping[str, _core.Misalignment]
     noise: _core.Noise
-    refractive_index: float
+    environment: _core.Environment
+    assumed_environment: _core.Environment
     uncertainty: _core.ReadingUncertainty
+
+    @property
+    def head(self) -> _core.Head:
+        """The head of the first line; those of the others have the same readings."""
+        return next(iter(self.heads.values()))
 
     @property
     def error_map(self) -> Path | None:
@@ -52,29 +55,35 @@ class Scenario:
         """The machine to simulate: reads the error map, or makes the random one."""
         return _core.Machine(self.chain, self._errors(), self.tool)
 
+    def actual_heads(self) -> Mapping[str, _core.Head]:
+        """The heads to simulate with, by line; `heads` are the same without the pose errors of their components."""
+        return actual_heads(self.described_heads, self.path)
+
     def _errors(self) -> _core.ErrorMap:
         path, random = self.error_map, self.keys.machine.random
         if path is not None:
-            with _located(f"{self.path}: machine.errors"):
+            with located(f"{self.path}: machine.errors"):
                 check_input(path)
                 return _core.read_error_map(path)
         if random is not None:
-            with _located(f"{self.path}: machine.random"):
+            with located(f"{self.path}: machine.random"):
                 return _random_errors(self.keys, random)
         return _core.ErrorMap()
 
 
 def simulate_scenario(scenario: Scenario) -> _core.Measurement:
     """The run that a scenario describes."""
-    machine = scenario.machine()
-    with _located(str(scenario.path)):
+    machine, heads = scenario.machine(), scenario.actual_heads()
+    with located(str(scenario.path)):
         return _core.simulate(
             machine,
             scenario.plan,
-            scenario.head,
+            of_run(heads),
             misalignment=dict(scenario.misalignment),
             noise=scenario.noise,
-            environment=_core.Environment(scenario.refractive_index),
+            environment=scenario.environment,
+            assumed_environment=scenario.assumed_environment,
+            verified_share=scenario.keys.head.verified_share,
         )
 
 
@@ -89,7 +98,7 @@ def evaluate_scenario(
     return _core.evaluate(
         measurement,
         scenario.plan,
-        scenario.head,
+        of_run(scenario.heads),
         scenario.chain,
         scenario.tool,
         method=method,
@@ -106,55 +115,35 @@ def read_scenario(path: str | PathLike[str]) -> Scenario:
 def parse_scenario(text: str, path: str | PathLike[str] = "scenario.toml") -> Scenario:
     """A scenario from its text. `path` names it in messages; paths in it are relative to its folder."""
     file = str(path)
-    content = _parse_toml(text, file)
+    content = parse_toml(text, file)
     if not content:
         raise InvalidArgument(f"{file}: has no sections; expected [volume], [machine], [plan] and [head]")
-    content = {name: _by_line(name, section, file) for name, section in content.items()}
-    try:
-        keys = ScenarioKeys.model_validate(_tuples(content))
-    except ValidationError as error:
-        raise explain(error, content, file) from None
-    return _build(keys, Path(path))
+    content = {name: _by_name(name, section, file) for name, section in content.items()}
+    return _build(check_keys(content, ScenarioKeys, file), Path(path))
 
 
-def _parse_toml(text: str, file: str) -> dict[str, Any]:
-    try:
-        return tomllib.loads(text)
-    except RecursionError:
-        raise InvalidArgument(f"{file}: not valid TOML: nested too deeply") from None
-    except tomllib.TOMLDecodeError as error:
-        message = str(error)
-        raise InvalidArgument(f"{file}: not valid TOML: {message[:1].lower()}{message[1:]}") from None
-    except ValueError:  # Python reads integers of up to 4300 digits
-        raise InvalidArgument(f"{file}: not valid TOML: a number has too many digits") from None
-
-
-def _by_line(name: str, section: Any, file: str) -> Any:
-    """Puts the tables for single lines, [misalignment.ppp], under a name of their own."""
-    if name not in SECTIONS_BY_LINE or not isinstance(section, dict):
+def _by_name(name: str, section: Any, file: str) -> Any:
+    """Puts tables of the user's own names, [misalignment.ppp] or [head.left], under a name of their own."""
+    place = TABLES_BY_NAME.get(name)
+    if place is None or not isinstance(section, dict):
         return section
-    if BY_LINE in section:
-        raise InvalidArgument(f"{file}: {name}.{BY_LINE}: unknown key")
-    by_line = {key: value for key, value in section.items() if isinstance(value, dict)}
-    return {key: value for key, value in section.items() if key not in by_line} | {BY_LINE: by_line}
-
-
-def _tuples(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _tuples(item) for key, item in value.items()}
-    return tuple(_tuples(item) for item in value) if isinstance(value, list) else value
+    if place in section:
+        raise InvalidArgument(f"{file}: {name}.{place}: unknown key")
+    (model,) = models_of(ScenarioKeys.model_fields[name].annotation)
+    named = {key: value for key, value in section.items() if isinstance(value, dict) and key not in model.model_fields}
+    return {key: value for key, value in section.items() if key not in named} | {place: named}
 
 
 def _build(keys: ScenarioKeys, path: Path) -> Scenario:
     """Makes the core's types, whose own checks get file and section put in front."""
-    machine, plan_keys, noise = keys.machine, keys.plan, keys.noise
+    machine, plan_keys = keys.machine, keys.plan
     if machine.errors is not None and machine.random is not None:
         raise InvalidArgument(f"{path}: machine: expected errors or [machine.random], got both")
     if machine.errors is not None and "\0" in machine.errors:
         raise InvalidArgument(f"{path}: machine.errors: expected the path of a file, got {show(machine.errors)}")
-    with _located(f"{path}: machine.chain"):
+    with located(f"{path}: machine.chain"):
         chain = _core.Chain(machine.chain)
-    with _located(f"{path}: plan"):
+    with located(f"{path}: plan"):
         plan = _core.Plan(
             (keys.volume.x_mm, keys.volume.y_mm, keys.volume.z_mm),
             list(plan_keys.lines),
@@ -162,89 +151,23 @@ def _build(keys: ScenarioKeys, path: Path) -> Scenario:
             order=plan_keys.order,
             scale_lines=list(plan_keys.scale_lines),
         )
+    described = heads_by_line(keys, plan, path)
+    heads = nominal_heads(described, path)
+    environment, assumed = environments(keys.environment, path)
     return Scenario(
         path=path,
         keys=keys,
         chain=chain,
         tool=machine.tool_mm,
         plan=plan,
-        head=_head(keys.head, plan, path),
-        misalignment=MappingProxyType(_misalignment(keys, path)),
-        noise=_core.Noise(
-            distance=noise.distance_um * MICROMETRE,
-            tilt=noise.tilt_urad * MICRORADIAN,
-            spot=noise.spot_um * MICROMETRE,
-            seed=noise.seed,
-        ),
-        refractive_index=keys.environment.refractive_index,
-        uncertainty=_uncertainty(keys),
+        described_heads=MappingProxyType(described),
+        heads=MappingProxyType(heads),
+        misalignment=MappingProxyType(misalignments(keys, heads, path)),
+        noise=noise_of(keys.noise),
+        environment=environment,
+        assumed_environment=assumed,
+        uncertainty=weights(keys),
     )
-
-
-def _head(keys: HeadSection, plan: _core.Plan, path: Path) -> _core.Head:
-    if keys.layout == "psd" and keys.psd_distance_mm is None:
-        raise InvalidArgument(f'{path}: head.psd_distance_mm: missing; the layout "psd" needs it')
-    if keys.layout == "multi_beam" and keys.beam_offsets_mm is None:
-        raise InvalidArgument(f'{path}: head.beam_offsets_mm: missing; the layout "multi_beam" needs it')
-    with _located(f"{path}: plan"):  # it may find the steps too small
-        smallest = plan.smallest_mirror()
-    if keys.mirror_mm is not None and (keys.mirror_mm[0] < smallest[0] or keys.mirror_mm[1] < smallest[1]):
-        least = [math.ceil(10.0 * edge) / 10.0 for edge in smallest]  # so that what is named will do
-        raise InvalidArgument(
-            f"{path}: head.mirror_mm: too small for this plan: expected at least {least}, got {show(keys.mirror_mm)}"
-        )
-    with _located(f"{path}: head"):
-        return _core.Head(
-            keys.layout,
-            standoff=keys.standoff_mm,
-            psd_distance=keys.psd_distance_mm or 0.0,
-            beam_offsets=list(keys.beam_offsets_mm or ()),
-            wavelength=keys.wavelength_nm,
-            aperture=keys.aperture_mm,
-            mirror=keys.mirror_mm,
-        )
-
-
-def _misalignment(keys: ScenarioKeys, path: Path) -> dict[str, _core.Misalignment]:
-    lines = [*keys.plan.lines, *keys.plan.scale_lines]
-    for section in SECTIONS_BY_LINE:
-        for line in getattr(keys, section).by_line:
-            if line not in lines:
-                raise InvalidArgument(f"{path}: {section}.{line}: not a line of the plan; {suggest(line, lines)}")
-    shared = keys.misalignment.model_dump(exclude={BY_LINE})
-    aligned = type(keys.misalignment)().model_dump(exclude={BY_LINE})
-    result = {}
-    for line in lines:
-        own = keys.misalignment.by_line.get(line)
-        if line in keys.plan.scale_lines and own is None:
-            continue
-        values = aligned if line in keys.plan.scale_lines else shared
-        values = values | (own.model_dump(exclude_unset=True) if own is not None else {})
-        result[line] = _core.Misalignment(
-            reflector=_scaled(values["reflector_urad"]),
-            laser=_scaled(values["laser_urad"]),
-            psd_zero=values["psd_zero_mm"],
-        )
-    return result
-
-
-def _scaled(angles: tuple[float, float]) -> tuple[float, float]:
-    return angles[0] * MICRORADIAN, angles[1] * MICRORADIAN
-
-
-def _uncertainty(keys: ScenarioKeys) -> _core.ReadingUncertainty:
-    """[uncertainty], else the positive deviations of [noise], else the core's defaults; key by key."""
-    weights = {}
-    for name, key, unit in (
-        ("distance", "distance_um", MICROMETRE),
-        ("tilt", "tilt_urad", MICRORADIAN),
-        ("spot", "spot_um", MICROMETRE),
-    ):
-        # A standard deviation of 0 makes a perfect simulation; it is no statement about readings.
-        value = getattr(keys.uncertainty, key) or getattr(keys.noise, key)
-        if value > 0.0:
-            weights[name] = value * unit
-    return _core.ReadingUncertainty(**weights)
 
 
 def _random_errors(keys: ScenarioKeys, random: RandomSection) -> _core.ErrorMap:
@@ -258,12 +181,3 @@ def _random_errors(keys: ScenarioKeys, random: RandomSection) -> _core.ErrorMap:
         screw_pitch=random.screw_pitch_mm,
         screw_amplitude=random.screw_amplitude_um * MICROMETRE,
     )
-
-
-@contextmanager
-def _located(place: str) -> Iterator[None]:
-    """Puts `place` in front of what the core has to say about its arguments."""
-    try:
-        yield
-    except InvalidArgument as error:
-        raise InvalidArgument(f"{place}: {error}") from None

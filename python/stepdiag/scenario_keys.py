@@ -4,26 +4,38 @@ One home for all of them: what is refused, what the error message says, the tabl
 comments of the file that `stepdiag init` writes are made from the models below.
 """
 
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, Field
 
 from stepdiag._core import Plan
+from stepdiag.key_errors import BY_HEAD, BY_LINE
+from stepdiag.scenario_head_keys import EnvironmentSection, HeadSection, LineKeys
+from stepdiag.sections import (
+    AMPLITUDE,
+    ANGLES,
+    DEVIATION,
+    LARGEST_LENGTH,
+    POSITIVE,
+    SEED,
+    THREE_LENGTHS,
+    Amplitude,
+    AnglePair,
+    Length,
+    Pair,
+    Positive,
+    Section,
+    Seed,
+    Triple,
+    key,
+    tables,
+)
 
 # Limits that the core checks as well; here they keep numbers inside the integer types behind the bindings.
 LARGEST_STEPS: Final = Plan.largest_step_count
 SMALLEST_EDGE: Final = 1e-3
 LARGEST_EDGE: Final = 1e6
 LARGEST_INTERVALS: Final = 1_000_000
-LARGEST_SEED: Final = 2**64 - 1
-# Beyond a tenth of a radian no set-up is meant, and beyond a kilometre no length.
-LARGEST_ANGLE: Final = 99_999.0
-LARGEST_LENGTH: Final = 1e6
-
-
-def key(expected: str, meaning: str, default: Any = ..., example: Any = None) -> Any:
-    """A key of a section. `expected` completes "expected ..." in messages; `example` is for the template."""
-    return Field(default, description=meaning, json_schema_extra={"expected": expected, "example": example})
 
 
 def _weighs(choice: str | float) -> str | float:
@@ -33,30 +45,10 @@ def _weighs(choice: str | float) -> str | float:
 
 
 Edge = Annotated[float, Field(ge=SMALLEST_EDGE, le=LARGEST_EDGE)]
-Length = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
-PositiveLength = Annotated[float, Field(gt=0.0, le=LARGEST_LENGTH)]
-Angle = Annotated[float, Field(ge=-LARGEST_ANGLE, le=LARGEST_ANGLE)]
-Amplitude = Annotated[float, Field(ge=0.0, le=LARGEST_LENGTH)]
-Positive = Annotated[float, Field(gt=0.0, le=1e9)]
-Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
-Pair = tuple[Length, Length]
-AnglePair = tuple[Angle, Angle]
 Choice = Annotated[Literal["free", "fixed"] | float, AfterValidator(_weighs)]
 
 _edge = "a length in mm from 0.001 to 1e6"
-_amplitude = "a number of at least 0"
-_deviation = "a standard deviation of at least 0"
-_positive = "a positive number"
-_positive_length = "a positive length in mm"
-_seed = "an integer from 0 to 2^64 - 1"
-_angles = "two angles below 0.1 rad, in µrad"
 _choice = '"free", "fixed" or a positive standard uncertainty'
-
-
-class Section(BaseModel):
-    """Keys are typed strictly (an integer may stand for a float), finite, and no other is accepted."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
 class VolumeSection(Section):
@@ -70,10 +62,10 @@ class VolumeSection(Section):
 class RandomSection(Section):
     """A random error map, made from the seed. Same keys, same map."""
 
-    seed: Seed = key(_seed, "Seed of the map.", example=1)
-    translation_um: Amplitude = key(_amplitude, "Peak of each positioning error and straightness.", 20.0)
-    rotation_urad: Amplitude = key(_amplitude, "Peak of each angular error.", 60.0)
-    squareness_urad: Amplitude = key(_amplitude, "Squarenesses are uniform within plus and minus this.", 60.0)
+    seed: Seed = key(SEED, "Seed of the map.", example=1)
+    translation_um: Amplitude = key(AMPLITUDE, "Peak of each positioning error and straightness.", 20.0)
+    rotation_urad: Amplitude = key(AMPLITUDE, "Peak of each angular error.", 60.0)
+    squareness_urad: Amplitude = key(AMPLITUDE, "Squarenesses are uniform within plus and minus this.", 60.0)
     intervals: Annotated[int, Field(ge=2, le=LARGEST_INTERVALS)] | None = key(
         "an integer from 2 to 1000000",
         "Intervals between the map's nodes, per axis; by default `plan.steps`.",
@@ -83,7 +75,7 @@ class RandomSection(Section):
     screw_pitch_mm: Annotated[float, Field(ge=0.0, le=LARGEST_LENGTH)] = key(
         "a length in mm of at least 0", "Pitch of a periodic positioning error on all axes; 0: none.", 0.0
     )
-    screw_amplitude_um: Amplitude = key(_amplitude, "Amplitude of that periodic error.", 0.0)
+    screw_amplitude_um: Amplitude = key(AMPLITUDE, "Amplitude of that periodic error.", 0.0)
 
 
 class MachineSection(Section):
@@ -94,9 +86,7 @@ class MachineSection(Section):
         "Kinematic chain from workpiece w over bed b to tool t; a prime marks the axes before b.",
         example="[w X' b Y Z t]",
     )
-    tool_mm: tuple[Length, Length, Length] = key(
-        "three lengths in mm", "Offset from the tool's origin to the centre of the mirror.", (0.0, 0.0, 0.0)
-    )
+    tool_mm: Triple = key(THREE_LENGTHS, "Offset from the tool's origin to the centre of the mirror.", (0.0, 0.0, 0.0))
     errors: Annotated[str, Field(min_length=1)] | None = key(
         "the path of an error map (CSV)",
         "Error map to simulate with, relative to this file.",
@@ -126,54 +116,19 @@ class PlanSection(Section):
     )
 
 
-class HeadSection(Section):
-    """The measuring head and its mirror."""
-
-    layout: Literal["ideal", "psd", "multi_beam"] = key(
-        '"ideal", "psd" or "multi_beam"',
-        "`ideal` reads distance and two tilts, `psd` distance and spot, `multi_beam` three or more distances.",
-        example="ideal",
-    )
-    standoff_mm: PositiveLength = key(_positive_length, "Distance from head to mirror at a line's first point.", 100.0)
-    psd_distance_mm: Length | None = key(
-        "a length in mm",
-        "Distance from reference plane to position sensing device; required for `psd`.",
-        None,
-        50.0,
-    )
-    beam_offsets_mm: tuple[Pair, ...] | None = key(
-        "a list of pairs of lengths in mm",
-        "Offsets (u, v) of the beams in the reference plane; required for `multi_beam`, at least three.",
-        None,
-        [[0.0, 0.0], [20.0, 0.0], [0.0, 20.0]],
-    )
-    wavelength_nm: Positive = key(
-        _positive, "Vacuum wavelength; changes nothing yet: the air's index is given, not computed.", 1530.0
-    )
-    aperture_mm: PositiveLength = key(
-        _positive_length,
-        "Edge of the square that takes the beam back. A beam outside it is a lost reading of `ideal`; "
-        "the other layouts lose none.",
-        50.0,
-    )
-    mirror_mm: tuple[PositiveLength, PositiveLength] | None = key(
-        "two positive lengths in mm",
-        "Width and height of the mirror; by default as large as the plan needs. A beam that misses it is a lost "
-        "reading of `ideal`; the other layouts lose none.",
-        None,
-        [120.0, 120.0],
-    )
-
-
 class MisalignmentKeys(Section):
     """How head and mirror are out of true on a line."""
 
-    reflector_urad: AnglePair = key(_angles, "Tilt (a, b) of the mirror about local x and y.", (0.0, 0.0))
+    reflector_urad: AnglePair = key(ANGLES, "Tilt (a, b) of the mirror about local x and y.", (0.0, 0.0))
     laser_urad: AnglePair = key(
-        _angles, "Tilt (a, b) of the beam and the sensor's axes about local x and y.", (0.0, 0.0)
+        ANGLES, "Tilt (a, b) of the beam and the sensor's axes about local x and y.", (0.0, 0.0)
     )
     psd_zero_mm: Pair = key(
         "two lengths in mm", "What the position sensing device reads for a centred spot.", (0.0, 0.0)
+    )
+    distance_constant_mm: Length = key("a length in mm", "What every distance of a line reads too much.", 0.0)
+    beam_constants_um: tuple[Length, ...] | None = key(
+        "a list of lengths in µm, one for each beam", "And each of d1, d2, ... by itself.", None, [0.0, 1.0, -1.0]
     )
 
 
@@ -182,27 +137,17 @@ class MisalignmentSection(MisalignmentKeys):
 
     `[misalignment.LINE]` replaces, for one line, the keys it names. Scale lines are aligned unless named."""
 
-    by_line: dict[str, MisalignmentKeys] = {}
-
-
-class EnvironmentSection(Section):
-    """The air around the machine."""
-
-    refractive_index: Annotated[float, Field(ge=1.0, le=2.0)] = key(
-        "a refractive index from 1 to 2",
-        "Refractive index of the air, constant over a run. Readings are lengths with the index taken off, so "
-        "it changes them by rounding only.",
-        1.0,
-    )
+    by_line: dict[str, MisalignmentKeys] = tables("LINE")
 
 
 class NoiseSection(Section):
     """Standard deviations of the noise that `simulate` adds, independent and Gaussian."""
 
-    distance_um: Amplitude = key(_deviation, "Noise of distances (also d1, d2, ...).", 0.0)
-    tilt_urad: Amplitude = key(_deviation, "Noise of the tilts.", 0.0)
-    spot_um: Amplitude = key(_deviation, "Noise of the spot position.", 0.0)
-    seed: Seed = key(_seed, "Seed of the noise.", 0)
+    distance_um: Amplitude = key(DEVIATION, "Noise of distances (also d1, d2, ...).", 0.0)
+    common_um: Amplitude = key(DEVIATION, "Noise that all distances of a point have in common.", 0.0)
+    tilt_urad: Amplitude = key(DEVIATION, "Noise of the tilts.", 0.0)
+    spot_um: Amplitude = key(DEVIATION, "Noise of the spot position.", 0.0)
+    seed: Seed = key(SEED, "Seed of the noise.", 0)
 
 
 class UncertaintySection(Section):
@@ -211,9 +156,9 @@ class UncertaintySection(Section):
     By default the positive standard deviations of `[noise]`, else 0.1 µm, 1 µrad and 1 µm; each key by itself.
     Columns u_... of a measurement file come before these."""
 
-    distance_um: Positive | None = key(_positive, "Of distances (also d1, d2, ...).", None, 0.1)
-    tilt_urad: Positive | None = key(_positive, "Of the tilts.", None, 1.0)
-    spot_um: Positive | None = key(_positive, "Of the spot position.", None, 1.0)
+    distance_um: Positive | None = key(POSITIVE, "Of distances (also d1, d2, ...).", None, 0.1)
+    tilt_urad: Positive | None = key(POSITIVE, "Of the tilts.", None, 1.0)
+    spot_um: Positive | None = key(POSITIVE, "Of the spot position.", None, 1.0)
 
 
 class AdjustmentKeys(Section):
@@ -237,7 +182,7 @@ class AdjustmentSection(AdjustmentKeys):
     Accepted and checked, but **not used yet**: neither `conventional` nor `enhanced` adjusts the set-up.
     `[adjustment.LINE]` replaces, for one line, the keys it names."""
 
-    by_line: dict[str, AdjustmentKeys] = {}
+    by_line: dict[str, AdjustmentKeys] = tables("LINE")
 
 
 class ScenarioKeys(Section):
@@ -247,6 +192,7 @@ class ScenarioKeys(Section):
     machine: MachineSection
     plan: PlanSection
     head: HeadSection
+    line: dict[str, LineKeys] = tables("LINE")
     misalignment: MisalignmentSection = MisalignmentSection()
     environment: EnvironmentSection = EnvironmentSection()
     noise: NoiseSection = NoiseSection()
@@ -254,6 +200,6 @@ class ScenarioKeys(Section):
     adjustment: AdjustmentSection = AdjustmentSection()
 
 
-# Sections that may hold a table for each line, kept under BY_LINE.
+# Sections that may hold tables of the user's own names, and where these are kept.
 SECTIONS_BY_LINE: Final = ("misalignment", "adjustment")
-BY_LINE: Final = "by_line"
+TABLES_BY_NAME: Final = {"misalignment": BY_LINE, "adjustment": BY_LINE, "head": BY_HEAD}

@@ -137,7 +137,7 @@ MISTAKES: list[tuple[list[str], str]] = [
     (["check"], "Missing argument 'FILE...'"),
     (["check", "no.csv"], "no.csv: cannot be read"),
     (["check", "."], ".: expected a file, got a folder"),
-    (["check", "notes.txt"], "notes.txt: expected a scenario (TOML), a measurement, an error map or a calibration"),
+    (["check", "notes.txt"], "notes.txt: expected a scenario or a head (TOML), a measurement"),
     (["init"], "Missing option '-o'"),
     (["init", "-o", "run.csv"], "run.csv"),
     (["init", "-o", "."], "scenario.toml: exists already, and is not overwritten"),

@@ -1,0 +1,126 @@
+"""What the light of a head does: where it arrives and by which ways, and up to where all readings are there."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from stepdiag import _core
+
+FloatArray = npt.NDArray[np.float64]
+Pair = tuple[float, float]
+
+LARGEST_TILT: Final = 0.1  # rad; beyond it no set-up is meant
+LARGEST_TRAVEL: Final = 1e3  # mm
+SMALLEST: Final = 1e-5  # of the largest: where the search for a limit begins
+HALVINGS: Final = 20  # of the bracket that the search finds
+
+
+@dataclass(frozen=True)
+class Detector:
+    """An interferometer's collimator, or a sensor."""
+
+    name: str
+    beam: str  # whose light it is for
+    position: FloatArray
+    rotation: FloatArray  # head_R_detector
+
+    def local(self, point: FloatArray) -> FloatArray:
+        """A point of the head's frame in the detector's."""
+        return (point - self.position) @ self.rotation
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """Light that comes to the detector of its beam: the indices of its segments from the source on."""
+
+    detector: Detector
+    way: tuple[int, ...]
+    spot: FloatArray  # in the detector's frame, mm
+    length: float  # geometric, mm
+    power: float  # share of the source's
+
+
+def detectors(design: _core.HeadDesign) -> list[Detector]:
+    """One for each beam, in the order of the beams."""
+    sensors = {sensor.name: sensor for sensor in design.sensors}
+    found = []
+    for beam in design.beams:
+        place = sensors[beam.sensor] if beam.sensor else beam
+        found.append(Detector(place.name, beam.name, place.position, place.rotation))
+    return found
+
+
+def arrivals(segments: Sequence[_core.BeamSegment], detector: Detector) -> list[Arrival]:
+    """The light of the detector's beam that comes to it, strongest first; what follows the first are ghosts."""
+    found = []
+    for index, segment in enumerate(segments):
+        if segment.beam != detector.beam or segment.arrives != detector.name:
+            continue
+        way = _way_to(segments, index)
+        length = sum(float(np.linalg.norm(segments[k].end - segments[k].start)) for k in way)
+        spot = detector.local(segment.end)[:2]
+        found.append(Arrival(detector, way, spot, length, segment.power))
+    return sorted(found, key=lambda arrival: -arrival.power)
+
+
+def _way_to(segments: Sequence[_core.BeamSegment], index: int) -> tuple[int, ...]:
+    way: list[int] = []
+    while index >= 0:
+        way.append(index)
+        index = segments[index].parent
+    return tuple(reversed(way))
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Lowest and highest value of one thing between which all readings are there; none: no end was found."""
+
+    low: float | None
+    high: float | None
+
+
+def tilt_limits(head: _core.Head, distance: float) -> dict[str, Limits]:
+    """Of the mirror's tilts alpha and beta, rad, for a mirror in the middle."""
+    return _limits(LARGEST_TILT, ("alpha", "beta"), lambda tilt: _is_read(head, distance, tilt, (0.0, 0.0)))
+
+
+def travel_limits(head: _core.Head, distance: float) -> dict[str, Limits]:
+    """Of the mirror's way along x and y, mm, for a mirror without tilt."""
+    return _limits(LARGEST_TRAVEL, ("x", "y"), lambda lateral: _is_read(head, distance, (0.0, 0.0), lateral))
+
+
+def _is_read(head: _core.Head, distance: float, tilt: Pair, lateral: Pair) -> bool:
+    readings = _core.read_head(head, distance=distance, tilt=tilt, lateral=lateral)
+    return all(value is not None for value in readings.values())
+
+
+def _limits(largest: float, names: tuple[str, str], is_read: Callable[[Pair], bool]) -> dict[str, Limits]:
+    if not is_read((0.0, 0.0)):
+        return {name: Limits(0.0, 0.0) for name in names}
+
+    def ends(direction: Pair) -> float | None:
+        return _first_lost(largest, lambda value: is_read((value * direction[0], value * direction[1])))
+
+    def signed(value: float | None) -> float | None:
+        return None if value is None else -value
+
+    return {
+        names[0]: Limits(signed(ends((-1.0, 0.0))), ends((1.0, 0.0))),
+        names[1]: Limits(signed(ends((0.0, -1.0))), ends((0.0, 1.0))),
+    }
+
+
+def _first_lost(largest: float, is_read: Callable[[float], bool]) -> float | None:
+    """The largest value up to which all is read: by doubling, then by halving the bracket."""
+    low, high = 0.0, SMALLEST * largest
+    while is_read(high):
+        low, high = high, 2.0 * high
+        if high > largest:
+            return None
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if is_read(middle) else (low, middle)
+    return low
