@@ -22,7 +22,10 @@ void check(const TreeLimits& limits) {
 class Growth {
 public:
     Growth(const Scene& scene, const Medium& ambient, const TreeLimits& limits)
-        : scene_(scene), ambient_(ambient), limits_(limits) {}
+        : scene_(scene), ambient_(ambient), limits_(limits) {
+        tree_.segments.reserve(32);  // more than most heads need: growing costs as much as tracing
+        hits_before_.reserve(32);
+    }
 
     RayTree from(const Ray& ray) {
         add({-1, ray, ambient_.index, 1.0, {}, {}, SegmentEnd::cut}, 0);
