@@ -1,4 +1,4 @@
-// Vectors of lanes as number types of encounter-inl.hpp, one or two at a time.
+// Vectors of lanes as a number type of encounter-inl.hpp, two at a time.
 #if defined(STEPDIAG_LANES_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef STEPDIAG_LANES_INL
 #undef STEPDIAG_LANES_INL
@@ -28,15 +28,11 @@ HWY_INLINE Vector magnitude(Vector a) { return hn::Abs(a); }
 HWY_INLINE Vector negative(Vector a) { return hn::Neg(a); }
 HWY_INLINE Vector with_sign(Vector a, Vector sign) { return hn::CopySignToAbs(a, sign); }
 HWY_INLINE Mask both(Mask a, Mask b) { return hn::And(a, b); }
-HWY_INLINE Vector broadcast(Type<Vector>, double value) { return hn::Set(Tag(), value); }
-HWY_INLINE Vector load(Type<Vector>, const double* from) { return hn::LoadU(Tag(), from); }
-HWY_INLINE void store(Vector a, double* to) { hn::StoreU(a, Tag(), to); }
 HWY_INLINE void store(Mask a, std::uint8_t* to) {
     HWY_ALIGN double truth[hn::MaxLanes(Tag())];
-    hn::StoreU(hn::IfThenElseZero(a, hn::Set(Tag(), 1.0)), Tag(), truth);
+    hn::Store(hn::IfThenElseZero(a, hn::Set(Tag(), 1.0)), Tag(), truth);
     for (std::size_t i = 0; i < hn::Lanes(Tag()); ++i) to[i] = truth[i] != 0.0;
 }
-HWY_INLINE std::size_t width(Type<Vector>) { return hn::Lanes(Tag()); }
 
 // Two vectors side by side: while one waits for a root or a quotient, the other goes on.
 struct Pair {
@@ -62,19 +58,15 @@ HWY_INLINE Pair broadcast(Type<Pair>, double value) {
     const Vector all = hn::Set(Tag(), value);
     return {all, all};
 }
-HWY_INLINE Pair load(Type<Pair>, const double* from) {
-    return {hn::LoadU(Tag(), from), hn::LoadU(Tag(), from + hn::Lanes(Tag()))};
-}
-template <class To>
-HWY_INLINE void store(Pair x, To* to) {
-    store(x.a, to);
-    store(x.b, to + hn::Lanes(Tag()));
+HWY_INLINE Pair load(const double* from) { return {hn::LoadU(Tag(), from), hn::LoadU(Tag(), from + hn::Lanes(Tag()))}; }
+HWY_INLINE void store(Pair x, double* to) {
+    hn::StoreU(x.a, Tag(), to);
+    hn::StoreU(x.b, Tag(), to + hn::Lanes(Tag()));
 }
 HWY_INLINE void store(MaskPair x, std::uint8_t* to) {
     store(x.a, to);
     store(x.b, to + hn::Lanes(Tag()));
 }
-HWY_INLINE std::size_t width(Type<Pair>) { return 2 * hn::Lanes(Tag()); }
 
 }  // namespace HWY_NAMESPACE
 }  // namespace stepdiag

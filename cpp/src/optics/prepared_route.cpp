@@ -27,11 +27,10 @@ bool reads_both_indices(const Encounter& encounter) {
 }  // namespace
 
 PreparedRoute::PreparedRoute(const std::vector<Encounter>& route, const LaneRays& rays, std::size_t lanes,
-                             std::size_t width, std::size_t padded_below)
+                             std::size_t width)
     : lanes_(lanes),
       width_(width),
       size_(route.size()),
-      padded_(lanes < padded_below),
       encounters_(new PreparedEncounter[size_]),
       rows_(new double[(14 * size_ + 8) * width]),
       next_row_(rows_.get()) {
@@ -47,16 +46,6 @@ void PreparedRoute::prepare(const Encounter& encounter, PreparedEncounter& made)
     made.deflects = encounter.deflects;
     made.outline = encounter.outline;
 
-    const bool rotation_varies = vary(encounter.rotation), translation_varies = vary(encounter.translation);
-    made.plane_by_lane = rotation_varies || translation_varies;
-    if (made.plane_by_lane) {
-        for (int k = 0; k < 9; ++k) made.plane_from[k] = source(encounter.rotation[k]);
-        for (int k = 0; k < 3; ++k) made.plane_from[9 + k] = source(encounter.translation[k]);
-    } else {
-        for (int k = 0; k < 9; ++k) made.plane[k] = *encounter.rotation[k].value;
-        for (int k = 0; k < 3; ++k) made.plane[9 + k] = *encounter.translation[k].value;
-    }
-
     const LaneValue& before = encounter.index_before;
     const LaneValue& after = reads_both_indices(encounter) ? encounter.index_after : before;
     made.indices_by_lane = vary(std::array{before, after});
@@ -69,16 +58,44 @@ void PreparedRoute::prepare(const Encounter& encounter, PreparedEncounter& made)
         made.inverse_index = 1.0 / made.index_before;
         made.index_ratio = made.index_before / made.index_after;
     }
+
+    // One way for lanes is enough: where the indices vary, the plane is taken by lane too.
+    const bool rotation_varies = vary(encounter.rotation), translation_varies = vary(encounter.translation);
+    made.plane_by_lane = rotation_varies || translation_varies || made.indices_by_lane;
+    if (made.plane_by_lane) {
+        for (int k = 0; k < 9; ++k) made.plane_from[k] = source(encounter.rotation[k]);
+        for (int k = 0; k < 3; ++k) made.plane_from[9 + k] = source(encounter.translation[k]);
+    } else {
+        for (int k = 0; k < 9; ++k) made.plane[k] = *encounter.rotation[k].value;
+        for (int k = 0; k < 3; ++k) made.plane[9 + k] = *encounter.translation[k].value;
+    }
 }
 
 LaneSource PreparedRoute::source(const LaneValue& value) {
-    if (value.stride != 0 && !padded_) return {value.value, ~std::size_t(0)};
+    if (value.stride != 0 && lanes_ >= width_) return {value.value, ~std::size_t(0)};
     double* const row = next_row_;
     next_row_ += width_;
     const std::size_t given = value.stride != 0 ? std::min(lanes_, width_) : 1;
     for (std::size_t i = 0; i < given; ++i) row[i] = value.value[i];
     for (std::size_t i = given; i < width_; ++i) row[i] = row[given - 1];
     return {row, 0};
+}
+
+LaneResults from_lane(const LaneResults& results, std::size_t lane) {
+    LaneResults to = results;
+    for (int k = 0; k < 3; ++k) to.point[k] += lane, to.direction[k] += lane;
+    to.optical_length += lane, to.reduced_length += lane, to.followed += lane;
+    return to;
+}
+
+void copy(const LaneResults& from, std::size_t lanes, const LaneResults& to) {
+    for (int k = 0; k < 3; ++k) {
+        std::copy_n(from.point[k], lanes, to.point[k]);
+        std::copy_n(from.direction[k], lanes, to.direction[k]);
+    }
+    std::copy_n(from.optical_length, lanes, to.optical_length);
+    std::copy_n(from.reduced_length, lanes, to.reduced_length);
+    std::copy_n(from.followed, lanes, to.followed);
 }
 
 }  // namespace stepdiag

@@ -30,11 +30,9 @@ struct PreparedEncounter {
 
 class PreparedRoute {
 public:
-    // For vectors of up to `width` lanes, which may read beyond `lanes` only what is copied here: where there are fewer
-    // lanes than `padded_below`, copies go on with the last lane. Throws InvalidArgument for strides other than 0
-    // and 1.
-    PreparedRoute(const std::vector<Encounter>& route, const LaneRays& rays, std::size_t lanes, std::size_t width,
-                  std::size_t padded_below);
+    // To be read `width` lanes at a time. Where there are fewer lanes, they are copied, and the last of them goes on.
+    // Throws InvalidArgument for strides other than 0 and 1.
+    PreparedRoute(const std::vector<Encounter>& route, const LaneRays& rays, std::size_t lanes, std::size_t width);
 
     LaneSource start[8];  // origin, direction, optical and reduced length
     PreparedEncounter* begin() const { return encounters_.get(); }
@@ -45,11 +43,21 @@ private:
     LaneSource source(const LaneValue& value);
 
     std::size_t lanes_, width_, size_;
-    bool padded_;
     // Both without initial values: a call for one lane should not cost that of hundreds.
     std::unique_ptr<PreparedEncounter[]> encounters_;
     std::unique_ptr<double[]> rows_;
     double* next_row_;
 };
+
+// Results of up to 64 lanes, to be copied where they belong.
+struct ResultsAside {
+    double number[8][64];
+    std::uint8_t followed[64];
+    LaneResults results{
+        {number[0], number[1], number[2]}, {number[3], number[4], number[5]}, number[6], number[7], followed};
+};
+
+LaneResults from_lane(const LaneResults& results, std::size_t lane);
+void copy(const LaneResults& from, std::size_t lanes, const LaneResults& to);
 
 }  // namespace stepdiag
