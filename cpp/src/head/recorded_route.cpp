@@ -1,6 +1,10 @@
 #include "head/recorded_route.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
+
+#include "stepdiag/optics/separation.hpp"
 
 namespace stepdiag {
 namespace {
@@ -31,6 +35,48 @@ RecordedRoute record_route(const RayTree& tree, int segment) {
     }
     std::reverse(route.encounters.begin(), route.encounters.end());
     return route;
+}
+
+std::vector<Segment> path_segments(const RayTree& tree, int segment) {
+    std::vector<Segment> path;
+    for (int s = segment; s >= 0; s = tree.segments[s].parent) path.push_back(tree.segments[s]);
+    std::reverse(path.begin(), path.end());
+    return path;
+}
+
+namespace {
+
+// How far a segment has moved square to itself: a mirror that goes away along the beam leaves it where it was.
+double sideways(const Segment& from, const Segment& to) {
+    const auto across = [&](const Eigen::Vector3d& way) { return way.cross(from.ray.direction).norm(); };
+    return std::max(across(to.ray.origin - from.ray.origin), across(to.hit->point - from.hit->point));
+}
+
+}  // namespace
+
+bool pass_clear(const std::vector<std::vector<Segment>>& paths, const Scene& fixed) {
+    const std::vector<Face>& faces = fixed.faces();
+    std::vector<Eigen::AlignedBox3d> boxes(faces.size());
+    for (std::size_t f = 0; f < faces.size(); ++f)
+        for (const auto& corner : faces[f].outline) boxes[f].extend(corner);
+
+    for (std::size_t k = 0; k < paths.front().size(); ++k) {
+        double moved = 0.0;
+        for (const auto& path : paths) moved = std::max(moved, sideways(paths[0][k], path[k]));
+        const double clearance = 1.0 + 2.0 * moved;
+        for (const auto& path : paths) {
+            const Eigen::Vector3d &start = path[k].ray.origin, &end = path[k].hit->point;
+            Eigen::AlignedBox3d around(start.cwiseMin(end), start.cwiseMax(end));
+            const std::vector<Face> line{{start, Eigen::Vector3d::UnitZ(), {start, end}, Surface::absorbing}};
+            for (std::size_t f = 0; f < faces.size(); ++f) {
+                const bool is_met = int(f) == path[k].hit->face || (k > 0 && int(f) == path[k - 1].hit->face);
+                const bool is_source = k == 0 && std::abs(faces[f].normal.dot(start - faces[f].point)) < 1e-9;
+                if (is_met || is_source || boxes[f].exteriorDistance(around) >= clearance) continue;
+                if (separation(line, {faces[f]}) < clearance) return false;
+            }
+        }
+    }
+    return true;
 }
 
 bool same_faces(const std::vector<RecordedRoute>& a, const std::vector<RecordedRoute>& b) {

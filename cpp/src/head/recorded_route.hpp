@@ -21,6 +21,13 @@ struct RecordedRoute {
 RecordedRoute record_route(const RayTree& tree, int segment);
 bool same_faces(const std::vector<RecordedRoute>& a, const std::vector<RecordedRoute>& b);
 
+// A path as its segments, source first.
+std::vector<Segment> path_segments(const RayTree& tree, int segment);
+// Whether nothing else comes near any of these paths of one beam (all with the same faces, at several poses): no face
+// that they do not meet is nearer to a segment than twice what the segment moves from pose to pose, and a millimetre. A
+// replay cannot see what comes into the way.
+bool pass_clear(const std::vector<std::vector<Segment>>& paths, const Scene& fixed);
+
 // A column for each coordinate, a row for each pose.
 struct RouteReplay {
     Eigen::Matrix<double, Eigen::Dynamic, 3> points, directions;

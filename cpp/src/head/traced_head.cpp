@@ -109,17 +109,39 @@ Arrivals TracedHead::arrivals(int beam, const MirrorPose& mirror) const {
     return arrivals;
 }
 
-// Light that never saw the mirror is straylight: a sensor sees it, an interferometer does not count it.
 std::vector<int> TracedHead::wanted_segments(const RayTree& tree, int beam) const {
     std::vector<int> segments = tree.arrivals(optics_[beam].detector_face);
-    if (!design_.beams[beam].interferometer) return segments;
     const auto saw_mirror = [&](int segment) {
         for (; segment >= 0; segment = tree.segments[segment].parent)
             if (tree.segments[segment].hit && tree.segments[segment].hit->face == mirror_face()) return true;
         return false;
     };
-    const auto first = std::find_if(segments.begin(), segments.end(), saw_mirror);
-    return first == segments.end() ? std::vector<int>{} : std::vector<int>{*first};
+    const auto straylight = std::stable_partition(segments.begin(), segments.end(), saw_mirror);
+    if (straylight == segments.begin()) return {};
+    if (design_.beams[beam].interferometer) return {segments.front()};
+    return segments;
+}
+
+// The paths that all recorded poses have in common; none where these have different ones, or where they do not pass
+// clear.
+std::vector<RecordedRoute> TracedHead::record(int beam, const std::vector<MirrorPose>& mirrors) const {
+    std::vector<RecordedRoute> routes;
+    std::vector<std::vector<std::vector<Segment>>> paths;  // by route, by pose
+    const std::size_t last = mirrors.size() - 1;
+    for (const std::size_t pose : {std::size_t(0), last / 2, last}) {
+        const RayTree tree = trace(beam, mirrors[pose]);
+        const std::vector<int> wanted = wanted_segments(tree, beam);
+        if (wanted.empty()) continue;  // a lost beam says nothing of the other poses
+        std::vector<RecordedRoute> found;
+        for (const int segment : wanted) found.push_back(record_route(tree, segment));
+        if (routes.empty()) routes = found;
+        if (!same_faces(routes, found)) return {};
+        paths.resize(routes.size());
+        for (std::size_t r = 0; r < routes.size(); ++r) paths[r].push_back(path_segments(tree, wanted[r]));
+    }
+    for (const auto& of_route : paths)
+        if (!pass_clear(of_route, optics_[beam].fixed)) return {};
+    return routes;
 }
 
 std::vector<Arrivals> TracedHead::replay(int beam, const std::vector<MirrorPose>& mirrors, const ReplayOptions& options,
@@ -127,36 +149,23 @@ std::vector<Arrivals> TracedHead::replay(int beam, const std::vector<MirrorPose>
     const BeamOptics& optics = optics_[beam];
     const std::size_t n = mirrors.size();
     std::vector<Arrivals> result(n);
-    ReplayCount counted;
+    if (n == 0) return result;
 
-    // Record.
-    std::vector<RecordedRoute> routes;
-    bool alike = true;
-    for (const std::size_t pose : {std::size_t(0), n / 2, n - 1}) {
-        if (pose >= n) continue;
-        const RayTree tree = trace(beam, mirrors[pose]);
-        std::vector<RecordedRoute> found;
-        for (const int segment : wanted_segments(tree, beam)) found.push_back(record_route(tree, segment));
-        if (found.empty()) continue;  // a lost beam says nothing of the others
-        if (routes.empty()) routes = found;
-        alike = alike && same_faces(routes, found);
+    const std::vector<RecordedRoute> routes =
+        options.verified_share < 1.0 ? record(beam, mirrors) : std::vector<RecordedRoute>{};
+    std::vector<std::uint8_t> followed(n, !routes.empty());
+    for (const RecordedRoute& route : routes) {
+        const RouteReplay replayed = replay_route(route, optics.frames, optics.outlines, optics.source, mirrors,
+                                                  optics.fixed.self_intersection_gap());
+        for (std::size_t i = 0; i < n; ++i) {
+            followed[i] = followed[i] && replayed.followed[i];
+            if (followed[i])
+                result[i].push_back(arrival(beam, replayed.point(i), replayed.direction(i), replayed.optical_length[i],
+                                            replayed.reduced_length[i], route.power));
+        }
     }
 
-    // Replay: what comes before the mirror once, the rest for all poses.
-    std::vector<std::uint8_t> followed(n, alike && !routes.empty());
-    if (alike)
-        for (const RecordedRoute& route : routes) {
-            const RouteReplay replayed = replay_route(route, optics.frames, optics.outlines, optics.source, mirrors,
-                                                      optics.fixed.self_intersection_gap());
-            for (std::size_t i = 0; i < n; ++i) {
-                followed[i] = followed[i] && replayed.followed[i];
-                if (followed[i])
-                    result[i].push_back(arrival(beam, replayed.point(i), replayed.direction(i),
-                                                replayed.optical_length[i], replayed.reduced_length[i], route.power));
-            }
-        }
-
-    // Verify, and fall back.
+    ReplayCount counted;
     for (std::size_t i = 0; i < n; ++i) {
         if (!followed[i]) {
             result[i] = arrivals(beam, mirrors[i]);
@@ -170,8 +179,8 @@ std::vector<Arrivals> TracedHead::replay(int beam, const std::vector<MirrorPose>
             std::ostringstream text;
             text << "replay: beam " << design_.beams[beam].name << " at pose " << i << " (mirror at "
                  << mirrors[i].point.transpose()
-                 << " mm in the sensor frame) differs from its trace; another face came "
-                 << "into its way: verify all poses (share 1) to trace them";
+                 << " mm in the sensor frame) differs from its trace: another face came "
+                 << "into its way; with a verified share of 1 every pose is traced instead";
             throw ReplayMismatch(text.str());
         }
     }

@@ -30,11 +30,15 @@ struct Arrival {
     ReturnedBeam beam;
     double power;  // share of the source's
 };
-using Arrivals = std::vector<Arrival>;  // strongest first; none: the beam is lost. An interferometer has one at most.
+// Strongest first, straylight that never saw the mirror last; none: the beam is lost. An interferometer has one at most.
+using Arrivals = std::vector<Arrival>;
+
+struct RecordedRoute;
 
 struct ReplayOptions {
-    double verified_share = 1e-3;  // of the poses that were replayed, traced as well and compared; 1: all, 0: none
-    std::uint64_t seed = 0;        // decides which
+    double verified_share =
+        1e-3;                // of the poses that were replayed, traced as well and compared; 1: nothing is replayed
+    std::uint64_t seed = 0;  // decides which
 };
 
 struct ReplayCount {
@@ -63,9 +67,9 @@ public:
     int mirror_face() const;  // its index in the tree's hits
     int detector_face(int beam) const { return optics_[beam].detector_face; }
 
-    // Many poses by replay. The paths are recorded at the first, the middle and the last pose; where these do not have
-    // the same ones, and for each pose that does not follow them, the Embree trace takes its place. Throws
-    // ReplayMismatch naming the pose where a verification differs by more than rounding (1e-9 mm).
+    // Many poses by replay. The paths are recorded at the first, the middle and the last pose. Where these do not have
+    // the same ones, or where another face is near them, all poses are traced; so is each pose that does not follow
+    // them. Throws ReplayMismatch naming the pose where a verification differs by more than rounding (1e-9 mm).
     std::vector<Arrivals> replay(int beam, const std::vector<MirrorPose>& mirrors, const ReplayOptions& options = {},
                                  ReplayCount* count = nullptr) const;
 
@@ -81,10 +85,12 @@ public:
         Placement detector;  // where the light is wanted
     };
     const BeamOptics& optics(int beam) const { return optics_[beam]; }
-    // Segments that end where the beam's light is wanted, strongest first.
+    // Segments that end where the beam's light is wanted: those that saw the mirror, strongest first, then straylight
+    // that did not; none where only straylight came. Of an interferometer's the first alone.
     std::vector<int> wanted_segments(const RayTree& tree, int beam) const;
 
 private:
+    std::vector<RecordedRoute> record(int beam, const std::vector<MirrorPose>& mirrors) const;
     Face mirror_at(const MirrorPose& pose) const;
     Arrival arrival(int beam, const Eigen::Vector3d& point, const Eigen::Vector3d& direction, double optical_length,
                     double reduced_length, double power) const;
