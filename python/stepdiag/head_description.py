@@ -83,7 +83,7 @@ def parse_head_design(text: str, path: str | PathLike[str] = "head.toml") -> _co
     beams = [_located(_beam, f"{file}: beam.{name}", name, beam) for name, beam in keys.beam.items()]
     sensors = [_located(_sensor, f"{file}: sensor.{name}", name, sensor) for name, sensor in keys.sensor.items()]
     with located(file):
-        return _core.HeadDesign(
+        design = _core.HeadDesign(
             keys.name,
             keys.layout,
             bodies,
@@ -92,6 +92,8 @@ def parse_head_design(text: str, path: str | PathLike[str] = "head.toml") -> _co
             most_hits=keys.limits.most_hits,
             least_power=keys.limits.least_power,
         )
+        _core.Head.from_design(design)  # refuses beams on one line, which no single component shows
+    return design
 
 
 def parse_head_keys(text: str, path: str | PathLike[str] = "head.toml") -> HeadFile:

@@ -20,6 +20,7 @@ COLOUR = {"X": "#0072B2", "Y": "#D55E00", "Z": "#009E73"}
 TRUTH: Mapping[str, Any] = {"linewidth": 4.0, "alpha": 0.32, "solid_capstyle": "butt"}
 ENHANCED: Mapping[str, Any] = {"linewidth": 1.0}
 CONVENTIONAL: Mapping[str, Any] = {"linewidth": 1.0, "linestyle": (0, (4, 1.6))}
+DOTS: Mapping[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.0}
 METHODS: Mapping[str, Mapping[str, Any]] = {"enhanced": ENHANCED, "conventional": CONVENTIONAL}
 
 STRAIGHTNESS = ("EYX", "EZY", "EXZ")
@@ -35,9 +36,10 @@ PANELS: Mapping[str, tuple[str, str, Sequence[str], Sequence[str]]] = {
     "2b": ("as 1b", "1b", STRAIGHTNESS, ("enhanced", "conventional")),
     "2c": ("as 1c", "1c", STRAIGHTNESS, ("enhanced", "conventional")),
     "2d": ("as 1d", "1d", STRAIGHTNESS, ("enhanced", "conventional")),
-    "3a": ("PSD zero off by 1.5, 2 mm", "3", POSITIONING, ("enhanced",)),
+    "3a": ("PSD displaced by 1.5, 2 mm", "3", POSITIONING, ("enhanced",)),
     "3b": ("as 3a", "3", ANGLES, ("enhanced",)),
 }
+DEFINED = ("3a", "3b")  # traced, with what the definition of the readings gives beside it
 YLABEL = {
     "1a": "positioning (µm)",
     "2a": "straightness (µm)",
@@ -56,13 +58,15 @@ def draw_figure(results: Sequence[Result]) -> dict[str, bytes]:
         for name, (title, case, functions, methods) in PANELS.items():
             draw_functions(panels[name], by_name[case], functions, methods)
             set_title(panels[name], name, title)
+        for name in DEFINED:
+            draw_definition(panels[name], by_name["3d"], PANELS[name][2])
         draw_screw(panels["4"], by_name["4"])
         set_title(panels["4"], "4", "screw error of 10 mm pitch: right at the nodes, unseen between them")
         for name, label in YLABEL.items():
             panels[name].set_ylabel(label)
         for name in ("3a", "3b", "4"):
             panels[name].set_xlabel("position (mm)")
-        figure.legend(handles=legend_handles(), loc="outside upper center", ncols=3, handlelength=3.0)
+        figure.legend(handles=legend_handles(), loc="outside upper center", ncols=4, handlelength=3.0)
         return {"figure.png": save(figure, "png"), "figure.svg": save(figure, "svg")}
 
 
@@ -71,7 +75,7 @@ def set_title(axes: Axes, name: str, title: str) -> None:
 
 
 def legend_handles() -> list[Any]:
-    styles = {"truth": TRUTH, **METHODS}
+    styles = {"truth": TRUTH, **METHODS, "enhanced, by definition of the readings (3a, 3b)": DOTS}
     return [Line2D([], [], color="black", label=name, **style) for name, style in styles.items()]
 
 
@@ -86,6 +90,14 @@ def draw_functions(axes: Axes, result: Result, names: Sequence[str], methods: Se
             if function is not None:
                 axes.plot(function[0], function[1] * scale, color=COLOUR[name[2]], **METHODS[method])
     name_functions(axes, names)
+
+
+def draw_definition(axes: Axes, result: Result, names: Sequence[str]) -> None:
+    """Dots on every tenth node of the enhanced evaluation."""
+    for name in names:
+        position, value, _ = result.calibrations["enhanced"].functions[name]
+        scale = 1e6 if name[1] in "ABC" else 1e3
+        axes.plot(position[::10], value[::10] * scale, color=COLOUR[name[2]], **DOTS)
 
 
 def name_functions(axes: Axes, names: Sequence[str]) -> None:

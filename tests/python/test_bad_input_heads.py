@@ -70,7 +70,7 @@ MALFORMED = {
     "bad rotation": (put(PSD, TURN, "rotation_deg = 180.0"), "body.splitter.rotation_deg: expected three angles from -360 to 360, got 180.0"),
     "rotation in two units": (put(PSD, TURN, f"{TURN}\nrotation_mrad = [0, 0, 1]"), "body.splitter: expected rotation_deg or rotation_mrad, got both"),
     "index below 1": (put(BLOCK, "material = 1.5", "material = 0.9"), 'body.block.material: expected the name of a glass such as "N-BK7", or a refractive index from 1 to 5, got 0.9'),
-    "unknown glass": (put(BLOCK, "material = 1.5", 'material = "N-BK8"'), 'body.block: glass "N-BK8": unknown'),
+    "unknown glass": (put(BLOCK, "material = 1.5", 'material = "N-BK8"'), 'body.block: glass: expected one of N-BK7, K7, N-SK4, F2, N-SF11, fused silica, got "N-BK8"'),
     "body that is no section": (put(PSD, "[body.splitter]", "[body]\nblock = 3\n[body.splitter]"), "body.block: expected a section [body.block], got 3"),
     "unknown section": (put(PSD, "[sensor.psd]", "[sensors.psd]"), "sensors: unknown section; did you mean sensor?"),
     "unknown key at the top": (put(PSD, "layout = ", "layuot = "), "layuot: unknown key; did you mean layout? (and 1 more)"),
@@ -86,7 +86,7 @@ MALFORMED = {
     "no hits": (PSD + "[limits]\nmost_hits = 0\n", "limits.most_hits: expected an integer from 1 to 1000, got 0"),
     "too many faces": (put(BLOCK, FACES, str([[0, 1, 2, 3]] * 10001)), "body.block.faces: expected a list of up to 10000 faces, each a list of numbers of corners, got [[0, 1, 2, 3]"),
     # bodies
-    "reflectance and absorptance above 1": (put(PSD, "reflectance = 0.5", "reflectance = 0.7\nabsorptance = 0.4"), "body.splitter: "),
+    "reflectance and absorptance above 1": (put(PSD, "reflectance = 0.5", "reflectance = 0.7\nabsorptance = 0.4"), "body.splitter: splitter: expected reflectance and absorptance of 0 to 1, together at most 1"),
     "faces of a wedge that meet": (put(put(PSD, 'shape = "plate"', 'shape = "wedge"'), WINDOW, f"{WINDOW}\nangle_deg = 80.0"), "body.window: wedge angle: too large"),
     "open polyhedron": (put(BLOCK, ", [3, 0, 4, 7]]", "]"), "body.block: body: not closed: the edge between corners 0 and 3 belongs to 1 face(s), expected 2"),
     "face that is not planar": (put(BLOCK, "[1, 1, 1]", "[1, 1, 1.2]"), "body.block: body: face 1: is not planar"),
@@ -94,17 +94,17 @@ MALFORMED = {
     "face of two corners": (put(BLOCK, "[3, 0, 4, 7]", "[3, 0]"), "body.block: body: face 5: expected three corners or more"),
     "corner that is not there": (put(BLOCK, "[3, 0, 4, 7]", "[3, 0, 4, 8]"), "body.block: body: face 5: there is no corner 8"),
     # the whole
-    "laser's wavelength out of range": (put(PSD, LASER, "wavelength_nm = 200.0"), ""),
-    "overlapping bodies": (put(BLOCK, "position_mm = [12.5, 0.0, 40.0]", "position_mm = [12.5, 0.0, 15.5]"), "window and block: "),
-    "bodies that touch": (put(BLOCK, "position_mm = [12.5, 0.0, 40.0]", "position_mm = [12.5, 0.0, 16.0]"), "window and block: "),
-    "body inside another": (put(BLOCK, "position_mm = [12.5, 0.0, 40.0]", "position_mm = [12.5, 0.0, 12.5]"), "window and block: "),
-    "sensor inside glass": (put(PSD, "position_mm = [45.0, 0.0, -20.0]", "position_mm = [30.0, 0.0, -20.0]"), "splitter and psd: "),
-    "source in glass": (put(PSD, "position_mm = [25.0, 0.0, -40.0]", "position_mm = [25.0, 0.0, -28.0]"), "splitter and laser: "),
-    "head that sees no mirror": (put(PSD, "[body.window]", '[body.lid]\nshape = "screen"\nposition_mm = [0.0, 0.0, 5.0]\nwidth_mm = 8.0\nheight_mm = 8.0\n[body.window]'), ""),
-    "sensor without light": (put(PSD, "position_mm = [45.0, 0.0, -20.0]", "position_mm = [45.0, 0.0, 40.0]"), ""),
+    "laser's wavelength out of range": (put(PSD, LASER, "wavelength_nm = 200.0"), "N-BK7, wavelength in nm: expected 334.000000 to 2325.000000, got 200.000000"),
+    "overlapping bodies": (put(BLOCK, "position_mm = [12.5, 0.0, 40.0]", "position_mm = [12.5, 0.0, 15.5]"), "window and block: overlap or touch; expected a gap of at least 0.01 mm, got 0 mm"),
+    "bodies that touch": (put(BLOCK, "position_mm = [12.5, 0.0, 40.0]", "position_mm = [12.5, 0.0, 16.0]"), "window and block: overlap or touch; expected a gap of at least 0.01 mm, got 0 mm"),
+    "body inside another": (put(BLOCK, "position_mm = [12.5, 0.0, 40.0]", "position_mm = [12.5, 0.0, 12.5]"), "window and block: overlap or touch; expected a gap of at least 0.01 mm, got 0 mm"),
+    "sensor inside glass": (put(PSD, "position_mm = [45.0, 0.0, -20.0]", "position_mm = [30.0, 0.0, -20.0]"), "splitter and psd: overlap or touch; expected a gap"),
+    "source in glass": (put(PSD, "position_mm = [25.0, 0.0, -40.0]", "position_mm = [25.0, 0.0, -28.0]"), "splitter and laser: overlap or touch; expected a gap"),
+    "head that sees no mirror": (put(PSD, "[body.window]", '[body.lid]\nshape = "screen"\nposition_mm = [0.0, 0.0, 5.0]\nwidth_mm = 8.0\nheight_mm = 8.0\n[body.window]'), "beam interferometer: does not meet a mirror square to the beam"),
+    "sensor without light": (put(PSD, "position_mm = [45.0, 0.0, -20.0]", "position_mm = [45.0, 0.0, 40.0]"), "beam laser: does not come back from a mirror square to the beam at 150 mm to its sensor psd"),
     "layout without its beams": (put(BEAMS, 'layout = "multi_beam"', 'layout = "psd"'), "layout psd: expected one interferometer beam"),
     "layout with a sensor too many": (put(PSD, 'layout = "psd"', 'layout = "multi_beam"'), "layout multi_beam: expected three or more interferometer beams"),
-    "beams on a line": (put(BEAMS, "position_mm = [0.0, 20.0, 0.0]", "position_mm = [-20.0, 0.0, 0.0]"), ""),
+    "beams on a line": (put(BEAMS, "position_mm = [0.0, 20.0, 0.0]", "position_mm = [-20.0, 0.0, 0.0]"), "head beam_offsets: expected three or more beams that are not on one line, got 3 beam(s)"),
     # the file
     "nothing": ("# only words\n", "has no keys"),
     "bad TOML": (put(PSD, "[body.window]", "[body.window"), "not valid TOML: expected ']'"),
@@ -118,12 +118,6 @@ def test_malformed_head_is_refused_in_one_line_that_names_the_key(case: str) -> 
     said = refusal(text)
     assert said.startswith(f"h.toml: {message}")
     assert "\n" not in said
-
-
-def test_message_of_the_core_names_the_component() -> None:
-    assert "laser" in refusal(MALFORMED["sensor without light"][0])
-    assert "interferometer" in refusal(MALFORMED["head that sees no mirror"][0])
-    assert "635" in refusal(MALFORMED["laser's wavelength out of range"][0]) or True
 
 
 @pytest.mark.parametrize(

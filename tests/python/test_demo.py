@@ -10,13 +10,16 @@ import stepdiag as sd
 from stepdiag.cli import main
 from stepdiag.demo import (
     CASES,
+    LASER_OFFSET,
     POSITIONING,
+    PSD_DISTANCE,
     SCREW_AMPLITUDE,
     Result,
     alias_of,
     between_nodes,
     run_case,
     run_demo,
+    traced_differences,
     write_truths,
 )
 
@@ -85,10 +88,35 @@ def test_laser_alone_makes_no_trend_but_a_following_mirror_does(results: dict[st
     assert moved["1d"] > 0.1
 
 
-def test_psd_zero_offset_spoils_positions_and_angles(results: dict[str, Result]) -> None:
+def test_displaced_psd_spoils_positions_and_angles(results: dict[str, Result]) -> None:
     largest = sd.largest_deviations(results["3"].calibrations["enhanced"], results["3"].truth)
     assert abs(largest["positioning"].value) > 0.05
     assert abs(largest["angle"].value) > 100e-6
+
+
+def test_constants_of_the_definition_are_those_of_the_traced_head(results: dict[str, Result]) -> None:
+    calibration = results["3"].scenario.head.calibration
+    assert calibration.psd_distance == pytest.approx(PSD_DISTANCE, abs=1e-6)  # as many digits are written
+    assert calibration.spot_beam.tolist() == pytest.approx([LASER_OFFSET, 0.0], abs=1e-6)
+
+
+def test_traced_readings_are_the_defined_ones_to_second_order(results: dict[str, Result]) -> None:
+    for name, (difference, rest) in traced_differences(results["3"], results["3d"]).items():
+        # 25 mm times twice the square of 1 mrad is 50 nm. What is left is of third order: paths of a metre, 1 mrad.
+        assert 0.5e-6 < difference < 50e-6, name
+        assert rest < 1e-6, name
+
+
+def test_traced_run_evaluated_with_the_defined_head_gives_the_defined_calibration(results: dict[str, Result]) -> None:
+    traced, defined = results["3"], results["3d"]
+    scenario, head = traced.scenario, defined.scenario.head
+    ours = sd.evaluate(traced.measurement, scenario.plan, head, scenario.chain, scenario.tool).functions
+    theirs = defined.calibrations["enhanced"].functions
+    for name in theirs:
+        # 34 nm of spot over an arm of twice 131 mm are 130 nrad, most of it constant along a line; over a lateral
+        # travel of 16 mm at each of 150 steps that drifts by some nanometres.
+        limit = 130e-9 if name[1] in "ABC" else 20e-6
+        assert np.max(np.abs(ours[name][1] - theirs[name][1])) < limit, name
 
 
 @pytest.mark.parametrize("name", POSITIONING)
