@@ -14,6 +14,7 @@ Bad input raises InvalidArgument, a ValueError.
 from typing import TYPE_CHECKING, Any
 
 from stepdiag._core import (
+    BeamSegment,
     Calibration,
     Chain,
     Environment,
@@ -30,9 +31,12 @@ from stepdiag._core import (
     Noise,
     Plan,
     ReadingUncertainty,
+    ReplayMismatch,
+    Sensitivity,
     SpotSensor,
     __version__,
     evaluate,
+    head_sensitivities,
     random_error_map,
     read_calibration,
     read_error_map,
@@ -54,6 +58,7 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
+    "BeamSegment",
     "Calibration",
     "Chain",
     "Deviation",
@@ -71,11 +76,14 @@ __all__ = [
     "Noise",
     "Plan",
     "ReadingUncertainty",
+    "ReplayMismatch",
     "Scenario",
+    "Sensitivity",
     "SpotSensor",
     "__version__",
     "evaluate",
     "evaluate_scenario",
+    "head_sensitivities",
     "largest_deviations",
     "parse_head_design",
     "parse_scenario",

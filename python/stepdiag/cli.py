@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from stepdiag._core import InvalidArgument, __version__
+from stepdiag._core import InvalidArgument, ReplayMismatch, __version__
 from stepdiag.cli_head import head
 from stepdiag.cli_options import PATH, InOrder, out_file, tell
 
@@ -228,7 +228,7 @@ def _complain(message: str) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs the command line and returns the exit code: 2 for a caller's mistake, 130 when interrupted."""
+    """Runs the command line and returns the exit code: 2 for a caller's mistake, 1 for ours, 130 when interrupted."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without µ still gets the rest of the line
@@ -245,6 +245,9 @@ def main(arguments: list[str] | None = None) -> int:
         _complain(error.format_message() + hint)
     except (InvalidArgument, click.ClickException) as error:
         _complain(error.format_message() if isinstance(error, click.ClickException) else str(error))
+    except ReplayMismatch as error:
+        _complain(f"{error}; nothing was written (verified_share = 1 traces every pose)")
+        return 1
     except OSError as error:
         _complain(str(error))
     return 2

@@ -1,12 +1,11 @@
 """What `stepdiag head check` tells of a head: constants, light at the detectors, limits, mirror."""
 
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from stepdiag import _core
-from stepdiag.head_trace import Arrival, Limits, arrivals, detectors, tilt_limits, travel_limits
+from stepdiag.head_trace import Arrival, Limits, arrivals, detectors, meets_mirror, tilt_limits, travel_limits
 
 MICRO = 1e6
 
@@ -51,7 +50,7 @@ def _light(head: _core.Head, distances: Sequence[float]) -> Iterator[str]:
     for distance in distances:
         segments = _core.trace_beams(head, distance=distance)
         for detector in detectors(head.design):
-            found = arrivals(segments, detector)
+            found = arrivals(segments, detector, distance)
             yield f"  {distance:9g}  {detector.name:<18}" + (_arrival(found) if found else f"{'no light':>12}")
 
 
@@ -90,7 +89,7 @@ def _mirror(head: _core.Head, distances: Sequence[float]) -> Iterator[str]:
     half = np.zeros(2)
     for distance in distances:
         for segment in _core.trace_beams(head, distance=distance):
-            if math.isclose(segment.end[2], distance, rel_tol=0.0, abs_tol=1e-6):
+            if meets_mirror(segment, distance):
                 half = np.maximum(half, np.abs(segment.end[:2]))
     width, height = 2.0 * half
     yield f"Smallest mirror, its middle on the head's z: {width:.4g} x {height:.4g} mm for the axes of the beams;"

@@ -61,7 +61,7 @@ def draw_head(head: _core.Head, distance: float, suffix: str) -> bytes:
         for view, (large, whole) in zip(VIEWS, panels, strict=True):
             for axes in (large, whole):
                 _draw_bodies(axes, view, design)
-                _draw_beams(axes, view, design, segments)
+                _draw_beams(axes, view, design, segments, distance)
                 _draw_detectors(axes, view, design, outlines)
                 axes.axvline(0.0, color="#999999", linewidth=0.6, linestyle=":", zorder=0)
             large.set(xlim=(low[2], high[2]), ylim=(low[view.axis], high[view.axis]), aspect="equal")
@@ -110,9 +110,12 @@ def _draw_bodies(axes: Axes, view: View, design: _core.HeadDesign) -> None:
         axes.add_collection(PolyCollection(faces, facecolors="none", zorder=2, **style))
 
 
-def _draw_beams(axes: Axes, view: View, design: _core.HeadDesign, segments: Sequence[_core.BeamSegment]) -> None:
+def _draw_beams(
+    axes: Axes, view: View, design: _core.HeadDesign, segments: Sequence[_core.BeamSegment], distance: float
+) -> None:
     """The way to the detector full, everything else dashed, the paler the weaker; not what was not followed."""
-    main = {k for detector in detectors(design) for arrival in arrivals(segments, detector)[:1] for k in arrival.way}
+    ways = [arrival.way for detector in detectors(design) for arrival in arrivals(segments, detector, distance)[:1]]
+    main = {k for way in ways for k in way}
     for number, beam in enumerate(design.beams):
         for is_main in (True, False):
             mine = [

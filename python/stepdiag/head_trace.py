@@ -15,6 +15,7 @@ Pair = tuple[float, float]
 LARGEST_TILT: Final = 0.1  # rad; beyond it no set-up is meant
 LARGEST_TRAVEL: Final = 1e3  # mm
 SMALLEST: Final = 1e-5  # of the largest: where the search for a limit begins
+ON_MIRROR: Final = 1e-6  # mm; a point on a face is off by rounding, 1e-12 mm
 HALVINGS: Final = 20  # of the bracket that the search finds
 
 
@@ -53,8 +54,9 @@ def detectors(design: _core.HeadDesign) -> list[Detector]:
     return found
 
 
-def arrivals(segments: Sequence[_core.BeamSegment], detector: Detector) -> list[Arrival]:
-    """The light of the detector's beam that comes to it, strongest first; what follows the first are ghosts."""
+def arrivals(segments: Sequence[_core.BeamSegment], detector: Detector, distance: float) -> list[Arrival]:
+    """The light of the detector's beam that comes to it from an aligned mirror at this distance, strongest first, then
+    straylight that never saw the mirror. What follows the first are ghosts; none where only straylight came."""
     found = []
     for index, segment in enumerate(segments):
         if segment.beam != detector.beam or segment.arrives != detector.name:
@@ -63,7 +65,17 @@ def arrivals(segments: Sequence[_core.BeamSegment], detector: Detector) -> list[
         length = sum(float(np.linalg.norm(segments[k].end - segments[k].start)) for k in way)
         spot = detector.local(segment.end)[:2]
         found.append(Arrival(detector, way, spot, length, segment.power))
-    return sorted(found, key=lambda arrival: -arrival.power)
+
+    def is_straylight(arrival: Arrival) -> bool:
+        return not any(meets_mirror(segments[k], distance) for k in arrival.way)
+
+    found.sort(key=lambda arrival: (is_straylight(arrival), -arrival.power))
+    return [] if not found or is_straylight(found[0]) else found
+
+
+def meets_mirror(segment: _core.BeamSegment, distance: float) -> bool:
+    """Whether it ends on an aligned mirror, which stands beyond all other faces."""
+    return segment.fate != "left" and abs(float(segment.end[2]) - distance) < ON_MIRROR
 
 
 def _way_to(segments: Sequence[_core.BeamSegment], index: int) -> tuple[int, ...]:

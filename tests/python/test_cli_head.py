@@ -157,6 +157,20 @@ def test_init_with_a_head_makes_a_copy_to_edit() -> None:
     assert run("evaluate", "machine/scenario.toml", "run.csv", "-o", "calibration.csv") == 0
 
 
+def test_replay_that_differs_from_its_trace_is_told_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def differs(_: object) -> None:
+        raise sd.ReplayMismatch("line ppp, point 3: replay and trace differ")
+
+    run("init", "-o", "machine", "--head", "three_beams")
+    monkeypatch.setattr("stepdiag.scenario.simulate_scenario", differs)
+    capsys.readouterr()
+    assert run("simulate", "machine/scenario.toml", "-o", "run.csv") == 1
+    assert capsys.readouterr().err.startswith("stepdiag: error: line ppp, point 3: replay and trace differ; nothing")
+    assert not Path("run.csv").exists()
+
+
 MISTAKES: list[tuple[list[str], str]] = [
     (["head", "show", "beam_and_psd"], "Missing option '-o'"),
     (["head", "show", "four_beams", "-o", "h.png"], 'expected the name of a shipped head (beam_and_psd, three_beams) or the path of a TOML file, got "four_beams"'),
