@@ -54,9 +54,9 @@ def list_heads() -> None:
 @head.command(short_help="Draw a head.", epilog="\b\nExample: stepdiag head show beam_and_psd -o head.png")
 @HEAD
 @out_file("Figure to write, .png or .svg.")
-@click.option("--distance", default=DISTANCES[1], show_default=True, help="Of the mirror from the head, mm.")
+@click.option("--distance", type=float, metavar="MM", help=f"Of the mirror.  [default: {DISTANCES[1]:g}]")
 @MIRROR
-def show(name: str, output: Path, distance: float, mirror: tuple[float, float] | None) -> None:
+def show(name: str, output: Path, distance: float | None, mirror: tuple[float, float] | None) -> None:
     """Draw bodies, beams and detectors of HEAD from two sides.
 
     Light that comes to its detector is a full line; what goes elsewhere is dashed, the paler the weaker.
@@ -67,10 +67,10 @@ def show(name: str, output: Path, distance: float, mirror: tuple[float, float] |
     if suffix not in ("png", "svg"):
         raise InvalidArgument(f"{output}: expected a name that ends in .png or .svg")
     check_output(output)
-    made = _make(name, mirror, [distance])
+    made, distances = _prepare(name, mirror, () if distance is None else (distance,), DISTANCES[1:2])
     from stepdiag.head_drawing import draw_head
 
-    write_whole(output, draw_head(made, distance, suffix))
+    write_whole(output, draw_head(made, distances[0], suffix))
 
 
 @head.command(
@@ -94,7 +94,7 @@ def check(name: str, distances: tuple[float, ...], mirror: tuple[float, float] |
     """
     from stepdiag.head_check import check_report
 
-    for line in check_report(_make(name, mirror, distances or DISTANCES), distances or DISTANCES):
+    for line in check_report(*_prepare(name, mirror, distances, DISTANCES)):
         click.echo(line)
 
 
@@ -103,7 +103,7 @@ def check(name: str, distances: tuple[float, ...], mirror: tuple[float, float] |
     epilog="\b\nExample: stepdiag head sensitivity three_beams --distance 600",
 )
 @HEAD
-@click.option("--distance", default=DISTANCES[2], show_default=True, help="Of the mirror from the head, mm.")
+@click.option("--distance", type=float, metavar="MM", help=f"Of the mirror.  [default: {DISTANCES[2]:g}]")
 @click.option(
     "--tilt",
     nargs=2,
@@ -112,7 +112,7 @@ def check(name: str, distances: tuple[float, ...], mirror: tuple[float, float] |
     metavar="A B",
     help="Of the mirror, alpha and beta, µrad.",
 )
-def sensitivity(name: str, distance: float, tilt: tuple[float, float]) -> None:
+def sensitivity(name: str, distance: float | None, tilt: tuple[float, float]) -> None:
     """List what every pose error, index error and change of the air in HEAD changes, the strongest first.
 
     Exact derivatives along the traced rays, for distance and tilts after reduction with the nominal calibration.
@@ -120,27 +120,29 @@ def sensitivity(name: str, distance: float, tilt: tuple[float, float]) -> None:
     from stepdiag.head_sensitivity import sensitivity_report
     from stepdiag.sections import MICRORADIAN
 
-    made = _make(name, None, [distance])
     if not all(math.isfinite(angle) for angle in tilt):
         raise InvalidArgument(f"--tilt: expected two angles in µrad, got {tilt[0]:g} {tilt[1]:g}")
-    for line in sensitivity_report(made, distance, (tilt[0] * MICRORADIAN, tilt[1] * MICRORADIAN)):
+    made, distances = _prepare(name, None, () if distance is None else (distance,), DISTANCES[2:3])
+    for line in sensitivity_report(made, distances[0], (tilt[0] * MICRORADIAN, tilt[1] * MICRORADIAN)):
         click.echo(line)
 
 
-def _make(name: str, mirror: tuple[float, float] | None, distances: Sequence[float]) -> "_core.Head":
-    """A head that is looked at with a mirror that no beam misses, unless one is given."""
-    from stepdiag import _core
-    from stepdiag.head_description import find_head, read_head_design
+def _prepare(
+    name: str, mirror: tuple[float, float] | None, distances: Sequence[float], standard: Sequence[float]
+) -> tuple["_core.Head", Sequence[float]]:
+    """A head with a mirror that no beam misses, unless one is given; the distances given, else the standard ones."""
+    from stepdiag.head_description import ROOM, before_the_head, find_head, reach, read_head_design
 
     if mirror is not None and not all(math.isfinite(edge) and edge > 0.0 for edge in mirror):
         raise InvalidArgument(f"--mirror: expected two positive lengths in mm, got {mirror[0]:g} {mirror[1]:g}")
     path = Path(name) if Path(name).is_file() else find_head(name)
     design = read_head_design(path)
-    reach = max((float(outline[:, 2].max()) for body in design.bodies for outline in body.outlines), default=0.0)
+    nearest = reach(design)
     for distance in distances:
-        if not (math.isfinite(distance) and distance > max(0.0, reach)):
+        if not (math.isfinite(distance) and distance > nearest):
             raise InvalidArgument(
-                f"--distance: expected more than the {reach:g} mm that the head reaches to, got {distance:g}"
+                f"--distance: expected more than the {nearest:g} mm that the head reaches to, got {distance:g}"
             )
     edge = MARGIN + 2.0 * max(float(abs(beam.position[:2]).max()) for beam in design.beams)
-    return _core.Head.from_design(design, mirror=mirror or (edge, edge))
+    wanted = distances or [distance for distance in standard if distance > nearest] or [nearest + ROOM]
+    return before_the_head(design, mirror or (edge, edge)), wanted

@@ -40,6 +40,7 @@ from stepdiag.sections import MICROMETRE, MILLIRADIAN, NANOMETRE
 from stepdiag.toml_text import check_keys, located, parse_toml
 
 PPM: Final = 1e-6
+ROOM: Final = 100.0  # mm between a head that is looked at by itself and its mirror
 FOLDER: Final = Path(str(resource_files("stepdiag") / "heads"))
 
 
@@ -92,8 +93,18 @@ def parse_head_design(text: str, path: str | PathLike[str] = "head.toml") -> _co
             most_hits=keys.limits.most_hits,
             least_power=keys.limits.least_power,
         )
-        _core.Head.from_design(design)  # refuses beams on one line, which no single component shows
+        before_the_head(design)  # refuses beams on one line, which no single component shows
     return design
+
+
+def reach(design: _core.HeadDesign) -> float:
+    """How far the head stands out beyond its reference plane: a mirror is farther away. In mm."""
+    return max([0.0, *(float(outline[:, 2].max()) for body in design.bodies for outline in body.outlines)])
+
+
+def before_the_head(design: _core.HeadDesign, mirror: tuple[float, float] | None = None) -> _core.Head:
+    """The head to look at by itself, whose mirror may come as near as it reaches."""
+    return _core.Head.from_design(design, standoff=reach(design) + ROOM, mirror=mirror)
 
 
 def parse_head_keys(text: str, path: str | PathLike[str] = "head.toml") -> HeadFile:

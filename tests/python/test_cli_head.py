@@ -2,6 +2,7 @@
 
 # ruff: noqa: E501  a table of messages reads best with a case a line
 
+import math
 import re
 from pathlib import Path
 
@@ -99,6 +100,26 @@ def test_limits_are_those_of_acceptance_and_aperture(capsys: pytest.CaptureFixtu
     assert far[0] == far[1] == pytest.approx((-2.083, 2.083), abs=0.01)
     assert near[2:] == far[2:] == [(-30.0, 50.0), (-20.0, 40.0)]  # the mirror's edges at the beams, 0 and 20 mm
     assert "Smallest mirror, its middle on the head's z: 40 x 40 mm" in said
+
+
+def test_head_of_a_thousand_faces_works(capsys: pytest.CaptureFixture[str]) -> None:
+    """A row of plates that reaches 358.5 mm out, and a disc with a rim of a thousand faces."""
+    plate = '[body.p{0}]\nshape = "plate"\nwidth_mm = 60\nheight_mm = 60\nthickness_mm = 1\nmaterial = "N-BK7"\n'
+    plates = "".join(plate.format(k) + f"position_mm = [10, 10, {20 + 2 * k}]\n" for k in range(170))
+    around = [[30.0 * math.cos(k * math.pi / 500) + 10.0, 30.0 * math.sin(k * math.pi / 500)] for k in range(1000)]
+    corners = [[x, y, z] for z in (0, 4) for x, y in around]
+    rim = [[k, (k + 1) % 1000, (k + 1) % 1000 + 1000, k + 1000] for k in range(1000)]
+    disc = (
+        '[body.disc]\nshape = "polyhedron"\nposition_mm = [0.0, 10.0, 400.0]\nmaterial = "F2"\n'
+        f"corners_mm = {corners}\nfaces = {[list(range(1000)), list(range(1000, 2000)), *rim]}\n"
+    )
+    text = find_head("three_beams").read_text()
+    Path("large.toml").write_text(f"{text}\n[limits]\nmost_hits = 1000\n{plates}{disc}")
+    assert run("head", "check", "large.toml") == 0
+    said = capsys.readouterr().out
+    # 5 mm and 170 mm of N-BK7 (1.5009) and 4 mm of F2 (1.5955, at 1530 nm) over air.
+    assert numbers_after(said, "d1 constant")[0] == pytest.approx(175.0 * 0.5005 + 4.0 * 0.595, abs=0.1)
+    assert [line.split()[0] for line in said.splitlines() if "centre  " in line] == ["600", "1200"]
 
 
 def test_check_says_what_cannot_be_traced(capsys: pytest.CaptureFixture[str]) -> None:
