@@ -66,7 +66,8 @@ def _tidy(value: float) -> float:
 
 
 def _limits(head: _core.Head, distances: Sequence[float]) -> Iterator[str]:
-    yield "All readings are there for tilts (at travel 0) and travels of the mirror (at tilt 0) between:"
+    size = "" if head.mirror is None else f" of {head.mirror[0]:g} x {head.mirror[1]:g} mm"
+    yield f"All readings are there for tilts (at travel 0) and travels (at tilt 0) of a mirror{size} between:"
     yield f"  {'mirror':>9}{'alpha':>21}{'beta':>21}{'x':>21}{'y':>21}"
     yield f"  {'mm':>9}{'mrad':>21}{'mrad':>21}{'mm':>21}{'mm':>21}"
     for distance in distances:

@@ -16,7 +16,7 @@ LARGEST_TILT: Final = 0.1  # rad; beyond it no set-up is meant
 LARGEST_TRAVEL: Final = 1e3  # mm
 SMALLEST: Final = 1e-5  # of the largest: where the search for a limit begins
 ON_MIRROR: Final = 1e-6  # mm; a point on a face is off by rounding, 1e-12 mm
-HALVINGS: Final = 20  # of the bracket that the search finds
+HALVINGS: Final = 14  # of the bracket that the search finds
 
 
 @dataclass(frozen=True)

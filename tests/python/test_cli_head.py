@@ -6,6 +6,7 @@ import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import stepdiag as sd
@@ -102,24 +103,39 @@ def test_limits_are_those_of_acceptance_and_aperture(capsys: pytest.CaptureFixtu
     assert "Smallest mirror, its middle on the head's z: 40 x 40 mm" in said
 
 
-def test_head_of_a_thousand_faces_works(capsys: pytest.CaptureFixture[str]) -> None:
-    """A row of plates that reaches 358.5 mm out, and a disc with a rim of a thousand faces."""
+def far_plates(count: int) -> str:
+    """Plates of 1 mm, 2 mm apart from 20 mm on."""
     plate = '[body.p{0}]\nshape = "plate"\nwidth_mm = 60\nheight_mm = 60\nthickness_mm = 1\nmaterial = "N-BK7"\n'
-    plates = "".join(plate.format(k) + f"position_mm = [10, 10, {20 + 2 * k}]\n" for k in range(170))
+    places = "".join(plate.format(k) + f"position_mm = [10, 10, {20 + 2 * k}]\n" for k in range(count))
+    return find_head("three_beams").read_text() + "\n[limits]\nmost_hits = 1000\n" + places
+
+
+def test_head_that_reaches_far_is_looked_at_from_farther(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("far.toml").write_text(far_plates(60))
+    assert run("head", "check", "far.toml") == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines() if "centre  " in line] == [
+        "300",
+        "600",
+        "1200",
+    ]
+
+
+def test_head_of_a_thousand_faces_works() -> None:
     around = [[30.0 * math.cos(k * math.pi / 500) + 10.0, 30.0 * math.sin(k * math.pi / 500)] for k in range(1000)]
     corners = [[x, y, z] for z in (0, 4) for x, y in around]
     rim = [[k, (k + 1) % 1000, (k + 1) % 1000 + 1000, k + 1000] for k in range(1000)]
     disc = (
-        '[body.disc]\nshape = "polyhedron"\nposition_mm = [0.0, 10.0, 400.0]\nmaterial = "F2"\n'
+        '[body.disc]\nshape = "polyhedron"\nposition_mm = [0.0, 10.0, 400.0]\nmaterial = 1.6\n'
         f"corners_mm = {corners}\nfaces = {[list(range(1000)), list(range(1000, 2000)), *rim]}\n"
     )
-    text = find_head("three_beams").read_text()
-    Path("large.toml").write_text(f"{text}\n[limits]\nmost_hits = 1000\n{plates}{disc}")
-    assert run("head", "check", "large.toml") == 0
-    said = capsys.readouterr().out
-    # 5 mm and 170 mm of N-BK7 (1.5009) and 4 mm of F2 (1.5955, at 1530 nm) over air.
-    assert numbers_after(said, "d1 constant")[0] == pytest.approx(175.0 * 0.5005 + 4.0 * 0.595, abs=0.1)
-    assert [line.split()[0] for line in said.splitlines() if "centre  " in line] == ["600", "1200"]
+    design = sd.parse_head_design(far_plates(170) + disc)
+    assert sum(len(body.surfaces) for body in design.bodies) == 6 * 171 + 1002
+    head = sd.Head.from_design(design, standoff=500.0)
+    # 5 mm and 170 mm of N-BK7 (n = 1.5009 in vacuum) and 4 mm of index 1.6 over air, 1.0003.
+    expected = 175.0 * (1.5009 / 1.0003 - 1.0) + 4.0 * (1.6 / 1.0003 - 1.0)
+    assert head.calibration.head_constants.tolist() == pytest.approx([expected] * 3, abs=0.1)
+    machine, plan = sd.Machine("[w X' b Y Z t]"), sd.Plan((80, 60, 50), ["ppp"], 5)
+    assert not np.isnan(sd.simulate(machine, plan, head).channels["d3"]).any()
 
 
 def test_check_says_what_cannot_be_traced(capsys: pytest.CaptureFixture[str]) -> None:
