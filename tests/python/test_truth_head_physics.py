@@ -80,7 +80,8 @@ def test_turned_splitter_moves_the_spot_by_the_lever_to_the_device(
 def test_displaced_splitter_moves_the_spot_as_its_mirror_does(tilt: tuple[float, float]) -> None:
     """Along y nothing changes. Shifted by s along z the face meets the light s earlier: the spot is s higher.
 
-    Higher is x, unfolded. Shifted along x the face meets the light s later: s lower. The way is as much shorter or longer, times tan(2 phi).
+    Higher is x, unfolded. Shifted along x the face meets the light s later: s lower. The way is as much shorter or
+    longer, times tan(2 phi).
     """
     alpha, beta = tilt
     slope = 2 / (1 - alpha**2 - beta**2) * np.array([-beta, alpha])
