@@ -25,19 +25,19 @@ struct Light {
 };
 
 template <class N>
-HWY_INLINE N dot_add(const N (&a)[3], const N (&b)[3], N c) {
+STEPDIAG_INLINE N dot_add(const N (&a)[3], const N (&b)[3], N c) {
     return mul_add(a[0], b[0], mul_add(a[1], b[1], mul_add(a[2], b[2], c)));
 }
 
 template <class N>
-HWY_INLINE Truth<N> within(const std::array<double, 3>& edge, N x, N y) {
+STEPDIAG_INLINE Truth<N> within(const std::array<double, 3>& edge, N x, N y) {
     const Type<N> n;
     return mul_add(broadcast(n, edge[0]), x, broadcast(n, edge[1]) * y) <= broadcast(n, edge[2]);
 }
 
 // Whether a point of the face's plane, in the scene, is inside the outline.
 template <class N, class Face>
-HWY_INLINE Truth<N> inside(const Outline& outline, const Face& face, const N (&point)[3]) {
+STEPDIAG_INLINE Truth<N> inside(const Outline& outline, const Face& face, const N (&point)[3]) {
     const N row_x[3] = {face.rotation(0), face.rotation(1), face.rotation(2)};
     const N row_y[3] = {face.rotation(3), face.rotation(4), face.rotation(5)};
     const N x = dot_add(row_x, point, face.translation(0));
@@ -55,7 +55,7 @@ HWY_INLINE Truth<N> inside(const Outline& outline, const Face& face, const N (&p
 // as N: rotation(0..8),
 // translation(0..2), index() before, inverse_index() of it, index_ratio() mu = before / after, and 1 - mu^2.
 template <class N, class Met, class Face>
-HWY_INLINE void meet(const Met& met, const Face& face, N gap, Light<N>& light) {
+STEPDIAG_INLINE void meet(const Met& met, const Face& face, N gap, Light<N>& light) {
     const N normal[3] = {face.rotation(6), face.rotation(7), face.rotation(8)};
     N(&d)[3] = light.direction;
     const N along = mul_add(normal[0], d[0], mul_add(normal[1], d[1], normal[2] * d[2]));  // cosine, signed
@@ -90,12 +90,12 @@ HWY_INLINE void meet(const Met& met, const Face& face, N gap, Light<N>& light) {
 
 // Infinite and NaN differ from themselves less themselves.
 template <class N>
-HWY_INLINE Truth<N> is_finite(N a) {
+STEPDIAG_INLINE Truth<N> is_finite(N a) {
     return magnitude(a - a) <= broadcast(Type<N>(), 0.0);
 }
 
 template <class N>
-HWY_INLINE void check_end(Light<N>& light) {
+STEPDIAG_INLINE void check_end(Light<N>& light) {
     light.followed = both(light.followed, both(is_finite(light.optical_length), is_finite(light.reduced_length)));
     for (int k = 0; k < 3; ++k) {
         light.followed = both(light.followed, is_finite(light.point[k]));

@@ -21,14 +21,14 @@ using Tag = hn::ScalableTag<double>;
 using Vector = hn::Vec<Tag>;
 using Mask = hn::Mask<Tag>;
 
-HWY_INLINE Vector mul_add(Vector a, Vector b, Vector c) { return hn::MulAdd(a, b, c); }
-HWY_INLINE Vector sub_mul(Vector a, Vector b, Vector c) { return hn::NegMulAdd(a, b, c); }
-HWY_INLINE Vector root(Vector a) { return hn::Sqrt(a); }
-HWY_INLINE Vector magnitude(Vector a) { return hn::Abs(a); }
-HWY_INLINE Vector negative(Vector a) { return hn::Neg(a); }
-HWY_INLINE Vector with_sign(Vector a, Vector sign) { return hn::CopySignToAbs(a, sign); }
-HWY_INLINE Mask both(Mask a, Mask b) { return hn::And(a, b); }
-HWY_INLINE void store(Mask a, std::uint8_t* to) {
+STEPDIAG_INLINE Vector mul_add(Vector a, Vector b, Vector c) { return hn::MulAdd(a, b, c); }
+STEPDIAG_INLINE Vector sub_mul(Vector a, Vector b, Vector c) { return hn::NegMulAdd(a, b, c); }
+STEPDIAG_INLINE Vector root(Vector a) { return hn::Sqrt(a); }
+STEPDIAG_INLINE Vector magnitude(Vector a) { return hn::Abs(a); }
+STEPDIAG_INLINE Vector negative(Vector a) { return hn::Neg(a); }
+STEPDIAG_INLINE Vector with_sign(Vector a, Vector sign) { return hn::CopySignToAbs(a, sign); }
+STEPDIAG_INLINE Mask both(Mask a, Mask b) { return hn::And(a, b); }
+STEPDIAG_INLINE void store(Mask a, std::uint8_t* to) {
     HWY_ALIGN double truth[hn::MaxLanes(Tag())];
     hn::Store(hn::IfThenElseZero(a, hn::Set(Tag(), 1.0)), Tag(), truth);
     for (std::size_t i = 0; i < hn::Lanes(Tag()); ++i) to[i] = truth[i] != 0.0;
@@ -41,29 +41,31 @@ struct Pair {
 struct MaskPair {
     Mask a, b;
 };
-HWY_INLINE Pair operator+(Pair x, Pair y) { return {x.a + y.a, x.b + y.b}; }
-HWY_INLINE Pair operator-(Pair x, Pair y) { return {x.a - y.a, x.b - y.b}; }
-HWY_INLINE Pair operator*(Pair x, Pair y) { return {x.a * y.a, x.b * y.b}; }
-HWY_INLINE Pair operator/(Pair x, Pair y) { return {x.a / y.a, x.b / y.b}; }
-HWY_INLINE MaskPair operator>(Pair x, Pair y) { return {x.a > y.a, x.b > y.b}; }
-HWY_INLINE MaskPair operator<=(Pair x, Pair y) { return {x.a <= y.a, x.b <= y.b}; }
-HWY_INLINE Pair mul_add(Pair x, Pair y, Pair z) { return {mul_add(x.a, y.a, z.a), mul_add(x.b, y.b, z.b)}; }
-HWY_INLINE Pair sub_mul(Pair x, Pair y, Pair z) { return {sub_mul(x.a, y.a, z.a), sub_mul(x.b, y.b, z.b)}; }
-HWY_INLINE Pair root(Pair x) { return {root(x.a), root(x.b)}; }
-HWY_INLINE Pair magnitude(Pair x) { return {magnitude(x.a), magnitude(x.b)}; }
-HWY_INLINE Pair negative(Pair x) { return {negative(x.a), negative(x.b)}; }
-HWY_INLINE Pair with_sign(Pair x, Pair sign) { return {with_sign(x.a, sign.a), with_sign(x.b, sign.b)}; }
-HWY_INLINE MaskPair both(MaskPair x, MaskPair y) { return {both(x.a, y.a), both(x.b, y.b)}; }
-HWY_INLINE Pair broadcast(Type<Pair>, double value) {
+STEPDIAG_INLINE Pair operator+(Pair x, Pair y) { return {x.a + y.a, x.b + y.b}; }
+STEPDIAG_INLINE Pair operator-(Pair x, Pair y) { return {x.a - y.a, x.b - y.b}; }
+STEPDIAG_INLINE Pair operator*(Pair x, Pair y) { return {x.a * y.a, x.b * y.b}; }
+STEPDIAG_INLINE Pair operator/(Pair x, Pair y) { return {x.a / y.a, x.b / y.b}; }
+STEPDIAG_INLINE MaskPair operator>(Pair x, Pair y) { return {x.a > y.a, x.b > y.b}; }
+STEPDIAG_INLINE MaskPair operator<=(Pair x, Pair y) { return {x.a <= y.a, x.b <= y.b}; }
+STEPDIAG_INLINE Pair mul_add(Pair x, Pair y, Pair z) { return {mul_add(x.a, y.a, z.a), mul_add(x.b, y.b, z.b)}; }
+STEPDIAG_INLINE Pair sub_mul(Pair x, Pair y, Pair z) { return {sub_mul(x.a, y.a, z.a), sub_mul(x.b, y.b, z.b)}; }
+STEPDIAG_INLINE Pair root(Pair x) { return {root(x.a), root(x.b)}; }
+STEPDIAG_INLINE Pair magnitude(Pair x) { return {magnitude(x.a), magnitude(x.b)}; }
+STEPDIAG_INLINE Pair negative(Pair x) { return {negative(x.a), negative(x.b)}; }
+STEPDIAG_INLINE Pair with_sign(Pair x, Pair sign) { return {with_sign(x.a, sign.a), with_sign(x.b, sign.b)}; }
+STEPDIAG_INLINE MaskPair both(MaskPair x, MaskPair y) { return {both(x.a, y.a), both(x.b, y.b)}; }
+STEPDIAG_INLINE Pair broadcast(Type<Pair>, double value) {
     const Vector all = hn::Set(Tag(), value);
     return {all, all};
 }
-HWY_INLINE Pair load(const double* from) { return {hn::LoadU(Tag(), from), hn::LoadU(Tag(), from + hn::Lanes(Tag()))}; }
-HWY_INLINE void store(Pair x, double* to) {
+STEPDIAG_INLINE Pair load(const double* from) {
+    return {hn::LoadU(Tag(), from), hn::LoadU(Tag(), from + hn::Lanes(Tag()))};
+}
+STEPDIAG_INLINE void store(Pair x, double* to) {
     hn::StoreU(x.a, Tag(), to);
     hn::StoreU(x.b, Tag(), to + hn::Lanes(Tag()));
 }
-HWY_INLINE void store(MaskPair x, std::uint8_t* to) {
+STEPDIAG_INLINE void store(MaskPair x, std::uint8_t* to) {
     store(x.a, to);
     store(x.b, to + hn::Lanes(Tag()));
 }

@@ -4,9 +4,18 @@
 //   -a with_sign(a, s) = a >= 0 with the sign of s      both(p, q) of two comparisons      broadcast(Type<N>(), double)
 #pragma once
 
+#include <hwy/base.h>
+
 #include <utility>
 
 #include "stepdiag/optics/dual.hpp"
+
+// All of it inlined keeps lanes in registers; under sanitizers that would compile for minutes.
+#if HWY_IS_ASAN
+#define STEPDIAG_INLINE inline
+#else
+#define STEPDIAG_INLINE HWY_INLINE
+#endif
 
 namespace stepdiag {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-// Instruction sets that differ from another one only in what is not used here.
+// Not those instruction sets that differ from another one only in what is not used here.
 #include <hwy/detect_targets.h>
 #undef HWY_DISABLED_TARGETS
 #ifdef HWY_AVX3_ZEN4  // since Highway 1.1
@@ -30,28 +30,28 @@ struct CommonFace {
     const PreparedEncounter& encounter;
     std::size_t lane;
 
-    HWY_INLINE Pair common(double value) const { return broadcast(Type<Pair>(), value); }
-    HWY_INLINE Pair by_lane(const LaneSource& source) const { return load(source.from + (lane & source.mask)); }
-    HWY_INLINE Pair rotation(int k) const { return common(encounter.plane[k]); }
-    HWY_INLINE Pair translation(int k) const { return common(encounter.plane[9 + k]); }
-    HWY_INLINE Pair index() const { return common(encounter.index_before); }
-    HWY_INLINE Pair inverse_index() const { return common(encounter.inverse_index); }
-    HWY_INLINE Pair index_ratio() const { return common(encounter.index_ratio); }
-    HWY_INLINE Pair one_less_ratio2() const { return common(encounter.one_less_ratio2); }
+    STEPDIAG_INLINE Pair common(double value) const { return broadcast(Type<Pair>(), value); }
+    STEPDIAG_INLINE Pair by_lane(const LaneSource& source) const { return load(source.from + (lane & source.mask)); }
+    STEPDIAG_INLINE Pair rotation(int k) const { return common(encounter.plane[k]); }
+    STEPDIAG_INLINE Pair translation(int k) const { return common(encounter.plane[9 + k]); }
+    STEPDIAG_INLINE Pair index() const { return common(encounter.index_before); }
+    STEPDIAG_INLINE Pair inverse_index() const { return common(encounter.inverse_index); }
+    STEPDIAG_INLINE Pair index_ratio() const { return common(encounter.index_ratio); }
+    STEPDIAG_INLINE Pair one_less_ratio2() const { return common(encounter.one_less_ratio2); }
 };
 
 // ... where the plane is that of each lane ...
 struct PlaneByLane : CommonFace {
-    HWY_INLINE Pair rotation(int k) const { return by_lane(encounter.plane_from[k]); }
-    HWY_INLINE Pair translation(int k) const { return by_lane(encounter.plane_from[9 + k]); }
+    STEPDIAG_INLINE Pair rotation(int k) const { return by_lane(encounter.plane_from[k]); }
+    STEPDIAG_INLINE Pair translation(int k) const { return by_lane(encounter.plane_from[9 + k]); }
 };
 
 // ... and where the indices are as well.
 struct FaceByLane : PlaneByLane {
-    HWY_INLINE Pair index() const { return by_lane(encounter.index_before_from); }
-    HWY_INLINE Pair inverse_index() const { return common(1.0) / index(); }
-    HWY_INLINE Pair index_ratio() const { return index() / by_lane(encounter.index_after_from); }
-    HWY_INLINE Pair one_less_ratio2() const { return sub_mul(index_ratio(), index_ratio(), common(1.0)); }
+    STEPDIAG_INLINE Pair index() const { return by_lane(encounter.index_before_from); }
+    STEPDIAG_INLINE Pair inverse_index() const { return common(1.0) / index(); }
+    STEPDIAG_INLINE Pair index_ratio() const { return index() / by_lane(encounter.index_after_from); }
+    STEPDIAG_INLINE Pair one_less_ratio2() const { return sub_mul(index_ratio(), index_ratio(), common(1.0)); }
 };
 
 // By the operation that FaceByLane takes, so that the bits are the same.
