@@ -144,7 +144,7 @@ class Description:
         if face == "split":
             return light.reflected(plane) if what == ["reflected"] else light
         in_air = light.index == air
-        return light.refracted(plane, glass_index(component.numbers["material"], wavelength) if in_air else air)
+        return light.refracted(plane, material_index(component.numbers["material"], wavelength) if in_air else air)
 
 
 def half_path(description: Description, beam: str, air: Number, mirror: Plane) -> Number:
@@ -200,6 +200,10 @@ def glass_index(name: str, wavelength: float) -> Number:
     terms = zip(*(map(MP.mpf, text.split()) for text in SELLMEIER[name]), strict=True)
     relative = MP.sqrt(1 + MP.fsum(b * square / (square - c) for b, c in terms))
     return relative * ciddor(wavelength, humidity=0.0)
+
+
+def material_index(material: str | float, wavelength: float) -> Number:
+    return glass_index(material, wavelength) if isinstance(material, str) else MP.mpf(material)
 
 
 def vapour_pressure(temperature: float) -> Number:

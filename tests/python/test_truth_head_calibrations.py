@@ -25,8 +25,8 @@ STEPS = 50
 EVERY_LINE = [*DIAGONALS, *SCALE_LINES]
 REFLECTOR = sd.Misalignment(reflector=(100e-6, 300e-6))
 
-# What the linear evaluation leaves of the second order: as in test_truth_evaluation.py. Spots weigh the points of a line
-# otherwise than tilts do, by their levers, and leave up to 6 nrad.
+# What the linear evaluation leaves of the second order: as in test_truth_evaluation.py. Spots weigh the points of a
+# line otherwise than tilts do, by their levers, and leave up to 6 nrad.
 CLEAN = (15 * NANOMETRE, 10 * NANORADIAN)
 TURNED = (150 * NANOMETRE, 50 * NANORADIAN)
 
@@ -84,7 +84,8 @@ def test_shipped_heads_calibrate_as_well_as_their_definitions(
         assert error.position <= limit[0]
         assert error.angle <= limit[1]
     position, angle = largest_change(*found)
-    # The window: t phi^2 (1 - 1/n) = 3e-7 mm at 450 urad. In tilts the third order of 30 mm of glass, 6e-12 rad at 100 mm.
+    # The window: t phi^2 (1 - 1/n) = 3e-7 mm at 450 urad. In tilts the third order of 30 mm of glass, 6e-12 rad at
+    # 100 mm.
     assert position <= 3e-7
     assert angle <= 5e-12
 

@@ -15,8 +15,8 @@ AXES = "xyz"
 NUMBERS = SpotHead()
 AIR = sd.Environment.from_air(temperature=22.0, relative_humidity=0.3)
 
-# Central differences over 2 h: roundings of 2e-13 mm over it, and a third of h^2 of the lever, tan(h) = h + h^3/3; a shift
-# acts linearly, so it may be long, and a laser's lever is 1.4 m.
+# Central differences over 2 h: roundings of 2e-13 mm over it, and a third of h^2 of the lever, tan(h) = h + h^3/3. A
+# shift acts linearly, so it may be long; a laser's lever is 1.4 m.
 STEP = {"mm": 1e-2, "rad": 1e-4}
 LIMIT = {"mm": 1e-10, "rad": 1e-5}
 
@@ -95,7 +95,7 @@ def test_derivatives_by_the_mirror_are_those_of_its_definition(name: str) -> Non
 
 
 def test_derivatives_by_rotations_of_an_aligned_mirror() -> None:
-    """alpha is a rotation about x and beta one about y; distances change by -beta u + alpha v, spots by their levers."""
+    """alpha turns about x and beta about y; distances change by -beta u + alpha v, spots by their levers."""
     aligned = {"tilt": (0.0, 0.0), "lateral": (0.0, 0.0)}
     beams = by_name(three_beams(), **aligned)
     about_x, about_y = (beams["mirror", f"rotation {axis}"] for axis in "xy")
