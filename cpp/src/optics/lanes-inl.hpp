@@ -29,9 +29,9 @@ STEPDIAG_INLINE Vector negative(Vector a) { return hn::Neg(a); }
 STEPDIAG_INLINE Vector with_sign(Vector a, Vector sign) { return hn::CopySignToAbs(a, sign); }
 STEPDIAG_INLINE Mask both(Mask a, Mask b) { return hn::And(a, b); }
 STEPDIAG_INLINE void store(Mask a, std::uint8_t* to) {
-    HWY_ALIGN double truth[hn::MaxLanes(Tag())];
-    hn::Store(hn::IfThenElseZero(a, hn::Set(Tag(), 1.0)), Tag(), truth);
-    for (std::size_t i = 0; i < hn::Lanes(Tag()); ++i) to[i] = truth[i] != 0.0;
+    std::uint8_t bits[8] = {};  // what Highway writes at least
+    hn::StoreMaskBits(Tag(), a, bits);
+    for (std::size_t i = 0; i < hn::Lanes(Tag()); ++i) to[i] = (bits[0] >> i) & 1;
 }
 
 // Two vectors side by side: while one waits for a root or a quotient, the other goes on.

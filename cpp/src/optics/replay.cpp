@@ -63,8 +63,8 @@ void prepare_indices(const PreparedRoute& route) {
     }
 }
 
-// The lanes from `lane` on that a pair of vectors holds; results go to to.point[0][0], [1] ...
-void follow(const PreparedRoute& route, std::size_t lane, double gap, const LaneResults& to) {
+// The lanes from `lane` on that a pair of vectors holds; results go to to.point[0][at] and on.
+void follow(const PreparedRoute& route, std::size_t lane, double gap, const LaneResults& to, std::size_t at) {
     const auto start = [&](int k) HWY_ATTR { return load(route.start[k].from + (lane & route.start[k].mask)); };
     const Pair zero = broadcast(Type<Pair>(), 0.0), nearest = broadcast(Type<Pair>(), gap);
     Light<Pair> light{{start(0), start(1), start(2)}, {start(3), start(4), start(5)}, start(6), start(7), zero <= zero};
@@ -75,10 +75,11 @@ void follow(const PreparedRoute& route, std::size_t lane, double gap, const Lane
         else meet(encounter, face, nearest, light);
     }
     check_end(light);
-    for (int k = 0; k < 3; ++k) store(light.point[k], to.point[k]), store(light.direction[k], to.direction[k]);
-    store(light.optical_length, to.optical_length);
-    store(light.reduced_length, to.reduced_length);
-    store(light.followed, to.followed);
+    for (int k = 0; k < 3; ++k)
+        store(light.point[k], to.point[k] + at), store(light.direction[k], to.direction[k] + at);
+    store(light.optical_length, to.optical_length + at);
+    store(light.reduced_length, to.reduced_length + at);
+    store(light.followed, to.followed + at);
 }
 
 void replay_lanes(const std::vector<Encounter>& route, const LaneRays& rays, std::size_t lanes, double gap,
@@ -90,9 +91,8 @@ void replay_lanes(const std::vector<Encounter>& route, const LaneRays& rays, std
     // written over what the rays came from.
     const std::size_t left = lanes % width;
     ResultsAside aside;
-    if (left > 0) follow(prepared, std::max(lanes, width) - width, gap, aside.results);
-    for (std::size_t lane = 0; lane + width <= lanes; lane += width)
-        follow(prepared, lane, gap, from_lane(results, lane));
+    if (left > 0) follow(prepared, std::max(lanes, width) - width, gap, aside.results, 0);
+    for (std::size_t lane = 0; lane + width <= lanes; lane += width) follow(prepared, lane, gap, results, lane);
     if (left > 0)
         copy(from_lane(aside.results, lanes < width ? 0 : width - left), left, from_lane(results, lanes - left));
 }
