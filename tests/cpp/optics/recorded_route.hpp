@@ -21,6 +21,7 @@ struct RecordedRoute {
     std::vector<int> faces;  // of the scene
 
     RecordedRoute() = default;
+    RecordedRoute(const RecordedRoute&) = delete;  // the route points into this one
     RecordedRoute(const stepdiag::Scene& scene, const stepdiag::Medium& ambient, const stepdiag::Ray& ray,
                   const stepdiag::Path& path) {
         Eigen::Vector3d from = ray.origin;

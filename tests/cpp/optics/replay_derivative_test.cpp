@@ -187,7 +187,8 @@ TEST(ReplayDerivative, TiltedPlateDisplacesByItsClosedForm) {
 
 TEST(ReplayDerivative, FailedCheckGivesNothing) {
     const Bench bench;
-    auto route = with_slopes(bench.record(), bench, {});
+    const RecordedRoute recorded = bench.record();
+    auto route = with_slopes(recorded, bench, {});
     route[2].event = Event::totally_reflected;
     EXPECT_FALSE(replay(route, moving(bench.ray), gap));
 }
