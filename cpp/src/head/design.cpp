@@ -23,19 +23,13 @@ void check_placement(const Placement& placement, const std::string& name) {
 
 void check_beam(const HeadDesign& design, const HeadBeam& beam) {
     check_placement(beam.placement, beam.name);
-    const auto require_positive = [&](double value, const char* key) {
-        if (!(std::isfinite(value) && value > 0.0))
-            throw InvalidArgument(beam.name + ": " + key + ": expected a finite value above 0");
-    };
-    require_positive(beam.mode.wavelength, "wavelength");
-    require_positive(beam.mode.waist_radius, "waist_radius");
-    if (!std::isfinite(beam.mode.waist_position))
-        throw InvalidArgument(beam.name + ": waist_position: expected a finite value");
+    check_gaussian_mode(beam.mode);
     if (beam.interferometer) {
         check_interferometer(*beam.interferometer);
         return;
     }
-    require_positive(beam.housing, "housing");
+    if (!(std::isfinite(beam.housing) && beam.housing > 0.0))
+        throw InvalidArgument(beam.name + ": housing: expected a finite value above 0");
     sensor_of(design, beam);
 }
 

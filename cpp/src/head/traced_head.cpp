@@ -124,14 +124,18 @@ std::vector<int> TracedHead::wanted_segments(const RayTree& tree, int beam) cons
 
 // The paths that all recorded poses have in common; none where these have different ones, or where they do not pass
 // clear.
-std::vector<RecordedRoute> TracedHead::record(int beam, const std::vector<MirrorPose>& mirrors) const {
+std::vector<RecordedRoute> TracedHead::record(int beam, const std::vector<MirrorPose>& mirrors,
+                                              std::vector<std::size_t>& lost) const {
     std::vector<RecordedRoute> routes;
     std::vector<std::vector<std::vector<Segment>>> paths;  // by route, by pose
     const std::size_t last = mirrors.size() - 1;
     for (const std::size_t pose : {std::size_t(0), last / 2, last}) {
         const RayTree tree = trace(beam, mirrors[pose]);
         const std::vector<int> wanted = wanted_segments(tree, beam);
-        if (wanted.empty()) continue;  // a lost beam says nothing of the other poses
+        if (wanted.empty()) {
+            lost.push_back(pose);
+            continue;
+        }
         std::vector<RecordedRoute> found;
         for (const int segment : wanted) found.push_back(record_route(tree, segment));
         if (routes.empty()) routes = found;
@@ -151,8 +155,9 @@ std::vector<Arrivals> TracedHead::replay(int beam, const std::vector<MirrorPose>
     std::vector<Arrivals> result(n);
     if (n == 0) return result;
 
+    std::vector<std::size_t> lost;
     const std::vector<RecordedRoute> routes =
-        options.verified_share < 1.0 ? record(beam, mirrors) : std::vector<RecordedRoute>{};
+        options.verified_share < 1.0 ? record(beam, mirrors, lost) : std::vector<RecordedRoute>{};
     std::vector<std::uint8_t> followed(n, !routes.empty());
     for (const RecordedRoute& route : routes) {
         const RouteReplay replayed = replay_route(route, optics.frames, optics.outlines, optics.source, mirrors,
@@ -164,6 +169,10 @@ std::vector<Arrivals> TracedHead::replay(int beam, const std::vector<MirrorPose>
                                             replayed.reduced_length[i], route.power));
         }
     }
+
+    // A pose that is known to be lost follows none of the paths; if it seems to, something is in its way.
+    const auto seems_to_follow = [&](std::size_t pose) { return followed[pose] != 0; };
+    if (std::any_of(lost.begin(), lost.end(), seems_to_follow)) std::fill(followed.begin(), followed.end(), 0);
 
     ReplayCount counted;
     for (std::size_t i = 0; i < n; ++i) {

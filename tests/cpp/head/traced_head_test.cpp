@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -102,9 +103,13 @@ TEST(TracedHead, CoatedWindowSendsGhostsToItsSensor) {
     const TracedHead head(design, {}, air, mirror_size);
     const auto arrivals = head.arrivals(1, tilted_mirror({0.0, 0.0, 300.0}, 1e-4, 2e-4));
     ASSERT_GT(arrivals.size(), 2u);
-    // Two passes of the splitter and four of the window's faces; each ghost of the window alone is R on the way back.
+    // Two passes of the splitter and four of the window's faces.
     EXPECT_NEAR(arrivals[0].power, 0.25 * std::pow(0.99, 4), 1e-12);
-    EXPECT_NEAR(arrivals[1].power, 0.25 * 0.01, 1e-12);
+    // The window's first face sends R straight back: stronger than all ghosts that saw the mirror, but straylight.
+    const auto straylight = std::find_if(arrivals.begin(), arrivals.end(),
+                                         [](const Arrival& a) { return std::abs(a.power - 0.25 * 0.01) < 1e-12; });
+    ASSERT_NE(straylight, arrivals.end());
+    EXPECT_LT((straylight - 1)->power, straylight->power);
 }
 
 TEST(NominalHead, KnowsOffsetsPsdDistanceAndGlass) {

@@ -90,7 +90,8 @@ public:
     std::vector<int> wanted_segments(const RayTree& tree, int beam) const;
 
 private:
-    std::vector<RecordedRoute> record(int beam, const std::vector<MirrorPose>& mirrors) const;
+    std::vector<RecordedRoute> record(int beam, const std::vector<MirrorPose>& mirrors,
+                                      std::vector<std::size_t>& lost) const;
     Face mirror_at(const MirrorPose& pose) const;
     Arrival arrival(int beam, const Eigen::Vector3d& point, const Eigen::Vector3d& direction, double optical_length,
                     double reduced_length, double power) const;
