@@ -21,13 +21,23 @@ void check_placement(const Placement& placement, const std::string& name) {
         throw InvalidArgument(name + ": expected a finite position and a rotation");
 }
 
+// Puts the component's name in front of what its parts have to say.
+template <class Check>
+void check_part(const std::string& name, const Check& check) {
+    try {
+        check();
+    } catch (const InvalidArgument& error) {
+        throw InvalidArgument(name + ": " + error.what());
+    }
+}
+
 void check_beam(const HeadDesign& design, const HeadBeam& beam) {
     check_placement(beam.placement, beam.name);
-    check_gaussian_mode(beam.mode);
-    if (beam.interferometer) {
-        check_interferometer(*beam.interferometer);
-        return;
-    }
+    check_part(beam.name, [&] {
+        check_gaussian_mode(beam.mode);
+        if (beam.interferometer) check_interferometer(*beam.interferometer);
+    });
+    if (beam.interferometer) return;
     if (!(std::isfinite(beam.housing) && beam.housing > 0.0))
         throw InvalidArgument(beam.name + ": housing: expected a finite value above 0");
     sensor_of(design, beam);

@@ -30,7 +30,8 @@ struct Arrival {
     ReturnedBeam beam;
     double power;  // share of the source's
 };
-// Strongest first, straylight that never saw the mirror last; none: the beam is lost. An interferometer has one at most.
+// Strongest first, straylight that never saw the mirror last; none: the beam is lost. An interferometer has one at
+// most.
 using Arrivals = std::vector<Arrival>;
 
 struct RecordedRoute;
