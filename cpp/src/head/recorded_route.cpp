@@ -54,13 +54,19 @@ double sideways(const Segment& from, const Segment& to) {
 
 }  // namespace
 
-bool pass_clear(const std::vector<std::vector<Segment>>& paths, const Scene& fixed) {
+bool pass_clear(const std::vector<std::vector<Segment>>& paths, const Scene& fixed, const std::vector<int>& component,
+                int source) {
     const std::vector<Face>& faces = fixed.faces();
     std::vector<Eigen::AlignedBox3d> boxes(faces.size());
     for (std::size_t f = 0; f < faces.size(); ++f)
         for (const auto& corner : faces[f].outline) boxes[f].extend(corner);
 
+    const auto component_of = [&](int face) {
+        return face < int(faces.size()) ? component[face] : -1;
+    };  // mirror: none
     for (std::size_t k = 0; k < paths.front().size(); ++k) {
+        const int to = component_of(paths.front()[k].hit->face);
+        const int from = k > 0 ? component_of(paths.front()[k - 1].hit->face) : source;
         double moved = 0.0;
         for (const auto& path : paths) moved = std::max(moved, sideways(paths[0][k], path[k]));
         const double clearance = 1.0 + 2.0 * moved;
@@ -69,9 +75,8 @@ bool pass_clear(const std::vector<std::vector<Segment>>& paths, const Scene& fix
             Eigen::AlignedBox3d around(start.cwiseMin(end), start.cwiseMax(end));
             const std::vector<Face> line{{start, Eigen::Vector3d::UnitZ(), {start, end}, Surface::absorbing}};
             for (std::size_t f = 0; f < faces.size(); ++f) {
-                const bool is_met = int(f) == path[k].hit->face || (k > 0 && int(f) == path[k - 1].hit->face);
-                const bool is_source = k == 0 && std::abs(faces[f].normal.dot(start - faces[f].point)) < 1e-9;
-                if (is_met || is_source || boxes[f].exteriorDistance(around) >= clearance) continue;
+                if (component[f] == to || component[f] == from || boxes[f].exteriorDistance(around) >= clearance)
+                    continue;
                 if (separation(line, {faces[f]}) < clearance) return false;
             }
         }

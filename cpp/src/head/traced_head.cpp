@@ -29,14 +29,35 @@ void check_errors(const HeadDesign& design, const PoseErrors& errors) {
 }
 
 // Where two answers for the same pose differ by more than rounding.
-bool differ(const Arrivals& a, const Arrivals& b) {
-    if (a.size() != b.size()) return true;
-    for (std::size_t i = 0; i < a.size(); ++i)
-        if (!((a[i].beam.position - b[i].beam.position).norm() <= rounding &&
-              std::abs(a[i].beam.optical_length - b[i].beam.optical_length) <= rounding))
-            return true;
-    return false;
+bool differ(const ArrivalTable::Row& a, const Arrivals& b) {
+    const auto same = [](const Arrival& x, const Arrival& y) {
+        return (x.beam.position - y.beam.position).norm() <= rounding &&
+               std::abs(x.beam.optical_length - y.beam.optical_length) <= rounding;
+    };
+    return !std::equal(a.begin(), a.end(), b.begin(), b.end(), same);
 }
+
+// The poses to verify: each with the probability `share`, by the gaps between them, so that most cost no random number.
+class Verified {
+public:
+    Verified(double share, std::uint64_t seed) : share_(share), seed_(seed) { advance(); }
+    bool take(std::size_t pose) {
+        if (share_ <= 0.0 || double(pose) < next_) return false;
+        advance();
+        return true;
+    }
+
+private:
+    void advance() {
+        if (share_ > 0.0)
+            next_ += 1.0 + std::floor(std::log(uniform_pair(seed_, RandomStream::verification, draw_++)[0]) /
+                                      std::log1p(-share_));
+    }
+    double share_;
+    std::uint64_t seed_;
+    std::uint64_t draw_ = 0;
+    double next_ = -1.0;
+};
 
 }  // namespace
 
@@ -143,48 +164,51 @@ std::vector<RecordedRoute> TracedHead::record(int beam, const std::vector<Mirror
         paths.resize(routes.size());
         for (std::size_t r = 0; r < routes.size(); ++r) paths[r].push_back(path_segments(tree, wanted[r]));
     }
+    const int source = int(design_.bodies.size()) + beam;
     for (const auto& of_route : paths)
-        if (!pass_clear(of_route, optics_[beam].fixed)) return {};
+        if (!pass_clear(of_route, optics_[beam].fixed, optics_[beam].component, source)) return {};
     return routes;
 }
 
-std::vector<Arrivals> TracedHead::replay(int beam, const std::vector<MirrorPose>& mirrors, const ReplayOptions& options,
-                                         ReplayCount* count) const {
+ArrivalTable TracedHead::replay(int beam, const std::vector<MirrorPose>& mirrors, const ReplayOptions& options,
+                                ReplayCount* count) const {
     const BeamOptics& optics = optics_[beam];
     const std::size_t n = mirrors.size();
-    std::vector<Arrivals> result(n);
-    if (n == 0) return result;
+    ArrivalTable table;
+    if (n == 0) return table;
 
     std::vector<std::size_t> lost;
     const std::vector<RecordedRoute> routes =
         options.verified_share < 1.0 ? record(beam, mirrors, lost) : std::vector<RecordedRoute>{};
+    std::vector<RouteReplay> replayed;
     std::vector<std::uint8_t> followed(n, !routes.empty());
     for (const RecordedRoute& route : routes) {
-        const RouteReplay replayed = replay_route(route, optics.frames, optics.outlines, optics.source, mirrors,
-                                                  optics.fixed.self_intersection_gap());
-        for (std::size_t i = 0; i < n; ++i) {
-            followed[i] = followed[i] && replayed.followed[i];
-            if (followed[i])
-                result[i].push_back(arrival(beam, replayed.point(i), replayed.direction(i), replayed.optical_length[i],
-                                            replayed.reduced_length[i], route.power));
-        }
+        replayed.push_back(replay_route(route, optics.frames, optics.outlines, optics.source, mirrors,
+                                        optics.fixed.self_intersection_gap()));
+        for (std::size_t i = 0; i < n; ++i) followed[i] = followed[i] && replayed.back().followed[i];
     }
-
     // A pose that is known to be lost follows none of the paths; if it seems to, something is in its way.
     const auto seems_to_follow = [&](std::size_t pose) { return followed[pose] != 0; };
     if (std::any_of(lost.begin(), lost.end(), seems_to_follow)) std::fill(followed.begin(), followed.end(), 0);
 
+    table.reserve(n, n * std::max<std::size_t>(1, routes.size()));
+    Verified verified(options.verified_share, options.seed);
     ReplayCount counted;
     for (std::size_t i = 0; i < n; ++i) {
         if (!followed[i]) {
-            result[i] = arrivals(beam, mirrors[i]);
+            for (const Arrival& traced : arrivals(beam, mirrors[i])) table.add(traced);
+            table.end_pose();
             ++counted.traced;
             continue;
         }
+        for (std::size_t r = 0; r < routes.size(); ++r)
+            table.add(arrival(beam, replayed[r].point(i), replayed[r].direction(i), replayed[r].optical_length[i],
+                              replayed[r].reduced_length[i], routes[r].power));
+        table.end_pose();
         ++counted.replayed;
-        if (uniform_pair(options.seed, RandomStream::verification, i)[0] >= options.verified_share) continue;
+        if (!verified.take(i)) continue;
         ++counted.verified;
-        if (differ(result[i], arrivals(beam, mirrors[i]))) {
+        if (differ(table[i], arrivals(beam, mirrors[i]))) {
             std::ostringstream text;
             text << "replay: beam " << design_.beams[beam].name << " at pose " << i << " (mirror at "
                  << mirrors[i].point.transpose()
@@ -198,7 +222,7 @@ std::vector<Arrivals> TracedHead::replay(int beam, const std::vector<MirrorPose>
         count->traced += counted.traced;
         count->verified += counted.verified;
     }
-    return result;
+    return table;
 }
 
 }  // namespace stepdiag

@@ -15,7 +15,7 @@ TracedReader::TracedReader(const Head& head, const Eigen::Vector2d& mirror, cons
       nominal_(nominal_head(*head.design, head.standoff, conditions.assumed.value_or(conditions.environment))),
       conditions_(conditions) {}
 
-void TracedReader::detect(int beam, const Arrivals& arrivals, std::uint64_t row, SignalRow& signals) const {
+void TracedReader::detect(int beam, const ArrivalTable::Row& arrivals, std::uint64_t row, SignalRow& signals) const {
     const HeadDesign& design = traced_.design();
     const HeadBeam& light = design.beams[beam];
     if (light.interferometer) {
@@ -23,8 +23,8 @@ void TracedReader::detect(int beam, const Arrivals& arrivals, std::uint64_t row,
         const double assumed =
             refractive_index(conditions_.assumed.value_or(conditions_.environment), light.mode.wavelength);
         if (!arrivals.empty())
-            distance = read_distance(*light.interferometer, light.mode, arrivals.front().beam, traced_.air_index(beam),
-                                     assumed);
+            distance =
+                read_distance(*light.interferometer, light.mode, arrivals[0].beam, traced_.air_index(beam), assumed);
         if (distance) *distance -= nominal_.calibration.head_constants[signals.size()];
         signals.push_back(distance);
         return;
@@ -52,7 +52,7 @@ std::vector<SignalRow> TracedReader::read(const std::vector<MirrorPose>& mirrors
                                           ReplayCount* count) const {
     std::vector<SignalRow> rows(mirrors.size());
     for (const int beam : signal_order(traced_.design())) {
-        const std::vector<Arrivals> arrivals = traced_.replay(beam, mirrors, conditions_.replay, count);
+        const ArrivalTable arrivals = traced_.replay(beam, mirrors, conditions_.replay, count);
         for (std::size_t i = 0; i < mirrors.size(); ++i) detect(beam, arrivals[i], first_row + i, rows[i]);
     }
     return rows;
@@ -60,7 +60,10 @@ std::vector<SignalRow> TracedReader::read(const std::vector<MirrorPose>& mirrors
 
 SignalRow TracedReader::trace(const MirrorPose& mirror) const {
     SignalRow row;
-    for (const int beam : signal_order(traced_.design())) detect(beam, traced_.arrivals(beam, mirror), 0, row);
+    for (const int beam : signal_order(traced_.design())) {
+        const Arrivals arrivals = traced_.arrivals(beam, mirror);
+        detect(beam, {arrivals.data(), arrivals.data() + arrivals.size()}, 0, row);
+    }
     return row;
 }
 

@@ -30,9 +30,37 @@ struct Arrival {
     ReturnedBeam beam;
     double power;  // share of the source's
 };
-// Strongest first, straylight that never saw the mirror last; none: the beam is lost. An interferometer has one at
-// most.
+// A beam's light at one pose: strongest first, straylight that never saw the mirror last; none: the beam is lost. An
+// interferometer has one at most.
 using Arrivals = std::vector<Arrival>;
+
+// The same of many poses, one after the other.
+class ArrivalTable {
+public:
+    struct Row {
+        const Arrival* first;
+        const Arrival* last;
+        const Arrival* begin() const { return first; }
+        const Arrival* end() const { return last; }
+        std::size_t size() const { return std::size_t(last - first); }
+        bool empty() const { return first == last; }
+        const Arrival& operator[](std::size_t i) const { return first[i]; }
+    };
+    std::size_t size() const { return ends_.size(); }  // poses
+    Row operator[](std::size_t pose) const {
+        return {all_.data() + (pose > 0 ? ends_[pose - 1] : 0), all_.data() + ends_[pose]};
+    }
+    void reserve(std::size_t poses, std::size_t arrivals) {
+        ends_.reserve(poses);
+        all_.reserve(arrivals);
+    }
+    void add(const Arrival& arrival) { all_.push_back(arrival); }  // to the pose that end_pose closes
+    void end_pose() { ends_.push_back(all_.size()); }
+
+private:
+    std::vector<Arrival> all_;
+    std::vector<std::size_t> ends_;
+};
 
 struct RecordedRoute;
 
@@ -71,8 +99,8 @@ public:
     // Many poses by replay. The paths are recorded at the first, the middle and the last pose. Where these do not have
     // the same ones, or where another face is near them, all poses are traced; so is each pose that does not follow
     // them. Throws ReplayMismatch naming the pose where a verification differs by more than rounding (1e-9 mm).
-    std::vector<Arrivals> replay(int beam, const std::vector<MirrorPose>& mirrors, const ReplayOptions& options = {},
-                                 ReplayCount* count = nullptr) const;
+    ArrivalTable replay(int beam, const std::vector<MirrorPose>& mirrors, const ReplayOptions& options = {},
+                        ReplayCount* count = nullptr) const;
 
     // A beam's own scene: glass has another index at another wavelength.
     struct BeamOptics {

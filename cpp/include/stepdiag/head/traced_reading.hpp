@@ -35,7 +35,7 @@ public:
     const TracedHead& head() const { return traced_; }
 
 private:
-    void detect(int beam, const Arrivals& arrivals, std::uint64_t row, SignalRow& signals) const;
+    void detect(int beam, const ArrivalTable::Row& arrivals, std::uint64_t row, SignalRow& signals) const;
 
     TracedHead traced_;
     NominalHead nominal_;

@@ -41,7 +41,8 @@ struct Heads {
     Head head;
     std::map<std::string, Head> by_line = {};  // of the lines that have another one
 
-    Heads(Head head = {}, std::map<std::string, Head> by_line = {}) : head(std::move(head)), by_line(std::move(by_line)) {}
+    Heads(Head head = {}, std::map<std::string, Head> by_line = {})
+        : head(std::move(head)), by_line(std::move(by_line)) {}
     const Head& of(const Line& line) const;
     HeadCalibrations calibration() const;
 };
