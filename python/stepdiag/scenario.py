@@ -36,8 +36,8 @@ class Scenario:
     heads: Mapping[str, _core.Head]
     misalignment: Mapping[str, _core.Misalignment]
     noise: _core.Noise
-    environment: _core.Environment
-    assumed_environment: _core.Environment
+    environment: _core.Environment | None
+    assumed_environment: _core.Environment | None
     uncertainty: _core.ReadingUncertainty
 
     @property

@@ -119,7 +119,7 @@ class AirKeys(Section):
 
     refractive_index: Annotated[float, Field(ge=1.0, le=2.0)] | None = key(
         "a refractive index from 1 to 2",
-        "Index at every wavelength, in place of the keys below; by default 1.",
+        "Index at every wavelength, in place of the keys below.",
         None,
         1.0,
     )
@@ -148,6 +148,8 @@ class AssumedAirKeys(AirKeys):
 
 class EnvironmentSection(AirKeys):
     """The air around machine and head, constant over a run: a `refractive_index`, or the state of the air.
+
+    Without any key: air of 20 °C before a described head, an index of 1 before one by its layout.
 
     Used by `simulate` only. The equations hold for wavelengths of 300 to 1700 nm."""
 

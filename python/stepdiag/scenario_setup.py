@@ -64,8 +64,11 @@ def noise_of(keys: NoiseSection) -> _core.Noise:
     )
 
 
-def environments(keys: EnvironmentSection, path: Path) -> tuple[_core.Environment, _core.Environment]:
-    """The air of the trace, and the air that readings are reduced with."""
+Air = _core.Environment | None
+
+
+def environments(keys: EnvironmentSection, path: Path) -> tuple[Air, Air]:
+    """The air of the trace, and the air that readings are reduced with; None where nothing is said of it."""
     true = environment(keys, f"{path}: environment")
     if keys.assumed is None:
         return true, true
@@ -76,15 +79,15 @@ def environments(keys: EnvironmentSection, path: Path) -> tuple[_core.Environmen
     return true, environment(AirKeys.model_validate(others | mine), f"{path}: environment.assumed")
 
 
-def environment(keys: AirKeys, place: str) -> _core.Environment:
-    """Air of the given state, at 20 °C and so on where it is not; or of the given index, 1 where nothing is given."""
+def environment(keys: AirKeys, place: str) -> Air:
+    """Air of the given state, at 20 °C and so on where it is not; or of the given index; None where nothing is given."""
     state = keys.model_fields_set & AirKeys.model_fields.keys() - {"refractive_index"}
     if "refractive_index" in keys.model_fields_set and state:
         named = ", ".join(sorted(state))
         raise InvalidArgument(f"{place}: expected refractive_index or a state of the air, got both ({named})")
     with located(place):
         if not state:
-            return _core.Environment(1.0 if keys.refractive_index is None else keys.refractive_index)
+            return None if keys.refractive_index is None else _core.Environment(keys.refractive_index)
         values = {
             "temperature": keys.temperature_c,
             "pressure": None if keys.pressure_hpa is None else keys.pressure_hpa * HECTOPASCAL,

@@ -131,18 +131,20 @@ void bind_simulation(py::module_& m) {
     m.def(
         "simulate",
         [](const Machine& machine, const Plan& plan, const HeadLike& head,
-           const std::map<std::string, Misalignment>& misalignment, const Noise& noise, const Environment& environment,
-           const std::optional<Environment>& assumed, double verified_share) {
+           const std::map<std::string, Misalignment>& misalignment, const Noise& noise,
+           const std::optional<Environment>& environment, const std::optional<Environment>& assumed,
+           double verified_share) {
             const Heads heads = to_heads(head, plan);
             py::gil_scoped_release release;
             return simulate(machine, plan, heads, {misalignment, noise, environment, assumed, verified_share});
         },
         py::arg("machine"), py::arg("plan"), py::arg("head"), py::kw_only(),
         py::arg("misalignment") = std::map<std::string, Misalignment>{}, py::arg("noise") = Noise{},
-        py::arg("environment") = Environment{}, py::arg("assumed_environment") = std::nullopt,
+        py::arg("environment") = std::nullopt, py::arg("assumed_environment") = std::nullopt,
         py::arg("verified_share") = SimulationOptions{}.verified_share,
         "A run on the virtual machine: lines of the plan, then its scale lines. head: one, or a dict with one for each "
-        "line. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace; "
+        "line. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace "
+        "(none: of 20 degrees Celsius for a head with a design, an index of 1 for the others); "
         "assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's "
         "replayed poses, traced again and compared. Readings whose beam misses the mirror or does not come back are "
         "lost (NaN). Raises InvalidArgument; RuntimeError where a replay and its trace differ.");

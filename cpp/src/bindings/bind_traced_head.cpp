@@ -50,11 +50,11 @@ const char* name_of(SegmentEnd end) {
 constexpr double drawn_length = 50.0;  // mm: of a segment that leaves
 
 std::vector<BeamSegment> trace_beams(const Head& head, double distance, const ArrayLike& tilt, const ArrayLike& lateral,
-                                     const Environment& environment) {
+                                     const std::optional<Environment>& environment) {
     const HeadDesign& design = design_of(head);
     const MirrorPose mirror = to_mirror(distance, tilt, lateral);
     py::gil_scoped_release release;
-    const TracedHead traced(design, head.pose_errors, environment, mirror_of(head));
+    const TracedHead traced(design, head.pose_errors, environment.value_or(usual_environment(head)), mirror_of(head));
     std::vector<BeamSegment> result;
     for (std::size_t b = 0; b < design.beams.size(); ++b) {
         const int first = int(result.size());
@@ -74,12 +74,15 @@ std::vector<BeamSegment> trace_beams(const Head& head, double distance, const Ar
 }
 
 std::map<std::string, std::optional<double>> read_head(const Head& head, double distance, const ArrayLike& tilt,
-                                                       const ArrayLike& lateral, const Environment& environment,
+                                                       const ArrayLike& lateral,
+                                                       const std::optional<Environment>& environment,
                                                        const std::optional<Environment>& assumed) {
     design_of(head);
     const MirrorPose mirror = to_mirror(distance, tilt, lateral);
     py::gil_scoped_release release;
-    const SignalRow row = TracedReader(head, mirror_of(head), {environment, assumed, {}, 0}).trace(mirror);
+    const SignalRow row =
+        TracedReader(head, mirror_of(head), {environment.value_or(usual_environment(head)), assumed, {}, 0})
+            .trace(mirror);
     const std::vector<std::string> names = signal_names(head);
     std::map<std::string, std::optional<double>> readings;
     for (std::size_t c = 0; c < names.size(); ++c) readings[names[c]] = row[c];
@@ -103,7 +106,7 @@ void bind_traced_head(py::module_& m) {
             "\"goes_on\", \"absorbed\", \"left\" or \"cut\".")
         .def_readonly("arrives", &BeamSegment::arrives, "Name of the detector that it arrives at, or None.");
     m.def("trace_beams", &trace_beams, py::arg("head"), py::kw_only(), py::arg("distance"), py::arg("tilt") = zeros(2),
-          py::arg("lateral") = zeros(2), py::arg("environment") = Environment{},
+          py::arg("lateral") = zeros(2), py::arg("environment") = std::nullopt,
           "All light of a traced head, as segments: the mirror's centre at (lateral, distance) in the sensor frame, "
           "mm, its tilts (alpha, beta) in rad. A parent stands before its children. Raises InvalidArgument.");
     py::class_<Sensitivity>(m, "Sensitivity",
@@ -117,19 +120,19 @@ void bind_traced_head(py::module_& m) {
     m.def(
         "head_sensitivities",
         [](const Head& head, double distance, const ArrayLike& tilt, const ArrayLike& lateral,
-           const Environment& environment) {
+           const std::optional<Environment>& environment) {
             const MirrorPose mirror = to_mirror(distance, tilt, lateral);
             const Eigen::Vector2d size = mirror_of(head);
             py::gil_scoped_release release;
-            return head_sensitivities(head, mirror, size, environment);
+            return head_sensitivities(head, mirror, size, environment.value_or(usual_environment(head)));
         },
         py::arg("head"), py::kw_only(), py::arg("distance"), py::arg("tilt") = zeros(2), py::arg("lateral") = zeros(2),
-        py::arg("environment") = Environment{},
+        py::arg("environment") = std::nullopt,
         "Derivatives of a traced head's readings by the six degrees of freedom of every component (along the head's "
         "axes, rotations about its own origin) and of the mirror, by indices, and by the state of the air: exact, by "
         "forward mode through the replay. Raises InvalidArgument where a beam is lost.");
     m.def("read_head", &read_head, py::arg("head"), py::kw_only(), py::arg("distance"), py::arg("tilt") = zeros(2),
-          py::arg("lateral") = zeros(2), py::arg("environment") = Environment{},
+          py::arg("lateral") = zeros(2), py::arg("environment") = std::nullopt,
           py::arg("assumed_environment") = std::nullopt,
           "The signals of a traced head for one mirror pose, by the trace of all its light; None for a lost one.");
 }

@@ -61,6 +61,8 @@ Head make_head(HeadDesign design, double standoff, const std::optional<Eigen::Ve
     return head;
 }
 
+Environment usual_environment(const Head& head) { return head.design ? Environment{Air{}} : Environment{}; }
+
 HeadSetup set_up(const Head& head, const Eigen::Matrix3d& machine_R_line, const Eigen::Vector3d& first_point,
                  const Eigen::Vector2d& mirror, const Misalignment& misalignment) {
     return {first_point - head.standoff * machine_R_line.col(2), turned(machine_R_line, misalignment.laser),

@@ -58,8 +58,11 @@ void check_heads(const Heads& heads, const Plan& plan) {
     }
 }
 
-TracedConditions conditions(const SimulationOptions& options) {
-    return {options.environment, options.assumed, {options.verified_share, options.noise.seed}, options.noise.seed};
+TracedConditions conditions(const Head& head, const SimulationOptions& options) {
+    return {options.environment.value_or(usual_environment(head)),
+            options.assumed,
+            {options.verified_share, options.noise.seed},
+            options.noise.seed};
 }
 
 std::vector<SignalRow> read_traced(const TracedReader& reader, const HeadSetup& setup, const std::vector<Pose>& poses,
@@ -74,8 +77,9 @@ bool is_distance(const std::string& channel) { return channel.front() == 'd'; }
 // The ideal head, traced, and the closed definitions. The air's index is taken off the path with the assumed one.
 std::vector<SignalRow> read_defined(const Head& head, const HeadSetup& setup, const std::vector<Pose>& poses,
                                     const SimulationOptions& options) {
-    const Medium air{refractive_index(options.environment, head.wavelength)};
-    const double assumed = refractive_index(options.assumed.value_or(options.environment), head.wavelength);
+    const Environment environment = options.environment.value_or(usual_environment(head));
+    const Medium air{refractive_index(environment, head.wavelength)};
+    const double assumed = refractive_index(options.assumed.value_or(environment), head.wavelength);
     const std::vector<std::string> names = signal_names(head);
     std::vector<SignalRow> rows;
     for (const Pose& pose : poses) {
@@ -164,7 +168,7 @@ Measurement simulate(const Machine& machine, const Plan& plan, const Heads& head
         const std::uint64_t first_row = stations.size();
         std::vector<SignalRow> rows;
         if (head.design) {
-            const auto reader = readers.try_emplace(&head, head, mirror, conditions(options)).first;
+            const auto reader = readers.try_emplace(&head, head, mirror, conditions(head, options)).first;
             rows = read_traced(reader->second, setup, poses, first_row, count);
         } else {
             rows = read_defined(head, setup, poses, options);

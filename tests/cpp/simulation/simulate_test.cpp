@@ -90,7 +90,7 @@ TEST(Simulate, NoiseRepeatsWithItsSeedAndDiffersWithout) {
 
 TEST(Simulate, RefractiveIndexIsTakenOffAgain) {
     SimulationOptions air;
-    air.environment = {1.000268};
+    air.environment = stepdiag::Environment{1.000268};
     const auto vacuum = simulate(machine(), plan(), Head{}), in_air = simulate(machine(), plan(), Head{}, air);
     for (std::size_t i = 0; i < vacuum.size(); ++i)
         EXPECT_NEAR(*vacuum.find("distance")->value[i], *in_air.find("distance")->value[i],
@@ -138,5 +138,5 @@ TEST(Simulate, WhatMakesNoSenseIsRefusedByName) {
         expect_refused(with([&](Head&, Options& o) { o.noise.spot = sigma; }), "noise");
     }
     for (const double index : {0.99, 0.0, -1.0, undefined, double(INFINITY)})
-        expect_refused(with([&](Head&, Options& o) { o.environment = {index}; }), "refractive_index");
+        expect_refused(with([&](Head&, Options& o) { o.environment = stepdiag::Environment{index}; }), "refractive_index");
 }

@@ -48,6 +48,10 @@ struct Head {
 Head make_head(HeadDesign design, double standoff, const std::optional<Eigen::Vector2d>& mirror = std::nullopt,
                PoseErrors pose_errors = {}, std::optional<ReadingModel> reading_model = std::nullopt);
 
+// The air before a head where nobody says which: that of 20 degrees Celsius, with which a design is calibrated
+// (nominal_head); an index of 1 for the closed definitions, whose readings are lengths with the index taken off.
+Environment usual_environment(const Head& head);
+
 // Throws InvalidArgument for lengths that are not positive or finite, and for beams on one line.
 void check_head(const Head& head);
 

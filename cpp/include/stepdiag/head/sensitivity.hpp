@@ -25,6 +25,6 @@ struct Sensitivity {
 // mirror, air, interferometer (relative index error). Rotations are about the component's own origin, all along the
 // head's axes. Throws InvalidArgument for a head without a design, or a mirror pose at which a beam is lost.
 std::vector<Sensitivity> head_sensitivities(const Head& head, const MirrorPose& mirror, const Eigen::Vector2d& size,
-                                            const Environment& environment = {});
+                                            const Environment& environment = {Air{}});
 
 }  // namespace stepdiag

@@ -31,9 +31,9 @@ void check_noise(const Noise& noise);
 struct SimulationOptions {
     std::map<std::string, Misalignment> misalignment = {};  // by line name; a line without an entry is aligned
     Noise noise = {};
-    Environment environment = {};             // the air that light runs in
-    std::optional<Environment> assumed = {};  // the air that readings are reduced with; none: the same
-    double verified_share = 1e-3;             // of a traced head's replayed poses (ReplayOptions)
+    std::optional<Environment> environment = {};  // the air that light runs in; none: usual_environment of the head
+    std::optional<Environment> assumed = {};      // the air that readings are reduced with; none: the same
+    double verified_share = 1e-3;                 // of a traced head's replayed poses (ReplayOptions)
 };
 
 // The heads of a run's lines. All of them give the same signals.
