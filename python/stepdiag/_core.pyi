@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['BeamSegment', 'BeamSpot', 'Calibration', 'Camera', 'Chain', 'Environment', 'ErrorMap', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'Noise', 'Plan', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SpotSensor', 'beam_radius', 'couple', 'cramer_rao_bound', 'evaluate', 'expose', 'locate', 'power_inside', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'simulate', 'trace_beams']
+__all__: list[str] = ['BeamSegment', 'BeamSpot', 'Calibration', 'Camera', 'Chain', 'Environment', 'ErrorMap', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'Noise', 'Plan', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'Sensitivity', 'SpotSensor', 'beam_radius', 'couple', 'cramer_rao_bound', 'evaluate', 'expose', 'head_sensitivities', 'locate', 'power_inside', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'simulate', 'trace_beams']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -648,6 +648,25 @@ class BeamSegment:
     @property
     def start(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
+class Sensitivity:
+    """
+    First derivatives of a head's readings by one parameter: signals (n,) in mm by its unit, and reading (3,): distance (mm), alpha and beta (rad).
+    """
+    @property
+    def component(self) -> str:
+        ...
+    @property
+    def quantity(self) -> str:
+        ...
+    @property
+    def reading(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def signals(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def unit(self) -> str:
+        ...
 class ReadingUncertainty:
     """
     Standard uncertainty of a reading where the run gives none: distance (mm; also d1 ...), tilt (rad), spot (mm).
@@ -743,6 +762,10 @@ def expose(camera: Camera, spots: collections.abc.Sequence[BeamSpot], *, seed: t
     """
     Image in electrons, shape (rows, columns), pixel (0, 0) at the lowest x and y; the array is centred on the sensor's origin. The noise depends on seed and counter alone. Raises InvalidArgument for a seed outside 0 .. 2^64 - 1.
     """
+def head_sensitivities(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment | None = None) -> list[Sensitivity]:
+    """
+    Derivatives of a traced head's readings by the six degrees of freedom of every component (along the head's axes, rotations about its own origin) and of the mirror, by indices, and by the state of the air: exact, by forward mode through the replay. Raises InvalidArgument where a beam is lost.
+    """
 @typing.overload
 def locate(camera: Camera, image: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64] | None:
     """
@@ -773,7 +796,7 @@ def read_error_map(path: str | os.PathLike[str]) -> ErrorMap:
     """
     Reads an error map or calibration CSV. Raises InvalidArgument naming file and line.
     """
-def read_head(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment = ..., assumed_environment: Environment | None = None) -> dict[str, float | None]:
+def read_head(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment | None = None, assumed_environment: Environment | None = None) -> dict[str, float | None]:
     """
     The signals of a traced head for one mirror pose, by the trace of all its light; None for a lost one.
     """
@@ -781,11 +804,11 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
     """
     Reads a measurement CSV. Raises InvalidArgument naming file and line.
     """
-def simulate(machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[str, Head], *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment = ..., assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> Measurement:
+def simulate(machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[str, Head], *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment | None = None, assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> Measurement:
     """
-    A run on the virtual machine: lines of the plan, then its scale lines. head: one, or a dict with one for each line. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace; assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's replayed poses, traced again and compared. Readings whose beam misses the mirror or does not come back are lost (NaN). Raises InvalidArgument; RuntimeError where a replay and its trace differ.
+    A run on the virtual machine: lines of the plan, then its scale lines. head: one, or a dict with one for each line. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace (none: of 20 degrees Celsius for a head with a design, an index of 1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's replayed poses, traced again and compared. Readings whose beam misses the mirror or does not come back are lost (NaN). Raises InvalidArgument; RuntimeError where a replay and its trace differ.
     """
-def trace_beams(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment = ...) -> list[BeamSegment]:
+def trace_beams(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment | None = None) -> list[BeamSegment]:
     """
     All light of a traced head, as segments: the mirror's centre at (lateral, distance) in the sensor frame, mm, its tilts (alpha, beta) in rad. A parent stands before its children. Raises InvalidArgument.
     """

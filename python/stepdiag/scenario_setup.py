@@ -80,7 +80,7 @@ def environments(keys: EnvironmentSection, path: Path) -> tuple[Air, Air]:
 
 
 def environment(keys: AirKeys, place: str) -> Air:
-    """Air of the given state, at 20 °C and so on where it is not; or of the given index; None where nothing is given."""
+    """Air of the given state, at 20 °C and so on where it is not; or of the given index; None without either."""
     state = keys.model_fields_set & AirKeys.model_fields.keys() - {"refractive_index"}
     if "refractive_index" in keys.model_fields_set and state:
         named = ", ".join(sorted(state))

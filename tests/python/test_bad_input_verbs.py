@@ -25,13 +25,19 @@ ONES = np.ones(len(RUN))
         ({"misalignment": {"": sd.Misalignment()}}, "line"),
         ({"misalignment": {"ppp": sd.Misalignment(reflector=(0.1, 0.0))}}, "ppp"),
         ({"misalignment": {"ppp": sd.Misalignment(laser=(0.0, -0.5))}}, "ppp"),
-        ({"refractive_index": 0.5}, "refractive_index"),
-        ({"refractive_index": NAN}, "refractive_index"),
-        ({"refractive_index": INF}, "refractive_index"),
+        ({"misalignment": {"ppp": sd.Misalignment(distance_constant=NAN)}}, "ppp"),
+        ({"misalignment": {"ppp": sd.Misalignment(beam_constants=[0.0, INF])}}, "ppp"),
+        ({"verified_share": 1.5}, "verified_share"),
+        ({"verified_share": NAN}, "verified_share"),
     ],
 )
 def test_simulation_of_nonsense_is_refused(options: dict[str, Any], names: str) -> None:
     refused(sd.simulate, sd.Machine(CHAIN, ERRORS), SETUP.plan, sd.Head(), names=names, **options)
+
+
+@pytest.mark.parametrize("index", [0.5, NAN, INF])
+def test_air_that_is_none_is_refused(index: float) -> None:
+    refused(sd.Environment, index, names="refractive_index")
 
 
 @pytest.mark.parametrize("pair", [(NAN, NAN), (NAN, 0.0), (0.0, NAN), (INF, 0.0), (0.0,), (0.0, 0.0, 0.0), "ab", 1.0])

@@ -10,7 +10,7 @@ from small_heads import OFFSETS, SpotHead, read, three_beams, window
 
 import stepdiag as sd
 
-MIRROR = {"distance": 700.0, "tilt": (2e-4, -3e-4), "lateral": (3.0, -2.0)}
+MIRROR = {"distance": 700.0, "tilt": (2e-4, -3e-4), "lateral": (3.0, -2.0), "environment": sd.Environment()}
 AXES = "xyz"
 NUMBERS = SpotHead()
 AIR = sd.Environment.from_air(temperature=22.0, relative_humidity=0.3)
@@ -166,7 +166,7 @@ def test_derivatives_by_the_index_of_glass_and_air(name: str) -> None:
     ends = []
     for index in (1.5 + h, 1.5 - h):
         other = with_index(index)
-        signals = read(other, **MIRROR, environment=air)
+        signals = read(other, **(MIRROR | {"environment": air}))
         if name == "beams":
             signals += 5.0 * (index - 1.5) / 1.0002
         ends.append(signals)

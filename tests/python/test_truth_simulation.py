@@ -135,7 +135,7 @@ def test_traced_readings_are_the_closed_form(
     scenario: reference.Scenario, seed: int, intervals: int, index: float
 ) -> None:
     errors = errors_of(scenario, seed, intervals)
-    run = simulated(scenario, errors, refractive_index=index)
+    run = simulated(scenario, errors, environment=sd.Environment(index))
     for i, row in enumerate(reference.simulate(scenario, table_of(errors))):
         assert (run.line[i], run.point[i]) == (row["line"], row["point"])
         for channel in ("distance", "alpha", "beta"):

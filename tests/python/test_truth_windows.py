@@ -144,7 +144,7 @@ def test_wedge_of_one_degree_does_what_its_closed_form_says(distance: float, the
 
 
 def test_wedge_turns_the_beam_by_exact_snell() -> None:
-    segments = sd.trace_beams(wedge_head(), distance=500.0)
+    segments = sd.trace_beams(wedge_head(), distance=500.0, environment=sd.Environment())
     way = [s for s in segments if s.beam == "beam 1"]
     after = way[2]  # to the wedge, in it, and to the mirror
     direction = (after.end - after.start) / np.linalg.norm(after.end - after.start)
