@@ -179,8 +179,7 @@ def test_derivatives_by_the_index_of_glass_and_air(name: str) -> None:
     ends = [
         read(
             head,
-            **MIRROR,
-            environment=sd.Environment(1.0002 + d),
+            **(MIRROR | {"environment": sd.Environment(1.0002 + d)}),
             assumed_environment=air,
         )
         for d in (1e-5, -1e-5)

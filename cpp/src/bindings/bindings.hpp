@@ -58,7 +58,7 @@ std::string to_path(const PathLike& path);
 Chain to_chain(const ChainLike& chain);  // a Chain, or its text
 Axis to_axis(const std::string& name);
 Placement to_placement(const ArrayLike& position, const ArrayLike& rotation);  // a rotation vector
-Heads to_heads(const HeadLike& heads, const Plan& plan);                      // a Head, or one for each line
+Heads to_heads(const HeadLike& heads, const Plan& plan);                       // a Head, or one for each line
 
 DoubleArray to_numpy(const std::vector<double>& values);
 DoubleArray to_numpy(const std::vector<std::optional<double>>& values);  // NaN where there is none

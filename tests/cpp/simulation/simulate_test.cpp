@@ -138,5 +138,6 @@ TEST(Simulate, WhatMakesNoSenseIsRefusedByName) {
         expect_refused(with([&](Head&, Options& o) { o.noise.spot = sigma; }), "noise");
     }
     for (const double index : {0.99, 0.0, -1.0, undefined, double(INFINITY)})
-        expect_refused(with([&](Head&, Options& o) { o.environment = stepdiag::Environment{index}; }), "refractive_index");
+        expect_refused(with([&](Head&, Options& o) { o.environment = stepdiag::Environment{index}; }),
+                       "refractive_index");
 }
