@@ -43,7 +43,7 @@ def _calibration(head: _core.Head) -> Iterator[str]:
 
 
 def _light(head: _core.Head, distances: Sequence[float]) -> Iterator[str]:
-    yield "Light at the detectors (spot in the detector's own frame, path along the rays, power of the source's):"
+    yield "Light at the detectors (spot in the detector's frame, optical path from the source, share of its power):"
     yield f"  {'mirror':>9}  {'detector':<18}{'spot x':>12}{'spot y':>12}{'path':>15}{'power':>10}  ghosts"
     yield f"  {'mm':>9}  {'':<18}{'mm':>12}{'mm':>12}{'mm':>15}{'%':>10}"
     assert head.design is not None

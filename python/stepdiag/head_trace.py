@@ -40,7 +40,7 @@ class Arrival:
     detector: Detector
     way: tuple[int, ...]
     spot: FloatArray  # in the detector's frame, mm
-    length: float  # geometric, mm
+    length: float  # optical path from the source, mm
     power: float  # share of the source's
 
 
@@ -62,7 +62,7 @@ def arrivals(segments: Sequence[_core.BeamSegment], detector: Detector, distance
         if segment.beam != detector.beam or segment.arrives != detector.name:
             continue
         way = _way_to(segments, index)
-        length = sum(float(np.linalg.norm(segments[k].end - segments[k].start)) for k in way)
+        length = sum(segments[k].index * float(np.linalg.norm(segments[k].end - segments[k].start)) for k in way)
         spot = detector.local(segment.end)[:2]
         found.append(Arrival(detector, way, spot, length, segment.power))
 

@@ -82,13 +82,18 @@ def test_check_tells_the_nominal_calibration(capsys: pytest.CaptureFixture[str])
 def test_check_tells_spot_path_and_power_at_every_detector(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("head", "check", "beam_and_psd", "--distance", "300", "--distance", "500") == 0
     rows = [line.split() for line in capsys.readouterr().out.splitlines() if re.match(r"\s+\d+  [a-z]", line)]
-    # Twice the distance; for the laser from 40 mm behind the plane, and back over 20 + 20 mm to the PSD.
-    assert [(row[0], row[1], float(row[4]), float(row[5])) for row in rows] == [
-        ("300", "interferometer", 600.0, 100.0),
-        ("300", "psd", 680.0, 25.0),
-        ("500", "interferometer", 1000.0, 100.0),
-        ("500", "psd", 1080.0, 25.0),
+    assert [(row[0], row[1], float(row[5])) for row in rows] == [
+        ("300", "interferometer", 100.0),
+        ("300", "psd", 25.0),
+        ("500", "interferometer", 100.0),
+        ("500", "psd", 25.0),
     ]
+    # Twice the distance; for the laser from 40 mm behind the plane, and back over 20 + 20 mm to the PSD. Of it are glass
+    # twice the window's 5 mm and, for the laser, twice the cube's 20 mm: N-BK7 relative to air of 1.00027.
+    air, infrared, red = 1.00027, 1.5009 - 1.0, 1.5151 - 1.0
+    expected = [air * (600.0 + 10.0 * infrared), air * (680.0 + 50.0 * red)]
+    expected += [path + 2 * 200.0 * air for path in expected]
+    assert [float(row[4]) for row in rows] == pytest.approx(expected, abs=0.01)
 
 
 def test_limits_are_those_of_acceptance_and_aperture(capsys: pytest.CaptureFixture[str]) -> None:

@@ -32,7 +32,7 @@ struct BeamSegment {
     std::string beam;
     int parent;
     Eigen::Vector3d start, end;
-    double power;
+    double index, power;
     const char* fate;
     std::optional<std::string> arrives;
 };
@@ -64,6 +64,7 @@ std::vector<BeamSegment> trace_beams(const Head& head, double distance, const Ar
             segment.parent = s.parent < 0 ? -1 : first + s.parent;
             segment.start = s.ray.origin;
             segment.end = s.hit ? s.hit->point : Eigen::Vector3d(s.ray.origin + drawn_length * s.ray.direction);
+            segment.index = s.index;
             segment.power = s.power;
             segment.fate = name_of(s.end);
             if (s.hit && s.end == SegmentEnd::absorbed && s.hit->face == traced.detector_face(int(b)))
@@ -100,6 +101,7 @@ void bind_traced_head(py::module_& m) {
         .def_property_readonly(
             "end", [](const BeamSegment& s) { return to_numpy_vector(s.end); },
             "Where it meets a face; 50 mm on where it leaves.")
+        .def_readonly("index", &BeamSegment::index, "Refractive index of what it runs in.")
         .def_readonly("power", &BeamSegment::power, "Share of the source's power.")
         .def_property_readonly(
             "fate", [](const BeamSegment& s) { return std::string(s.fate); },
