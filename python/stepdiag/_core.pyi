@@ -636,6 +636,11 @@ class BeamSegment:
         "goes_on", "absorbed", "left" or "cut".
         """
     @property
+    def index(self) -> float:
+        """
+        Refractive index of what it runs in.
+        """
+    @property
     def parent(self) -> int:
         """
         Index of the segment it comes from; -1: the source.
