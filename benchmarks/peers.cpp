@@ -93,7 +93,7 @@ void replay_with_moving_mirror(benchmark::State& state) {
 // No time, but an answer: optical path and place of the spot, mm.
 void answer(benchmark::State& state) {
     const TracedHead head = make_head();
-    const stepdiag::Path path = traced(head, pose(int(state.range(0))));
+    stepdiag::Path path = traced(head, pose(int(state.range(0))));  // not const: DoNotOptimize
     for (auto _ : state) benchmark::DoNotOptimize(path.optical_length);
     state.counters["path"] = path.optical_length;
     state.counters["y"] = path.hits.back().point.y();

@@ -5,9 +5,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from stepdiag import _core
-from stepdiag.head_trace import Arrival, Limits, arrivals, detectors, meets_mirror, tilt_limits, travel_limits
+from stepdiag.head_trace import Arrival, Limits, angle_to_z, arrivals, detectors, meets_mirror, tilt_limits, travel_limits
 
 MICRO = 1e6
+SQUARE = 1e-9  # rad: what rounding leaves
 
 
 def check_report(head: _core.Head, distances: Sequence[float]) -> Iterator[str]:
@@ -47,11 +48,17 @@ def _light(head: _core.Head, distances: Sequence[float]) -> Iterator[str]:
     yield f"  {'mirror':>9}  {'detector':<18}{'spot x':>12}{'spot y':>12}{'path':>15}{'power':>10}  ghosts"
     yield f"  {'mm':>9}  {'':<18}{'mm':>12}{'mm':>12}{'mm':>15}{'%':>10}"
     assert head.design is not None
+    out_of_square = {}
     for distance in distances:
         segments = _core.trace_beams(head, distance=distance)
         for detector in detectors(head.design):
             found = arrivals(segments, detector, distance)
             yield f"  {distance:9g}  {detector.name:<18}" + (_arrival(found) if found else f"{'no light':>12}")
+            if found and distance == distances[-1]:
+                out_of_square[detector.beam] = angle_to_z(segments, found[0], distance)
+    for beam, angle in out_of_square.items():
+        if angle > SQUARE:
+            yield f"  {beam} leaves {angle * MICRO:.3g} µrad out of square to z: that reads as a misaligned laser does"
 
 
 def _arrival(found: list[Arrival]) -> str:

@@ -67,7 +67,8 @@ class BeamKeys(Placed):
     )
     reading_model: ReadingModel = key(
         READING_MODEL,
-        "Interferometer: path of the beam's axis, or phase and share of the light that couples back.",
+        "Interferometer: path of the beam's axis, or phase and share of the light that couples back. With it a "
+        "lateral-effect sensor reads the axis of its strongest beam, or all the light on its area.",
         "chief_ray",
     )
 

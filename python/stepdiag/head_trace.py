@@ -73,6 +73,13 @@ def arrivals(segments: Sequence[_core.BeamSegment], detector: Detector, distance
     return [] if not found or is_straylight(found[0]) else found
 
 
+def angle_to_z(segments: Sequence[_core.BeamSegment], arrival: Arrival, distance: float) -> float:
+    """Of the beam that comes to the mirror first, rad."""
+    (first, *_) = (segments[k] for k in arrival.way if meets_mirror(segments[k], distance))
+    along = first.end - first.start
+    return float(np.arctan2(np.hypot(along[0], along[1]), along[2]))
+
+
 def meets_mirror(segment: _core.BeamSegment, distance: float) -> bool:
     """Whether it ends on an aligned mirror, which stands beyond all other faces."""
     return segment.fate != "left" and abs(float(segment.end[2]) - distance) < ON_MIRROR

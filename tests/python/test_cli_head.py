@@ -96,6 +96,16 @@ def test_check_tells_spot_path_and_power_at_every_detector(capsys: pytest.Captur
     assert [float(row[4]) for row in rows] == pytest.approx(expected, abs=0.01)
 
 
+def test_check_tells_a_beam_that_is_out_of_square(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = find_head("three_beams").read_text(encoding="utf-8")
+    turned = tmp_path / "turned.toml"
+    turned.write_text(text.replace("[beam.d2]", "[beam.d2]\nrotation_mrad = [0.0, 0.5, 0.0]"), encoding="utf-8")
+    assert run("head", "check", str(turned), "--distance", "300") == 0
+    assert "d2 leaves 500 µrad out of square" in capsys.readouterr().out
+    assert run("head", "check", "three_beams", "--distance", "300") == 0
+    assert "out of square" not in capsys.readouterr().out
+
+
 def test_limits_are_those_of_acceptance_and_aperture(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("head", "check", "three_beams", "--distance", "300", "--distance", "1200", "--mirror", "100", "80") == 0
     said = capsys.readouterr().out

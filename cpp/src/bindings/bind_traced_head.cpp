@@ -19,10 +19,13 @@ Eigen::Vector2d mirror_of(const Head& head) {
     return Eigen::Vector2d::Constant(100.0 + 2.0 * widest);
 }
 
-MirrorPose to_mirror(double distance, const ArrayLike& tilt, const ArrayLike& lateral) {
+MirrorPose to_mirror(const Head& head, double distance, const ArrayLike& tilt, const ArrayLike& lateral) {
+    const double nearest = reach(design_of(head));
     const Eigen::Vector2d angles = to_vector2(tilt, "tilt"), place = to_vector2(lateral, "lateral");
-    if (!std::isfinite(distance) || !place.allFinite())
-        throw InvalidArgument("distance, lateral: expected finite lengths");
+    if (!place.allFinite()) throw InvalidArgument("lateral: expected two finite lengths");
+    if (!(distance > nearest) || !std::isfinite(distance))
+        throw InvalidArgument("distance: expected more than the " + std::to_string(nearest) +
+                              " mm that the head reaches, got " + std::to_string(distance) + " mm");
     if (!(angles.cwiseAbs().maxCoeff() < 1.0)) throw InvalidArgument("tilt: expected angles below 1 rad");
     return tilted_mirror({place.x(), place.y(), distance}, angles.x(), angles.y());
 }
@@ -52,7 +55,7 @@ constexpr double drawn_length = 50.0;  // mm: of a segment that leaves
 std::vector<BeamSegment> trace_beams(const Head& head, double distance, const ArrayLike& tilt, const ArrayLike& lateral,
                                      const std::optional<Environment>& environment) {
     const HeadDesign& design = design_of(head);
-    const MirrorPose mirror = to_mirror(distance, tilt, lateral);
+    const MirrorPose mirror = to_mirror(head, distance, tilt, lateral);
     py::gil_scoped_release release;
     const TracedHead traced(design, head.pose_errors, environment.value_or(usual_environment(head)), mirror_of(head));
     std::vector<BeamSegment> result;
@@ -79,7 +82,7 @@ std::map<std::string, std::optional<double>> read_head(const Head& head, double 
                                                        const std::optional<Environment>& environment,
                                                        const std::optional<Environment>& assumed) {
     design_of(head);
-    const MirrorPose mirror = to_mirror(distance, tilt, lateral);
+    const MirrorPose mirror = to_mirror(head, distance, tilt, lateral);
     py::gil_scoped_release release;
     const SignalRow row =
         TracedReader(head, mirror_of(head), {environment.value_or(usual_environment(head)), assumed, {}, 0})
@@ -123,7 +126,7 @@ void bind_traced_head(py::module_& m) {
         "head_sensitivities",
         [](const Head& head, double distance, const ArrayLike& tilt, const ArrayLike& lateral,
            const std::optional<Environment>& environment) {
-            const MirrorPose mirror = to_mirror(distance, tilt, lateral);
+            const MirrorPose mirror = to_mirror(head, distance, tilt, lateral);
             const Eigen::Vector2d size = mirror_of(head);
             py::gil_scoped_release release;
             return head_sensitivities(head, mirror, size, environment.value_or(usual_environment(head)));

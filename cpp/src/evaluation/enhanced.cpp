@@ -202,15 +202,15 @@ std::vector<std::string> explain(const EnhancedMap& map, const Plan& plan) {
         sentences.push_back(bent +
                             ": readings were lost, and the laser angles of the lines that bridge them are not "
                             "determined; measure the lost points again");
-    for (const Axis axis : all_axes) {
-        const FunctionId id{axis, Component(index(axis))};
+    for (int i = 0; i < function_count; ++i) {
+        const FunctionId id = FunctionId::at(i);
         if (!map.is_determined(id) || map.is_slope_determined(id)) continue;
         const auto planned = std::any_of(plan.scale_lines().begin(), plan.scale_lines().end(),
-                                         [&](const Line& line) { return line.moves(axis); });
-        sentences.push_back("slope of " + id.name() + " (scale of " + letter(axis) + "): " +
+                                         [&](const Line& line) { return line.moves(id.axis); });
+        sentences.push_back("slope of " + id.name() + " (scale of " + letter(id.axis) + "): " +
                             (planned ? "measure both ends of its scale line"
                                      : std::string("add the scale line ") +
-                                           std::array<const char*, 3>{"p00", "0p0", "00p"}[index(axis)]));
+                                           std::array<const char*, 3>{"p00", "0p0", "00p"}[index(id.axis)]));
     }
     for (const Squareness s : all_squarenesses)
         if (!map.is_determined(s))

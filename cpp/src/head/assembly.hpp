@@ -29,6 +29,9 @@ struct Assembly {
     std::vector<int> sensor_face;  // by sensor
 };
 
+// Throws InvalidArgument for components that overlap or touch.
+void check_gaps(const HeadDesign& design, const PoseErrors& errors);
+
 Assembly assemble(const HeadDesign& design, const PoseErrors& errors, double wavelength);
 
 }  // namespace stepdiag

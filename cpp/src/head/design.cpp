@@ -67,7 +67,7 @@ struct Piece {
     Eigen::Vector3d low = Eigen::Vector3d::Constant(INFINITY), high = -low;
 };
 
-// Nearer than this, and a scene of metres in single precision may lose a face (Scene::smallest_separation).
+// Pieces nearer than this are refused, although only a scene of metres needs as much (Scene::smallest_separation).
 constexpr double smallest_gap = 0.01;  // mm
 
 // Of the boxes around them, which is cheap and never more than that of the pieces.
@@ -75,17 +75,20 @@ double box_separation(const Piece& a, const Piece& b) {
     return (a.low - b.high).cwiseMax(b.low - a.high).cwiseMax(0.0).norm();
 }
 
-void check_gaps(const std::vector<Piece>& pieces) {
-    for (std::size_t i = 0; i < pieces.size(); ++i)
-        for (std::size_t j = i + 1; j < pieces.size(); ++j) {
-            if (box_separation(pieces[i], pieces[j]) >= smallest_gap) continue;
-            const double gap = separation(pieces[i].faces, pieces[j].faces);
-            if (gap >= smallest_gap) continue;
-            std::ostringstream text;
-            text << pieces[i].name << " and " << pieces[j].name << ": overlap or touch; expected a gap of at least "
-                 << smallest_gap << " mm, got " << gap << " mm";
-            throw InvalidArgument(text.str());
-        }
+// A body so thin that its two faces cannot be told apart.
+void check_thickness(const HeadBody& body, double least) {
+    if (!is_transparent(body)) return;
+    for (const Face& face : body.faces) {
+        if (face.before) continue;  // inside the body
+        double thickness = 0.0;
+        for (const Face& other : body.faces)
+            for (const Eigen::Vector3d& corner : other.outline)
+                thickness = std::max(thickness, (face.point - corner).dot(face.normal));
+        if (thickness >= least) continue;
+        std::ostringstream text;
+        text << body.name << ": too thin; expected at least " << least << " mm, got " << thickness << " mm";
+        throw InvalidArgument(text.str());
+    }
 }
 
 }  // namespace
@@ -115,6 +118,33 @@ double reach(const HeadDesign& design) {
     return highest;
 }
 
+void check_gaps(const HeadDesign& design, const PoseErrors& errors) {
+    const Assembly assembly = assemble(design, errors, design.beams.front().mode.wavelength);
+    std::vector<Piece> pieces;
+    for (const std::string& name : component_names(design)) pieces.push_back({name});
+    for (std::size_t f = 0; f < assembly.faces.size(); ++f) {
+        Piece& piece = pieces[assembly.component[f]];
+        piece.faces.push_back(assembly.faces[f]);
+        for (const Eigen::Vector3d& corner : assembly.faces[f].outline) {
+            piece.low = piece.low.cwiseMin(corner);
+            piece.high = piece.high.cwiseMax(corner);
+        }
+    }
+    const double least = std::max(smallest_gap, Scene(assembly.faces).smallest_separation());
+    for (const HeadBody& body : design.bodies) check_thickness(body, least);
+    for (std::size_t i = 0; i < pieces.size(); ++i)
+        for (std::size_t j = i + 1; j < pieces.size(); ++j) {
+            if (box_separation(pieces[i], pieces[j]) >= least) continue;
+            const double gap = separation(pieces[i].faces, pieces[j].faces);
+            if (gap >= least) continue;
+            std::ostringstream text;
+            text << pieces[i].name << " and " << pieces[j].name << ": overlap or touch"
+                 << (errors.empty() ? "" : ", with their pose errors") << "; expected a gap of at least "
+                 << smallest_gap << " mm, got " << gap << " mm";
+            throw InvalidArgument(text.str());
+        }
+}
+
 void check_design(const HeadDesign& design) {
     std::set<std::string> names;
     for (const std::string& name : component_names(design)) {
@@ -130,18 +160,7 @@ void check_design(const HeadDesign& design) {
         else check_lateral_effect(std::get<LateralEffect>(sensor.device));
     }
 
-    const Assembly assembly = assemble(design, {}, design.beams.front().mode.wavelength);
-    std::vector<Piece> pieces;
-    for (const std::string& name : component_names(design)) pieces.push_back({name});
-    for (std::size_t f = 0; f < assembly.faces.size(); ++f) {
-        Piece& piece = pieces[assembly.component[f]];
-        piece.faces.push_back(assembly.faces[f]);
-        for (const Eigen::Vector3d& corner : assembly.faces[f].outline) {
-            piece.low = piece.low.cwiseMin(corner);
-            piece.high = piece.high.cwiseMax(corner);
-        }
-    }
-    check_gaps(pieces);
+    check_gaps(design, {});
     nominal_head(design, reach(design) + 100.0);
 }
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "head/assembly.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/core/rotation.hpp"
 #include "stepdiag/head/nominal_head.hpp"
@@ -58,6 +59,7 @@ Head make_head(HeadDesign design, double standoff, const std::optional<Eigen::Ve
     head.design = std::make_shared<const HeadDesign>(std::move(design));
     check_head(head);
     TracedHead(*head.design, head.pose_errors, {}, {1.0, 1.0});  // checks the pose errors
+    if (!head.pose_errors.empty()) check_gaps(*head.design, head.pose_errors);
     return head;
 }
 

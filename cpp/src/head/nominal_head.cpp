@@ -14,6 +14,7 @@ namespace {
 // Large enough that rounding of a path (1e-13 mm) does not matter, small enough that third orders in glass do not.
 constexpr double distance_tilt = 1e-3;
 constexpr double spot_tilt = 1e-5;
+constexpr double smallest_offset = 1e-3;  // mm: 1 nm of distance at 1 mrad
 
 // Why a beam of the nominal head did not arrive.
 [[noreturn]] void refuse(const TracedHead& head, int beam, double distance, const MirrorPose& mirror) {
@@ -92,8 +93,14 @@ NominalHead nominal_head(const HeadDesign& design, double distance, const Enviro
     for (int b = 0; b < int(design.beams.size()); ++b) {
         if (design.beams[b].interferometer) {
             nominal.calibration.head_constants.push_back(reader.half_path(b, distance, 0.0, 0.0) - distance);
-            if (design.layout == HeadLayout::multi_beam)
-                nominal.calibration.beam_offsets.push_back(beam_offset(reader, b, distance));
+            const Eigen::Vector2d offset = beam_offset(reader, b, distance);
+            if (design.layout == HeadLayout::multi_beam) nominal.calibration.beam_offsets.push_back(offset);
+            if (design.layout == HeadLayout::psd && !(offset.norm() < smallest_offset)) {
+                std::ostringstream text;
+                text << "beam " << design.beams[b].name << ": a psd head measures its distance at x = 0, y = 0, got "
+                     << offset.x() << ", " << offset.y() << " mm";
+                throw InvalidArgument(text.str());
+            }
             continue;
         }
         const double farther = distance + 1000.0;
@@ -102,8 +109,12 @@ NominalHead nominal_head(const HeadDesign& design, double distance, const Enviro
         if (!(std::abs(gained.determinant()) > 1e-6))
             throw InvalidArgument("beam " + design.beams[b].name + ": its spot does not follow the mirror's tilts");
         nominal.spot_axes = gained.inverse();
-        nominal.spot_zero = reader.read(b, distance, 0.0, 0.0).position;
-        nominal.calibration.psd_distance = 0.25 * (nominal.spot_axes * near_slopes).trace() - distance;
+        const double psd_distance = 0.25 * (nominal.spot_axes * near_slopes).trace() - distance;
+        nominal.calibration.psd_distance = psd_distance;
+        // A beam out of square moves the spot as the mirror goes away, as a tilt would; what is left is the zero.
+        const Eigen::Vector2d spot = reader.read(b, distance, 0.0, 0.0).position;
+        const Eigen::Vector2d drift = (reader.read(b, farther, 0.0, 0.0).position - spot) / (farther - distance);
+        nominal.spot_zero = spot - (distance + psd_distance) * drift;
         nominal.calibration.spot_beam = reader.outgoing(b, distance);
     }
     return nominal;

@@ -37,10 +37,30 @@ bool differ(const ArrivalTable::Row& a, const Arrivals& b) {
     return !std::equal(a.begin(), a.end(), b.begin(), b.end(), same);
 }
 
+// Of the poses that followed a path: the first and the last, and those whose light ends farthest to each side.
+std::set<std::size_t> outermost(const RouteReplay& replayed, const std::vector<std::uint8_t>& followed) {
+    std::set<std::size_t> poses;
+    std::vector<std::size_t> members;
+    for (std::size_t i = 0; i < followed.size(); ++i)
+        if (followed[i]) members.push_back(i);
+    if (members.empty()) return poses;
+    poses = {members.front(), members.back()};
+    for (int axis = 0; axis < 3; ++axis) {
+        const auto less = [&](std::size_t a, std::size_t b) {
+            return replayed.point(a)[axis] < replayed.point(b)[axis];
+        };
+        const auto ends = std::minmax_element(members.begin(), members.end(), less);
+        poses.insert({*ends.first, *ends.second});
+    }
+    return poses;
+}
+
 // The poses to verify: each with the probability `share`, by the gaps between them, so that most cost no random number.
 class Verified {
 public:
-    Verified(double share, std::uint64_t seed) : share_(share), seed_(seed) { advance(); }
+    Verified(double share, std::uint64_t seed, std::uint64_t line) : share_(share), seed_(seed), draw_(line << 32) {
+        advance();
+    }
     bool take(std::size_t pose) {
         if (share_ <= 0.0 || double(pose) < next_) return false;
         advance();
@@ -55,7 +75,7 @@ private:
     }
     double share_;
     std::uint64_t seed_;
-    std::uint64_t draw_ = 0;
+    std::uint64_t draw_;
     double next_ = -1.0;
 };
 
@@ -143,31 +163,35 @@ std::vector<int> TracedHead::wanted_segments(const RayTree& tree, int beam) cons
     return segments;
 }
 
-// The paths that all recorded poses have in common; none where these have different ones, or where they do not pass
-// clear.
-std::vector<RecordedRoute> TracedHead::record(int beam, const std::vector<MirrorPose>& mirrors,
-                                              std::vector<std::size_t>& lost) const {
-    std::vector<RecordedRoute> routes;
-    std::vector<std::vector<std::vector<Segment>>> paths;  // by route, by pose
+// The paths of the first pose that is found to have any.
+std::vector<RecordedRoute> TracedHead::record(int beam, const std::vector<MirrorPose>& mirrors) const {
     const std::size_t last = mirrors.size() - 1;
-    for (const std::size_t pose : {std::size_t(0), last / 2, last}) {
+    for (const std::size_t pose : {std::size_t(0), last / 2, last, last / 4, last - last / 4}) {
         const RayTree tree = trace(beam, mirrors[pose]);
-        const std::vector<int> wanted = wanted_segments(tree, beam);
-        if (wanted.empty()) {
-            lost.push_back(pose);
-            continue;
-        }
+        std::vector<RecordedRoute> routes;
+        for (const int segment : wanted_segments(tree, beam)) routes.push_back(record_route(tree, segment));
+        if (!routes.empty()) return routes;
+    }
+    return {};
+}
+
+// Whether the outermost of the replayed poses meet the same faces when they are traced, with no other face near them.
+bool TracedHead::is_clear(int beam, const std::vector<MirrorPose>& mirrors, const std::vector<RecordedRoute>& routes,
+                          const std::set<std::size_t>& outermost) const {
+    std::vector<std::vector<std::vector<Segment>>> paths(routes.size());  // by route, by pose
+    for (const std::size_t pose : outermost) {
+        const RayTree tree = trace(beam, mirrors[pose]);
         std::vector<RecordedRoute> found;
-        for (const int segment : wanted) found.push_back(record_route(tree, segment));
-        if (routes.empty()) routes = found;
-        if (!same_faces(routes, found)) return {};
-        paths.resize(routes.size());
-        for (std::size_t r = 0; r < routes.size(); ++r) paths[r].push_back(path_segments(tree, wanted[r]));
+        for (const int segment : wanted_segments(tree, beam)) {
+            if (found.size() < routes.size()) paths[found.size()].push_back(path_segments(tree, segment));
+            found.push_back(record_route(tree, segment));
+        }
+        if (!same_faces(routes, found)) return false;
     }
     const int source = int(design_.bodies.size()) + beam;
-    for (const auto& of_route : paths)
-        if (!pass_clear(of_route, optics_[beam].fixed, optics_[beam].component, source)) return {};
-    return routes;
+    return std::all_of(paths.begin(), paths.end(), [&](const auto& of_route) {
+        return of_route.empty() || pass_clear(of_route, optics_[beam].fixed, optics_[beam].component, source);
+    });
 }
 
 ArrivalTable TracedHead::replay(int beam, const std::vector<MirrorPose>& mirrors, const ReplayOptions& options,
@@ -177,9 +201,8 @@ ArrivalTable TracedHead::replay(int beam, const std::vector<MirrorPose>& mirrors
     ArrivalTable table;
     if (n == 0) return table;
 
-    std::vector<std::size_t> lost;
-    const std::vector<RecordedRoute> routes =
-        options.verified_share < 1.0 ? record(beam, mirrors, lost) : std::vector<RecordedRoute>{};
+    std::vector<RecordedRoute> routes;
+    if (options.verified_share < 1.0) routes = record(beam, mirrors);
     std::vector<RouteReplay> replayed;
     std::vector<std::uint8_t> followed(n, !routes.empty());
     for (const RecordedRoute& route : routes) {
@@ -187,12 +210,11 @@ ArrivalTable TracedHead::replay(int beam, const std::vector<MirrorPose>& mirrors
                                         optics.fixed.self_intersection_gap()));
         for (std::size_t i = 0; i < n; ++i) followed[i] = followed[i] && replayed.back().followed[i];
     }
-    // A pose that is known to be lost follows none of the paths; if it seems to, something is in its way.
-    const auto seems_to_follow = [&](std::size_t pose) { return followed[pose] != 0; };
-    if (std::any_of(lost.begin(), lost.end(), seems_to_follow)) std::fill(followed.begin(), followed.end(), 0);
+    if (!routes.empty() && !is_clear(beam, mirrors, routes, outermost(replayed.front(), followed)))
+        std::fill(followed.begin(), followed.end(), 0);
 
     table.reserve(n, n * std::max<std::size_t>(1, routes.size()));
-    Verified verified(options.verified_share, options.seed);
+    Verified verified(options.verified_share, options.seed, (options.line << 8) + std::uint64_t(beam));
     ReplayCount counted;
     for (std::size_t i = 0; i < n; ++i) {
         if (!followed[i]) {

@@ -51,8 +51,10 @@ void TracedReader::detect(int beam, const ArrivalTable::Row& arrivals, std::uint
 std::vector<SignalRow> TracedReader::read(const std::vector<MirrorPose>& mirrors, std::uint64_t first_row,
                                           ReplayCount* count) const {
     std::vector<SignalRow> rows(mirrors.size());
+    ReplayOptions options = conditions_.replay;
+    options.line = first_row;
     for (const int beam : signal_order(traced_.design())) {
-        const ArrivalTable arrivals = traced_.replay(beam, mirrors, conditions_.replay, count);
+        const ArrivalTable arrivals = traced_.replay(beam, mirrors, options, count);
         for (std::size_t i = 0; i < mirrors.size(); ++i) detect(beam, arrivals[i], first_row + i, rows[i]);
     }
     return rows;

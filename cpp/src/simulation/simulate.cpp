@@ -58,6 +58,11 @@ void check_heads(const Heads& heads, const Plan& plan) {
     }
 }
 
+// Whoever says what air is assumed means air; else usual_environment.
+Environment true_environment(const Head& head, const SimulationOptions& options) {
+    return options.environment.value_or(options.assumed ? Environment{Air{}} : usual_environment(head));
+}
+
 TracedConditions conditions(const Head& head, const SimulationOptions& options) {
     return {options.environment.value_or(usual_environment(head)),
             options.assumed,
@@ -77,7 +82,7 @@ bool is_distance(const std::string& channel) { return channel.front() == 'd'; }
 // The ideal head, traced, and the closed definitions. The air's index is taken off the path with the assumed one.
 std::vector<SignalRow> read_defined(const Head& head, const HeadSetup& setup, const std::vector<Pose>& poses,
                                     const SimulationOptions& options) {
-    const Environment environment = options.environment.value_or(usual_environment(head));
+    const Environment environment = true_environment(head, options);
     const Medium air{refractive_index(environment, head.wavelength)};
     const double assumed = refractive_index(options.assumed.value_or(environment), head.wavelength);
     const std::vector<std::string> names = signal_names(head);

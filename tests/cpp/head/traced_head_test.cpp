@@ -94,6 +94,19 @@ TEST(TracedHead, FaceNearThePathIsNotReplayedOver) {
     EXPECT_LT(lost, 35);
 }
 
+TEST(TracedHead, WhatOnlyAPoseInBetweenMeetsIsNotReplayedOver) {
+    // The first, the middle and the last pose are aligned; others in between lean towards the screen.
+    HeadDesign design = three_beams();
+    design.bodies.push_back({"screen", make_screen(4.0, 4.0), 1.0, {{4.5, 0.0, 5.0}, Eigen::Matrix3d::Identity()}});
+    const TracedHead head(design, {}, air, mirror_size);
+    std::vector<MirrorPose> poses;
+    for (int i = 0; i <= 40; ++i) poses.push_back(tilted_mirror({0, 0, 500.0 + 10.0 * i}, 0.0, i % 20 ? -3e-3 : 0.0));
+    ReplayCount count;
+    const auto arrivals = head.replay(0, poses, {0.0, 0}, &count);
+    EXPECT_EQ(count.replayed, 0);
+    for (int i = 0; i <= 40; ++i) EXPECT_EQ(arrivals[i].empty(), i % 20 != 0) << i;
+}
+
 TEST(TracedHead, CoatedWindowSendsGhostsToItsSensor) {
     HeadDesign design = beam_and_psd();
     for (Face& face : design.bodies[0].faces) {
@@ -200,7 +213,12 @@ TEST(HeadDesign, RefusesWhatMakesNoHead) {
     refused(beam_and_psd(), [](D& d) { d.sensors[0].placement.position.x() = 45.0; }, "to its sensor psd");
     refused(three_beams(), [](D& d) { d.beams[0].mode.waist_radius = 0.0; }, "waist_radius");
     refused(three_beams(), [](D& d) { d.bodies[0].placement.rotation *= 2.0; }, "rotation");
+    refused(beam_and_psd(), [](D& d) { d.beams[0].placement.position = {0.0, 5.0, 0.0}; }, "at x = 0, y = 0");
     expect_refused([] { make_head(three_beams(), 10.0); }, "standoff");
+    PoseErrors into_collimator;
+    into_collimator["window"].shift.z() = -12.0;
+    expect_refused([&] { make_head(three_beams(), 100.0, {}, into_collimator); }, "with their pose errors");
+    refused(three_beams(), [](D& d) { d.bodies[0] = window(1e-3); }, "window: too thin");
     expect_refused([] { make_head(three_beams(), 100.0, {}, {{"psd", {}}}); }, "no component \"psd\"");
 }
 

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <set>
 #include <stdexcept>
 #include <vector>
 
@@ -67,7 +68,8 @@ struct RecordedRoute;
 struct ReplayOptions {
     double verified_share =
         1e-3;                // of the poses that were replayed, traced as well and compared; 1: nothing is replayed
-    std::uint64_t seed = 0;  // decides which
+    std::uint64_t seed = 0;  // decides which, together with
+    std::uint64_t line = 0;  // what is replayed: another number, other poses
 };
 
 struct ReplayCount {
@@ -96,9 +98,10 @@ public:
     int mirror_face() const;  // its index in the tree's hits
     int detector_face(int beam) const { return optics_[beam].detector_face; }
 
-    // Many poses by replay. The paths are recorded at the first, the middle and the last pose. Where these do not have
-    // the same ones, or where another face is near them, all poses are traced; so is each pose that does not follow
-    // them. Throws ReplayMismatch naming the pose where a verification differs by more than rounding (1e-9 mm).
+    // Many poses by replay of the paths that the first pose has. The outermost of the poses that follow them, whose
+    // light ends farthest to each side, are traced: where these do not meet the same faces, or where another face is
+    // near them, all poses are traced. So is each pose that does not follow the paths. Throws ReplayMismatch naming the
+    // pose where a verification differs by more than rounding (1e-9 mm).
     ArrivalTable replay(int beam, const std::vector<MirrorPose>& mirrors, const ReplayOptions& options = {},
                         ReplayCount* count = nullptr) const;
 
@@ -119,8 +122,9 @@ public:
     std::vector<int> wanted_segments(const RayTree& tree, int beam) const;
 
 private:
-    std::vector<RecordedRoute> record(int beam, const std::vector<MirrorPose>& mirrors,
-                                      std::vector<std::size_t>& lost) const;
+    std::vector<RecordedRoute> record(int beam, const std::vector<MirrorPose>& mirrors) const;
+    bool is_clear(int beam, const std::vector<MirrorPose>& mirrors, const std::vector<RecordedRoute>& routes,
+                  const std::set<std::size_t>& outermost) const;
     Face mirror_at(const MirrorPose& pose) const;
     Arrival arrival(int beam, const Eigen::Vector3d& point, const Eigen::Vector3d& direction, double optical_length,
                     double reduced_length, double power) const;

@@ -31,7 +31,7 @@ void check_noise(const Noise& noise);
 struct SimulationOptions {
     std::map<std::string, Misalignment> misalignment = {};  // by line name; a line without an entry is aligned
     Noise noise = {};
-    std::optional<Environment> environment = {};  // the air that light runs in; none: usual_environment of the head
+    std::optional<Environment> environment = {};  // the air that light runs in; none: usual_environment
     std::optional<Environment> assumed = {};      // the air that readings are reduced with; none: the same
     double verified_share = 1e-3;                 // of a traced head's replayed poses (ReplayOptions)
 };
