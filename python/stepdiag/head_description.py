@@ -4,7 +4,8 @@ docs/head.md lists every key. Two descriptions come with the package; they are f
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from importlib.resources import files as resource_files
 from os import PathLike
 from pathlib import Path
@@ -28,6 +29,7 @@ from stepdiag.body_keys import (
 from stepdiag.files import read_text
 from stepdiag.head_keys import (
     INTERFEROMETER_KEYS,
+    MOST_PIXELS_OF_A_FRAME,
     SPOT_KEYS,
     BeamKeys,
     CameraKeys,
@@ -83,7 +85,7 @@ def parse_head_design(text: str, path: str | PathLike[str] = "head.toml") -> _co
     bodies = [_located(_body, f"{file}: body.{name}", name, body) for name, body in keys.body.items()]
     beams = [_located(_beam, f"{file}: beam.{name}", name, beam) for name, beam in keys.beam.items()]
     sensors = [_located(_sensor, f"{file}: sensor.{name}", name, sensor) for name, sensor in keys.sensor.items()]
-    with located(file):
+    with located(file), _beam_named(keys):
         design = _core.HeadDesign(
             keys.name,
             keys.layout,
@@ -148,6 +150,18 @@ def _check_beam(name: str, beam: BeamKeys, keys: HeadFile, file: str) -> None:
         raise InvalidArgument(
             f"{file}: beam.{name}.sensor: expected the name of a sensor, got {show(beam.sensor)}; {known}"
         )
+
+
+@contextmanager
+def _beam_named(keys: HeadFile) -> Iterator[None]:
+    """Glass and air know which wavelength is out of their range; we know whose it is."""
+    try:
+        yield
+    except InvalidArgument as error:
+        for name, beam in keys.beam.items():
+            if "wavelength in nm: " in str(error) and str(error).endswith(f", got {beam.wavelength_nm:f}"):
+                raise InvalidArgument(f"beam.{name}: {error}") from None
+        raise
 
 
 def _located(make: Callable[[str, Any], Any], place: str, name: str, keys: Placed) -> Any:
@@ -239,6 +253,11 @@ def _sensor(name: str, keys: SensorKeys) -> _core.SpotSensor:
                 least_power=keys.least_power,
             )
         case CameraKeys():
+            if keys.columns * keys.rows > MOST_PIXELS_OF_A_FRAME:
+                raise InvalidArgument(
+                    f"expected columns times rows of at most {MOST_PIXELS_OF_A_FRAME} pixels, "
+                    f"got {keys.columns} x {keys.rows}"
+                )
             return _core.SpotSensor.camera(
                 name,
                 **place,

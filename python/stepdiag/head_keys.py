@@ -27,10 +27,14 @@ from stepdiag.sections import (
     tables,
 )
 
+# Of a row or a column, and of a frame, which takes eight bytes for each while it is read.
+FEWEST_PIXELS: Final = 4
 MOST_PIXELS: Final = 16_384
-Pixels = Annotated[int, Field(ge=1, le=MOST_PIXELS)]
+MOST_PIXELS_OF_A_FRAME: Final = 2**24
+Pixels = Annotated[int, Field(ge=FEWEST_PIXELS, le=MOST_PIXELS)]
+Electrons = Annotated[float, Field(gt=0.0, le=1e15)]
 
-_pixels = f"an integer from 1 to {MOST_PIXELS}"
+_pixels = f"an integer from {FEWEST_PIXELS} to {MOST_PIXELS}"
 
 
 class BeamKeys(Placed):
@@ -49,8 +53,10 @@ class BeamKeys(Placed):
     aperture_mm: PositiveLength = key(
         POSITIVE_LENGTH, "Interferometer: edge of the square that takes the beam back.", 10.0
     )
-    acceptance_mrad: Positive = key(
-        POSITIVE, "Interferometer: largest angle between returned beam and axis; beyond it a reading is lost.", 100.0
+    acceptance_mrad: Annotated[float, Field(gt=0.0, le=1570.0)] = key(
+        "a positive angle up to 1570 mrad",
+        "Interferometer: largest angle between returned beam and axis; beyond it a reading is lost.",
+        100.0,
     )
     least_coupling: Share = key(
         SHARE, "Interferometer, coupled_mode: a reading is lost where less of the light couples.", 0.0
@@ -68,7 +74,7 @@ class BeamKeys(Placed):
     reading_model: ReadingModel = key(
         READING_MODEL,
         "Interferometer: path of the beam's axis, or phase and share of the light that couples back. With it a "
-        "lateral-effect sensor reads the axis of its strongest beam, or all the light on its area.",
+        "lateral-effect sensor reads the axis of its beam, or all the light on its area.",
         "chief_ray",
     )
 
@@ -111,10 +117,12 @@ class CameraKeys(SensorKeys):
 
     kind: Literal["camera"] = key(_sensors, "What it is.")
     pixel_um: Positive = key(POSITIVE, "Pitch of the pixels.", 10.0)
-    columns: Pixels = key(_pixels, "Pixels along x.", 512)
+    columns: Pixels = key(_pixels, "Pixels along x; columns times rows are at most 2^24.", 512)
     rows: Pixels = key(_pixels, "Pixels along y.", 512)
-    electrons: Annotated[float, Field(gt=0.0, le=1e18)] = key(
-        POSITIVE, "Photo-electrons of the whole spot of a beam that has kept all of its power.", 1e6
+    electrons: Electrons = key(
+        "a positive number up to 1e15",
+        "Photo-electrons of the whole spot of a beam that has kept all of its power.",
+        1e6,
     )
     background: Annotated[float, Field(ge=0.0, le=1e12)] = key(AMPLITUDE, "Electrons a pixel without light.", 0.0)
     read_noise: Annotated[float, Field(ge=0.0, le=1e12)] = key(DEVIATION, "Of the read-out, in electrons.", 0.0)
@@ -128,7 +136,9 @@ class CameraKeys(SensorKeys):
     centroid: Literal["gaussian_fit", "centre_of_gravity"] = key(
         '"gaussian_fit" or "centre_of_gravity"', "How the position is found.", "gaussian_fit"
     )
-    threshold: Share = key(SHARE, "For the centre of gravity: share of the brightest pixel that counts.", 0.1)
+    threshold: Annotated[float, Field(ge=0.0, le=0.99)] = key(
+        "a share from 0 to 0.99", "For the centre of gravity: share of the brightest pixel that counts.", 0.05
+    )
 
 
 class LimitsSection(Section):

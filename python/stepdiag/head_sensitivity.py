@@ -37,7 +37,8 @@ def sensitivity_report(head: _core.Head, distance: float, tilt: Sequence[float])
     found = _core.head_sensitivities(head, distance=distance, tilt=tilt, environment=_core.Environment.from_air())
     rows = [_row(sensitivity) for sensitivity in found]
     place = f"mirror at {distance:g} mm, tilts {tilt[0] * 1e6:g} and {tilt[1] * 1e6:g} µrad"
-    yield f"{design.name}, {place}: changes of what is reduced from its readings"
+    yield f"{design.name}, {place}: changes of what is reduced from its readings,"
+    yield "for readings by the beams' axes (chief rays), whatever the reading model of the head"
     yield ""
     yield "By their effect on the distance:"
     yield from _table(rows, lambda row: abs(row.distance))
@@ -58,12 +59,13 @@ def _row(sensitivity: _core.Sensitivity) -> Row:
 
 
 def _table(rows: list[Row], effect: Callable[[Row], float]) -> Iterator[str]:
-    yield f"  {'component':<18}{'quantity':<14}{'per':<6}{'distance':>12}{'alpha':>12}{'beta':>12}"
-    yield f"  {'':<18}{'':<14}{'':<6}{'nm':>12}{'nrad':>12}{'nrad':>12}"
+    width = max([18, *(len(row.component) + 2 for row in rows)])
+    yield f"  {'component':<{width}}{'quantity':<14}{'per':<6}{'distance':>12}{'alpha':>12}{'beta':>12}"
+    yield f"  {'':<{width}}{'':<14}{'':<6}{'nm':>12}{'nrad':>12}{'nrad':>12}"
     for row in sorted(rows, key=effect, reverse=True):
         if effect(row) >= SMALLEST:
             cells = "".join(f"{_cell(value):>12}" for value in (row.distance, row.alpha, row.beta))
-            yield f"  {row.component:<18}{row.quantity:<14}{row.amount:<6}{cells}"
+            yield f"  {row.component:<{width}}{row.quantity:<14}{row.amount:<6}{cells}"
 
 
 def _cell(value: float) -> str:

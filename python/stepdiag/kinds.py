@@ -83,6 +83,7 @@ def _scenario(path: Path) -> Finding:
     lines = f"{len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines"
     summary = f"{scenario.chain.name}, {lines}"
     scenario.machine()  # refuses an error map that is not sound
+    scenario.actual_heads()  # and pose errors that push components into each other
     return Finding("scenario", summary, tuple(scenario_warnings(scenario)))
 
 

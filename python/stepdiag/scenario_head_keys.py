@@ -149,7 +149,8 @@ class AssumedAirKeys(AirKeys):
 class EnvironmentSection(AirKeys):
     """The air around machine and head, constant over a run: a `refractive_index`, or the state of the air.
 
-    Without any key: air of 20 °C before a described head, an index of 1 before one by its layout.
+    Without any key: air of 20 °C before a described head, an index of 1 before one by its layout; but with a key in
+    `[environment.assumed]` air of 20 °C before every head.
 
     Used by `simulate` only. The equations hold for wavelengths of 300 to 1700 nm."""
 

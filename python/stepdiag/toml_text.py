@@ -3,7 +3,7 @@
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 from pydantic import ValidationError
 
@@ -13,11 +13,13 @@ from stepdiag.sections import Section
 
 Keys = TypeVar("Keys", bound=Section)
 
+DEEPEST: Final = 32  # tables and lists in each other; our keys have six, and far more exhausts Python's stack
+
 
 def parse_toml(text: str, file: str) -> dict[str, Any]:
     """The tables of a TOML text. Raises InvalidArgument, with `file` in front."""
     try:
-        return tomllib.loads(text)
+        content = tomllib.loads(text)
     except RecursionError:
         raise InvalidArgument(f"{file}: not valid TOML: nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
@@ -25,6 +27,9 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
         raise InvalidArgument(f"{file}: not valid TOML: {message[:1].lower()}{message[1:]}") from None
     except ValueError:  # Python reads integers of up to 4300 digits
         raise InvalidArgument(f"{file}: not valid TOML: a number has too many digits") from None
+    if _too_deep(content):  # dotted names of tables, which tomllib reads at any length
+        raise InvalidArgument(f"{file}: not valid TOML: nested too deeply")
+    return content
 
 
 def check_keys(content: Mapping[str, Any], root: type[Keys], file: str) -> Keys:
@@ -33,6 +38,15 @@ def check_keys(content: Mapping[str, Any], root: type[Keys], file: str) -> Keys:
         return root.model_validate(_tuples(content))
     except ValidationError as error:
         raise explain(error, content, file, root) from None
+
+
+def _too_deep(content: dict[str, Any]) -> bool:
+    """Level by level, for recursion would fail where it matters."""
+    level: list[Any] = [content]
+    for _ in range(DEEPEST):
+        inner = [item for value in level for item in (value.values() if isinstance(value, dict) else value)]
+        level = [item for item in inner if isinstance(item, dict | list)]
+    return bool(level)
 
 
 def _tuples(value: Any) -> Any:

@@ -2,6 +2,7 @@
 
 # ruff: noqa: E501  a table of messages reads best with a case a line
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 
 import stepdiag as sd
 from stepdiag.head_description import find_head, parse_head_design, read_head_design
+from stepdiag.kinds import examine
 from stepdiag.scenario import parse_scenario
 
 PSD = find_head("beam_and_psd").read_text(encoding="utf-8")
@@ -57,6 +59,15 @@ WINDOW = "thickness_mm = 5.0"
 TURN = "rotation_deg = [0.0, 0.0, 180.0]"
 LASER = "wavelength_nm = 635.0"
 
+
+SIZE = "size_mm = [20.0, 20.0]"
+
+
+def camera(keys: str) -> str:
+    """The PSD's head with a camera in its place."""
+    return put(put(PSD, '"lateral_effect"', '"camera"'), SIZE, keys)
+
+
 MALFORMED = {
     # keys
     "unknown shape": (put(PSD, 'shape = "plate"', 'shape = "plat"'), 'body.window.shape: expected a shape: "plate" or "wedge"'),
@@ -85,6 +96,10 @@ MALFORMED = {
     "missing wavelength": (put(PSD, LASER, ""), "beam.laser.wavelength_nm: missing; expected a positive number"),
     "no hits": (PSD + "[limits]\nmost_hits = 0\n", "limits.most_hits: expected an integer from 1 to 1000, got 0"),
     "too many faces": (put(BLOCK, FACES, str([[0, 1, 2, 3]] * 10001)), "body.block.faces: expected a list of up to 10000 faces, each a list of numbers of corners, got [[0, 1, 2, 3]"),
+    "acceptance of a right angle": (put(PSD, "acceptance_mrad = 5.0", "acceptance_mrad = 1571.0"), "beam.interferometer.acceptance_mrad: expected a positive angle up to 1570 mrad, got 1571.0"),
+    "camera of three columns": (camera("columns = 3"), "sensor.psd.columns: expected an integer from 4 to 16384, got 3"),
+    "camera too large": (camera("columns = 16384\nrows = 1025"), "sensor.psd: expected columns times rows of at most 16777216 pixels, got 16384 x 1025"),
+    "threshold of all light": (camera("threshold = 1.0"), "sensor.psd.threshold: expected a share from 0 to 0.99, got 1.0"),
     # bodies
     "reflectance and absorptance above 1": (put(PSD, "reflectance = 0.5", "reflectance = 0.7\nabsorptance = 0.4"), "body.splitter: splitter: expected reflectance and absorptance of 0 to 1, together at most 1"),
     "faces of a wedge that meet": (put(put(PSD, 'shape = "plate"', 'shape = "wedge"'), WINDOW, f"{WINDOW}\nangle_deg = 80.0"), "body.window: wedge angle: too large"),
@@ -93,8 +108,10 @@ MALFORMED = {
     "body that is not convex": (put(put(BLOCK, CORNERS, str(L_CORNERS)), FACES, str(L_FACES)), "body.block: body: not convex: corners on both sides of "),
     "face of two corners": (put(BLOCK, "[3, 0, 4, 7]", "[3, 0]"), "body.block: body: face 5: expected three corners or more"),
     "corner that is not there": (put(BLOCK, "[3, 0, 4, 7]", "[3, 0, 4, 8]"), "body.block: body: face 5: there is no corner 8"),
+    "plate too thin": (put(PSD, WINDOW, "thickness_mm = 0.009"), "window: too thin; expected at least 0.01 mm, got 0.009 mm"),
     # the whole
-    "laser's wavelength out of range": (put(PSD, LASER, "wavelength_nm = 200.0"), "N-BK7, wavelength in nm: expected 334.000000 to 2325.000000, got 200.000000"),
+    "laser's wavelength out of range": (put(PSD, LASER, "wavelength_nm = 200.0"), "beam.laser: N-BK7, wavelength in nm: expected 334.000000 to 2325.000000, got 200.000000"),
+    "interferometer beside the origin": (put(PSD, "position_mm = [0.0, 0.0, 0.0]", "position_mm = [0.5, 0.0, 0.0]"), "beam interferometer: a psd head measures its distance at x = 0, y = 0, got 0.5, "),
     "overlapping bodies": (put(BLOCK, "position_mm = [12.5, 0.0, 40.0]", "position_mm = [12.5, 0.0, 15.5]"), "window and block: overlap or touch; expected a gap of at least 0.01 mm, got 0 mm"),
     "bodies that touch": (put(BLOCK, "position_mm = [12.5, 0.0, 40.0]", "position_mm = [12.5, 0.0, 16.0]"), "window and block: overlap or touch; expected a gap of at least 0.01 mm, got 0 mm"),
     "body inside another": (put(BLOCK, "position_mm = [12.5, 0.0, 40.0]", "position_mm = [12.5, 0.0, 12.5]"), "window and block: overlap or touch; expected a gap of at least 0.01 mm, got 0 mm"),
@@ -106,6 +123,7 @@ MALFORMED = {
     "layout with a sensor too many": (put(PSD, 'layout = "psd"', 'layout = "multi_beam"'), "layout multi_beam: expected three or more interferometer beams"),
     "beams on a line": (put(BEAMS, "position_mm = [0.0, 20.0, 0.0]", "position_mm = [-20.0, 0.0, 0.0]"), "head beam_offsets: expected three or more beams that are not on one line, got 3 beam(s)"),
     # the file
+    "table in 20,000 others": ("[" + ".".join("a" * 20_000) + "]", "not valid TOML: nested too deeply"),
     "nothing": ("# only words\n", "has no keys"),
     "bad TOML": (put(PSD, "[body.window]", "[body.window"), "not valid TOML: expected ']'"),
     "cut off": (PSD[: PSD.index("[body.splitter]")], 'beam.laser.sensor: expected the name of a sensor, got "psd"; there is no [sensor.NAME]'),
@@ -169,6 +187,7 @@ MALFORMED_IN_SCENARIO = {
     "air too hot": (put(DESCRIBED, "[noise]", "[environment]\ntemperature_c = 120\n[noise]"), "environment.temperature_c: expected a temperature from -40 to 100, got 120"),
     "assumed air too thin": (put(DESCRIBED, "[noise]", "[environment.assumed]\npressure_hpa = 1.0\n[noise]"), "environment.assumed.pressure_hpa: expected a pressure from 100 to 1400, got 1.0"),
     "unknown equation": (put(DESCRIBED, "[noise]", '[environment]\nequation = "edlen"\n[noise]'), 'environment.equation: expected "ciddor", "modified_edlen" or "edlen_1966", got "edlen"'),
+    "table in 20,000 others": (put(DESCRIBED, "[noise]", "[noise." + ".".join("a" * 20_000) + "]"), "not valid TOML: nested too deeply"),
     "mirror too small": (put(DESCRIBED, "[misalignment]", "mirror_mm = [1, 1]\n[misalignment]"), "head.mirror_mm: too small for this plan: expected at least"),
 }  # fmt: skip
 
@@ -180,6 +199,19 @@ def test_malformed_head_of_a_scenario_is_refused_in_one_line_that_names_the_key(
         parse_scenario(text, "s.toml")
     assert str(error.value).startswith(f"s.toml: {message}")
     assert "\n" not in str(error.value)
+
+
+def test_pose_error_that_pushes_a_component_into_another_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "s.toml"
+    error = "[head.pose_errors.psd]\nshift_mm = [-15, 0, 0]\n[misalignment]"
+    file.write_text(put(DESCRIBED, "[misalignment]", error), encoding="utf-8")
+    scenario = sd.read_scenario(file)  # an evaluation of it does not ask for pose errors
+    said = (
+        "s.toml: head: splitter and psd: overlap or touch, with their pose errors; expected a gap of at least 0.01 mm"
+    )
+    for call in (lambda: sd.simulate_scenario(scenario), lambda: examine(file)):
+        with pytest.raises(sd.InvalidArgument, match=re.escape(said)):
+            call()
 
 
 def test_scenarios_that_the_table_spoils_are_sound() -> None:

@@ -99,9 +99,9 @@ def test_check_tells_spot_path_and_power_at_every_detector(capsys: pytest.Captur
 def test_check_tells_a_beam_that_is_out_of_square(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = find_head("three_beams").read_text(encoding="utf-8")
     turned = tmp_path / "turned.toml"
-    turned.write_text(text.replace("[beam.d2]", "[beam.d2]\nrotation_mrad = [0.0, 0.5, 0.0]"), encoding="utf-8")
+    turned.write_text(text.replace("[beam.right]", "[beam.right]\nrotation_mrad = [0.0, 0.5, 0.0]"), encoding="utf-8")
     assert run("head", "check", str(turned), "--distance", "300") == 0
-    assert "d2 leaves 500 µrad out of square" in capsys.readouterr().out
+    assert "right leaves 500 µrad out of square" in capsys.readouterr().out
     assert run("head", "check", "three_beams", "--distance", "300") == 0
     assert "out of square" not in capsys.readouterr().out
 
@@ -181,6 +181,19 @@ def test_sensitivity_is_sorted_by_effect(capsys: pytest.CaptureFixture[str]) -> 
         effects = [max(abs(float(value)) for value in row[columns]) for row in rows if not row[0].startswith("beam")]
         assert effects == sorted(effects, reverse=True)
         assert len(effects) > 5
+
+
+@pytest.mark.parametrize("name", HEADS)
+def test_sensitivity_says_first_that_it_is_of_the_axes(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("head", "sensitivity", name) == 0
+    first, second, *table = capsys.readouterr().out.splitlines()
+    assert "600 mm, tilts 300 and 300 µrad" in first
+    assert second == "for readings by the beams' axes (chief rays), whatever the reading model of the head"
+    assert any("index error   ppm" in row for row in table)
+    widths = {row.index(" per ") for row in table if " per " in row} | {
+        row.index(" ppm ") for row in table if " ppm " in row
+    }
+    assert len(widths) == 1
 
 
 def test_sensitivity_knows_what_a_sensor_shift_does(capsys: pytest.CaptureFixture[str]) -> None:
