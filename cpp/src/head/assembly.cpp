@@ -39,6 +39,12 @@ bool is_transparent(const HeadBody& body) {
     });
 }
 
+double nominal_mirror(const HeadDesign& design) {
+    double widest = 0.0;
+    for (const HeadBeam& beam : design.beams) widest = std::max(widest, beam.placement.position.head<2>().norm());
+    return 100.0 + 4.0 * widest;
+}
+
 std::size_t sensor_of(const HeadDesign& design, const HeadBeam& beam) {
     for (std::size_t s = 0; s < design.sensors.size(); ++s)
         if (design.sensors[s].name == beam.sensor) return s;

@@ -18,6 +18,8 @@ std::vector<Placement> component_placements(const HeadDesign& design);
 bool is_transparent(const HeadBody& body);
 // Beams in the order of the signals: interferometers, then the beam to the sensor.
 std::vector<int> signal_order(const HeadDesign& design);
+// Edge of a mirror that no beam of the design misses by its place, mm.
+double nominal_mirror(const HeadDesign& design);
 std::size_t sensor_of(const HeadDesign& design, const HeadBeam& beam);  // its index
 
 // All faces in the head's frame for light of one wavelength: the bodies', then a square around each source that stops

@@ -84,10 +84,7 @@ NominalHead nominal_head(const HeadDesign& design, double distance, const Enviro
              << distance << " mm";
         throw InvalidArgument(text.str());
     }
-    double widest = 100.0;
-    for (const HeadBeam& beam : design.beams)
-        widest = std::max(widest, 100.0 + 4.0 * beam.placement.position.head<2>().norm());
-    const NominalReader reader(design, environment, Eigen::Vector2d::Constant(widest));
+    const NominalReader reader(design, environment, Eigen::Vector2d::Constant(nominal_mirror(design)));
 
     NominalHead nominal;
     for (int b = 0; b < int(design.beams.size()); ++b) {

@@ -84,15 +84,16 @@ bool pass_clear(const std::vector<std::vector<Segment>>& paths, const Scene& fix
     return true;
 }
 
-bool same_faces(const std::vector<RecordedRoute>& a, const std::vector<RecordedRoute>& b) {
-    const auto same_encounter = [](const RecordedEncounter& x, const RecordedEncounter& y) {
+bool same_faces(const RecordedRoute& a, const RecordedRoute& b) {
+    const auto same = [](const RecordedEncounter& x, const RecordedEncounter& y) {
         return x.face == y.face && x.event == y.event;
     };
-    const auto same_route = [&](const RecordedRoute& x, const RecordedRoute& y) {
-        return std::equal(x.encounters.begin(), x.encounters.end(), y.encounters.begin(), y.encounters.end(),
-                          same_encounter);
-    };
-    return std::equal(a.begin(), a.end(), b.begin(), b.end(), same_route);
+    return std::equal(a.encounters.begin(), a.encounters.end(), b.encounters.begin(), b.encounters.end(), same);
+}
+
+bool same_faces(const std::vector<RecordedRoute>& a, const std::vector<RecordedRoute>& b) {
+    const auto same = [](const RecordedRoute& x, const RecordedRoute& y) { return same_faces(x, y); };
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(), same);
 }
 
 RouteReplay replay_route(const RecordedRoute& route, const std::vector<FaceFrame>& frames,

@@ -8,17 +8,8 @@
 
 namespace stepdiag {
 
-struct RecordedEncounter {
-    int face;
-    Event event;
-    double index_before, index_after;
-};
-struct RecordedRoute {
-    std::vector<RecordedEncounter> encounters;
-    double power;  // of the arrival
-};
-
 RecordedRoute record_route(const RayTree& tree, int segment);
+bool same_faces(const RecordedRoute& a, const RecordedRoute& b);
 bool same_faces(const std::vector<RecordedRoute>& a, const std::vector<RecordedRoute>& b);
 
 // A path as its segments, source first.

@@ -235,10 +235,11 @@ std::vector<Sensitivity> head_sensitivities(const Head& head, const MirrorPose& 
     }
     Eigen::VectorXd by_index_error = Eigen::VectorXd::Zero(signals.size());
     for (std::size_t k = 0; k < order.size(); ++k)
-        if (design.beams[order[k]].interferometer)
+        if (const auto& interferometer =
+                design.beams[order[k]].interferometer)  // it divides the whole path, dead path too
             by_index_error[Eigen::Index(k)] =
-                -(signals[Eigen::Index(k)] + nominal.calibration.head_constants[k]);  // the whole path is divided
-    add({"interferometer", "index error", "1", {}}, by_index_error);
+                -(signals[Eigen::Index(k)] + nominal.calibration.head_constants[k] + interferometer->dead_path);
+    add({"all interferometers", "index error", "1", {}}, by_index_error);
     return result;
 }
 

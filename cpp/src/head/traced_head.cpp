@@ -9,6 +9,7 @@
 #include "head/recorded_route.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/core/random.hpp"
+#include "stepdiag/head/nominal_head.hpp"
 
 namespace stepdiag {
 namespace {
@@ -79,6 +80,25 @@ private:
     double next_ = -1.0;
 };
 
+bool meets(const RayTree& tree, int segment, int face) {
+    for (; segment >= 0; segment = tree.segments[segment].parent)
+        if (tree.segments[segment].hit && tree.segments[segment].hit->face == face) return true;
+    return false;
+}
+
+// The way of the strongest light that an aligned mirror sends to the detector of the design; none where there is none.
+RecordedRoute designed_way(const HeadDesign& design, const HeadBeam& beam, const Scene& nominal, const Medium& air,
+                           int detector_face) {
+    const int mirror_face = int(nominal.faces().size());
+    const Face mirror = make_rectangle({0.0, 0.0, reach(design) + 100.0}, Eigen::Matrix3d::Identity(),
+                                       Eigen::Vector2d::Constant(nominal_mirror(design)), Surface::reflecting);
+    const RayTree tree = trace_tree(nominal.with({mirror}), air,
+                                    {beam.placement.position, beam.placement.rotation.col(2)}, design.limits);
+    for (const int segment : tree.arrivals(detector_face))
+        if (meets(tree, segment, mirror_face)) return record_route(tree, segment);
+    return {};
+}
+
 }  // namespace
 
 MirrorPose tilted_mirror(const Eigen::Vector3d& point, double alpha, double beta) {
@@ -117,6 +137,8 @@ TracedHead::TracedHead(HeadDesign design, PoseErrors errors, const Environment& 
         }
         const Face mirror_face = mirror_at({Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity()});
         optics.outlines.push_back(outline_of(mirror_face, {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}}));
+        const Scene nominal = errors.empty() ? optics.fixed : Scene(assemble(design_, {}, beam.mode.wavelength).faces);
+        optics.designed = designed_way(design_, beam, nominal, optics.air, optics.detector_face);
         optics_.push_back(std::move(optics));
     }
 }
@@ -132,11 +154,17 @@ RayTree TracedHead::trace(int beam, const MirrorPose& mirror) const {
     return trace_tree(optics.fixed.with({mirror_at(mirror)}), optics.air, optics.source, design_.limits);
 }
 
+bool TracedHead::is_designed(int beam, const RecordedRoute& route) const {
+    return !route.encounters.empty() && same_faces(route, optics_[beam].designed);
+}
+
 Arrival TracedHead::arrival(int beam, const Eigen::Vector3d& point, const Eigen::Vector3d& direction,
-                            double optical_length, double reduced_length, double power) const {
+                            double optical_length, double reduced_length, double power, bool is_designed) const {
     const Placement& detector = optics_[beam].detector;
     const Eigen::Vector3d position = detector.rotation.transpose() * (point - detector.position);
-    return {{position.head<2>(), detector.rotation.transpose() * direction, optical_length, reduced_length}, power};
+    return {{position.head<2>(), detector.rotation.transpose() * direction, optical_length, reduced_length},
+            power,
+            is_designed};
 }
 
 Arrivals TracedHead::arrivals(int beam, const MirrorPose& mirror) const {
@@ -145,21 +173,20 @@ Arrivals TracedHead::arrivals(int beam, const MirrorPose& mirror) const {
     for (const int segment : wanted_segments(tree, beam)) {
         const Path path = tree.path_to(segment);
         arrivals.push_back(arrival(beam, path.hits.back().point, path.direction, path.optical_length,
-                                   path.reduced_length, tree.segments[segment].power));
+                                   path.reduced_length, tree.segments[segment].power,
+                                   is_designed(beam, record_route(tree, segment))));
     }
     return arrivals;
 }
 
 std::vector<int> TracedHead::wanted_segments(const RayTree& tree, int beam) const {
     std::vector<int> segments = tree.arrivals(optics_[beam].detector_face);
-    const auto saw_mirror = [&](int segment) {
-        for (; segment >= 0; segment = tree.segments[segment].parent)
-            if (tree.segments[segment].hit && tree.segments[segment].hit->face == mirror_face()) return true;
-        return false;
-    };
-    const auto straylight = std::stable_partition(segments.begin(), segments.end(), saw_mirror);
+    const auto straylight = std::stable_partition(segments.begin(), segments.end(),
+                                                  [&](int segment) { return meets(tree, segment, mirror_face()); });
     if (straylight == segments.begin()) return {};
-    if (design_.beams[beam].interferometer) return {segments.front()};
+    const auto ghosts = std::stable_partition(
+        segments.begin(), straylight, [&](int segment) { return is_designed(beam, record_route(tree, segment)); });
+    if (design_.beams[beam].interferometer) segments.erase(ghosts, segments.end());
     return segments;
 }
 
@@ -225,7 +252,7 @@ ArrivalTable TracedHead::replay(int beam, const std::vector<MirrorPose>& mirrors
         }
         for (std::size_t r = 0; r < routes.size(); ++r)
             table.add(arrival(beam, replayed[r].point(i), replayed[r].direction(i), replayed[r].optical_length[i],
-                              replayed[r].reduced_length[i], routes[r].power));
+                              replayed[r].reduced_length[i], routes[r].power, is_designed(beam, routes[r])));
         table.end_pose();
         ++counted.replayed;
         if (!verified.take(i)) continue;

@@ -35,6 +35,7 @@ void TracedReader::detect(int beam, const ArrivalTable::Row& arrivals, std::uint
     const bool chief_ray = !camera && interferometer.model == ReadingModel::chief_ray;
     std::vector<BeamSpot> spots;
     for (const Arrival& arrival : arrivals) {
+        if (chief_ray && !arrival.is_designed) break;
         const double radius = chief_ray ? point_radius : beam_radius(light.mode, arrival.beam.reduced_length);
         spots.push_back({arrival.beam.position, radius, arrival.power});
         if (chief_ray) break;

@@ -63,6 +63,13 @@ Environment true_environment(const Head& head, const SimulationOptions& options)
     return options.environment.value_or(options.assumed ? Environment{Air{}} : usual_environment(head));
 }
 
+void check_constants(const Misalignment& misalignment, const Head& head, const Line& line) {
+    const std::size_t given = misalignment.beam_constants.size(), beams = head.beam_offsets.size();
+    if (given > 0 && (head.layout != HeadLayout::multi_beam || given != beams))
+        throw InvalidArgument("misalignment of " + line.name() + ": expected " + std::to_string(beams) +
+                              " beam constants, got " + std::to_string(given));
+}
+
 TracedConditions conditions(const Head& head, const SimulationOptions& options) {
     return {options.environment.value_or(usual_environment(head)),
             options.assumed,
@@ -167,6 +174,7 @@ Measurement simulate(const Machine& machine, const Plan& plan, const Heads& head
         const auto points = plan.points(line);
         const HeadSetup setup =
             set_up(head, plan.frame(line), points.front().commanded + machine.tool(), mirror, misalignment);
+        check_constants(misalignment, head, line);
         std::vector<Pose> poses;
         for (const PlanPoint& point : points) poses.push_back(machine.pose(point.commanded));
 

@@ -1,7 +1,8 @@
 // How a traced head's readings answer to what may be wrong with it: first derivatives by the pose error of every
 // component and of the mirror, by the indices of glass and air, by the state of the air. Exact, by forward-mode
 // derivatives through the replay of each beam's path; only the slope of the air's index by temperature, pressure and
-// humidity is a difference of that equation. Chief rays: detectors are linear.
+// humidity is a difference of that equation. Of the beams' axes (chief rays), whatever the
+// reading model.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +15,7 @@
 namespace stepdiag {
 
 struct Sensitivity {
-    std::string component;    // its name; "mirror", "air", "interferometer"
+    std::string component;    // its name; "mirror", "air", "all interferometers"
     std::string quantity;     // "shift x" ..., "rotation x" ..., "index", "temperature", "pressure", "humidity"
     std::string unit;         // of the quantity: "mm", "rad", "1", "K", "Pa"
     Eigen::VectorXd signals;  // by one unit, in the order of signal_names; mm

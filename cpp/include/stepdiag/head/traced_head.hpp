@@ -29,10 +29,11 @@ MirrorPose tilted_mirror(const Eigen::Vector3d& point, double alpha, double beta
 // Light of a beam where it belongs: on its collimator's plane, or on its sensor; in the frame of that component.
 struct Arrival {
     ReturnedBeam beam;
-    double power;  // share of the source's
+    double power;      // share of the source's
+    bool is_designed;  // came the way that the design's strongest light comes from an aligned mirror: no ghost
 };
-// A beam's light at one pose: strongest first, straylight that never saw the mirror last; none: the beam is lost. An
-// interferometer has one at most.
+// A beam's light at one pose: that of the designed way, then ghosts that saw the mirror, strongest first, then
+// straylight; none where nothing but straylight came. Of an interferometer that of the designed way at most.
 using Arrivals = std::vector<Arrival>;
 
 // The same of many poses, one after the other.
@@ -63,7 +64,16 @@ private:
     std::vector<std::size_t> ends_;
 };
 
-struct RecordedRoute;
+// The faces that light meets on its way to a detector.
+struct RecordedEncounter {
+    int face;
+    Event event;
+    double index_before, index_after;
+};
+struct RecordedRoute {
+    std::vector<RecordedEncounter> encounters;
+    double power;  // at the end, share of the source's
+};
 
 struct ReplayOptions {
     double verified_share =
@@ -114,11 +124,11 @@ public:
         std::vector<int> component;     // of its faces: bodies, beams, sensors counted through
         Ray source;
         int detector_face;
-        Placement detector;  // where the light is wanted
+        Placement detector;           // where the light is wanted
+        RecordedRoute designed = {};  // none where the design gets no light there
     };
     const BeamOptics& optics(int beam) const { return optics_[beam]; }
-    // Segments that end where the beam's light is wanted: those that saw the mirror, strongest first, then straylight
-    // that did not; none where only straylight came. Of an interferometer's the first alone.
+    // Segments that end where the beam's light is wanted, in the order of Arrivals.
     std::vector<int> wanted_segments(const RayTree& tree, int beam) const;
 
 private:
@@ -127,7 +137,8 @@ private:
                   const std::set<std::size_t>& outermost) const;
     Face mirror_at(const MirrorPose& pose) const;
     Arrival arrival(int beam, const Eigen::Vector3d& point, const Eigen::Vector3d& direction, double optical_length,
-                    double reduced_length, double power) const;
+                    double reduced_length, double power, bool is_designed) const;
+    bool is_designed(int beam, const RecordedRoute& route) const;
 
     HeadDesign design_;
     Eigen::Vector2d mirror_;
