@@ -71,7 +71,9 @@ def draw_head(head: _core.Head, distance: float, suffix: str) -> bytes:
             whole.plot([distance, distance], [-half, half], color=DARK, linewidth=3.0, solid_capstyle="butt", zorder=6)
             whole.set(xlim=(low[2], distance + 0.05 * (distance - low[2])))
             whole.set(ylim=(min(low[view.axis], -1.1 * half), max(high[view.axis], 1.1 * half)))
-        for axes, title in zip(panels[0], (f"{design.name}: the head", f"the mirror at {distance:g} mm"), strict=True):
+        for axes, title in zip(
+            panels[0], (f"{_plain(design.name)}: the head", f"the mirror at {distance:g} mm"), strict=True
+        ):
             axes.set_title(title)
         for axes in panels[1]:
             axes.set_xlabel("z (mm)")
@@ -147,6 +149,11 @@ def _draw_detectors(axes: Axes, view: View, design: _core.HeadDesign, outlines: 
             axes.add_collection(edges)
 
 
+def _plain(name: str) -> str:
+    """A name as it is: between dollar signs Matplotlib would read a formula."""
+    return name.replace("$", r"\$")
+
+
 def _colour(beam: int) -> str:
     return COLOURS[beam % len(COLOURS)]
 
@@ -173,7 +180,7 @@ def _name_components(axes: Axes, view: View, outlines: dict[str, list[FloatArray
         places = [p for p in (above, below) if _is_free((p, p + size), others)]
         places += [p for p in stacked if _is_free((p, p + size), taken)]
         taken.append((places[0], places[0] + size))
-        axes.text(float(places[0][0]), float(places[0][1]), name, size=7.5, va="bottom", zorder=7, bbox=LABEL)
+        axes.text(float(places[0][0]), float(places[0][1]), _plain(name), size=7.5, va="bottom", zorder=7, bbox=LABEL)
 
 
 def _is_free(box: Box, others: Sequence[Box]) -> bool:
@@ -182,7 +189,7 @@ def _is_free(box: Box, others: Sequence[Box]) -> bool:
 
 def _legend(design: _core.HeadDesign) -> list[Any]:
     beams = [
-        Line2D([], [], color=_colour(k), linewidth=1.6, label=f"{beam.name} ({beam.wavelength:g} nm)")
+        Line2D([], [], color=_colour(k), linewidth=1.6, label=f"{_plain(beam.name)} ({beam.wavelength:g} nm)")
         for k, beam in enumerate(design.beams)
     ]
     return [

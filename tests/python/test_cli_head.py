@@ -60,6 +60,13 @@ def test_figure_shows_the_ghosts_of_a_coated_window() -> None:
     assert dashed[1] > dashed[0] > 0
 
 
+def test_name_with_dollar_signs_is_drawn_as_it_is(tmp_path: Path) -> None:
+    text = find_head("three_beams").read_text(encoding="utf-8")
+    odd = tmp_path / "odd.toml"
+    odd.write_text(re.sub(r'^name = ".*"', 'name = "costs $x^{$"', text, count=1, flags=re.M), encoding="utf-8")
+    assert run("head", "show", str(odd), "-o", str(tmp_path / "odd.svg")) == 0
+
+
 # --- check -----------------------------------------------------------------------------------------------------------
 def numbers_after(text: str, label: str) -> list[float]:
     (line,) = [line for line in text.splitlines() if line.strip().startswith(label)]

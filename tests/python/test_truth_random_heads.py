@@ -117,15 +117,15 @@ def test_shipped_heads_far_out_of_place_hold_against_forty_digits(
 
 def coated(reflectance: float, absorptance: float = 0.0) -> sd.Head:
     window = sd.HeadBody.plate(
-        "window", width=40, height=40, thickness=5, material=1.5, position=(0, 0, 60), reflectance=reflectance
+        "window", width=40, height=80, thickness=5, material=1.5, position=(0, 0, 60), reflectance=reflectance
     )
     cube = sd.HeadBody.cube_splitter(
-        "cube", edge=20.0, material=1.5, reflectance=0.4, absorptance=absorptance, position=(0, 0, 20)
+        "cube", edge=20.0, material=1.5, reflectance=0.4, absorptance=absorptance, position=(0, -16, 20)
     )
-    device = sd.SpotSensor.lateral_effect("psd", position=(-20, 0, 20), rotation=(0, -math.pi / 2, 0), size=(12, 12))
+    device = sd.SpotSensor.lateral_effect("psd", position=(-20, -16, 20), rotation=(0, -math.pi / 2, 0), size=(12, 12))
     beams = [
-        sd.HeadBeam.interferometer("distance", position=(0.0, 16.0, 0.0)),
-        sd.HeadBeam.spot("laser", sensor="psd", position=(0.0, 0.0, -5.0)),
+        sd.HeadBeam.interferometer("distance", position=(0.0, 0.0, 0.0)),
+        sd.HeadBeam.spot("laser", sensor="psd", position=(0.0, -16.0, -5.0)),
     ]
     return sd.Head.from_design(sd.HeadDesign("coated", "psd", [window, cube], beams, [device], least_power=1e-15))
 

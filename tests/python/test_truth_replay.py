@@ -133,7 +133,8 @@ def test_body_in_the_way_of_some_poses_is_found(x: float, width: float, which: s
     assert np.max(np.abs(run.channels["d1"] - clear.channels["d1"])[kept]) <= 5e-12
 
 
-def test_body_far_from_the_recorded_poses_is_found_by_a_verification() -> None:
+@pytest.mark.parametrize("share", [0.0, 1e-3, ALL_BUT_ONE_IN_A_MILLION])
+def test_body_that_one_pose_in_between_meets_is_found(share: float) -> None:
     """The mirror leans over between the first pose, the middle one and the last, where it stands upright."""
     travel = VOLUME[0]
     nodes = np.array([0.0, 0.2, 0.25, 0.3, 1.0]) * travel  # of X; the middle of the line is at its half
@@ -148,5 +149,4 @@ def test_body_far_from_the_recorded_poses_is_found_by_a_verification() -> None:
 
     lost = np.flatnonzero(np.isnan(run(1.0).channels["d1"]))
     assert list(lost) == [5]  # a quarter of the travel
-    with pytest.raises(sd.ReplayMismatch, match="beam beam 1 at pose 5 "):
-        run(ALL_BUT_ONE_IN_A_MILLION)
+    assert list(np.flatnonzero(np.isnan(run(share).channels["d1"]))) == list(lost)

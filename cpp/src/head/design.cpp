@@ -152,8 +152,8 @@ void check_gaps(const HeadDesign& design, const PoseErrors& errors) {
             if (gap >= least) continue;
             std::ostringstream text;
             text << pieces[i].name << " and " << pieces[j].name << ": overlap or touch"
-                 << (errors.empty() ? "" : ", with their pose errors") << "; expected a gap of at least "
-                 << smallest_gap << " mm, got " << gap << " mm";
+                 << (errors.empty() ? "" : ", with their pose errors") << "; expected a gap of at least " << least
+                 << " mm, got " << gap << " mm";
             throw InvalidArgument(text.str());
         }
 }

@@ -86,11 +86,17 @@ NominalHead nominal_head(const HeadDesign& design, double distance, const Enviro
     }
     const NominalReader reader(design, environment, Eigen::Vector2d::Constant(nominal_mirror(design)));
 
+    // What a beam out of square gains with distance is a tilt of the head, no offset in its reference plane.
+    const double farther = distance + 1000.0;
+    const auto at_plane = [&](const Eigen::Vector2d& here, const Eigen::Vector2d& there) -> Eigen::Vector2d {
+        return here - distance / (farther - distance) * (there - here);
+    };
+
     NominalHead nominal;
     for (int b = 0; b < int(design.beams.size()); ++b) {
         if (design.beams[b].interferometer) {
             nominal.calibration.head_constants.push_back(reader.half_path(b, distance, 0.0, 0.0) - distance);
-            const Eigen::Vector2d offset = beam_offset(reader, b, distance);
+            const Eigen::Vector2d offset = at_plane(beam_offset(reader, b, distance), beam_offset(reader, b, farther));
             if (design.layout == HeadLayout::multi_beam) nominal.calibration.beam_offsets.push_back(offset);
             if (design.layout == HeadLayout::psd && !(offset.norm() < smallest_offset)) {
                 std::ostringstream text;
@@ -100,7 +106,6 @@ NominalHead nominal_head(const HeadDesign& design, double distance, const Enviro
             }
             continue;
         }
-        const double farther = distance + 1000.0;
         const Eigen::Matrix2d near_slopes = spot_slopes(reader, b, distance);
         const Eigen::Matrix2d gained = (spot_slopes(reader, b, farther) - near_slopes) / (2.0 * (farther - distance));
         if (!(std::abs(gained.determinant()) > 1e-6))
@@ -112,7 +117,7 @@ NominalHead nominal_head(const HeadDesign& design, double distance, const Enviro
         const Eigen::Vector2d spot = reader.read(b, distance, 0.0, 0.0).position;
         const Eigen::Vector2d drift = (reader.read(b, farther, 0.0, 0.0).position - spot) / (farther - distance);
         nominal.spot_zero = spot - (distance + psd_distance) * drift;
-        nominal.calibration.spot_beam = reader.outgoing(b, distance);
+        nominal.calibration.spot_beam = at_plane(reader.outgoing(b, distance), reader.outgoing(b, farther));
     }
     return nominal;
 }

@@ -14,7 +14,8 @@
 namespace stepdiag {
 namespace {
 
-constexpr double rounding = 1e-9;  // mm: far above that of a path of metres, far below what another path would do
+// Far above that of a path of metres, far below what another path would do.
+double rounding(double path) { return 1e-9 + 1e-13 * path; }  // mm
 
 void check_errors(const HeadDesign& design, const PoseErrors& errors) {
     const std::vector<std::string> names = component_names(design);
@@ -32,27 +33,27 @@ void check_errors(const HeadDesign& design, const PoseErrors& errors) {
 // Where two answers for the same pose differ by more than rounding.
 bool differ(const ArrivalTable::Row& a, const Arrivals& b) {
     const auto same = [](const Arrival& x, const Arrival& y) {
-        return (x.beam.position - y.beam.position).norm() <= rounding &&
-               std::abs(x.beam.optical_length - y.beam.optical_length) <= rounding;
+        const double limit = rounding(x.beam.optical_length);
+        return (x.beam.position - y.beam.position).norm() <= limit &&
+               std::abs(x.beam.optical_length - y.beam.optical_length) <= limit;
     };
     return !std::equal(a.begin(), a.end(), b.begin(), b.end(), same);
 }
 
 // Of the poses that followed a path: the first and the last, and those whose light ends farthest to each side.
-std::set<std::size_t> outermost(const RouteReplay& replayed, const std::vector<std::uint8_t>& followed) {
+std::set<std::size_t> outermost(const std::vector<RouteReplay>& replayed, const std::vector<std::uint8_t>& followed) {
     std::set<std::size_t> poses;
     std::vector<std::size_t> members;
     for (std::size_t i = 0; i < followed.size(); ++i)
         if (followed[i]) members.push_back(i);
     if (members.empty()) return poses;
     poses = {members.front(), members.back()};
-    for (int axis = 0; axis < 3; ++axis) {
-        const auto less = [&](std::size_t a, std::size_t b) {
-            return replayed.point(a)[axis] < replayed.point(b)[axis];
-        };
-        const auto ends = std::minmax_element(members.begin(), members.end(), less);
-        poses.insert({*ends.first, *ends.second});
-    }
+    for (const RouteReplay& route : replayed)
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto less = [&](std::size_t a, std::size_t b) { return route.point(a)[axis] < route.point(b)[axis]; };
+            const auto ends = std::minmax_element(members.begin(), members.end(), less);
+            poses.insert({*ends.first, *ends.second});
+        }
     return poses;
 }
 
@@ -237,7 +238,7 @@ ArrivalTable TracedHead::replay(int beam, const std::vector<MirrorPose>& mirrors
                                         optics.fixed.self_intersection_gap()));
         for (std::size_t i = 0; i < n; ++i) followed[i] = followed[i] && replayed.back().followed[i];
     }
-    if (!routes.empty() && !is_clear(beam, mirrors, routes, outermost(replayed.front(), followed)))
+    if (!routes.empty() && !is_clear(beam, mirrors, routes, outermost(replayed, followed)))
         std::fill(followed.begin(), followed.end(), 0);
 
     table.reserve(n, n * std::max<std::size_t>(1, routes.size()));

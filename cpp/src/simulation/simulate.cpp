@@ -159,7 +159,7 @@ Measurement simulate(const Machine& machine, const Plan& plan, const Heads& head
     check_heads(heads, plan);
     check_options(plan, options);
     const std::vector<std::string> names = signal_names(heads.head);
-    std::map<const Head*, TracedReader> readers;  // a head that is used for several lines is put together once
+    std::map<const Head*, TracedReader> readers;  // the common head is put together once
 
     std::vector<Station> stations;
     std::vector<Channel> channels;

@@ -1,9 +1,8 @@
 // What an interferometer makes of the light that comes back to its collimator.
-//   chief_ray      half the optical path of the beam's axis to the collimator's plane and back (the conventions'
-//   reading) coupled_mode   the phase with which the returned Gaussian couples into the fibre's mode: -L phi^2/2
-//   instead of
-//                  +L phi^2 for a mirror at L turned by phi (waist at the collimator), and the share of the light that
-//                  couples
+// Two reading models. The chief ray: half the optical path of the beam's axis to the collimator's plane and back, the
+// conventions' reading. The coupled mode: the phase with which the returned Gaussian couples into the fibre's mode,
+// -L phi^2/2 instead of +L phi^2 for a mirror at L turned by phi (waist at the collimator), and the share of the light
+// that couples.
 // Both models read the same path when the light comes back along the axis: what diffraction adds to the phase of an
 // aligned beam on its way (Gouy's phase and the curvature of its wave fronts, below half a wavelength in the round
 // trip) is taken off, because it is no length. Lengths in mm, angles in rad, wavelengths in nm (vacuum).

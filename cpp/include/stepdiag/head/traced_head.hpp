@@ -111,7 +111,8 @@ public:
     // Many poses by replay of the paths that the first pose has. The outermost of the poses that follow them, whose
     // light ends farthest to each side, are traced: where these do not meet the same faces, or where another face is
     // near them, all poses are traced. So is each pose that does not follow the paths. Throws ReplayMismatch naming the
-    // pose where a verification differs by more than rounding (1e-9 mm).
+    // pose where a verification differs by more than rounding (1e-9 mm + 1e-13 of
+    // the path).
     ArrivalTable replay(int beam, const std::vector<MirrorPose>& mirrors, const ReplayOptions& options = {},
                         ReplayCount* count = nullptr) const;
 
