@@ -27,6 +27,7 @@ constexpr double smallest_offset = 1e-3;  // mm: 1 nm of distance at 1 mrad
     text << "beam " << design.name << ": " << (saw_mirror ? "does not come back from" : "does not meet")
          << " a mirror square to the beam at " << distance << " mm";
     if (saw_mirror) text << (design.interferometer ? " to its collimator" : " to its sensor " + design.sensor);
+    if (tree.cut > 0.0) text << " (light was cut by the limits on hits, power or segments)";
     throw InvalidArgument(text.str());
 }
 

@@ -187,6 +187,28 @@ TEST(TracedReading, IsTheDefinitionForAPerfectHead) {
     }
 }
 
+TEST(TracedReading, CameraFindsTheSpotOfTheChiefRay) {
+    const HeadDesign with_psd = beam_and_psd();
+    HeadDesign with_camera = with_psd;
+    Camera camera;
+    camera.pixel = 0.04;
+    camera.columns = camera.rows = 256;
+    camera.electrons = 4e6;  // a quarter of the power comes to the sensor
+    camera.shot_noise = true;
+    with_camera.sensors[0].device = camera;
+    TracedConditions conditions;
+    conditions.environment = air;
+    const TracedReader psd(make_head(with_psd, 100.0), mirror_size, conditions);
+    const TracedReader picture(make_head(with_camera, 100.0), mirror_size, conditions);
+    const auto poses = some_poses(6);
+    const auto axes = psd.read(poses), spots = picture.read(poses);
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+        EXPECT_EQ(*axes[i][0], *spots[i][0]);
+        // A million electrons: radius/2 sqrt(1e-6) = 0.4 um of 0.8 mm, and five times that.
+        for (int c : {1, 2}) EXPECT_NEAR(*axes[i][c], *spots[i][c], 2e-3) << i;
+    }
+}
+
 TEST(Sensitivity, IsTheSlopeOfTheReadings) {
     const MirrorPose pose = tilted_mirror({0.0, 0.0, 600.0}, 1e-4, -2e-4);
     for (const HeadDesign& design : {three_beams(), beam_and_psd()}) {
