@@ -241,7 +241,7 @@ def own_rows(build: Path) -> tuple[list[Row], dict[int, Answer]]:
     target = fastest.split("/")[1]
     return [
         Row("stepdiag, ray tree (Embree)", *tree, 0.0, "finds faces; all branches with their powers"),
-        Row("stepdiag, one path (Embree)", *route, None, "finds faces; follows one branch; moving: a new scene"),
+        Row("stepdiag, one path (Embree)", *route, None, "finds faces; follows one branch"),
         Row("stepdiag, TracedHead::replay", whole, whole, None, "records, replays, checks each, re-traces 1 in 1000"),
         Row(f"stepdiag, replay() {target}", kernel, kernel, None, "known faces; outlines, events, NaN checked"),
     ], answers
