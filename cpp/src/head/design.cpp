@@ -162,7 +162,9 @@ void check_design(const HeadDesign& design) {
     check_size(design);
     std::set<std::string> names;
     for (const std::string& name : component_names(design)) {
-        if (name.empty()) throw InvalidArgument("component: expected a name");
+        const auto is_control = [](unsigned char c) { return c < 0x20 || c == 0x7f; };
+        if (name.empty() || std::any_of(name.begin(), name.end(), is_control))
+            throw InvalidArgument("component: expected a name without control characters");
         if (!names.insert(name).second) throw InvalidArgument("component " + name + ": given twice");
     }
     check_layout(design);

@@ -76,8 +76,8 @@ struct RecordedRoute {
 };
 
 struct ReplayOptions {
-    double verified_share =
-        1e-3;                // of the poses that were replayed, traced as well and compared; 1: nothing is replayed
+    // Of the poses that were replayed, traced as well and compared; 1: nothing is replayed, 0: nothing compared.
+    double verified_share = 1e-3;
     std::uint64_t seed = 0;  // decides which, together with
     std::uint64_t line = 0;  // what is replayed: another number, other poses
 };
