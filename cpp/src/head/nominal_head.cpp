@@ -87,17 +87,18 @@ NominalHead nominal_head(const HeadDesign& design, double distance, const Enviro
     }
     const NominalReader reader(design, environment, Eigen::Vector2d::Constant(nominal_mirror(design)));
 
-    // What a beam out of square gains with distance is a tilt of the head, no offset in its reference plane.
-    const double farther = distance + 1000.0;
+    // What a beam out of square gains with distance is a tilt of the head, no offset in its reference plane. A short
+    // way tells, so that no beam is lost on it.
+    const double beyond = distance + 10.0, farther = distance + 1000.0;
     const auto at_plane = [&](const Eigen::Vector2d& here, const Eigen::Vector2d& there) -> Eigen::Vector2d {
-        return here - distance / (farther - distance) * (there - here);
+        return here - distance / (beyond - distance) * (there - here);
     };
 
     NominalHead nominal;
     for (int b = 0; b < int(design.beams.size()); ++b) {
         if (design.beams[b].interferometer) {
             nominal.calibration.head_constants.push_back(reader.half_path(b, distance, 0.0, 0.0) - distance);
-            const Eigen::Vector2d offset = at_plane(beam_offset(reader, b, distance), beam_offset(reader, b, farther));
+            const Eigen::Vector2d offset = at_plane(beam_offset(reader, b, distance), beam_offset(reader, b, beyond));
             if (design.layout == HeadLayout::multi_beam) nominal.calibration.beam_offsets.push_back(offset);
             if (design.layout == HeadLayout::psd && !(offset.norm() < smallest_offset)) {
                 std::ostringstream text;
@@ -118,7 +119,7 @@ NominalHead nominal_head(const HeadDesign& design, double distance, const Enviro
         const Eigen::Vector2d spot = reader.read(b, distance, 0.0, 0.0).position;
         const Eigen::Vector2d drift = (reader.read(b, farther, 0.0, 0.0).position - spot) / (farther - distance);
         nominal.spot_zero = spot - (distance + psd_distance) * drift;
-        nominal.calibration.spot_beam = at_plane(reader.outgoing(b, distance), reader.outgoing(b, farther));
+        nominal.calibration.spot_beam = at_plane(reader.outgoing(b, distance), reader.outgoing(b, beyond));
     }
     return nominal;
 }
