@@ -14,6 +14,7 @@ namespace {
 // Large enough that rounding of a path (1e-13 mm) does not matter, small enough that third orders in glass do not.
 constexpr double distance_tilt = 1e-3;
 constexpr double spot_tilt = 1e-5;
+constexpr double square = 1e-8;           // mm in 10 mm: rounding, which must not be taken for an angle and grow
 constexpr double smallest_offset = 1e-3;  // mm: 1 nm of distance at 1 mrad
 
 // Why a beam of the nominal head did not arrive.
@@ -91,6 +92,7 @@ NominalHead nominal_head(const HeadDesign& design, double distance, const Enviro
     // way tells, so that no beam is lost on it.
     const double beyond = distance + 10.0, farther = distance + 1000.0;
     const auto at_plane = [&](const Eigen::Vector2d& here, const Eigen::Vector2d& there) -> Eigen::Vector2d {
+        if ((there - here).norm() < square) return here;
         return here - distance / (beyond - distance) * (there - here);
     };
 
