@@ -24,6 +24,18 @@ struct CalibratedFunction {
     bool slope_determined = true;
 };
 
+// Reversal error of one function (ISO 230-2): its value at a node approached in + direction minus that in - direction.
+// A calibration's functions are those of the + direction, and its squarenesses belong to both.
+struct CalibratedReversal {
+    std::vector<double> position;              // mm
+    std::vector<double> value;                 // mm or rad
+    std::vector<double> standard_uncertainty;  // mm or rad; NaN where a file that was read does not give it
+    // Of the function approached in - direction, which is function - reversal.
+    std::vector<double> negative_standard_uncertainty;
+    // False: only its change from home is known; the values are then 0 at home.
+    bool constant_determined = true;
+};
+
 struct CalibratedSquareness {
     double value;                 // rad
     double standard_uncertainty;  // rad
@@ -42,6 +54,8 @@ struct Calibration {
     // Of all values in the order of the tables (functions by FunctionId::index, nodes ascending, then C0Y, B0Z, A0Z);
     // native units. Empty unless asked for.
     Eigen::MatrixXd covariance;
+
+    std::array<std::optional<CalibratedReversal>, function_count> reversal = {};  // where backward runs tell it
 };
 
 bool is_anything_determined(const Calibration& calibration);

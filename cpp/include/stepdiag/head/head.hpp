@@ -37,8 +37,13 @@ struct Head {
     HeadCalibration nominal = {};
 
     HeadCalibration calibration() const {
-        if (design) return nominal;
-        return {layout == HeadLayout::psd ? std::optional(psd_distance) : std::nullopt, beam_offsets};
+        HeadCalibration calibration = nominal;
+        if (!design) {
+            if (layout == HeadLayout::psd) calibration.psd_distance = psd_distance;
+            calibration.beam_offsets = beam_offsets;
+        }
+        calibration.standoff = standoff;
+        return calibration;
     }
 };
 

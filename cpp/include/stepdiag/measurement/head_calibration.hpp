@@ -20,6 +20,8 @@ struct HeadCalibration {
     Eigen::Vector2d spot_beam = Eigen::Vector2d::Zero();
     // What windows and splitters add to each distance of a nominal head, mm; the head has taken it off its readings.
     std::vector<double> head_constants = {};
+    // From the beam's origin to the line's first commanded functional point, mm.
+    double standoff = 100.0;
 };
 
 // Of all lines' heads.
