@@ -6,12 +6,9 @@ Lengths in mm, angles in rad.
 
 from __future__ import annotations
 
-import csv
 import re
-import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import mpmath
@@ -40,16 +37,25 @@ DOUBLE = Arithmetic(float, np.sqrt, np.sin, np.cos)
 DIGITS_40 = Arithmetic(lambda x: MP.mpf(float(x)) if not isinstance(x, MP.mpf) else x, MP.sqrt, MP.sin, MP.cos)
 
 
+Table = tuple[list[float], list[float]]
+Approach = tuple[int, int, int]  # per axis, the direction in which it came to where it stands: +1 or -1
+FORWARD = (1, 1, 1)
+
+
 @dataclass(frozen=True)
 class ErrorTable:
-    functions: dict[str, tuple[list[float], list[float]]] = field(default_factory=dict)
-    squareness: dict[str, float] = field(default_factory=dict)
+    """Functions of either direction, or those of the + direction beside `negative`, those of the - direction."""
 
-    def value(self, name: str, position: Number) -> Number:
+    functions: dict[str, Table] = field(default_factory=dict)
+    squareness: dict[str, float] = field(default_factory=dict)
+    negative: dict[str, Table] = field(default_factory=dict)
+
+    def value(self, name: str, position: Number, direction: int = 1) -> Number:
         """Linear between nodes, the end values outside."""
-        if name not in self.functions:
+        table = self.negative.get(name, self.functions.get(name)) if direction < 0 else self.functions.get(name)
+        if table is None:
             return position * 0
-        nodes, values = self.functions[name]
+        nodes, values = table
         if position <= nodes[0]:
             return position * 0 + values[0]
         for a, b, u, v in zip(nodes, nodes[1:], values, values[1:], strict=False):
@@ -57,35 +63,6 @@ class ErrorTable:
                 share = (position - a) / ((position * 0 + b) - a)
                 return (1 - share) * u + share * v
         return position * 0 + values[-1]
-
-
-def read_error_table(path: Path) -> ErrorTable:
-    functions: dict[str, tuple[list[float], list[float]]] = {}
-    squareness: dict[str, float] = {}
-    with open(path, newline="", encoding="utf-8") as file:
-        for row in csv.DictReader(line for line in file if not line.startswith("#")):
-            value = float(row["value"]) * {"um": 1e-3, "urad": 1e-6}[row["unit"]]
-            if row["position_mm"] == "":
-                squareness[row["parameter"]] = value
-            else:
-                nodes, values = functions.setdefault(row["parameter"], ([], []))
-                nodes.append(float(row["position_mm"]))
-                values.append(value)
-    return ErrorTable(functions, squareness)
-
-
-def read_rows(path: Path) -> list[dict[str, Any]]:
-    """Rows of a measurement file with native units; an empty field is None."""
-    factor = {"mm": 1.0, "urad": 1e-6}
-    rows = []
-    with open(path, newline="", encoding="utf-8") as file:
-        for text in csv.DictReader(file):
-            row: dict[str, Any] = {"line": text.pop("line"), "point": int(text.pop("point"))}
-            for column, value in text.items():
-                name, unit = column.rsplit("_", 1)
-                row[name] = float(value) * factor[unit] if value else None
-            rows.append(row)
-    return rows
 
 
 def frame(line: str, volume: Any, a: Arithmetic = DOUBLE) -> np.ndarray:
@@ -121,10 +98,12 @@ def turn(vector: Any, a: Arithmetic = DOUBLE) -> np.ndarray:
     )
 
 
-def axis_errors(table: ErrorTable, axis: str, p: Number, a: Arithmetic = DOUBLE) -> tuple[Vector, Vector]:
-    """delta_a and theta_a at a position, squarenesses included."""
-    delta = a.vector([table.value(f"E{c}{axis}", p) for c in "XYZ"])
-    theta = a.vector([table.value(f"E{c}{axis}", p) for c in "ABC"])
+def axis_errors(
+    table: ErrorTable, axis: str, p: Number, a: Arithmetic = DOUBLE, direction: int = 1
+) -> tuple[Vector, Vector]:
+    """delta_a and theta_a at a position approached in a direction, squarenesses (of both directions) included."""
+    delta = a.vector([table.value(f"E{c}{axis}", p, direction) for c in "XYZ"])
+    theta = a.vector([table.value(f"E{c}{axis}", p, direction) for c in "ABC"])
     if axis == "Y":
         delta[0] -= table.squareness.get("C0Y", 0.0) * p
     if axis == "Z":
@@ -133,8 +112,10 @@ def axis_errors(table: ErrorTable, axis: str, p: Number, a: Arithmetic = DOUBLE)
     return delta, theta
 
 
-def pose(chain: str, table: ErrorTable, tool: Any, commanded: Any, a: Arithmetic = DOUBLE) -> tuple[Any, Vector]:
-    """(rotation, functional point) by homogeneous 4x4 matrices, from w to t."""
+def pose(
+    chain: str, table: ErrorTable, tool: Any, commanded: Any, a: Arithmetic = DOUBLE, approach: Approach = FORWARD
+) -> tuple[Any, Vector]:
+    """(rotation, functional point) by homogeneous 4x4 matrices, from w to t; each axis approached as said."""
     links = re.findall(r"[XYZ]|b", chain)
     bed = links.index("b")
     total = np.array([[a.number(float(i == j)) for j in range(4)] for i in range(4)])
@@ -142,7 +123,7 @@ def pose(chain: str, table: ErrorTable, tool: Any, commanded: Any, a: Arithmetic
         if link == "b":
             continue
         p = a.number(commanded[AXES.index(link)])
-        delta, theta = axis_errors(table, link, p, a)
+        delta, theta = axis_errors(table, link, p, a, approach[AXES.index(link)])
         delta[AXES.index(link)] += p
         rotation, shift = homogeneous(turn(theta, a), None, a), homogeneous(None, delta, a)
         total = total @ rotation @ shift if place < bed else total @ shift @ rotation
@@ -161,6 +142,9 @@ def homogeneous(rotation: Any, shift: Any, a: Arithmetic) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Scenario:
+    """`misalignment` says by line: reflector, laser (rad), psd_zero, lateral (mm), pairs all; roll (rad), gain (1),
+    drift (mm/s), distance_constant (mm); beam_constants (mm, one a beam). What is missing is 0."""
+
     volume: tuple[float, float, float]
     chain: str
     lines: list[str]
@@ -172,36 +156,11 @@ class Scenario:
     standoff: float = 100.0
     psd_distance: float = 0.0
     beam_offsets: list[list[float]] = field(default_factory=list)
-    misalignment: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict)
+    misalignment: dict[str, dict[str, Any]] = field(default_factory=dict)
     noise: dict[str, float] = field(default_factory=dict)
-
-
-def read_scenario(path: Path) -> Scenario:
-    """As much of a scenario as the runs with known truth use."""
-    data = tomllib.loads(path.read_text(encoding="utf-8"))
-    head, plan, machine = data["head"], data["plan"], data["machine"]
-    misalignment = {}
-    for line, keys in data.get("misalignment", {}).items():
-        pairs = {"reflector": (0.0, 0.0), "laser": (0.0, 0.0), "psd_zero": (0.0, 0.0)}
-        for key, (u, v) in keys.items():
-            name, unit = key.rsplit("_", 1)
-            pairs[name] = (u * 1e-6, v * 1e-6) if unit == "urad" else (u, v)
-        misalignment[line] = pairs
-    return Scenario(
-        volume=(data["volume"]["x_mm"], data["volume"]["y_mm"], data["volume"]["z_mm"]),
-        chain=machine["chain"],
-        tool=tuple(machine["tool_mm"]),
-        lines=plan["lines"],
-        steps=plan["steps"],
-        order=plan["order"],
-        scale_lines=plan["scale_lines"],
-        layout=head["layout"],
-        standoff=head["standoff_mm"],
-        psd_distance=head.get("psd_distance_mm", 0.0),
-        beam_offsets=head.get("beam_offsets_mm", []),
-        misalignment=misalignment,
-        noise=data.get("noise", {}),
-    )
+    repeats: int = 1
+    backward: bool = False
+    seconds_per_reading: float | None = None
 
 
 def commanded_points(scenario: Scenario, line: str) -> list[tuple[float, float, float]]:
@@ -222,19 +181,35 @@ def commanded_points(scenario: Scenario, line: str) -> list[tuple[float, float, 
     return points
 
 
+def approach_of(line: str, backward: bool = False) -> Approach:
+    """How the axes come to each point of a visit: in its own travel's direction; one that stays at home in +."""
+    x, y, z = ((-1 if (s == "n") != backward else 1) if s != "0" else 1 for s in line)
+    return x, y, z
+
+
 def readings(
-    scenario: Scenario, table: ErrorTable, line: str, commanded: Any, a: Arithmetic = DOUBLE
+    scenario: Scenario,
+    table: ErrorTable,
+    line: str,
+    commanded: Any,
+    a: Arithmetic = DOUBLE,
+    backward: bool = False,
+    elapsed: Number = 0.0,
 ) -> dict[str, Number]:
-    """What the head reads on a line with the machine at a commanded position; by the conventions' words."""
-    pairs = scenario.misalignment.get(line, {})
-    reflector, laser = pairs.get("reflector", (0.0, 0.0)), pairs.get("laser", (0.0, 0.0))
-    zero = pairs.get("psd_zero", (0.0, 0.0))
+    """What the head reads on a line with the machine at a commanded position; by the conventions' words.
+
+    `elapsed`: seconds since the first reading of the set-up, by which the distances have drifted."""
+    setup = scenario.misalignment.get(line, {})
+    pair = {name: setup.get(name, (0.0, 0.0)) for name in ("reflector", "laser", "psd_zero", "lateral")}
+    gain = 1 + a.number(setup.get("gain", 0.0))
     local = frame(line, scenario.volume, a)
     start = a.vector(commanded_points(scenario, line)[0]) + a.vector(scenario.tool)
-    origin = start - a.number(scenario.standoff) * local[:, 2]
-    sensor = local @ turn([*laser, 0.0], a)
-    rotation, point = pose(scenario.chain, table, scenario.tool, commanded, a)
-    normal = rotation @ local @ turn([*reflector, 0.0], a) @ a.vector([0, 0, 1])
+    beside = local[:, :2] @ a.vector(pair["lateral"])
+    origin = start - a.number(scenario.standoff) * local[:, 2] + beside
+    sensor = local @ turn([*pair["laser"], 0.0], a) @ turn([0.0, 0.0, setup.get("roll", 0.0)], a)
+    approach = approach_of(line, backward)
+    rotation, point = pose(scenario.chain, table, scenario.tool, commanded, a, approach)
+    normal = rotation @ local @ turn([*pair["reflector"], 0.0], a) @ a.vector([0, 0, 1])
     beam = sensor[:, 2]
 
     def length_from(start_of_beam: Vector) -> Number:
@@ -242,25 +217,45 @@ def readings(
 
     back = beam - 2 * (normal @ beam) * normal
     cos_2phi = -(back @ beam)
+    offset = setup.get("distance_constant", 0.0) + a.number(setup.get("drift", 0.0)) * a.number(elapsed)
 
-    def half_round_trip(start_of_beam: Vector) -> Number:
+    def distance_from(start_of_beam: Vector) -> Number:
         length = length_from(start_of_beam)
-        return (length + length / cos_2phi) / 2
+        return (length + length / cos_2phi) / 2 + offset
 
-    distance = half_round_trip(origin)
     if scenario.layout == "multi_beam":
-        starts = [origin + u * sensor[:, 0] + v * sensor[:, 1] for u, v in scenario.beam_offsets]
-        return {f"d{i}": half_round_trip(s) for i, s in enumerate(starts, start=1)}
+        starts = [origin + gain * (sensor[:, :2] @ a.vector(uv)) for uv in scenario.beam_offsets]
+        constants = setup.get("beam_constants") or [0.0] * len(starts)
+        beams = zip(starts, constants, strict=True)
+        return {f"d{i}": distance_from(s) + constant for i, (s, constant) in enumerate(beams, start=1)}
+    distance = distance_from(origin)
     if scenario.layout == "psd":
         x, y, z = sensor.T @ back
-        way = length_from(origin) + scenario.psd_distance
-        return {"distance": distance, "spot_x": way * x / -z + zero[0], "spot_y": way * y / -z + zero[1]}
+        lever = gain * (length_from(origin) + scenario.psd_distance) / -z
+        zero = pair["psd_zero"]
+        return {"distance": distance, "spot_x": lever * x + zero[0], "spot_y": lever * y + zero[1]}
     n = sensor.T @ normal
-    return {"distance": distance, "alpha": -n[1] / n[2], "beta": n[0] / n[2]}
+    return {"distance": distance, "alpha": -gain * n[1] / n[2], "beta": gain * n[0] / n[2]}
 
 
 def simulate(scenario: Scenario, table: ErrorTable, a: Arithmetic = DOUBLE) -> Iterator[dict[str, Any]]:
-    """Rows of the run: the plan's lines, then its scale lines."""
+    """Rows in the order in which they are read: each of the plan's lines, then of its scale lines, all of its runs one
+    after the other: numbers 0, 1, 2, ...; or 0, 2, ... and after each a backward run, 1, 3, ..., points descending.
+
+    `time`: seconds since the run's first reading; the drift counts from a forward run's first one."""
+    count = 0
+    seconds = scenario.seconds_per_reading or 0.0
     for line in [*scenario.lines, *scenario.scale_lines]:
-        for point, commanded in enumerate(commanded_points(scenario, line)):
-            yield {"line": line, "point": point, "position": commanded, **readings(scenario, table, line, commanded, a)}
+        points = list(enumerate(commanded_points(scenario, line)))
+        visits = [(points, False), (points[::-1], True)] if scenario.backward else [(points, False)]
+        for repeat in range(scenario.repeats):
+            first = count
+            for i, (visit, backward) in enumerate(visits):
+                for point, commanded in visit:
+                    row = {"line": line, "point": point, "position": commanded, "run": repeat * len(visits) + i}
+                    row["direction"] = "backward" if backward else "forward"
+                    if scenario.seconds_per_reading is not None:
+                        row["time"] = count * seconds
+                    elapsed = (count - first) * seconds
+                    yield {**row, **readings(scenario, table, line, commanded, a, backward, elapsed)}
+                    count += 1

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import reference
+import reference_files
 from truth import (
     DIAGONALS,
     MICROMETRE,
@@ -35,7 +35,7 @@ LASER = sd.Misalignment(laser=(700e-6, 1000e-6))  # 1c
 
 
 def known_run(case: str) -> tuple[Setup, sd.Measurement, sd.ErrorMap]:
-    s = reference.read_scenario(RUNS / case / "scenario.toml")
+    s = reference_files.read_scenario(RUNS / case / "scenario.toml")
     head = sd.Head(s.layout, standoff=s.standoff, psd_distance=s.psd_distance, beam_offsets=s.beam_offsets)
     setup = Setup(s.steps, s.lines, s.scale_lines, s.order, s.chain, s.tool, s.volume, head)
     return setup, sd.read_measurement(RUNS / case / "measurement.csv"), sd.read_error_map(RUNS / case / "truth.csv")

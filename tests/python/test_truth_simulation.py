@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import reference
+import reference_files
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -53,8 +54,8 @@ def table_of(errors: sd.ErrorMap) -> reference.ErrorTable:
 
 @pytest.mark.parametrize("case", CASES)
 def test_run_with_known_truth_is_reproduced(case: str) -> None:
-    scenario = reference.read_scenario(RUNS / case / "scenario.toml")
-    rows = reference.read_rows(RUNS / case / "measurement.csv")
+    scenario = reference_files.read_scenario(RUNS / case / "scenario.toml")
+    rows = reference_files.read_rows(RUNS / case / "measurement.csv")
     run = simulated(scenario, sd.read_error_map(RUNS / case / "truth.csv"))
     place = {key: i for i, key in enumerate(zip(run.line, run.point, strict=True))}
     channels = set(run.channels)
@@ -77,9 +78,9 @@ def test_run_with_known_truth_is_reproduced(case: str) -> None:
 @pytest.mark.parametrize("case", [case for case in CASES if case != "noisy"])
 def test_reference_reproduces_the_runs_too(case: str) -> None:
     """The reference itself is checked against the files, so that it is worth comparing with."""
-    scenario = reference.read_scenario(RUNS / case / "scenario.toml")
-    table = reference.read_error_table(RUNS / case / "truth.csv")
-    expected = {(row["line"], row["point"]): row for row in reference.read_rows(RUNS / case / "measurement.csv")}
+    scenario = reference_files.read_scenario(RUNS / case / "scenario.toml")
+    table = reference_files.read_error_table(RUNS / case / "truth.csv")
+    expected = {(row["line"], row["point"]): row for row in reference_files.read_rows(RUNS / case / "measurement.csv")}
     for row in reference.simulate(scenario, table):
         for channel in LIMIT.keys() & row.keys():
             value = expected[row["line"], row["point"]][channel]
@@ -202,7 +203,7 @@ def test_plan_visits_the_points_of_the_conventions(scenario: reference.Scenario)
 
 
 def test_runs_made_in_threads_have_the_same_bits() -> None:
-    scenario = reference.read_scenario(RUNS / "noisy" / "scenario.toml")
+    scenario = reference_files.read_scenario(RUNS / "noisy" / "scenario.toml")
     errors = sd.read_error_map(RUNS / "noisy" / "truth.csv")
     noise = sd.Noise(distance=1e-4, tilt=1e-6, seed=11)
     alone = simulated(scenario, errors, noise=noise)
