@@ -10,8 +10,9 @@ from pathlib import Path
 import click
 
 from stepdiag._core import InvalidArgument, ReplayMismatch, __version__
+from stepdiag.cli_evaluate import evaluate
 from stepdiag.cli_head import head
-from stepdiag.cli_options import PATH, InOrder, out_file, tell
+from stepdiag.cli_options import PATH, InOrder, keep_apart, keep_map, out_file, tell
 
 EPILOG = """\b
 See it all at once:
@@ -56,55 +57,12 @@ def simulate(scenario: Path, output: Path) -> None:
     from stepdiag.scenario import read_scenario, simulate_scenario
 
     check_output(output)
-    _keep_apart(output, scenario)
+    keep_apart(output, scenario)
     described = read_scenario(scenario)
-    _keep_map(output, described.error_map)
+    keep_map(output, described.error_map)
     for warning in scenario_warnings(described):
         tell("warning", warning)
     simulate_scenario(described).write(output)
-
-
-@cli.command(
-    short_help=SHORT["evaluate"],
-    epilog="\b\nExample: stepdiag evaluate scenario.toml run.csv -m enhanced -o calibration.csv",
-)
-@click.argument("scenario", type=PATH)
-@click.argument("run", type=PATH)
-@click.option(
-    "-m",
-    "method",
-    type=click.Choice(["conventional", "enhanced"]),
-    default="enhanced",
-    show_default=True,
-    help="conventional uses distances only; enhanced uses the tilts and scale lines too.",
-)
-@out_file("Calibration file (CSV) to write.")
-def evaluate(scenario: Path, run: Path, method: str, output: Path) -> None:
-    """Evaluate the measurement RUN (CSV), made by SCENARIO's plan and head.
-
-    Finds the machine's 21 error parameters with their standard uncertainties, and says what the readings do
-    not determine. Of the scenario only chain, tool, plan, head and uncertainties are used.
-    """
-    from stepdiag import _core
-    from stepdiag.files import check_input, check_output
-    from stepdiag.report import evaluation_report
-    from stepdiag.scenario import evaluate_scenario, read_scenario
-
-    check_output(output)
-    _keep_apart(output, scenario, run)
-    check_input(run)
-    plan = read_scenario(scenario)
-    _keep_map(output, plan.error_map)
-    measurement = _core.read_measurement(run)
-    try:
-        calibration = evaluate_scenario(
-            plan, measurement, method="enhanced" if method == "enhanced" else "conventional"
-        )
-    except InvalidArgument as error:
-        raise InvalidArgument(f"{run}: {error}") from None
-    calibration.write(output)
-    for line in evaluation_report(calibration, measurement, plan):
-        click.echo(line)
 
 
 @cli.command(short_help=SHORT["demo"], epilog="\b\nExample: stepdiag demo -o demo")
@@ -203,24 +161,10 @@ def init(folder: Path, scenario: Path | None, head_name: str | None) -> None:
         click.echo(f"wrote {path}")
 
 
-cli.add_command(head)
+for command, name in ((evaluate, "evaluate"), (head, "head")):
+    command.short_help = SHORT[name]
+    cli.add_command(command)
 cli.commands = {name: cli.commands[name] for name in SHORT}  # the order in which help lists them
-
-
-def _keep_apart(output: Path, *inputs: Path) -> None:
-    for path in inputs:
-        if _same_file(output, path):
-            raise InvalidArgument(f"{output}: is also an input; give the output another name")
-
-
-def _keep_map(output: Path, error_map: Path | None) -> None:
-    # By name too: a result that fills the place of a missing map would be taken for the machine's errors.
-    if error_map is not None and (output.resolve() == error_map.resolve() or _same_file(output, error_map)):
-        raise InvalidArgument(f"{output}: is the scenario's machine.errors; give the output another name")
-
-
-def _same_file(one: Path, other: Path) -> bool:
-    return one.exists() and other.exists() and one.samefile(other)
 
 
 def _complain(message: str) -> None:
