@@ -156,7 +156,7 @@ def init(folder: Path, scenario: Path | None, head_name: str | None) -> None:
     make_folder(folder)
     for name, text in texts.items():
         write_whole(folder / name, text)
-    empty_sheet(plan.plan, plan.head).write(folder / "measurement.csv")
+    empty_sheet(plan.plan, plan.signals).write(folder / "measurement.csv")
     for path in written:
         click.echo(f"wrote {path}")
 

@@ -22,7 +22,7 @@ def evaluation_report(calibration: Calibration, measurement: Measurement, scenar
     """Method, largest standard uncertainty of each kind, lost readings, and what is not determined."""
     yield f"method: {calibration.method}, chain {calibration.chain.name}"
     yield f"readings: {len(measurement)} points on {len(set(measurement.line))} lines"
-    incomplete, missing = lost_readings(measurement, scenario.plan, scenario.head)
+    incomplete, missing = lost_readings(measurement, scenario.plan, scenario.signals)
     if incomplete or missing:
         yield f"lost: {incomplete} rows without a complete reading, {missing} points of the plan without a row"
     yield "largest standard uncertainties:"

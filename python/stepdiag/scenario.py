@@ -1,7 +1,7 @@
 """A scenario: one TOML file that says which machine, plan and head a run is made with.
 
-docs/scenario.md lists every key. An evaluator may ask a scenario for `chain`, `tool`, `plan`, `heads` and
-`uncertainty` only; the truth behind a simulated run (`machine()`, `actual_heads()`, `misalignment`, `noise`,
+docs/scenario.md lists every key. An evaluator may ask a scenario for `chain`, `tool`, `plan`, `heads`, `signals`
+and `uncertainty` only; the truth behind a simulated run (`machine()`, `actual_heads()`, `misalignment`, `noise`,
 `environment`) is not touched, and need not exist.
 """
 
@@ -16,10 +16,11 @@ from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.files import check_input, read_text
 from stepdiag.key_errors import models_of, show
-from stepdiag.scenario_heads import DescribedHead, actual_heads, heads_by_line, nominal_heads, of_run
+from stepdiag.scenario_heads import DescribedHead, actual_heads, heads_by_line, nominal_heads, of_run, signals_of
 from stepdiag.scenario_keys import TABLES_BY_NAME, RandomSection, ScenarioKeys
 from stepdiag.scenario_setup import environments, misalignments, noise_of, weights
 from stepdiag.sections import MICROMETRE, MICRORADIAN
+from stepdiag.sheet import only
 from stepdiag.toml_text import check_keys, located, parse_toml
 
 
@@ -34,6 +35,7 @@ class Scenario:
     plan: _core.Plan
     described_heads: Mapping[str, DescribedHead]
     heads: Mapping[str, _core.Head]
+    signals: tuple[str, ...]
     misalignment: Mapping[str, _core.Misalignment]
     noise: _core.Noise
     environment: _core.Environment | None
@@ -75,7 +77,7 @@ def simulate_scenario(scenario: Scenario) -> _core.Measurement:
     """The run that a scenario describes."""
     machine, heads = scenario.machine(), scenario.actual_heads()
     with located(str(scenario.path)):
-        return _core.simulate(
+        run = _core.simulate(
             machine,
             scenario.plan,
             of_run(heads),
@@ -85,6 +87,7 @@ def simulate_scenario(scenario: Scenario) -> _core.Measurement:
             assumed_environment=scenario.assumed_environment,
             verified_share=scenario.keys.head.verified_share,
         )
+    return only(run, scenario.signals)
 
 
 def evaluate_scenario(
@@ -96,7 +99,7 @@ def evaluate_scenario(
 ) -> _core.Calibration:
     """Evaluates a run of a scenario's plan, and sees nothing of its truth."""
     return _core.evaluate(
-        measurement,
+        only(measurement, scenario.signals),
         scenario.plan,
         of_run(scenario.heads),
         scenario.chain,
@@ -162,6 +165,7 @@ def _build(keys: ScenarioKeys, path: Path) -> Scenario:
         plan=plan,
         described_heads=MappingProxyType(described),
         heads=MappingProxyType(heads),
+        signals=tuple(signals_of(keys, next(iter(heads.values())), path)),
         misalignment=MappingProxyType(misalignments(keys, heads, path)),
         noise=noise_of(keys.noise),
         environment=environment,

@@ -98,6 +98,12 @@ class HeadSection(HeadKeys):
     verified_share: Share = key(
         SHARE, "Described heads: share of the poses whose replay is compared with the full trace.", 1e-3
     )
+    tilts: bool = key(
+        "true or false",
+        "false: distances only. Runs and sheets have no tilts or spots, and an evaluation does not look at those of a "
+        "run that has them. Not for beams d1, d2, ...",
+        True,
+    )
     by_head: dict[str, HeadKeys] = tables("NAME")
 
 

@@ -109,6 +109,15 @@ def actual_heads(heads: Mapping[str, DescribedHead], path: Path) -> dict[str, _c
     return {line: made[head.place] for line, head in heads.items()}
 
 
+def signals_of(keys: ScenarioKeys, head: _core.Head, path: Path) -> list[str]:
+    """The channels of a run. Raises InvalidArgument where there is nothing but tilts to leave out of them."""
+    if keys.head.tilts:
+        return head.signals
+    if head.layout == "multi_beam":
+        raise InvalidArgument(f'{path}: head.tilts: goes with the layouts "ideal" and "psd"; beams are distances all')
+    return ["distance"]
+
+
 def of_run(heads: Mapping[str, _core.Head]) -> _core.Head | dict[str, _core.Head]:
     """One head where all lines have the same."""
     several = {id(head) for head in heads.values()}

@@ -4,11 +4,12 @@ One home for all of them: what is refused, what the error message says, the tabl
 comments of the file that `stepdiag init` writes are made from the models below.
 """
 
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from stepdiag._core import Plan
+from stepdiag.adjustment_keys import AdjustmentSection, SmoothnessSection
 from stepdiag.key_errors import BY_HEAD, BY_LINE
 from stepdiag.scenario_head_keys import EnvironmentSection, HeadSection, LineKeys
 from stepdiag.sections import (
@@ -38,17 +39,9 @@ LARGEST_EDGE: Final = 1e6
 LARGEST_INTERVALS: Final = 1_000_000
 
 
-def _weighs(choice: str | float) -> str | float:
-    if isinstance(choice, str) or 0.0 < choice <= 1e9:
-        return choice
-    raise ValueError("not positive")
-
-
 Edge = Annotated[float, Field(ge=SMALLEST_EDGE, le=LARGEST_EDGE)]
-Choice = Annotated[Literal["free", "fixed"] | float, AfterValidator(_weighs)]
 
 _edge = "a length in mm from 0.001 to 1e6"
-_choice = '"free", "fixed" or a positive standard uncertainty'
 
 
 class VolumeSection(Section):
@@ -161,30 +154,6 @@ class UncertaintySection(Section):
     spot_um: Positive | None = key(POSITIVE, "Of the spot position.", None, 1.0)
 
 
-class AdjustmentKeys(Section):
-    """What an adjustment takes each unknown of a line's set-up for."""
-
-    reflector_urad: Choice | None = key(_choice, "Tilt of the mirror.", None, "free")
-    laser_urad: Choice | None = key(_choice, "Tilt of the beam.", None, "free")
-    distance_constant_mm: Choice | None = key(_choice, "Constant of a line's distances.", None, "free")
-    beam_constants_um: Choice | None = key(_choice, "Constants of the beams of `multi_beam`.", None, "fixed")
-    psd_zero_mm: Choice | None = key(_choice, "Zero offset of the position sensing device.", None, "fixed")
-    lateral_mm: Choice | None = key(_choice, "Lateral offset of the beam.", None, "fixed")
-    roll_urad: Choice | None = key(_choice, "Roll of the head about its beam.", None, "fixed")
-    gain: Choice | None = key(_choice, "Gain error of the tilts.", None, "fixed")
-    drift_um_per_h: Choice | None = key(_choice, "Drift of the distances.", None, "fixed")
-
-
-class AdjustmentSection(AdjustmentKeys):
-    """What an adjustment takes each unknown of the set-up for.
-
-    That is "free", "fixed" at 0, or a number: the standard uncertainty with which it is known to be 0.
-    Accepted and checked, but **not used yet**: neither `conventional` nor `enhanced` adjusts the set-up.
-    `[adjustment.LINE]` replaces, for one line, the keys it names."""
-
-    by_line: dict[str, AdjustmentKeys] = tables("LINE")
-
-
 class ScenarioKeys(Section):
     """The whole file, section by section."""
 
@@ -198,6 +167,7 @@ class ScenarioKeys(Section):
     noise: NoiseSection = NoiseSection()
     uncertainty: UncertaintySection = UncertaintySection()
     adjustment: AdjustmentSection = AdjustmentSection()
+    smoothness: SmoothnessSection = SmoothnessSection()
 
 
 # Sections that may hold tables of the user's own names, and where these are kept.

@@ -9,6 +9,7 @@ from conftest import SCENARIO
 import stepdiag as sd
 from stepdiag.head_description import find_head
 from stepdiag.scenario import parse_scenario
+from stepdiag.sheet import empty_sheet
 
 PLAIN = SCENARIO.split("[misalignment]")[0]
 PERFECT = PLAIN.replace("[machine.random]\nseed = 7\n", "")
@@ -222,3 +223,32 @@ def test_library_evaluates_without_asking_for_the_actual_heads(monkeypatch: pyte
     for owner, name in ((Scenario, "actual_heads"), (DescribedHead, "actual"), (Scenario, "machine")):
         monkeypatch.setattr(owner, name, forbidden)
     assert sd.evaluate_scenario(scenario, run).method == "enhanced"
+
+
+# --- distances only --------------------------------------------------------------------------------------------------
+NO_TILTS = PLAIN.replace('layout = "ideal"', 'layout = "ideal"\ntilts = false')
+
+
+@pytest.mark.parametrize("head", ['"ideal"', CLOSED])
+def test_run_without_tilts_has_the_distances_of_the_one_with_them(head: str) -> None:
+    run, whole = (run_of(text.replace('"ideal"', head)) for text in (NO_TILTS, PLAIN))
+    assert run.channels.keys() == {"distance"}
+    assert run.channels["distance"].tobytes() == whole.channels["distance"].tobytes()
+
+
+def test_evaluation_without_tilts_does_not_look_at_those_of_a_run() -> None:
+    scenario = parse_scenario(NO_TILTS)
+    whole = run_of(PLAIN)
+    assert empty_sheet(scenario.plan, scenario.signals).channels.keys() == {"distance"}
+    with pytest.raises(sd.InvalidArgument, match="nothing can be determined"):
+        sd.evaluate_scenario(scenario, whole, method="enhanced")
+    calibration = sd.evaluate_scenario(scenario, whole, method="conventional")
+    assert (
+        calibration.functions.keys()
+        == sd.evaluate_scenario(parse_scenario(PLAIN), whole, method="conventional").functions.keys()
+    )
+
+
+def test_beams_are_distances_all() -> None:
+    with pytest.raises(sd.InvalidArgument, match=r's\.toml: head\.tilts: goes with the layouts "ideal" and "psd"'):
+        parse_scenario(BEAMS.replace("[head]", "[head]\ntilts = false"), "s.toml")
