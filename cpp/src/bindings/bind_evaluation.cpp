@@ -1,4 +1,5 @@
 #include "bindings.hpp"
+#include "stepdiag/evaluation/adjustment.hpp"
 #include "stepdiag/evaluation/conventional.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
 
@@ -11,12 +12,18 @@ Calibration evaluate(const Measurement& measurement, const Plan& plan, const Hea
     const auto evaluator = method == "enhanced"       ? &evaluate_enhanced
                            : method == "conventional" ? &evaluate_conventional
                                                       : nullptr;
-    if (!evaluator) throw InvalidArgument("method: expected \"conventional\" or \"enhanced\", got \"" + method + "\"");
+    if (!evaluator && method != "adjustment")
+        throw InvalidArgument("method: expected \"conventional\", \"enhanced\" or \"adjustment\", got \"" + method +
+                              "\"");
     const Eigen::Vector3d offset = to_vector3(tool, "tool");
     const Chain kinematics = to_chain(chain);
     const HeadCalibrations heads = to_heads(head, plan).calibration();
     py::gil_scoped_release release;
-    return evaluator(measurement, plan, kinematics, offset, heads, {uncertainty, full_covariance});
+    if (evaluator) return evaluator(measurement, plan, kinematics, offset, heads, {uncertainty, full_covariance});
+    AdjustmentOptions options;
+    options.uncertainty = uncertainty;
+    options.full_covariance = full_covariance;
+    return adjust(measurement, plan, kinematics, offset, heads, options).calibration;
 }
 
 std::vector<std::pair<std::string, std::optional<double>>> covariance_labels(const Calibration& calibration) {
@@ -115,7 +122,7 @@ void bind_evaluation(py::module_& m) {
         "read_calibration", [](const PathLike& path) { return read_calibration(to_path(path)); }, py::arg("path"),
         "Reads a calibration CSV. Raises InvalidArgument naming file and line.");
     m.def("evaluate", &evaluate, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
-          py::arg("tool") = zeros(3), py::kw_only(), py::arg("method") = "enhanced",
+          py::arg("tool") = zeros(3), py::kw_only(), py::arg("method") = "adjustment",
           py::arg("uncertainty") = ReadingUncertainty{}, py::arg("full_covariance") = false,
           "Calibration from a run. Of the head only its calibration is used, of the machine only chain "
           "and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan.");

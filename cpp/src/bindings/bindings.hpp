@@ -79,6 +79,7 @@ void bind_traced_head(py::module_& m);
 void bind_simulation(py::module_& m);
 void bind_detectors(py::module_& m);
 void bind_evaluation(py::module_& m);
+void bind_adjustment(py::module_& m);
 
 }  // namespace stepdiag::bindings
 

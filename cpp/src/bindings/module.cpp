@@ -157,4 +157,5 @@ PYBIND11_MODULE(_core, m) {
     bind_detectors(m);
     bind_traced_head(m);
     bind_evaluation(m);
+    bind_adjustment(m);
 }

@@ -3,32 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <sstream>
 
+#include "evaluation/rows.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
 namespace {
-
-constexpr double position_tolerance = 1e-3;  // mm: positions are written with three decimals by many controllers
-
-std::string row_name(const Measurement& measurement, std::size_t row) {
-    const Station& station = measurement.stations()[row];
-    return "data row " + std::to_string(row + 1) + " (run " + std::to_string(station.run) + ", line " +
-           station.line.name() + ", point " + std::to_string(station.point) + ")";
-}
-
-// One raw value with its standard uncertainty; none where it was lost.
-struct RawValue {
-    double value;
-    double standard_uncertainty;
-};
-
-std::optional<RawValue> raw_value(const Channel* channel, std::size_t row, double fallback) {
-    if (!channel || !channel->value[row]) return std::nullopt;
-    const auto own = channel->standard_uncertainty.empty() ? std::nullopt : channel->standard_uncertainty[row];
-    return RawValue{*channel->value[row], own.value_or(fallback)};
-}
 
 // Reading and effects of the raw channels on (distance, alpha, beta).
 struct Reduced {
@@ -59,10 +39,8 @@ public:
           beta_(kind == LengthKind::distance ? nullptr : measurement.find("beta")),
           spot_x_(kind == LengthKind::distance ? nullptr : measurement.find("spot_x")),
           spot_y_(kind == LengthKind::distance ? nullptr : measurement.find("spot_y")) {
-        const int beams = measurement.beam_count();
-        check(heads.head, beams);
-        for (const auto& entry : heads.by_line) check(entry.second, beams);
-        for (int i = 1; i <= beams; ++i) beams_.push_back(measurement.find("d" + std::to_string(i)));
+        check_heads_fit(measurement, heads, kind != LengthKind::distance);
+        for (int i = 1; i <= measurement.beam_count(); ++i) beams_.push_back(measurement.find("d" + std::to_string(i)));
     }
 
     Reduced reduce(std::size_t row) const {
@@ -70,14 +48,6 @@ public:
     }
 
 private:
-    void check(const HeadCalibration& head, int beams) const {
-        if (beams > 0 && beams != int(head.beam_offsets.size()))
-            throw InvalidArgument("measurement: has " + std::to_string(beams) + " beams d1 ... d" +
-                                  std::to_string(beams) + ", but the head's beam_offsets name " +
-                                  std::to_string(head.beam_offsets.size()));
-        if (spot_x_ && !head.psd_distance)
-            throw InvalidArgument("measurement: has spot readings, but the head has no psd_distance (layout \"psd\")");
-    }
     const HeadCalibration& head(std::size_t row) const { return heads_.of(measurement_.stations()[row].line.name()); }
 
     [[noreturn]] void refuse(std::size_t row, const std::string& what) const {
@@ -174,15 +144,6 @@ void fill_point(VisitPoint& point, const Reduced& reduced, double travel, bool i
     }
 }
 
-void check_position(const Measurement& measurement, std::size_t row, const Eigen::Vector3d& expected) {
-    const Eigen::Vector3d& commanded = measurement.stations()[row].commanded;
-    if ((commanded - expected).cwiseAbs().maxCoeff() <= position_tolerance) return;
-    std::ostringstream text;
-    text << row_name(measurement, row) << ": the plan has this point at (" << expected.transpose()
-         << ") mm, the row says (" << commanded.transpose() << ") mm";
-    throw InvalidArgument(text.str());
-}
-
 }  // namespace
 
 Eigen::Vector3d VisitPoint::variance() const {
@@ -193,37 +154,22 @@ Eigen::Vector3d VisitPoint::variance() const {
 
 std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& plan, const HeadCalibrations& heads,
                                   const ReadingUncertainty& uncertainty, LengthKind kind) {
-    for (const auto& [key, u] : {std::pair("distance", uncertainty.distance), std::pair("tilt", uncertainty.tilt),
-                                 std::pair("spot", uncertainty.spot)})
-        if (!(u > 0.0 && std::isfinite(u)))
-            throw InvalidArgument(std::string("uncertainty.") + key +
-                                  ": expected a positive finite standard uncertainty");
+    check_uncertainty(uncertainty);
     const Reducer reducer(measurement, heads, uncertainty, kind);
-    std::map<std::pair<int, std::string>, std::vector<std::size_t>> rows;
-    for (std::size_t i = 0; i < measurement.size(); ++i)
-        rows[{measurement.stations()[i].run, measurement.stations()[i].line.name()}].push_back(i);
+    const auto rows = rows_by_visit(measurement);
 
     std::vector<Visit> visits;
     int readings = 0;
     for (const auto& entry : rows) {
         const std::vector<std::size_t>& members = entry.second;
         const Line line = measurement.stations()[members.front()].line;
-        const auto planned = [&] {
-            try {
-                return plan.points(line);
-            } catch (const InvalidArgument& error) {
-                throw InvalidArgument(row_name(measurement, members.front()) + ": " + error.what());
-            }
-        }();
+        const auto planned = planned_points(measurement, members.front(), plan);
         Visit visit{line, plan.is_scale_line(line), plan.frame(line), {}, readings};
         for (const PlanPoint& point : planned) visit.points.emplace_back().plan = point;
         const Eigen::Vector3d start = planned.front().commanded;
         for (const std::size_t row : members) {
             const Station& station = measurement.stations()[row];
-            if (station.point >= int(planned.size()))
-                throw InvalidArgument(row_name(measurement, row) + ": the line has the points 0 to " +
-                                      std::to_string(planned.size() - 1));
-            check_position(measurement, row, planned[station.point].commanded);
+            check_station(measurement, row, planned);
             VisitPoint& point = visit.points[station.point];
             // The file's position only finds the point: it may have been rounded when it was written.
             const Eigen::Vector3d travel = visit.frame.transpose() * (planned[station.point].commanded - start);

@@ -63,6 +63,7 @@ struct AdjustmentOptions {
     // A set-up serves a run's line and the backward runs that follow it; or, if true, all runs of the line.
     bool one_setup_per_line = false;
     bool reversal = true;  // where there are backward runs: tables of their own for nodes approached in - direction
+    bool rotations = true;  // false: the machine is taken to have no angular errors
     std::optional<Smoothness> smoothness = {};
     // Readings that do not fit are left out, the worst first, at this probability of any false alarm in a run; 0: none
     // is. No more than one in fifty, or ten: where more do not fit, it is the model that does not, and all stay.

@@ -1,0 +1,234 @@
+#include <cmath>
+
+#include "bindings.hpp"
+#include "stepdiag/evaluation/adjustment.hpp"
+
+namespace stepdiag::bindings {
+namespace {
+
+// None, "free", "fixed" or a standard uncertainty.
+class PriorLike : public py::object {
+    PYBIND11_OBJECT_DEFAULT(PriorLike, py::object, PyObject_Type)
+};
+
+struct Priors {
+    SetupPriors value;
+};
+
+std::optional<PriorUncertainty> to_prior(const PriorLike& prior, const std::string& quantity) {
+    if (prior.is_none()) return std::nullopt;
+    if (py::isinstance<py::str>(prior)) {
+        const auto text = prior.cast<std::string>();
+        if (text == "free") return free_unknown;
+        if (text == "fixed") return fixed_unknown;
+    } else if (PyNumber_Check(prior.ptr()) && !PyBool_Check(prior.ptr())) {
+        const double number = py::float_(prior).cast<double>();
+        if (std::isfinite(number) && number > 0.0) return number;
+    }
+    throw InvalidArgument(quantity + ": expected None, \"free\", \"fixed\" or a positive standard uncertainty, got " +
+                          std::string(py::repr(prior)));
+}
+
+struct Outlier {
+    std::size_t row;
+    int run;
+    std::string line;
+    int point;
+    std::string channel;
+    double residual;
+    double normalised;
+};
+
+// What Python sees: an adjustment, and the run's rows that it belongs to.
+struct AdjustmentOfRun {
+    Adjustment adjustment;
+    std::vector<Station> stations;
+
+    template <typename Value>
+    py::dict by_channel(double missing, const Value& value) const {
+        py::dict channels;
+        for (const ReadingResidual& residual : adjustment.residuals) {
+            const py::str name(residual.channel);
+            if (!channels.contains(name)) {
+                py::array_t<double> empty(py::ssize_t(stations.size()));
+                std::fill_n(empty.mutable_data(), stations.size(), missing);
+                channels[name] = empty;
+            }
+            channels[name].cast<py::array_t<double>>().mutable_data()[residual.row] = value(residual);
+        }
+        return channels;
+    }
+};
+
+using ChannelArrays = py::typing::Dict<py::str, DoubleArray>;
+
+PriorLike none() { return py::reinterpret_borrow<PriorLike>(py::none()); }
+
+}  // namespace
+}  // namespace stepdiag::bindings
+
+namespace pybind11::detail {
+template <>
+struct handle_type_name<stepdiag::bindings::PriorLike> {
+    static constexpr auto name = const_name("float | str | None");
+};
+}  // namespace pybind11::detail
+
+namespace stepdiag::bindings {
+namespace {
+
+void bind_options(py::module_& m) {
+    py::class_<Priors>(m, "SetupPriors",
+                       "How each unknown of a line's set-up is taken: \"free\", \"fixed\" at 0, or the standard "
+                       "uncertainty with which it is known to be 0 (rad, mm, 1 for gain, mm/s for drift); None: the "
+                       "default.")
+        .def(py::init([](const PriorLike& reflector, const PriorLike& laser, const PriorLike& distance_constant,
+                         const PriorLike& beam_constants, const PriorLike& psd_zero, const PriorLike& lateral,
+                         const PriorLike& roll, const PriorLike& gain, const PriorLike& drift) {
+                 const std::array<const PriorLike*, setup_quantity_count> given = {
+                     &reflector, &laser, &distance_constant, &beam_constants, &psd_zero, &lateral, &roll, &gain,
+                     &drift};
+                 Priors priors;
+                 for (int q = 0; q < setup_quantity_count; ++q)
+                     priors.value[q] = to_prior(*given[q], name(SetupQuantity(q)));
+                 return priors;
+             }),
+             py::kw_only(), py::arg("reflector") = none(), py::arg("laser") = none(),
+             py::arg("distance_constant") = none(), py::arg("beam_constants") = none(), py::arg("psd_zero") = none(),
+             py::arg("lateral") = none(), py::arg("roll") = none(), py::arg("gain") = none(),
+             py::arg("drift") = none(), "Raises InvalidArgument.");
+
+    py::class_<Smoothness>(m, "Smoothness",
+                           "Standard deviations with which second differences of neighbouring nodes are known to be 0: "
+                           "translation (mm), rotation (rad); 0: no such knowledge. cross_validated: found for each "
+                           "function, not below these.")
+        .def(py::init([](double translation, double rotation, bool cross_validated) {
+                 return Smoothness{translation, rotation, cross_validated};
+             }),
+             py::kw_only(), py::arg("translation") = 0.0, py::arg("rotation") = 0.0, py::arg("cross_validated") = false)
+        .def_readonly("translation", &Smoothness::translation)
+        .def_readonly("rotation", &Smoothness::rotation)
+        .def_readonly("cross_validated", &Smoothness::cross_validated);
+}
+
+void bind_result(py::module_& m) {
+    py::class_<SetupEstimate>(m, "SetupEstimate", "One unknown of a line's set-up as it was found; rad, mm, 1, mm/s.")
+        .def_readonly("run", &SetupEstimate::run)
+        .def_readonly("line", &SetupEstimate::line)
+        .def_property_readonly("quantity", [](const SetupEstimate& e) { return name(e.quantity); })
+        .def_readonly("component", &SetupEstimate::component, "0 or 1 of pairs; of beam_constants 1 for d2, ...")
+        .def_readonly("value", &SetupEstimate::value, "None where it is not determined.")
+        .def_readonly("standard_uncertainty", &SetupEstimate::standard_uncertainty)
+        .def_readonly("prior", &SetupEstimate::prior, "Standard uncertainty of its prior; infinite where it is free.");
+
+    py::class_<Outlier>(m, "Outlier", "A reading that did not fit and was left out.")
+        .def_readonly("row", &Outlier::row)
+        .def_readonly("run", &Outlier::run)
+        .def_readonly("line", &Outlier::line)
+        .def_readonly("point", &Outlier::point)
+        .def_readonly("channel", &Outlier::channel)
+        .def_readonly("residual", &Outlier::residual, "mm or rad")
+        .def_readonly("normalised", &Outlier::normalised, "In its standard uncertainties.");
+
+    using Result = AdjustmentOfRun;
+    py::class_<Result>(m, "Adjustment", "What an adjustment found: calibration, set-ups, and how the readings fit.")
+        .def_property_readonly("calibration", [](const Result& r) { return r.adjustment.calibration; })
+        .def_property_readonly("setup", [](const Result& r) { return r.adjustment.setup; })
+        .def_property_readonly(
+            "residuals",
+            [](const Result& r) -> ChannelArrays {
+                return r.by_channel(NAN, [](const ReadingResidual& x) { return x.residual; });
+            },
+            "channel -> (n,) read minus adjusted, mm or rad, by row of the measurement; NaN where nothing was read.")
+        .def_property_readonly(
+            "redundancy",
+            [](const Result& r) -> ChannelArrays {
+                return r.by_channel(NAN, [](const ReadingResidual& x) { return x.redundancy; });
+            },
+            "channel -> (n,): 0 where nothing controls a reading, 1 where all others know it better.")
+        .def_property_readonly(
+            "normalised_residuals",
+            [](const Result& r) -> ChannelArrays {
+                return r.by_channel(NAN, [](const ReadingResidual& x) { return x.normalised; });
+            },
+            "channel -> (n,): residuals by their own standard uncertainty.")
+        .def_property_readonly(
+            "used",
+            [](const Result& r) {
+                py::dict used = r.by_channel(0.0, [](const ReadingResidual& x) { return x.used ? 1.0 : 0.0; });
+                for (const auto& item : used) used[item.first] = item.second.attr("astype")("bool");
+                return py::typing::Dict<py::str, py::array_t<bool>>(used);
+            },
+            "channel -> (n,) whether a reading was used: it was there, and is no outlier.")
+        .def_property_readonly("outliers",
+                               [](const Result& r) {
+                                   std::vector<Outlier> list;
+                                   for (const std::size_t i : r.adjustment.outliers()) {
+                                       const ReadingResidual& x = r.adjustment.residuals[i];
+                                       const Station& s = r.stations[x.row];
+                                       list.push_back({x.row, s.run, s.line.name(), s.point, x.channel, x.residual,
+                                                       x.normalised});
+                                   }
+                                   return list;
+                               })
+        .def_property_readonly("weighted_square_sum", [](const Result& r) { return r.adjustment.weighted_square_sum; })
+        .def_property_readonly("variance_factor", [](const Result& r) { return r.adjustment.variance_factor(); })
+        .def_property_readonly("degrees_of_freedom", [](const Result& r) { return r.adjustment.degrees_of_freedom; })
+        .def_property_readonly(
+            "chi_square_probability", [](const Result& r) { return r.adjustment.chi_square_probability; },
+            "Of a larger square sum, if model and uncertainties are right.")
+        .def_property_readonly("iterations", [](const Result& r) { return r.adjustment.iterations; })
+        .def_property_readonly(
+            "combinations", [](const Result& r) { return r.adjustment.combinations; },
+            "What is known of unknowns that are not determined one by one.")
+        .def_property_readonly(
+            "smoothness",
+            [](const Result& r) {
+                std::map<std::string, double> deviations;
+                for (int i = 0; i < function_count; ++i)
+                    if (r.adjustment.smoothness[i] > 0.0)
+                        deviations[FunctionId::at(i).name()] = r.adjustment.smoothness[i];
+                return deviations;
+            },
+            "function -> standard deviation of its second differences (mm or rad) in force.");
+}
+
+AdjustmentOfRun adjust_run(const Measurement& measurement, const Plan& plan, const HeadLike& head,
+                           const ChainLike& chain, const ArrayLike& tool, const ReadingUncertainty& uncertainty,
+                           const Priors& setup, const std::map<std::string, Priors>& setup_by_line,
+                           bool one_setup_per_line, bool reversal, bool rotations,
+                           const std::optional<Smoothness>& smoothness, double outlier_probability,
+                           bool full_covariance) {
+    AdjustmentOptions options;
+    options.uncertainty = uncertainty;
+    options.setup = setup.value;
+    for (const auto& [line, priors] : setup_by_line) options.setup_by_line[line] = priors.value;
+    options.one_setup_per_line = one_setup_per_line;
+    options.reversal = reversal;
+    options.rotations = rotations;
+    options.smoothness = smoothness;
+    options.outlier_probability = outlier_probability;
+    options.full_covariance = full_covariance;
+    const Eigen::Vector3d offset = to_vector3(tool, "tool");
+    const Chain kinematics = to_chain(chain);
+    const HeadCalibrations heads = to_heads(head, plan).calibration();
+    py::gil_scoped_release release;
+    return {adjust(measurement, plan, kinematics, offset, heads, options), measurement.stations()};
+}
+
+}  // namespace
+
+void bind_adjustment(py::module_& m) {
+    bind_options(m);
+    bind_result(m);
+    m.def("adjust", &adjust_run, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
+          py::arg("tool") = zeros(3), py::kw_only(), py::arg("uncertainty") = ReadingUncertainty{},
+          py::arg("setup") = Priors{}, py::arg("setup_by_line") = std::map<std::string, Priors>{},
+          py::arg("one_setup_per_line") = false, py::arg("reversal") = true, py::arg("rotations") = true,
+          py::arg("smoothness") = std::nullopt, py::arg("outlier_probability") = 0.01,
+          py::arg("full_covariance") = false,
+          "The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. "
+          "setup_by_line replaces the quantities that it names. Raises InvalidArgument.");
+}
+
+}  // namespace stepdiag::bindings

@@ -1,0 +1,203 @@
+#include "stepdiag/evaluation/adjustment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <sstream>
+#include <unsupported/Eigen/SpecialFunctions>
+
+#include "evaluation/adjustment_result.hpp"
+#include "evaluation/smoothness.hpp"
+#include "stepdiag/core/error.hpp"
+#include "stepdiag/core/units.hpp"
+
+namespace stepdiag {
+namespace {
+
+void check_options(const AdjustmentOptions& options, const Plan& plan) {
+    if (!(options.outlier_probability >= 0.0 && options.outlier_probability <= 0.5))
+        throw InvalidArgument("adjustment outlier_probability: expected a probability from 0 to 0.5");
+    if (const auto& s = options.smoothness)
+        for (const auto& [key, value] : {std::pair("translation", s->translation), std::pair("rotation", s->rotation)})
+            if (!(value >= 0.0 && std::isfinite(value)))
+                throw InvalidArgument(std::string("smoothness ") + key + ": expected a finite deviation, at least 0");
+    for (const auto& entry : options.setup_by_line)
+        if (!plan.contains(Line::parse(entry.first)))
+            throw InvalidArgument("adjustment: line \"" + entry.first + "\" is not in the plan");
+}
+
+std::array<double, function_count> smoothness_at_start(const AdjustmentOptions& options) {
+    if (!options.smoothness || options.smoothness->cross_validated) return {};
+    return given_deviations(*options.smoothness);
+}
+
+int degrees_of_freedom(const AdjustmentSolver& solver) {
+    const AdjustmentProblem& problem = solver.equations().problem();
+    int count = int(solver.equations().smooth_rows().size()) - (problem.size() - int(solver.held().size()));
+    for (const AdjustedReading& reading : problem.readings()) count += reading.used;
+    for (const double prior : problem.prior()) count += std::isfinite(prior);
+    for (const int held : solver.held()) count -= std::isfinite(problem.prior()[held]);
+    return count;
+}
+
+// Leaves out readings that do not fit, the worst first (W. Baarda's data snooping, each reading against what the others
+// say of it), and adjusts again; puts them back where they are too many.
+class OutlierSearch {
+public:
+    OutlierSearch(AdjustmentProblem& problem, AdjustmentSolver& solver, double probability)
+        : problem_(problem), solver_(solver) {
+        const double count = double(problem.readings().size());
+        limit_ = -Eigen::numext::ndtri(probability / (2.0 * count));
+        most_ = std::max<std::size_t>(10, problem.readings().size() / 50);
+    }
+
+    void run(Eigen::VectorXd& x) {
+        const Eigen::VectorXd before = x;
+        for (std::size_t found = 0;; ++found) {
+            const std::optional<std::size_t> worst = worst_reading(x);
+            if (!worst) return;
+            if (found == most_) break;
+            problem_.readings()[*worst].used = false;
+            solver_.solve(x);
+        }
+        for (AdjustedReading& reading : problem_.readings()) reading.used = true;
+        x = before;
+    }
+
+private:
+    std::optional<std::size_t> worst_reading(const Eigen::VectorXd& x) {
+        solver_.factorize(x);
+        const auto residuals = reading_residuals(solver_.equations(), solver_.factor().selected_inverse());
+        const double square_sum = solver_.equations().square_sum(x);
+        const int freedom = degrees_of_freedom(solver_);
+        std::size_t worst = 0;
+        for (std::size_t r = 1; r < residuals.size(); ++r)
+            if (size(residuals[r]) > size(residuals[worst])) worst = r;
+        // Where all readings scatter more than was said, the worst is measured against that.
+        const double w = size(residuals[worst]);
+        const double others = freedom > 1 ? std::max(1.0, (square_sum - w * w) / (freedom - 1)) : 1.0;
+        return w > limit_ * std::sqrt(others) ? std::optional(worst) : std::nullopt;
+    }
+    static double size(const ReadingResidual& residual) { return residual.used ? std::abs(residual.normalised) : 0.0; }
+
+    AdjustmentProblem& problem_;
+    AdjustmentSolver& solver_;
+    double limit_;
+    std::size_t most_;
+};
+
+std::vector<std::string> describe(const Observability& observability, const Eigen::VectorXd& x,
+                                  const BorderedBand& inverse) {
+    std::vector<std::string> sentences;
+    for (const KnownCombination& combination : observability.combinations()) {
+        std::ostringstream text;
+        text.precision(4);
+        text << combination.text << " = " << combination.form.value(x) / microradian << " +- "
+             << std::sqrt(std::max(0.0, combination.form.variance(inverse))) / microradian
+             << (combination.is_angle ? " urad" : " um/m");
+        sentences.push_back(text.str());
+    }
+    return sentences;
+}
+
+}  // namespace
+
+double Adjustment::variance_factor() const {
+    return degrees_of_freedom > 0 ? weighted_square_sum / degrees_of_freedom : 1.0;
+}
+
+std::vector<std::size_t> Adjustment::outliers() const {
+    std::vector<std::size_t> list;
+    for (std::size_t r = 0; r < residuals.size(); ++r)
+        if (!residuals[r].used) list.push_back(r);
+    std::sort(list.begin(), list.end(), [&](std::size_t i, std::size_t j) {
+        return std::abs(residuals[i].normalised) > std::abs(residuals[j].normalised);
+    });
+    return list;
+}
+
+Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
+                  const HeadCalibrations& heads, const AdjustmentOptions& options) {
+    check_options(options, plan);
+    AdjustmentProblem problem(measurement, plan, chain, tool, heads, options);
+    if (problem.readings().empty()) throw InvalidArgument("adjustment: the run has no readings");
+    AdjustmentSolver solver(problem, smoothness_at_start(options));
+    AdjustmentTables tables(problem);
+    const Observability observability(solver, tables);
+    const CalibratedForms forms = choose_forms(problem, tables);
+
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
+    Adjustment result{{"", chain, {}, {}, {}, {}, {}, {}, {}}, {}, {}, 0.0, 0, 1.0, 0, {}, smoothness_at_start(options)};
+    result.iterations = solver.solve(x);
+    if (options.outlier_probability > 0.0) OutlierSearch(problem, solver, options.outlier_probability).run(x);
+    if (options.smoothness && options.smoothness->cross_validated) {
+        result.smoothness = cross_validate(solver, x, options);
+        solver.solve(x);
+    }
+
+    solver.factorize(x);
+    const BorderedBand inverse = solver.factor().selected_inverse();
+    result.calibration = make_calibration(problem, tables, forms, x, inverse);
+    result.calibration.undetermined = observability.sentences();
+    if (!is_anything_determined(result.calibration))
+        throw InvalidArgument("adjustment: nothing can be determined. " +
+                              (result.calibration.undetermined.empty() ? std::string()
+                                                                       : result.calibration.undetermined.front()));
+    if (options.full_covariance) result.calibration.covariance = full_covariance(problem, forms, solver.factor());
+    result.setup = setup_estimates(problem, observability, x, inverse);
+    result.residuals = reading_residuals(solver.equations(), inverse);
+    result.combinations = describe(observability, x, inverse);
+    result.weighted_square_sum = solver.equations().square_sum(x);
+    result.degrees_of_freedom = degrees_of_freedom(solver);
+    if (result.degrees_of_freedom > 0)
+        result.chi_square_probability =
+            Eigen::numext::igammac(0.5 * result.degrees_of_freedom, 0.5 * result.weighted_square_sum);
+    return result;
+}
+
+struct Adjuster::State {
+    AdjustmentProblem problem;
+    std::vector<std::string> channels;
+    AdjustmentSolver solver;
+    std::vector<LinearForm> forms;
+    Eigen::VectorXd start;
+
+    State(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
+          const HeadCalibrations& heads, const AdjustmentOptions& options)
+        : problem(measurement, plan, chain, tool, heads, options), solver(problem, smoothness_at_start(options)) {
+        check_options(options, plan);
+        AdjustmentTables tables(problem);
+        const Observability observability(solver, tables);
+        const CalibratedForms chosen = choose_forms(problem, tables);
+        for (const LinearForm* form : chosen.in_order()) forms.push_back(*form);
+        start.setZero(problem.size());
+        solver.solve(start);
+        solver.factorize(start);
+        for (const Channel& channel : measurement.channels()) channels.push_back(channel.name);
+        channel_of_reading.reserve(problem.readings().size());
+        for (const AdjustedReading& reading : problem.readings())
+            channel_of_reading.push_back(int(std::find(channels.begin(), channels.end(), problem.channel_name(reading)) -
+                                             channels.begin()));
+    }
+    std::vector<int> channel_of_reading;
+};
+
+Adjuster::Adjuster(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
+                   const HeadCalibrations& heads, const AdjustmentOptions& options)
+    : state_(std::make_unique<State>(measurement, plan, chain, tool, heads, options)) {}
+Adjuster::~Adjuster() = default;
+Adjuster::Adjuster(Adjuster&&) noexcept = default;
+
+Eigen::VectorXd Adjuster::evaluate(const Eigen::MatrixXd& readings) {
+    State& s = *state_;
+    auto& list = s.problem.readings();
+    for (std::size_t r = 0; r < list.size(); ++r)
+        list[r].value = readings(s.channel_of_reading[r], Eigen::Index(list[r].row));
+    Eigen::VectorXd x = s.start;
+    s.solver.solve_nearby(x);
+    Eigen::VectorXd values(s.forms.size());
+    for (std::size_t i = 0; i < s.forms.size(); ++i) values[Eigen::Index(i)] = s.forms[i].value(x);
+    return values;
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,30 @@
+// What an adjustment gives back, from its unknowns and their covariance. Internal: not installed.
+#pragma once
+
+#include "evaluation/adjustment_solver.hpp"
+#include "evaluation/adjustment_tables.hpp"
+#include "evaluation/observability.hpp"
+#include "stepdiag/evaluation/adjustment.hpp"
+
+namespace stepdiag {
+
+// The forms that a calibration's tables are made of: what is determined, as itself or as its shape.
+struct CalibratedForms {
+    std::array<std::optional<FunctionForms>, function_count> functions;
+    std::array<bool, function_count> slope_determined;
+    std::array<std::optional<LinearForm>, squareness_count> squarenesses;
+
+    std::vector<const LinearForm*> in_order() const;  // that of Calibration::covariance
+};
+CalibratedForms choose_forms(const AdjustmentProblem& problem, const AdjustmentTables& tables);
+
+Calibration make_calibration(const AdjustmentProblem& problem, const AdjustmentTables& tables,
+                             const CalibratedForms& forms, const Eigen::VectorXd& x, const BorderedBand& inverse);
+Eigen::MatrixXd full_covariance(const AdjustmentProblem& problem, const CalibratedForms& forms,
+                                const BorderedFactor& factor);
+std::vector<SetupEstimate> setup_estimates(const AdjustmentProblem& problem, const Observability& observability,
+                                           const Eigen::VectorXd& x, const BorderedBand& inverse);
+// Of all readings, at the last linearisation.
+std::vector<ReadingResidual> reading_residuals(const NormalEquations& equations, const BorderedBand& inverse);
+
+}  // namespace stepdiag

@@ -1,0 +1,51 @@
+// Gauss-Newton on the adjustment's normal equations, and what they leave open. Internal: not installed.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "evaluation/normal_equations.hpp"
+
+namespace stepdiag {
+
+// Rank is decided on the normal equations at zero, columns scaled to 1: a pivot at or below this counts as 0. It is the
+// square of a singular value: directions known 3e5 times worse than the best ones still count as determined.
+inline constexpr double rank_threshold = 1e-11;
+
+class AdjustmentSolver {
+public:
+    // `smoothness`: deviations of second differences by function, 0 for none.
+    AdjustmentSolver(const AdjustmentProblem& problem, const std::array<double, function_count>& smoothness);
+
+    NormalEquations& equations() { return equations_; }
+    const NormalEquations& equations() const { return equations_; }
+    // The unknowns held at 0, because the readings do not tell them apart from the others; ascending. Decided at zero.
+    const std::vector<int>& held() const { return held_; }
+    // Those of them that are unknowns of the problem: the band has places without one.
+    std::vector<int> dependent() const;
+    const BorderedFactor& factor() const { return factor_; }
+    const Eigen::VectorXd& scale() const { return scale_; }  // length of each column of the weighted problem
+
+    // The change of all unknowns that no reading sees when the held unknown changes by 1 (at the last factorisation).
+    Eigen::VectorXd null_vector(int held) const;
+
+    // From x to the minimum: returns the number of steps. Throws InvalidArgument where there is none to be found.
+    int solve(Eigen::VectorXd& x);
+    // The same with derivatives and factor as they are, for readings that differ little; falls back to solve.
+    void solve_nearby(Eigen::VectorXd& x);
+    // Derivatives and factor at x, for what has changed (readings left out, smoothness) or for uncertainties.
+    void factorize(const Eigen::VectorXd& x);
+
+private:
+    // One Gauss-Newton step with the derivatives and the factor that there are. Returns its largest effect on the
+    // readings, in standard uncertainties.
+    double step(Eigen::VectorXd& x, double& change);
+
+    NormalEquations equations_;
+    BorderedBand matrix_;
+    BorderedFactor factor_;
+    Eigen::VectorXd scale_;  // square roots of the diagonal at the last factorisation
+    std::vector<int> held_;
+};
+
+}  // namespace stepdiag

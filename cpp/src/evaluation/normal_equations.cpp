@@ -1,0 +1,219 @@
+#include "evaluation/normal_equations.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stepdiag {
+double& element(BorderedBand& matrix, int i, int j) {
+    if (i < j) std::swap(i, j);
+    const int banded = 6 * matrix.blocks();
+    if (j >= banded) return matrix.corner()(i - banded, j - banded);
+    if (i >= banded) return matrix.border_rows(j / 6).coeffRef(i - banded, j % 6);
+    return matrix.block(i / 6, j / 6).coeffRef(i % 6, j % 6);
+}
+
+double element(const BorderedBand& matrix, int i, int j) {
+    if (i < j) std::swap(i, j);
+    const int banded = 6 * matrix.blocks();
+    if (j >= banded) return matrix.corner()(i - banded, j - banded);
+    if (i >= banded) return matrix.border_rows(j / 6)(i - banded, j % 6);
+    return matrix.block(i / 6, j / 6)(i % 6, j % 6);
+}
+
+double SmoothRow::value(const Eigen::VectorXd& x) const {
+    double value = 0.0;
+    for (int i = 0; i < 3; ++i)
+        if (unknown[i] != no_unknown) value += coefficient[i] * x[unknown[i]];
+    return value;
+}
+
+double NormalEquations::Row::product(const Eigen::VectorXd& v) const {
+    double sum = 0.0;
+    for (int i = 0; i < size; ++i)
+        if (unknown[i] != no_unknown) sum += derivative[i] * v[unknown[i]];
+    return sum;
+}
+
+NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&problem) {
+    for (const LineSetup& setup : problem.setups()) models_.push_back(setup.model);
+    std::size_t weights = 0;
+    first_weight_.resize(problem.readings().size());
+    point_of_reading_.resize(problem.readings().size());
+    for (std::size_t p = 0; p < problem.points().size(); ++p) {
+        const AdjustedPoint& point = problem.points()[p];
+        first_unknown_.push_back(int(unknowns_.size()));
+        for (const int node : point.node)
+            for (int c = 0; c < 6; ++c)
+                unknowns_.push_back(node == no_unknown ? no_unknown : problem.nodes()[node].unknown[c]);
+        const LineSetup& setup = problem.setups()[point.setup];
+        for (const int c : setup.active) unknowns_.push_back(setup.unknown[c]);
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            first_weight_[r] = weights;
+            point_of_reading_[r] = int(p);
+            weights += 18 + setup.active.size();
+        }
+    }
+    first_unknown_.push_back(int(unknowns_.size()));
+    derivatives_.resize(weights);
+    residuals_.setZero(Eigen::Index(problem.readings().size()));
+}
+
+void NormalEquations::make_smooth(const std::array<double, function_count>& deviation) {
+    smooth_.clear();
+    const auto& nodes = problem_->nodes();
+    for (std::vector<int> chain : problem_->node_chains()) {
+        if (chain.empty()) continue;
+        const AxisNode& first = nodes[chain.front()];
+        if (first.node > 0 && !first.negative) chain.insert(chain.begin(), no_unknown);  // home
+        for (std::size_t k = 1; k + 1 < chain.size(); ++k) {
+            const auto position = [&](int i) { return i == no_unknown ? 0.0 : nodes[i].position; };
+            const double before = position(chain[k]) - position(chain[k - 1]);
+            const double after = position(chain[k + 1]) - position(chain[k]);
+            const double step = 0.5 * (before + after);
+            for (int c = 0; c < 6; ++c) {
+                const int function = FunctionId{first.axis, Component(c)}.index();
+                if (deviation[function] <= 0.0) continue;
+                const double weight = 1.0 / deviation[function];
+                SmoothRow row{function, {}, {}};
+                row.coefficient = {weight * step / before, -weight * step * (1.0 / before + 1.0 / after),
+                                   weight * step / after};
+                for (int i = 0; i < 3; ++i) {
+                    const int node = chain[k - 1 + i];
+                    row.unknown[i] = node == no_unknown ? no_unknown : nodes[node].unknown[c];
+                }
+                smooth_.push_back(row);
+            }
+        }
+    }
+}
+
+void NormalEquations::linearise(const Eigen::VectorXd& x, bool derivatives) {
+    const AdjustmentProblem& problem = *problem_;
+    for (std::size_t s = 0; s < models_.size(); ++s)
+        models_[s].set_up(problem.setup_values(problem.setups()[s], x));
+    Eigen::VectorXd value;
+    ReadingDerivative derivative;
+    for (const AdjustedPoint& point : problem.points()) {
+        const LineSetup& setup = problem.setups()[point.setup];
+        const ReadingModel& model = models_[point.setup];
+        value.resize(model.channels());
+        if (derivatives) derivative.resize(model.channels(), 18 + model.setup_size());
+        const PoseDerivative pose =
+            differentiate_pose(problem.chain(), problem.tool(), point.place.commanded, problem.errors(point, x));
+        model.read(pose, point.place, value, derivatives ? &derivative : nullptr);
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            const AdjustedReading& reading = problem.readings()[r];
+            const double weight = 1.0 / reading.standard_uncertainty;
+            residuals_[r] = weight * (reading.value - value[reading.channel]);
+            if (!derivatives) continue;
+            double* row = derivatives_.data() + first_weight_[r];
+            const int* unknown = unknowns_.data() + first_unknown_[point_of_reading_[r]];
+            for (int c = 0; c < 18; ++c)
+                row[c] = unknown[c] == no_unknown ? 0.0 : weight * derivative(reading.channel, c);
+            for (std::size_t c = 0; c < setup.active.size(); ++c)
+                row[18 + c] = weight * derivative(reading.channel, 18 + setup.active[c]);
+        }
+    }
+}
+
+NormalEquations::Row NormalEquations::row(const AdjustedPoint& point, int reading) const {
+    const std::size_t p = std::size_t(&point - problem_->points().data());
+    return {unknowns_.data() + first_unknown_[p], derivatives_.data() + first_weight_[reading],
+            first_unknown_[p + 1] - first_unknown_[p]};
+}
+
+double NormalEquations::square_sum(const Eigen::VectorXd& x) const {
+    double sum = 0.0;
+    for (Eigen::Index r = 0; r < residuals_.size(); ++r)
+        if (problem_->readings()[r].used) sum += residuals_[r] * residuals_[r];
+    for (int j = 0; j < x.size(); ++j)
+        if (std::isfinite(problem_->prior()[j])) sum += std::pow(x[j] / problem_->prior()[j], 2);
+    for (const SmoothRow& row : smooth_) sum += std::pow(row.value(x), 2);
+    return sum;
+}
+
+BorderedBand NormalEquations::matrix() const { return BorderedBand(problem_->reach(), problem_->border()); }
+
+void NormalEquations::assemble(BorderedBand& matrix) const {
+    matrix.set_zero();
+    for (std::size_t p = 0; p < problem_->points().size(); ++p)
+        assemble_point(problem_->points()[p], int(p), matrix);
+    for (int j = 0; j < problem_->size(); ++j)
+        if (std::isfinite(problem_->prior()[j])) element(matrix, j, j) += 1.0 / std::pow(problem_->prior()[j], 2);
+    for (const SmoothRow& row : smooth_)
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j <= i; ++j)
+                if (row.unknown[i] != no_unknown && row.unknown[j] != no_unknown)
+                    element(matrix, row.unknown[i], row.unknown[j]) += row.coefficient[i] * row.coefficient[j];
+}
+
+// J^T J of one point is dense over the nodes of three axes and the set-up: blocks of six where both nodes are in the
+// band, single rows and entries in the border.
+void NormalEquations::assemble_point(const AdjustedPoint& point, int number, BorderedBand& matrix) const {
+    const int* unknown = unknowns_.data() + first_unknown_[number];
+    const int size = first_unknown_[number + 1] - first_unknown_[number];
+    const int readings = point.end_reading - point.first_reading;
+    using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const Eigen::Map<const Rows> rows(derivatives_.data() + first_weight_[point.first_reading], readings, size);
+    thread_local Rows square;
+    square.setZero(size, size);
+    for (int r = 0; r < readings; ++r) {
+        if (!problem_->readings()[point.first_reading + r].used) continue;
+        for (int i = 0; i < size; ++i) {
+            const double left = rows(r, i);
+            double* out = square.data() + i * size;
+            for (int j = 0; j < size; ++j) out[j] += left * rows(r, j);
+        }
+    }
+
+    const int banded = 6 * matrix.blocks();
+    std::array<int, 3> block;
+    for (int a = 0; a < 3; ++a)
+        block[a] = point.node[a] == no_unknown ? no_unknown : problem_->nodes()[point.node[a]].block;
+    for (int a = 0; a < 3; ++a) {
+        if (block[a] == no_unknown) continue;
+        for (int b = 0; b < 3; ++b)
+            if (block[b] != no_unknown && block[b] <= block[a])
+                matrix.block(block[a], block[b]) += square.block<6, 6>(6 * a, 6 * b);
+        auto border = matrix.border_rows(block[a]);
+        for (int i = 0; i < size; ++i)
+            if (unknown[i] >= banded) border.row(unknown[i] - banded) += square.block<1, 6>(i, 6 * a);
+    }
+    for (int i = 0; i < size; ++i) {
+        if (unknown[i] < banded) continue;
+        for (int j = 0; j < size; ++j)
+            if (unknown[j] >= banded && unknown[j] <= unknown[i])
+                matrix.corner()(unknown[i] - banded, unknown[j] - banded) += square(i, j);
+    }
+}
+
+Eigen::VectorXd NormalEquations::gradient(const Eigen::VectorXd& x) const { return transposed(residuals_, x); }
+
+// J^T w - P x
+Eigen::VectorXd NormalEquations::transposed(const Eigen::VectorXd& w, const Eigen::VectorXd& x) const {
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(problem_->size());
+    for (const AdjustedPoint& point : problem_->points())
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            if (!problem_->readings()[r].used) continue;
+            const Row row = this->row(point, r);
+            for (int i = 0; i < row.size; ++i)
+                if (row.unknown[i] != no_unknown) gradient[row.unknown[i]] += row.derivative[i] * w[r];
+        }
+    for (int j = 0; j < x.size(); ++j)
+        if (std::isfinite(problem_->prior()[j])) gradient[j] -= x[j] / std::pow(problem_->prior()[j], 2);
+    for (const SmoothRow& row : smooth_) {
+        const double value = row.value(x);
+        for (int i = 0; i < 3; ++i)
+            if (row.unknown[i] != no_unknown) gradient[row.unknown[i]] -= row.coefficient[i] * value;
+    }
+    return gradient;
+}
+
+Eigen::VectorXd NormalEquations::product(const Eigen::VectorXd& v) const {
+    Eigen::VectorXd image(residuals_.size());
+    for (const AdjustedPoint& point : problem_->points())
+        for (int r = point.first_reading; r < point.end_reading; ++r) image[r] = row(point, r).product(v);
+    return -transposed(-image, v);
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,73 @@
+// The adjustment linearised: weighted residuals, their derivatives, and the normal equations
+//   (J^T J + P) dx = J^T w - P x,  w = (read - model(x))/u, P the priors and the smoothness. Internal: not installed.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "evaluation/adjustment_problem.hpp"
+#include "evaluation/bordered_band.hpp"
+
+namespace stepdiag {
+
+// An entry on the matrix' pattern, in either order.
+double& element(BorderedBand& matrix, int i, int j);
+double element(const BorderedBand& matrix, int i, int j);
+
+// A weighted condition on neighbouring nodes: sum coefficient x = 0, with standard deviation 1. A part without unknown
+// is 0.
+struct SmoothRow {
+    int function;  // FunctionId::index
+    std::array<int, 3> unknown;
+    std::array<double, 3> coefficient;
+
+    double value(const Eigen::VectorXd& x) const;
+};
+
+class NormalEquations {
+public:
+    explicit NormalEquations(const AdjustmentProblem& problem);
+
+    const AdjustmentProblem& problem() const { return *problem_; }
+    // Second differences of each function's neighbouring nodes, by the standard deviation of each function (0: none).
+    void make_smooth(const std::array<double, function_count>& deviation);
+    const std::vector<SmoothRow>& smooth_rows() const { return smooth_; }
+
+    // Residuals and, if asked for, derivatives at x. Values that are not finite come out as such.
+    void linearise(const Eigen::VectorXd& x, bool derivatives = true);
+    // Weighted residual of each reading, used or not, at the last linearise.
+    const Eigen::VectorXd& residuals() const { return residuals_; }
+    double square_sum(const Eigen::VectorXd& x) const;  // of residuals, priors and smoothness
+
+    BorderedBand matrix() const;
+    void assemble(BorderedBand& matrix) const;  // J^T J + P
+    Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;          // J^T w - P x
+    Eigen::VectorXd product(const Eigen::VectorXd& v) const;           // (J^T J + P) v
+
+    // The derivative of a reading, weighted: unknowns of its point (no_unknown where there is none), and its row.
+    struct Row {
+        const int* unknown;
+        const double* derivative;
+        int size;
+
+        double product(const Eigen::VectorXd& v) const;
+    };
+    Row row(const AdjustedPoint& point, int reading) const;
+
+private:
+    Eigen::VectorXd transposed(const Eigen::VectorXd& w, const Eigen::VectorXd& x) const;
+    void assemble_point(const AdjustedPoint& point, int number, BorderedBand& matrix) const;
+
+    const AdjustmentProblem* problem_;
+    std::vector<ReadingModel> models_;       // by set-up
+    std::vector<int> first_unknown_;         // by point, into unknowns_
+    std::vector<int> unknowns_;              // 18 + active columns of the set-up, by point
+    std::vector<std::size_t> first_weight_;  // by reading, into derivatives_
+    std::vector<int> point_of_reading_;
+    std::vector<double> derivatives_;
+    Eigen::VectorXd residuals_;
+    std::vector<SmoothRow> smooth_;
+};
+
+}  // namespace stepdiag

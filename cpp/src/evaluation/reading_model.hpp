@@ -1,0 +1,96 @@
+// What the raw channels of a head read, as one differentiable function of the machine's errors at the axes' nodes and of
+// the line's set-up: exact pose (machine/machine.hpp), exact readings (measurement/reading.hpp). Internal: not
+// installed.
+//   q = S^T (p - o), m = S^T n, S the sensor frame: beta = m_x/m_z, alpha = -m_y/m_z, L = q_z + beta q_x - alpha q_y
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "stepdiag/machine/chain.hpp"
+#include "stepdiag/machine/machine.hpp"
+#include "stepdiag/measurement/head_calibration.hpp"
+
+namespace stepdiag {
+
+// (delta_a, theta_a) of an axis at a node, squareness terms included: mm, rad.
+using AxisErrors = Eigen::Matrix<double, 6, 1>;
+using MachineErrors = std::array<AxisErrors, 3>;  // by axis
+
+// Where the unknowns of a line's set-up stand in its vector (adjustment.hpp, SetupQuantity). The constants of the beams
+// d2 ... dn against d1 come last.
+namespace setup {
+enum Column : int {
+    reflector = 0,
+    laser = 2,
+    distance_constant = 4,
+    psd_zero = 5,
+    lateral = 7,
+    roll = 9,
+    gain = 10,
+    drift = 11,
+    cosine = 12,  // of scale lines: distances read short by this times the travel
+    beam_constants = 13,
+};
+}  // namespace setup
+
+enum class ReadingKind { ideal, psd, multi_beam };  // channels: distance alpha beta, distance spot_x spot_y, d1 ... dn
+
+// Where and when a reading was made.
+struct ReadingPlace {
+    Eigen::Vector3d commanded;  // mm
+    double travel = 0.0;        // commanded, from the line's first point along it, mm
+    double time = 0.0;          // since the set-up's first reading, s
+};
+
+// The pose with its derivatives by (delta_a, theta_a): a column of `shift` moves the functional point, one of `turn` is
+// the rotation vector in the machine frame.
+struct PoseDerivative {
+    Pose pose;
+    std::array<Eigen::Matrix3d, 3> shift;  // by delta_a
+    std::array<Eigen::Matrix3d, 3> turn;   // by theta_a
+    std::array<Eigen::Vector3d, 3> pivot;  // about which theta_a turns
+};
+PoseDerivative differentiate_pose(const Chain& chain, const Eigen::Vector3d& tool, const Eigen::Vector3d& commanded,
+                                  const MachineErrors& errors);
+
+// The derivative of the channels: 18 columns by the axes' errors, axis by axis, then those of the set-up.
+using ReadingDerivative = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+class ReadingModel {
+public:
+    // `origin`: of the beam on a well aligned line, o = P0 - standoff z, machine frame, mm.
+    ReadingModel(ReadingKind kind, const HeadCalibration& head, const Eigen::Matrix3d& machine_R_line,
+                 const Eigen::Vector3d& origin);
+
+    int channels() const { return kind_ == ReadingKind::multi_beam ? int(head_->beam_offsets.size()) : 3; }
+    int setup_size() const { return setup_size(kind_, *head_); }
+    static int setup_size(ReadingKind kind, const HeadCalibration& head);
+
+    // The set-up of the readings that follow; `setup` has setup_size() entries.
+    void set_up(const Eigen::Ref<const Eigen::VectorXd>& setup);
+    // What the channels read. `derivative`: channels() x (18 + setup_size()), where it is asked for. The mirror must face
+    // the head.
+    void read(const PoseDerivative& pose, const ReadingPlace& place, Eigen::Ref<Eigen::VectorXd> reading,
+              ReadingDerivative* derivative) const;
+
+private:
+    struct Tilt;
+    void read_channels(const Tilt& tilt, const ReadingPlace& place, Eigen::Ref<Eigen::VectorXd> reading,
+                       ReadingDerivative* derivative) const;
+
+    ReadingKind kind_;
+    const HeadCalibration* head_;
+    Eigen::Matrix3d line_;    // machine_R_line
+    Eigen::Vector3d origin_;  // nominal
+
+    Eigen::VectorXd setup_;
+    Eigen::Matrix3d sensor_;                         // machine_R_sensor
+    Eigen::Vector3d beam_origin_;                    // o
+    Eigen::Vector3d normal_;                         // of the mirror, in the tool's frame
+    Eigen::Matrix<double, 3, 2> normal_by_reflector_;
+    Eigen::Matrix3d sensor_turn_;  // rotation vectors in the sensor frame by laser a, laser b, roll
+};
+
+}  // namespace stepdiag

@@ -1,0 +1,25 @@
+// How the set-up unknowns of a line are taken, defaults included. Internal: not installed.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "evaluation/reading_model.hpp"
+#include "stepdiag/evaluation/adjustment.hpp"
+
+namespace stepdiag {
+
+// The quantity and component that a column of a set-up's vector stands for; none for the cosine error of scale lines,
+// which follows from the laser's angles.
+struct SetupColumnName {
+    SetupQuantity quantity;
+    int component;
+};
+std::optional<SetupColumnName> setup_column_name(int column);
+
+// Standard uncertainty of each column (setup::Column, beams) of a line's set-up. Throws InvalidArgument for a negative
+// one, and for a free laser on a scale line.
+std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, const std::string& line,
+                                           bool is_scale_line, ReadingKind kind, int columns);
+
+}  // namespace stepdiag

@@ -1,0 +1,87 @@
+#include "evaluation/smoothness.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "evaluation/adjustment_result.hpp"
+
+namespace stepdiag {
+namespace {
+
+using Deviations = std::array<double, function_count>;
+
+double validation_score(AdjustmentSolver& solver, const Eigen::VectorXd& x, const Deviations& deviations) {
+    solver.equations().make_smooth(deviations);
+    solver.factorize(x);
+    const NormalEquations& equations = solver.equations();
+    Eigen::VectorXd dx = equations.gradient(x);
+    solver.factor().solve(dx);
+    const BorderedBand inverse = solver.factor().selected_inverse();
+    double square_sum = 0.0, freedom = 0.0;
+    int count = 0;
+    for (const AdjustedPoint& point : equations.problem().points())
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            if (!equations.problem().readings()[r].used) continue;
+            square_sum += std::pow(equations.residuals()[r] - equations.row(point, r).product(dx), 2);
+            ++count;
+        }
+    for (const ReadingResidual& residual : reading_residuals(equations, inverse))
+        if (residual.used) freedom += residual.redundancy;
+    return freedom > 0.0 ? count * square_sum / (freedom * freedom) : 0.0;
+}
+
+}  // namespace
+
+std::array<double, function_count> given_deviations(const Smoothness& smoothness) {
+    Deviations deviations{};
+    for (int i = 0; i < function_count; ++i)
+        deviations[i] = FunctionId::at(i).is_rotation() ? smoothness.rotation : smoothness.translation;
+    return deviations;
+}
+
+std::array<double, function_count> cross_validate(AdjustmentSolver& solver, const Eigen::VectorXd& x,
+                                                  const AdjustmentOptions& options) {
+    constexpr double least_gain = 1e-4;  // of the score: less is not worth a smoother function
+    constexpr double factor = 4.0;
+    constexpr int most_sweeps = 4;
+    const Deviations limits = given_deviations(*options.smoothness);
+    // Second differences far above the readings' uncertainty do nothing, far below it make a straight line.
+    Deviations start;
+    for (int i = 0; i < function_count; ++i)
+        start[i] = 16.0 * (FunctionId::at(i).is_rotation() ? options.uncertainty.tilt : options.uncertainty.distance);
+
+    Deviations best{};
+    double least = validation_score(solver, x, best);
+    const auto try_out = [&](const Deviations& candidate) {
+        const double score = validation_score(solver, x, candidate);
+        if (!(score < least * (1.0 - least_gain))) return false;
+        least = score;
+        best = candidate;
+        return true;
+    };
+    for (int sweep = 0; sweep < most_sweeps; ++sweep) {
+        bool better = false;
+        for (int i = 0; i < function_count; ++i) {
+            Deviations candidate = best;
+            for (const double smoother : {1.0 / factor, factor}) {
+                // On, as long as it helps.
+                for (int step = 0; step < 8; ++step) {
+                    candidate[i] = best[i] > 0.0 ? best[i] * smoother : start[i];
+                    candidate[i] = std::max(candidate[i], limits[i]);
+                    if (candidate[i] == best[i] || !try_out(candidate)) break;
+                    better = true;
+                }
+                candidate = best;
+            }
+            if (best[i] > 0.0) {
+                candidate[i] = 0.0;
+                better = try_out(candidate) || better;
+            }
+        }
+        if (!better) break;
+    }
+    solver.equations().make_smooth(best);
+    return best;
+}
+
+}  // namespace stepdiag
