@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['BeamSegment', 'BeamSpot', 'Calibration', 'Camera', 'Chain', 'Environment', 'ErrorMap', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'Noise', 'Plan', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'Sensitivity', 'SpotSensor', 'beam_radius', 'couple', 'cramer_rao_bound', 'evaluate', 'expose', 'head_sensitivities', 'locate', 'power_inside', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'simulate', 'trace_beams']
+__all__: list[str] = ['Adjustment', 'BeamSegment', 'BeamSpot', 'Calibration', 'Camera', 'Chain', 'Environment', 'ErrorMap', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'Noise', 'Outlier', 'Plan', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'adjust', 'beam_radius', 'couple', 'cramer_rao_bound', 'evaluate', 'expose', 'head_sensitivities', 'locate', 'power_inside', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'simulate', 'trace_beams']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -747,6 +747,153 @@ class Calibration:
     @property
     def volume(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
+class SetupPriors:
+    """
+    How each unknown of a line's set-up is taken: "free", "fixed" at 0, or the standard uncertainty with which it is known to be 0 (rad, mm, 1 for gain, mm/s for drift); None: the default.
+    """
+    def __init__(self, *, reflector: float | str | None = None, laser: float | str | None = None, distance_constant: float | str | None = None, beam_constants: float | str | None = None, psd_zero: float | str | None = None, lateral: float | str | None = None, roll: float | str | None = None, gain: float | str | None = None, drift: float | str | None = None) -> None:
+        """
+        Raises InvalidArgument.
+        """
+class Smoothness:
+    """
+    Standard deviations with which second differences of neighbouring nodes are known to be 0: translation (mm), rotation (rad); 0: no such knowledge. cross_validated: found for each function, not below these.
+    """
+    def __init__(self, *, translation: typing.SupportsFloat | typing.SupportsIndex = 0.0, rotation: typing.SupportsFloat | typing.SupportsIndex = 0.0, cross_validated: bool = False) -> None:
+        ...
+    @property
+    def cross_validated(self) -> bool:
+        ...
+    @property
+    def rotation(self) -> float:
+        ...
+    @property
+    def translation(self) -> float:
+        ...
+class SetupEstimate:
+    """
+    One unknown of a line's set-up as it was found; rad, mm, 1, mm/s.
+    """
+    @property
+    def component(self) -> int:
+        """
+        0 or 1 of pairs; of beam_constants 1 for d2, ...
+        """
+    @property
+    def line(self) -> str:
+        ...
+    @property
+    def prior(self) -> float:
+        """
+        Standard uncertainty of its prior; infinite where it is free.
+        """
+    @property
+    def quantity(self) -> str:
+        ...
+    @property
+    def run(self) -> int:
+        ...
+    @property
+    def standard_uncertainty(self) -> float:
+        ...
+    @property
+    def value(self) -> float | None:
+        """
+        None where it is not determined.
+        """
+class Outlier:
+    """
+    A reading that did not fit and was left out.
+    """
+    @property
+    def channel(self) -> str:
+        ...
+    @property
+    def line(self) -> str:
+        ...
+    @property
+    def normalised(self) -> float:
+        """
+        In its standard uncertainties.
+        """
+    @property
+    def point(self) -> int:
+        ...
+    @property
+    def residual(self) -> float:
+        """
+        mm or rad
+        """
+    @property
+    def row(self) -> int:
+        ...
+    @property
+    def run(self) -> int:
+        ...
+class Adjustment:
+    """
+    What an adjustment found: calibration, set-ups, and how the readings fit.
+    """
+    @property
+    def calibration(self) -> Calibration:
+        ...
+    @property
+    def chi_square_probability(self) -> float:
+        """
+        Of a larger square sum, if model and uncertainties are right.
+        """
+    @property
+    def combinations(self) -> list[str]:
+        """
+        What is known of unknowns that are not determined one by one.
+        """
+    @property
+    def degrees_of_freedom(self) -> int:
+        ...
+    @property
+    def iterations(self) -> int:
+        ...
+    @property
+    def normalised_residuals(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        channel -> (n,): residuals by their own standard uncertainty.
+        """
+    @property
+    def outliers(self) -> list[Outlier]:
+        ...
+    @property
+    def redundancy(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        channel -> (n,): 0 where nothing controls a reading, 1 where all others know it better.
+        """
+    @property
+    def residuals(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        channel -> (n,) read minus adjusted, mm or rad, by row of the measurement; NaN where nothing was read.
+        """
+    @property
+    def setup(self) -> list[SetupEstimate]:
+        ...
+    @property
+    def smoothness(self) -> dict[str, float]:
+        """
+        function -> standard deviation of its second differences (mm or rad) in force.
+        """
+    @property
+    def used(self) -> dict[str, numpy.typing.NDArray[numpy.bool]]:
+        """
+        channel -> (n,) whether a reading was used: it was there, and is no outlier.
+        """
+    @property
+    def variance_factor(self) -> float:
+        ...
+    @property
+    def weighted_square_sum(self) -> float:
+        ...
+def adjust(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.01, full_covariance: bool = False) -> Adjustment:
+    """
+    The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. setup_by_line replaces the quantities that it names. Raises InvalidArgument.
+    """
 def beam_radius(mode: GaussianMode, reduced_length: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     Radius (1/e^2 of power, mm) of a beam after a reduced length (sum of t/n, mm) from the collimator's plane.
@@ -759,7 +906,7 @@ def cramer_rao_bound(camera: Camera, spot: BeamSpot) -> float:
     """
     Smallest standard deviation (mm) of the spot's x that an unbiased estimate can have with position, radius, brightness and background unknown (Winick, J. Opt. Soc. Am. A 3 (1986) 1809); 0 without noise, inf where x is not observable.
     """
-def evaluate(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'enhanced', uncertainty: ReadingUncertainty = ..., full_covariance: bool = False) -> Calibration:
+def evaluate(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'adjustment', uncertainty: ReadingUncertainty = ..., full_covariance: bool = False) -> Calibration:
     """
     Calibration from a run. Of the head only its calibration is used, of the machine only chain and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan.
     """

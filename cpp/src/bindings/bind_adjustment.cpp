@@ -86,8 +86,8 @@ void bind_options(py::module_& m) {
                          const PriorLike& beam_constants, const PriorLike& psd_zero, const PriorLike& lateral,
                          const PriorLike& roll, const PriorLike& gain, const PriorLike& drift) {
                  const std::array<const PriorLike*, setup_quantity_count> given = {
-                     &reflector, &laser, &distance_constant, &beam_constants, &psd_zero, &lateral, &roll, &gain,
-                     &drift};
+                     &reflector, &laser, &distance_constant, &beam_constants, &psd_zero, &lateral, &roll,
+                     &gain,      &drift};
                  Priors priors;
                  for (int q = 0; q < setup_quantity_count; ++q)
                      priors.value[q] = to_prior(*given[q], name(SetupQuantity(q)));
@@ -95,8 +95,8 @@ void bind_options(py::module_& m) {
              }),
              py::kw_only(), py::arg("reflector") = none(), py::arg("laser") = none(),
              py::arg("distance_constant") = none(), py::arg("beam_constants") = none(), py::arg("psd_zero") = none(),
-             py::arg("lateral") = none(), py::arg("roll") = none(), py::arg("gain") = none(),
-             py::arg("drift") = none(), "Raises InvalidArgument.");
+             py::arg("lateral") = none(), py::arg("roll") = none(), py::arg("gain") = none(), py::arg("drift") = none(),
+             "Raises InvalidArgument.");
 
     py::class_<Smoothness>(m, "Smoothness",
                            "Standard deviations with which second differences of neighbouring nodes are known to be 0: "
@@ -160,17 +160,17 @@ void bind_result(py::module_& m) {
                 return py::typing::Dict<py::str, py::array_t<bool>>(used);
             },
             "channel -> (n,) whether a reading was used: it was there, and is no outlier.")
-        .def_property_readonly("outliers",
-                               [](const Result& r) {
-                                   std::vector<Outlier> list;
-                                   for (const std::size_t i : r.adjustment.outliers()) {
-                                       const ReadingResidual& x = r.adjustment.residuals[i];
-                                       const Station& s = r.stations[x.row];
-                                       list.push_back({x.row, s.run, s.line.name(), s.point, x.channel, x.residual,
-                                                       x.normalised});
-                                   }
-                                   return list;
-                               })
+        .def_property_readonly(
+            "outliers",
+            [](const Result& r) {
+                std::vector<Outlier> list;
+                for (const std::size_t i : r.adjustment.outliers()) {
+                    const ReadingResidual& x = r.adjustment.residuals[i];
+                    const Station& s = r.stations[x.row];
+                    list.push_back({x.row, s.run, s.line.name(), s.point, x.channel, x.residual, x.normalised});
+                }
+                return list;
+            })
         .def_property_readonly("weighted_square_sum", [](const Result& r) { return r.adjustment.weighted_square_sum; })
         .def_property_readonly("variance_factor", [](const Result& r) { return r.adjustment.variance_factor(); })
         .def_property_readonly("degrees_of_freedom", [](const Result& r) { return r.adjustment.degrees_of_freedom; })

@@ -127,7 +127,8 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     const CalibratedForms forms = choose_forms(problem, tables);
 
     Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
-    Adjustment result{{"", chain, {}, {}, {}, {}, {}, {}, {}}, {}, {}, 0.0, 0, 1.0, 0, {}, smoothness_at_start(options)};
+    Adjustment result{
+        {"", chain, {}, {}, {}, {}, {}, {}, {}}, {}, {}, 0.0, 0, 1.0, 0, {}, smoothness_at_start(options)};
     result.iterations = solver.solve(x);
     if (options.outlier_probability > 0.0) OutlierSearch(problem, solver, options.outlier_probability).run(x);
     if (options.smoothness && options.smoothness->cross_validated) {
@@ -140,9 +141,9 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     result.calibration = make_calibration(problem, tables, forms, x, inverse);
     result.calibration.undetermined = observability.sentences();
     if (!is_anything_determined(result.calibration))
-        throw InvalidArgument("adjustment: nothing can be determined. " +
-                              (result.calibration.undetermined.empty() ? std::string()
-                                                                       : result.calibration.undetermined.front()));
+        throw InvalidArgument(
+            "adjustment: nothing can be determined. " +
+            (result.calibration.undetermined.empty() ? std::string() : result.calibration.undetermined.front()));
     if (options.full_covariance) result.calibration.covariance = full_covariance(problem, forms, solver.factor());
     result.setup = setup_estimates(problem, observability, x, inverse);
     result.residuals = reading_residuals(solver.equations(), inverse);
@@ -176,8 +177,8 @@ struct Adjuster::State {
         for (const Channel& channel : measurement.channels()) channels.push_back(channel.name);
         channel_of_reading.reserve(problem.readings().size());
         for (const AdjustedReading& reading : problem.readings())
-            channel_of_reading.push_back(int(std::find(channels.begin(), channels.end(), problem.channel_name(reading)) -
-                                             channels.begin()));
+            channel_of_reading.push_back(
+                int(std::find(channels.begin(), channels.end(), problem.channel_name(reading)) - channels.begin()));
     }
     std::vector<int> channel_of_reading;
 };

@@ -185,7 +185,8 @@ void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options) {
     const auto couple = [&](int i, int j) {
         if (i == no_unknown || j == no_unknown) return;
         const int a = nodes_[i].block, b = nodes_[j].block;
-        if (a != no_unknown && b != no_unknown) reach_[std::min(a, b)] = std::max(reach_[std::min(a, b)], std::max(a, b));
+        if (a != no_unknown && b != no_unknown)
+            reach_[std::min(a, b)] = std::max(reach_[std::min(a, b)], std::max(a, b));
     };
     for (const AdjustedPoint& point : points_)
         for (int a = 0; a < 3; ++a) couple(point.node[a], point.node[(a + 1) % 3]);

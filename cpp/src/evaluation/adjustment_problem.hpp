@@ -1,7 +1,7 @@
 // The adjustment's unknowns, readings and their order, made once from a run's pattern. Internal: not installed.
 // The machine is unknown at nodes: the six errors of one axis at one position (squareness terms included), approached
-// in one direction. Nodes inside the travel are blocks of six in a band; nodes at its ends, whose values fix slopes, and
-// the set-ups of the lines are the border. Both ends of the travel are folded together (nodes k and N - k are
+// in one direction. Nodes inside the travel are blocks of six in a band; nodes at its ends, whose values fix slopes,
+// and the set-ups of the lines are the border. Both ends of the travel are folded together (nodes k and N - k are
 // neighbours), so that lines of every sign couple blocks that stand near each other.
 #pragma once
 

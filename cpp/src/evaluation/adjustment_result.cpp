@@ -130,8 +130,8 @@ std::vector<SetupEstimate> setup_estimates(const AdjustmentProblem& problem, con
         for (const int column : setup.active) {
             const auto of = setup_column_name(column);
             if (!of) continue;  // the cosine error of a scale line
-            SetupEstimate estimate{setup.run, setup.line.name(), of->quantity, of->component, std::nullopt, 0.0,
-                                   setup.prior[column]};
+            SetupEstimate estimate{setup.run, setup.line.name(),  of->quantity, of->component, std::nullopt,
+                                   0.0,       setup.prior[column]};
             const int unknown = setup.unknown[column];
             if (observability.is_determined(unknown)) {
                 estimate.value = x[unknown];
@@ -168,8 +168,9 @@ std::vector<ReadingResidual> reading_residuals(const NormalEquations& equations,
             for (Eigen::Index i = 0; i < size; ++i) derivative[i] = row.derivative[place[i]];
             const double share = derivative.dot(covariance * derivative);  // in units of the reading's own variance
             const double weighted = equations.residuals()[r];
-            ReadingResidual residual{reading.row, problem.channel_name(reading),
-                                     weighted * reading.standard_uncertainty, 0.0, 0.0, reading.used};
+            ReadingResidual residual{
+                reading.row, problem.channel_name(reading), weighted * reading.standard_uncertainty, 0.0, 0.0,
+                reading.used};
             residual.redundancy = reading.used ? std::max(0.0, 1.0 - share) : 1.0 / (1.0 + share);
             // Below this a residual is rounding.
             constexpr double controlled = 1e-8;

@@ -89,8 +89,7 @@ void NormalEquations::make_smooth(const std::array<double, function_count>& devi
 
 void NormalEquations::linearise(const Eigen::VectorXd& x, bool derivatives) {
     const AdjustmentProblem& problem = *problem_;
-    for (std::size_t s = 0; s < models_.size(); ++s)
-        models_[s].set_up(problem.setup_values(problem.setups()[s], x));
+    for (std::size_t s = 0; s < models_.size(); ++s) models_[s].set_up(problem.setup_values(problem.setups()[s], x));
     Eigen::VectorXd value;
     ReadingDerivative derivative;
     for (const AdjustedPoint& point : problem.points()) {
@@ -136,8 +135,7 @@ BorderedBand NormalEquations::matrix() const { return BorderedBand(problem_->rea
 
 void NormalEquations::assemble(BorderedBand& matrix) const {
     matrix.set_zero();
-    for (std::size_t p = 0; p < problem_->points().size(); ++p)
-        assemble_point(problem_->points()[p], int(p), matrix);
+    for (std::size_t p = 0; p < problem_->points().size(); ++p) assemble_point(problem_->points()[p], int(p), matrix);
     for (int j = 0; j < problem_->size(); ++j)
         if (std::isfinite(problem_->prior()[j])) element(matrix, j, j) += 1.0 / std::pow(problem_->prior()[j], 2);
     for (const SmoothRow& row : smooth_)

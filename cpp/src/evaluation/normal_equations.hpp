@@ -41,9 +41,9 @@ public:
     double square_sum(const Eigen::VectorXd& x) const;  // of residuals, priors and smoothness
 
     BorderedBand matrix() const;
-    void assemble(BorderedBand& matrix) const;  // J^T J + P
-    Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;          // J^T w - P x
-    Eigen::VectorXd product(const Eigen::VectorXd& v) const;           // (J^T J + P) v
+    void assemble(BorderedBand& matrix) const;                 // J^T J + P
+    Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;  // J^T w - P x
+    Eigen::VectorXd product(const Eigen::VectorXd& v) const;   // (J^T J + P) v
 
     // The derivative of a reading, weighted: unknowns of its point (no_unknown where there is none), and its row.
     struct Row {

@@ -75,7 +75,8 @@ Observability::Observability(const AdjustmentSolver& solver, AdjustmentTables& t
         for (int i = 0; i < 2; ++i) {
             const int reflector = setup.unknown[setup::reflector + i], laser = setup.unknown[setup::laser + i];
             if (reflector == no_unknown || laser == no_unknown) continue;
-            KnownCombination difference{{}, setup_name(setup::reflector + i) + " - laser tilt on " + place(setup), true};
+            KnownCombination difference{
+                {}, setup_name(setup::reflector + i) + " - laser tilt on " + place(setup), true};
             difference.form.add(reflector, 1.0);
             difference.form.add(laser, -1.0);
             differences.push_back(difference);
@@ -185,9 +186,10 @@ void Observability::add_function_sentences(std::vector<std::string>& sentences) 
     if (!not_moved.empty())
         sentences.push_back(join(not_moved) + ": no reading on a line that moves the axis to its end; add such lines");
     if (!open.empty())
-        sentences.push_back(join(open) +
-                            ": the readings do not tell them apart; read tilts too, or add lines of other directions or "
-                            "another order of steps");
+        sentences.push_back(
+            join(open) +
+            ": the readings do not tell them apart; read tilts too, or add lines of other directions or "
+            "another order of steps");
     for (const Squareness s : all_squarenesses)
         if (!tables_.squareness(s) || !tables_.squareness(s)->determined)
             sentences.push_back(name(s) + ": add body diagonals, or the two face diagonals of its plane");
@@ -196,7 +198,8 @@ void Observability::add_function_sentences(std::vector<std::string>& sentences) 
         const FunctionForms &reversal = tables_.reversal(FunctionId::at(i)),
                             &change = tables_.reversal_change(FunctionId::at(i));
         const auto open_at = [](const FunctionForms& forms) {
-            return std::any_of(forms.value.begin(), forms.value.end(), [](const auto& form) { return !form.determined; });
+            return std::any_of(forms.value.begin(), forms.value.end(),
+                               [](const auto& form) { return !form.determined; });
         };
         if (open_at(change)) reversals.push_back(FunctionId::at(i).name());
         else if (open_at(reversal)) constants.push_back(FunctionId::at(i).name());

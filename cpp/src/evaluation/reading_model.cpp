@@ -123,8 +123,8 @@ void ReadingModel::read_channels(const Tilt& tilt, const ReadingPlace& place, Ei
                                  ReadingDerivative* derivative) const {
     const double w = 1.0 - tilt.alpha * tilt.alpha - tilt.beta * tilt.beta;
     const double scale = 1.0 + setup_[setup::gain];
-    const double constant = setup_[setup::distance_constant] + setup_[setup::drift] * place.time -
-                            setup_[setup::cosine] * place.travel;
+    const double constant =
+        setup_[setup::distance_constant] + setup_[setup::drift] * place.time - setup_[setup::cosine] * place.travel;
     if (derivative) derivative->setZero();
     // The channel's value, and its gradient by (L, alpha, beta).
     const auto put = [&](int channel, double value, const Eigen::RowVector3d& gradient) {

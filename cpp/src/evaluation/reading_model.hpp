@@ -1,5 +1,5 @@
-// What the raw channels of a head read, as one differentiable function of the machine's errors at the axes' nodes and of
-// the line's set-up: exact pose (machine/machine.hpp), exact readings (measurement/reading.hpp). Internal: not
+// What the raw channels of a head read, as one differentiable function of the machine's errors at the axes' nodes and
+// of the line's set-up: exact pose (machine/machine.hpp), exact readings (measurement/reading.hpp). Internal: not
 // installed.
 //   q = S^T (p - o), m = S^T n, S the sensor frame: beta = m_x/m_z, alpha = -m_y/m_z, L = q_z + beta q_x - alpha q_y
 #pragma once
@@ -70,8 +70,8 @@ public:
 
     // The set-up of the readings that follow; `setup` has setup_size() entries.
     void set_up(const Eigen::Ref<const Eigen::VectorXd>& setup);
-    // What the channels read. `derivative`: channels() x (18 + setup_size()), where it is asked for. The mirror must face
-    // the head.
+    // What the channels read. `derivative`: channels() x (18 + setup_size()), where it is asked for. The mirror must
+    // face the head.
     void read(const PoseDerivative& pose, const ReadingPlace& place, Eigen::Ref<Eigen::VectorXd> reading,
               ReadingDerivative* derivative) const;
 
@@ -86,9 +86,9 @@ private:
     Eigen::Vector3d origin_;  // nominal
 
     Eigen::VectorXd setup_;
-    Eigen::Matrix3d sensor_;                         // machine_R_sensor
-    Eigen::Vector3d beam_origin_;                    // o
-    Eigen::Vector3d normal_;                         // of the mirror, in the tool's frame
+    Eigen::Matrix3d sensor_;       // machine_R_sensor
+    Eigen::Vector3d beam_origin_;  // o
+    Eigen::Vector3d normal_;       // of the mirror, in the tool's frame
     Eigen::Matrix<double, 3, 2> normal_by_reflector_;
     Eigen::Matrix3d sensor_turn_;  // rotation vectors in the sensor frame by laser a, laser b, roll
 };

@@ -7,10 +7,10 @@
 namespace stepdiag {
 namespace {
 
-constexpr PriorUncertainty usual_lateral = 1.0;          // mm
-constexpr PriorUncertainty usual_roll = 20e-3;           // rad
-constexpr PriorUncertainty usual_gain = 0.01;            // 1
-constexpr PriorUncertainty laser_beside_beams = 2e-3;    // rad, where the constants of the beams are unknown
+constexpr PriorUncertainty usual_lateral = 1.0;           // mm
+constexpr PriorUncertainty usual_roll = 20e-3;            // rad
+constexpr PriorUncertainty usual_gain = 0.01;             // 1
+constexpr PriorUncertainty laser_beside_beams = 2e-3;     // rad, where the constants of the beams are unknown
 constexpr PriorUncertainty laser_of_scale_line = 500e-6;  // rad
 
 PriorUncertainty usual_prior(SetupQuantity quantity, bool is_scale_line, bool beams_unknown) {

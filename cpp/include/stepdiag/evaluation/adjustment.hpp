@@ -62,7 +62,7 @@ struct AdjustmentOptions {
     std::map<std::string, SetupPriors> setup_by_line = {};  // replaces the quantities that it names
     // A set-up serves a run's line and the backward runs that follow it; or, if true, all runs of the line.
     bool one_setup_per_line = false;
-    bool reversal = true;  // where there are backward runs: tables of their own for nodes approached in - direction
+    bool reversal = true;   // where there are backward runs: tables of their own for nodes approached in - direction
     bool rotations = true;  // false: the machine is taken to have no angular errors
     std::optional<Smoothness> smoothness = {};
     // Readings that do not fit are left out, the worst first, at this probability of any false alarm in a run; 0: none
@@ -96,14 +96,14 @@ struct Adjustment {
     Calibration calibration;
     std::vector<SetupEstimate> setup;
     std::vector<ReadingResidual> residuals;
-    double weighted_square_sum;         // of residuals and priors
+    double weighted_square_sum;  // of residuals and priors
     int degrees_of_freedom;
-    double chi_square_probability;      // of a larger square sum, if model and uncertainties are right; 1 without freedom
-    int iterations;                     // steps from zero
-    std::vector<std::string> combinations;  // what is known of unknowns that are not determined one by one
+    double chi_square_probability;  // of a larger square sum, if model and uncertainties are right; 1 without freedom
+    int iterations;                 // steps from zero
+    std::vector<std::string> combinations;               // what is known of unknowns that are not determined one by one
     std::array<double, function_count> smoothness = {};  // deviations of second differences in force; 0: none
 
-    double variance_factor() const;  // weighted_square_sum/degrees_of_freedom; 1 without freedom
+    double variance_factor() const;             // weighted_square_sum/degrees_of_freedom; 1 without freedom
     std::vector<std::size_t> outliers() const;  // into `residuals`, the largest normalised residual first
 };
 
