@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['Adjustment', 'BeamSegment', 'BeamSpot', 'Calibration', 'Camera', 'Chain', 'Environment', 'ErrorMap', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'Noise', 'Outlier', 'Plan', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'adjust', 'beam_radius', 'couple', 'cramer_rao_bound', 'evaluate', 'expose', 'head_sensitivities', 'locate', 'power_inside', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'simulate', 'trace_beams']
+__all__: list[str] = ['Adjustment', 'BeamSegment', 'BeamSpot', 'Calibration', 'Camera', 'Chain', 'Environment', 'ErrorMap', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'Noise', 'Outlier', 'Plan', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'adjust', 'beam_radius', 'couple', 'cramer_rao_bound', 'evaluate', 'expose', 'head_sensitivities', 'largest_repeat_count', 'locate', 'power_inside', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'simulate', 'trace_beams']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -38,19 +38,19 @@ class Chain:
         ...
 class ErrorMap:
     """
-    The 21 geometric errors as tables (ISO 230-1 names): functions in mm or rad over positions in mm, linear between nodes, end values held outside; squarenesses in rad. A missing parameter is 0.
+    The 21 geometric errors as tables (ISO 230-1 names): functions in mm or rad over positions in mm, linear between nodes, end values held outside; squarenesses in rad. A missing parameter is 0. A function may have another table for positions approached in - direction; its other one then is of the + direction.
     """
-    def __init__(self, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, squareness: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex] = {}) -> None:
+    def __init__(self, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, squareness: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex] = {}, *, negative_functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}) -> None:
         """
-        functions: name -> (position, value), one-dimensional and of one length, positions ascending. Raises InvalidArgument.
+        functions: name -> (position, value), one-dimensional and of one length, positions ascending. negative_functions: the same of the - direction, where it has others. Raises InvalidArgument.
         """
-    def function(self, name: str, position: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    def function(self, name: str, position: numpy.typing.ArrayLike, approach: str = '+') -> numpy.typing.NDArray[numpy.float64]:
         """
-        Values (mm or rad) of one error function at positions (mm), shape (n,).
+        Values (mm or rad) of one error function at positions (mm), shape (n,), approached in the direction "+" or "-".
         """
     def warnings(self, volume: numpy.typing.ArrayLike) -> list[str]:
         """
-        Where the map breaks the frame choice (0 at home, straightness 0 at both ends of travel); one sentence each.
+        Where the map breaks the frame choice (0 at home, straightness 0 at both ends of travel, approached in + direction); one sentence each.
         """
     def write(self, path: str | os.PathLike[str], *, chain: Chain | str | None = None, volume: numpy.typing.ArrayLike | None = None, tool: numpy.typing.ArrayLike | None = None) -> None:
         """
@@ -65,6 +65,11 @@ class ErrorMap:
         The leading "# key=value" lines of the file it came from.
         """
     @property
+    def negative_functions(self) -> dict[str, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]]:
+        """
+        The functions that have another table for the - direction: that table.
+        """
+    @property
     def squareness(self) -> dict[str, float]:
         ...
 class Machine:
@@ -73,17 +78,17 @@ class Machine:
     """
     def __init__(self, chain: Chain | str, errors: ErrorMap = ..., tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0)) -> None:
         ...
-    def error(self, commanded: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    def error(self, commanded: numpy.typing.ArrayLike, approach: str = '+++') -> numpy.typing.NDArray[numpy.float64]:
         """
         Actual minus nominal functional point (n, 3), mm, exact.
         """
-    def first_order_error(self, commanded: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    def first_order_error(self, commanded: numpy.typing.ArrayLike, approach: str = '+++') -> numpy.typing.NDArray[numpy.float64]:
         """
         The same to first order in the errors: sum over axes of delta + theta x L.
         """
-    def pose(self, commanded: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    def pose(self, commanded: numpy.typing.ArrayLike, approach: str = '+++') -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
-        Exact pose of the tool in the machine frame: (rotation (n, 3, 3), functional point (n, 3), mm) at commanded positions (n, 3), mm.
+        Exact pose of the tool in the machine frame: (rotation (n, 3, 3), functional point (n, 3), mm) at commanded positions (n, 3), mm. approach: the direction + or - in which X, Y, Z came there.
         """
     @property
     def chain(self) -> Chain:
@@ -415,9 +420,9 @@ class Head:
         ...
 class Misalignment:
     """
-    How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm, a constant of all distances and one of each beam d1 ... dn in mm.
+    How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm, a constant of all distances and one of each beam d1 ... dn in mm, lateral offset of the beam's origin (mm), roll of the head (rad), gain (tilts and spots read 1 + gain times themselves, beams stand at 1 + gain times their offsets), drift of the distances (mm/s).
     """
-    def __init__(self, reflector: numpy.typing.ArrayLike = (0.0, 0.0), laser: numpy.typing.ArrayLike = (0.0, 0.0), psd_zero: numpy.typing.ArrayLike = (0.0, 0.0), distance_constant: typing.SupportsFloat | typing.SupportsIndex = 0.0, beam_constants: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
+    def __init__(self, reflector: numpy.typing.ArrayLike = (0.0, 0.0), laser: numpy.typing.ArrayLike = (0.0, 0.0), psd_zero: numpy.typing.ArrayLike = (0.0, 0.0), distance_constant: typing.SupportsFloat | typing.SupportsIndex = 0.0, beam_constants: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], *, lateral: numpy.typing.ArrayLike = (0.0, 0.0), roll: typing.SupportsFloat | typing.SupportsIndex = 0.0, gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, drift: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
         Raises InvalidArgument for what is no pair of finite numbers.
         """
@@ -428,13 +433,25 @@ class Misalignment:
     def distance_constant(self) -> float:
         ...
     @property
+    def drift(self) -> float:
+        ...
+    @property
+    def gain(self) -> float:
+        ...
+    @property
     def laser(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def lateral(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
     @property
     def psd_zero(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
     @property
     def reflector(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def roll(self) -> float:
         ...
 class Noise:
     """
@@ -727,6 +744,16 @@ class Calibration:
     def method(self) -> str:
         ...
     @property
+    def negative_functions(self) -> dict[str, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]]:
+        """
+        name -> (position, value, standard uncertainty) of functions approached in - direction, which are functions - reversal.
+        """
+    @property
+    def reversal(self) -> dict[str, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]]:
+        """
+        name -> (position, value, standard uncertainty): the function approached in + direction less that in - direction, where backward runs tell it. `functions` are those of the + direction.
+        """
+    @property
     def squareness(self) -> dict[str, tuple[float, float]]:
         """
         name -> (value, standard uncertainty), rad.
@@ -738,6 +765,11 @@ class Calibration:
     def undetermined(self) -> list[str]:
         """
         What the readings do not determine, why, and what would help; one sentence each.
+        """
+    @property
+    def undetermined_reversal_constants(self) -> list[str]:
+        """
+        Functions of whose reversal error only the change from home is known; its values are 0 at home.
         """
     @property
     def undetermined_slopes(self) -> list[str]:
@@ -956,12 +988,13 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
     """
     Reads a measurement CSV. Raises InvalidArgument naming file and line.
     """
-def simulate(machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[str, Head], *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment | None = None, assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> Measurement:
+def simulate(machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[str, Head], *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment | None = None, assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001, repeats: typing.SupportsIndex = 1, backward: bool = False, seconds_per_reading: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Measurement:
     """
-    A run on the virtual machine: lines of the plan, then its scale lines. head: one, or a dict with one for each line. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace (none: of 20 degrees Celsius for a head with a design, an index of 1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's replayed poses, traced again and compared. Readings whose beam misses the mirror or does not come back are lost (NaN). Raises InvalidArgument; RuntimeError where a replay and its trace differ.
+    A run on the virtual machine: lines of the plan, then its scale lines. head: one, or a dict with one for each line. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace (none: of 20 degrees Celsius for a head with a design, an index of 1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's replayed poses, traced again and compared. repeats: how often each line is measured, runs 0, 1, 2, ...; backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; seconds_per_reading: makes the channel time. Points of a visit are approached in the direction of its own travel. Readings whose beam misses the mirror or does not come back are lost (NaN). Raises InvalidArgument; RuntimeError where a replay and its trace differ.
     """
 def trace_beams(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment | None = None) -> list[BeamSegment]:
     """
     All light of a traced head, as segments: the mirror's centre at (lateral, distance) in the sensor frame, mm, its tilts (alpha, beta) in rad. A parent stands before its children. Raises InvalidArgument.
     """
 __version__: str = '0.1.0'
+largest_repeat_count: int = 1000

@@ -86,6 +86,9 @@ def simulate_scenario(scenario: Scenario) -> _core.Measurement:
             environment=scenario.environment,
             assumed_environment=scenario.assumed_environment,
             verified_share=scenario.keys.head.verified_share,
+            repeats=scenario.keys.plan.repeats,
+            backward=scenario.keys.plan.backward,
+            seconds_per_reading=scenario.keys.plan.seconds_per_reading,
         )
     return only(run, scenario.signals)
 
@@ -157,6 +160,8 @@ def _build(keys: ScenarioKeys, path: Path) -> Scenario:
     described = heads_by_line(keys, plan, path)
     heads = nominal_heads(described, path)
     environment, assumed = environments(keys.environment, path)
+    with located(str(path)):
+        uncertainty = weights(keys)
     return Scenario(
         path=path,
         keys=keys,
@@ -170,7 +175,7 @@ def _build(keys: ScenarioKeys, path: Path) -> Scenario:
         noise=noise_of(keys.noise),
         environment=environment,
         assumed_environment=assumed,
-        uncertainty=weights(keys),
+        uncertainty=uncertainty,
     )
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Final
 
 from pydantic import Field
 
-from stepdiag._core import Plan
+from stepdiag._core import Plan, largest_repeat_count
 from stepdiag.adjustment_keys import AdjustmentSection, SmoothnessSection
 from stepdiag.key_errors import BY_HEAD, BY_LINE
 from stepdiag.scenario_head_keys import EnvironmentSection, HeadSection, LineKeys
@@ -21,6 +21,7 @@ from stepdiag.sections import (
     SEED,
     THREE_LENGTHS,
     Amplitude,
+    Angle,
     AnglePair,
     Length,
     Pair,
@@ -34,6 +35,7 @@ from stepdiag.sections import (
 
 # Limits that the core checks as well; here they keep numbers inside the integer types behind the bindings.
 LARGEST_STEPS: Final = Plan.largest_step_count
+LARGEST_REPEATS: Final = largest_repeat_count
 SMALLEST_EDGE: Final = 1e-3
 LARGEST_EDGE: Final = 1e6
 LARGEST_INTERVALS: Final = 1_000_000
@@ -107,6 +109,20 @@ class PlanSection(Section):
         (),
         ["p00", "0p0", "00p"],
     )
+    repeats: Annotated[int, Field(ge=1, le=LARGEST_REPEATS)] = key(
+        f"an integer from 1 to {LARGEST_REPEATS}",
+        "How often each line is measured, with head and mirror as they are; runs 0, 1, 2, ... "
+        "Used by `simulate` only, as are the next two.",
+        1,
+    )
+    backward: bool = key(
+        "true or false",
+        "Each run of a line is followed by a backward one, its points in reverse order: runs 0, 2, ... and 1, 3, ...",
+        False,
+    )
+    seconds_per_reading: Positive | None = key(
+        POSITIVE, "Time from a reading to the next one; makes the column `time_s` of the measurement.", None, 5.0
+    )
 
 
 class MisalignmentKeys(Section):
@@ -122,6 +138,20 @@ class MisalignmentKeys(Section):
     distance_constant_mm: Length = key("a length in mm", "What every distance of a line reads too much.", 0.0)
     beam_constants_um: tuple[Length, ...] | None = key(
         "a list of lengths in µm, one for each beam", "And each of d1, d2, ... by itself.", None, [0.0, 1.0, -1.0]
+    )
+    lateral_mm: Pair = key("two lengths in mm", "Offset of the beam's origin along local x and y.", (0.0, 0.0))
+    roll_urad: Angle = key("an angle below 0.1 rad, in µrad", "Roll of the head about its beam.", 0.0)
+    gain: Annotated[float, Field(ge=-0.5, le=0.5)] = key(
+        "a number from -0.5 to 0.5",
+        "Tilts read 1 + gain times themselves; `psd`: spots; `multi_beam`: the beams stand at 1 + gain times their "
+        "offsets (of a traced head they stand where its design says).",
+        0.0,
+    )
+    drift_um_per_h: Length = key(
+        "a drift in µm/h",
+        "Of all distances, from the first reading of a run and through its backward run; needs "
+        "`plan.seconds_per_reading`.",
+        0.0,
     )
 
 

@@ -13,6 +13,7 @@ from stepdiag.toml_text import located
 
 PERCENT = 0.01
 HECTOPASCAL = 100.0  # Pa
+HOUR = 3600.0  # s
 
 
 def misalignments(keys: ScenarioKeys, heads: Mapping[str, _core.Head], path: Path) -> dict[str, _core.Misalignment]:
@@ -36,7 +37,16 @@ def misalignments(keys: ScenarioKeys, heads: Mapping[str, _core.Head], path: Pat
             psd_zero=values["psd_zero_mm"],
             distance_constant=values["distance_constant_mm"],
             beam_constants=_beam_constants(values["beam_constants_um"], heads[line], f"{path}: {place}"),
+            lateral=values["lateral_mm"],
+            roll=values["roll_urad"] * MICRORADIAN,
+            gain=values["gain"],
+            drift=values["drift_um_per_h"] * MICROMETRE / HOUR,
         )
+        if values["drift_um_per_h"] != 0.0 and keys.plan.seconds_per_reading is None:
+            place = f"misalignment.{line}" if own and "drift_um_per_h" in own.model_fields_set else "misalignment"
+            raise InvalidArgument(
+                f"{path}: {place}.drift_um_per_h: expected plan.seconds_per_reading as well, got none"
+            )
     return result
 
 

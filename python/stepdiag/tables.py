@@ -58,15 +58,21 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
     """The determined parameters by name, each with its standard uncertainty as NAME_u.
 
     Functions lie over the position x, y or z (mm) of their axis; one whose nodes differ from those of its
-    axis has a dimension of its own (x_EXX). Squarenesses are scalars. What is not determined is absent, and the
-    attributes say so."""
+    axis has a dimension of its own (x_EXX). Squarenesses are scalars. Where backward runs tell reversal errors,
+    functions are those of the + direction; those of the - direction are less by NAME_reversal, and NAME_negative_u is
+    their uncertainty. What is not determined is absent, and the attributes say so."""
     coordinates: dict[str, Any] = {}
     variables: dict[str, Any] = {}
-    for name, (position, value, uncertainty) in calibration.functions.items():
+
+    def dimension(name: str, position: Any) -> str:
         axis = name[2].lower()
         if axis in coordinates and not np.array_equal(coordinates[axis][1], position):
             axis = f"{axis}_{name}"
         coordinates[axis] = (axis, position, {"units": "mm", "long_name": f"position of {name[2]}"})
+        return axis
+
+    for name, (position, value, uncertainty) in calibration.functions.items():
+        axis = dimension(name, position)
         attributes = {
             "units": "rad" if name[1] in "ABC" else "mm",
             "long_name": f"{_COMPONENT[name[1]]} of axis {name[2]}",
@@ -74,6 +80,22 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
         }
         variables[name] = (axis, value, attributes)
         variables[f"{name}_u"] = (axis, uncertainty, _uncertainty_of(attributes))
+    for name, (position, value, uncertainty) in calibration.reversal.items():
+        axis = dimension(f"{name}_reversal", position)
+        attributes = {
+            "units": "rad" if name[1] in "ABC" else "mm",
+            "long_name": f"reversal error of the {_COMPONENT[name[1]]} of axis {name[2]}",
+            "constant_determined": str(name not in calibration.undetermined_reversal_constants).lower(),
+        }
+        variables[f"{name}_reversal"] = (axis, value, attributes)
+        variables[f"{name}_reversal_u"] = (axis, uncertainty, _uncertainty_of(attributes))
+        negative = calibration.negative_functions.get(name)  # none without the function itself
+        if negative is not None:
+            variables[f"{name}_negative_u"] = (
+                axis,
+                negative[2],
+                _uncertainty_of(attributes | {"long_name": f"{name} approached in - direction"}),
+            )
     for name, (angle, angle_uncertainty) in calibration.squareness.items():
         attributes = {"units": "rad", "long_name": _SQUARENESS[name]}
         variables[name] = ((), angle, attributes)

@@ -73,7 +73,9 @@ BAD_TABLES = [
     ("just some words\n", "line 1"),
     (TABLE.replace("unit,", "") + "EXX,0,0,\n", "line 1"),
     (TABLE.replace("unit", "value") + "EXX,0,0,0,\n", "line 1"),
-    (TABLE.replace("\n", ",direction\n") + "EXX,0,0,um,,+\nEXX,0,0,um,,-\n", "reversal"),
+    (TABLE.replace("\n", ",direction\n") + "EXX,0,0,um,,+\nEXX,0,0,um,,-\nEXX,0,1,um,,-\n", "must ascend"),
+    (TABLE.replace("\n", ",direction\n") + "EXX,0,0,um,,+\nEXX,10,0,um,,\n", "direction"),
+    (TABLE.replace("\n", ",direction\n") + "C0Y,,0,urad,,+\nC0Y,,0,urad,,-\n", "C0Y is given twice"),
     (TABLE + "EXX,0,0,um\n", "line 2"),
     (TABLE + "EXX,0,0,um,\nEXX,10,1.2", "line 3"),  # cut off
     (TABLE + "EXW,0,0,um,\n", "EXW"),

@@ -42,14 +42,20 @@ def head_of(scenario: reference.Scenario, **more: Any) -> sd.Head:
 
 
 def simulated(scenario: reference.Scenario, errors: sd.ErrorMap, **more: Any) -> sd.Measurement:
-    misalignment = {line: sd.Misalignment(**pairs) for line, pairs in scenario.misalignment.items()}
+    misalignment = {line: sd.Misalignment(**setup) for line, setup in scenario.misalignment.items()}
     machine = sd.Machine(sd.Chain(scenario.chain), errors, scenario.tool)
-    return sd.simulate(machine, plan_of(scenario), head_of(scenario), misalignment=misalignment, **more)
+    runs = {
+        "repeats": scenario.repeats,
+        "backward": scenario.backward,
+        "seconds_per_reading": scenario.seconds_per_reading,
+    }
+    return sd.simulate(machine, plan_of(scenario), head_of(scenario), misalignment=misalignment, **runs, **more)
 
 
 def table_of(errors: sd.ErrorMap) -> reference.ErrorTable:
     functions = {name: (list(p), list(v)) for name, (p, v) in errors.functions.items()}
-    return reference.ErrorTable(functions, dict(errors.squareness))
+    negative = {name: (list(p), list(v)) for name, (p, v) in errors.negative_functions.items()}
+    return reference.ErrorTable(functions, dict(errors.squareness), negative)
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -93,6 +93,40 @@ void bind_evaluation(py::module_& m) {
                 return names;
             },
             "Functions of which only the shape is known; their values are 0 at both ends.")
+        .def_property_readonly(
+            "reversal",
+            [](const Calibration& c) {
+                std::map<std::string, std::tuple<DoubleArray, DoubleArray, DoubleArray>> reversal;
+                for (int i = 0; i < function_count; ++i)
+                    if (const auto& r = c.reversal[i])
+                        reversal[FunctionId::at(i).name()] = {to_numpy(r->position), to_numpy(r->value),
+                                                              to_numpy(r->standard_uncertainty)};
+                return reversal;
+            },
+            "name -> (position, value, standard uncertainty): the function approached in + direction less that in - "
+            "direction, where backward runs tell it. `functions` are those of the + direction.")
+        .def_property_readonly(
+            "negative_functions",
+            [](const Calibration& c) {
+                std::map<std::string, std::tuple<DoubleArray, DoubleArray, DoubleArray>> functions;
+                const ParameterTable table = to_parameter_table(c);
+                for (int i = 0; i < function_count; ++i)
+                    if (const auto& f = table.negative_functions[i])
+                        functions[FunctionId::at(i).name()] = {to_numpy(f->position), to_numpy(f->value),
+                                                               to_numpy(f->standard_uncertainty)};
+                return functions;
+            },
+            "name -> (position, value, standard uncertainty) of functions approached in - direction, which are "
+            "functions - reversal.")
+        .def_property_readonly(
+            "undetermined_reversal_constants",
+            [](const Calibration& c) {
+                std::vector<std::string> names;
+                for (int i = 0; i < function_count; ++i)
+                    if (c.reversal[i] && !c.reversal[i]->constant_determined) names.push_back(FunctionId::at(i).name());
+                return names;
+            },
+            "Functions of whose reversal error only the change from home is known; its values are 0 at home.")
         .def_readonly("undetermined", &Calibration::undetermined,
                       "What the readings do not determine, why, and what would help; one sentence each.")
         .def_property_readonly(

@@ -6,17 +6,44 @@ namespace {
 
 using FunctionArrays = std::map<std::string, std::pair<ArrayLike, ArrayLike>>;
 
-ErrorMap make_error_map(const FunctionArrays& functions, const std::map<std::string, double>& squareness) {
-    ParameterTable table;
+using FunctionTables = std::array<std::optional<FunctionTable>, function_count>;
+
+FunctionTables to_tables(const FunctionArrays& functions, const std::string& argument) {
+    FunctionTables tables;
     for (const auto& [name, arrays] : functions) {
         const auto id = FunctionId::parse(name);
-        if (!id) throw InvalidArgument("functions: expected names EXX ... ECZ, got \"" + name + "\"");
+        if (!id) throw InvalidArgument(argument + ": expected names EXX ... ECZ, got \"" + name + "\"");
         const Eigen::VectorXd position = to_vector(arrays.first, (name + " position").c_str());
         const Eigen::VectorXd value = to_vector(arrays.second, (name + " value").c_str());
-        table.functions[id->index()] = FunctionTable{{position.begin(), position.end()},
-                                                     {value.begin(), value.end()},
-                                                     std::vector<std::optional<double>>(position.size())};
+        tables[id->index()] = FunctionTable{{position.begin(), position.end()},
+                                            {value.begin(), value.end()},
+                                            std::vector<std::optional<double>>(position.size())};
     }
+    return tables;
+}
+
+std::map<std::string, std::pair<DoubleArray, DoubleArray>> to_arrays(const FunctionTables& tables) {
+    std::map<std::string, std::pair<DoubleArray, DoubleArray>> functions;
+    for (int i = 0; i < function_count; ++i)
+        if (const auto& table = tables[i])
+            functions[FunctionId::at(i).name()] = {to_numpy(table->position), to_numpy(table->value)};
+    return functions;
+}
+
+Approaches to_approaches(const std::string& text) {
+    const bool valid = text.size() == 3 && text.find_first_not_of("+-") == std::string::npos;
+    if (!valid) throw InvalidArgument("approach: expected + or - of X, Y, Z such as \"++-\", got \"" + text + "\"");
+    Approaches approaches = all_positive;
+    for (int a = 0; a < 3; ++a)
+        if (text[a] == '-') approaches[a] = Approach::negative;
+    return approaches;
+}
+
+ErrorMap make_error_map(const FunctionArrays& functions, const std::map<std::string, double>& squareness,
+                        const FunctionArrays& negative_functions) {
+    ParameterTable table;
+    table.functions = to_tables(functions, "functions");
+    table.negative_functions = to_tables(negative_functions, "negative_functions");
     for (const auto& [text, value] : squareness) {
         const auto id = parse_squareness(text);
         if (!id) throw InvalidArgument("squareness: expected names C0Y, B0Z, A0Z, got \"" + text + "\"");
@@ -63,20 +90,17 @@ void bind_machine(py::module_& m) {
     py::class_<ErrorMap>(
         m, "ErrorMap",
         "The 21 geometric errors as tables (ISO 230-1 names): functions in mm or rad over positions in mm, linear "
-        "between nodes, end values held outside; squarenesses in rad. A missing parameter is 0.")
+        "between nodes, end values held outside; squarenesses in rad. A missing parameter is 0. A function may have "
+        "another table for positions approached in - direction; its other one then is of the + direction.")
         .def(py::init(&make_error_map), py::arg("functions") = FunctionArrays{},
-             py::arg("squareness") = std::map<std::string, double>{},
-             "functions: name -> (position, value), one-dimensional and of one length, positions ascending. Raises "
-             "InvalidArgument.")
-        .def_property_readonly("functions",
-                               [](const ErrorMap& map) {
-                                   std::map<std::string, std::pair<DoubleArray, DoubleArray>> functions;
-                                   for (int i = 0; i < function_count; ++i)
-                                       if (const auto& table = map.table().functions[i])
-                                           functions[FunctionId::at(i).name()] = {to_numpy(table->position),
-                                                                                  to_numpy(table->value)};
-                                   return functions;
-                               })
+             py::arg("squareness") = std::map<std::string, double>{}, py::kw_only(),
+             py::arg("negative_functions") = FunctionArrays{},
+             "functions: name -> (position, value), one-dimensional and of one length, positions ascending. "
+             "negative_functions: the same of the - direction, where it has others. Raises InvalidArgument.")
+        .def_property_readonly("functions", [](const ErrorMap& map) { return to_arrays(map.table().functions); })
+        .def_property_readonly(
+            "negative_functions", [](const ErrorMap& map) { return to_arrays(map.table().negative_functions); },
+            "The functions that have another table for the - direction: that table.")
         .def_property_readonly("squareness",
                                [](const ErrorMap& map) {
                                    std::map<std::string, double> values;
@@ -90,28 +114,34 @@ void bind_machine(py::module_& m) {
             "The leading \"# key=value\" lines of the file it came from.")
         .def(
             "function",
-            [](const ErrorMap& map, const std::string& name, const ArrayLike& position) {
+            [](const ErrorMap& map, const std::string& name, const ArrayLike& position, const std::string& approach) {
                 const auto id = FunctionId::parse(name);
                 if (!id) throw InvalidArgument("name: expected EXX ... ECZ, got \"" + name + "\"");
+                if (approach != "+" && approach != "-")
+                    throw InvalidArgument("approach: expected \"+\" or \"-\", got \"" + approach + "\"");
+                const Approach came = approach == "+" ? Approach::positive : Approach::negative;
                 Eigen::VectorXd value = to_vector(position, "position");
                 if (!value.allFinite()) throw InvalidArgument("position: expected finite positions in mm");
-                for (double& p : value) p = map.function(*id, p);
+                for (double& p : value) p = map.function(*id, p, came);
                 return to_numpy_vector(value);
             },
-            py::arg("name"), py::arg("position"),
-            "Values (mm or rad) of one error function at positions (mm), shape (n,).")
+            py::arg("name"), py::arg("position"), py::arg("approach") = "+",
+            "Values (mm or rad) of one error function at positions (mm), shape (n,), approached in the direction \"+\" "
+            "or \"-\".")
         .def(
             "warnings",
             [](const ErrorMap& map, const ArrayLike& volume) { return map.warnings(to_vector3(volume, "volume")); },
             py::arg("volume"),
-            "Where the map breaks the frame choice (0 at home, straightness 0 at both ends of travel); one sentence "
-            "each.")
+            "Where the map breaks the frame choice (0 at home, straightness 0 at both ends of travel, approached in "
+            "+ direction); one sentence each.")
         .def(
             "write",
             [](const ErrorMap& map, const PathLike& path, const std::optional<ChainLike>& chain,
                const std::optional<ArrayLike>& volume, const std::optional<ArrayLike>& tool) {
                 ParameterTable table = map.table();
-                for (const char* key : {"method", "undetermined", "undetermined_slopes"}) table.header.erase(key);
+                for (const char* key :
+                     {"method", "undetermined", "undetermined_slopes", "undetermined_reversal_constants"})
+                    table.header.erase(key);
                 table.header["format"] = error_map_format;
                 if (chain) table.header["chain"] = to_chain(*chain).name();
                 if (volume) table.header["volume_mm"] = format_lengths(to_vector3(*volume, "volume"));
@@ -152,37 +182,44 @@ void bind_machine(py::module_& m) {
         .def_property_readonly("tool", [](const Machine& machine) { return to_numpy_vector(machine.tool()); })
         .def(
             "pose",
-            [](const Machine& machine, const ArrayLike& commanded) {
+            [](const Machine& machine, const ArrayLike& commanded, const std::string& approach) {
                 const Points points = to_commanded(commanded);
+                const Approaches came = to_approaches(approach);
                 DoubleArray rotation({points.rows(), Eigen::Index(3), Eigen::Index(3)}),
                     position({points.rows(), Eigen::Index(3)});
                 double *r = rotation.mutable_data(), *p = position.mutable_data();
                 {
                     py::gil_scoped_release release;
                     for (Eigen::Index i = 0; i < points.rows(); ++i) {
-                        const Pose pose = machine.pose(points.row(i).transpose());
+                        const Pose pose = machine.pose(points.row(i).transpose(), came);
                         Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r + 9 * i) = pose.rotation;
                         Eigen::Map<Eigen::Vector3d>(p + 3 * i) = pose.position;
                     }
                 }
                 return std::make_pair(rotation, position);
             },
-            py::arg("commanded"),
+            py::arg("commanded"), py::arg("approach") = "+++",
             "Exact pose of the tool in the machine frame: (rotation (n, 3, 3), functional point (n, 3), mm) at "
-            "commanded positions (n, 3), mm.")
+            "commanded positions (n, 3), mm. approach: the direction + or - in which X, Y, Z came there.")
         .def(
             "error",
-            [](const Machine& machine, const ArrayLike& commanded) {
-                return map_points(to_commanded(commanded), [&](const Eigen::Vector3d& p) { return machine.error(p); });
+            [](const Machine& machine, const ArrayLike& commanded, const std::string& approach) {
+                return map_points(
+                    to_commanded(commanded),
+                    [&, came = to_approaches(approach)](const Eigen::Vector3d& p) { return machine.error(p, came); });
             },
-            py::arg("commanded"), "Actual minus nominal functional point (n, 3), mm, exact.")
+            py::arg("commanded"), py::arg("approach") = "+++",
+            "Actual minus nominal functional point (n, 3), mm, exact.")
         .def(
             "first_order_error",
-            [](const Machine& machine, const ArrayLike& commanded) {
+            [](const Machine& machine, const ArrayLike& commanded, const std::string& approach) {
                 return map_points(to_commanded(commanded),
-                                  [&](const Eigen::Vector3d& p) { return machine.first_order_error(p); });
+                                  [&, came = to_approaches(approach)](const Eigen::Vector3d& p) {
+                                      return machine.first_order_error(p, came);
+                                  });
             },
-            py::arg("commanded"), "The same to first order in the errors: sum over axes of delta + theta x L.");
+            py::arg("commanded"), py::arg("approach") = "+++",
+            "The same to first order in the errors: sum over axes of delta + theta x L.");
 }
 
 }  // namespace stepdiag::bindings

@@ -95,17 +95,32 @@ void bind_simulation(py::module_& m) {
     py::class_<Misalignment>(
         m, "Misalignment",
         "How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm, "
-        "a constant of all distances and one of each beam d1 ... dn in mm.")
+        "a constant of all distances and one of each beam d1 ... dn in mm, lateral offset of the beam's origin (mm), "
+        "roll of the head (rad), gain (tilts and spots read 1 + gain times themselves, beams stand at 1 + gain times "
+        "their offsets), drift of the distances (mm/s).")
         .def(py::init([](const ArrayLike& reflector, const ArrayLike& laser, const ArrayLike& psd_zero,
-                         double distance_constant, const std::vector<double>& beam_constants) {
-                 return Misalignment{to_finite_pair(reflector, "reflector"), to_finite_pair(laser, "laser"),
-                                     to_finite_pair(psd_zero, "psd_zero"), distance_constant, beam_constants};
+                         double distance_constant, const std::vector<double>& beam_constants, const ArrayLike& lateral,
+                         double roll, double gain, double drift) {
+                 return Misalignment{to_finite_pair(reflector, "reflector"),
+                                     to_finite_pair(laser, "laser"),
+                                     to_finite_pair(psd_zero, "psd_zero"),
+                                     distance_constant,
+                                     beam_constants,
+                                     to_finite_pair(lateral, "lateral"),
+                                     roll,
+                                     gain,
+                                     drift};
              }),
              py::arg("reflector") = zeros(2), py::arg("laser") = zeros(2), py::arg("psd_zero") = zeros(2),
-             py::arg("distance_constant") = 0.0, py::arg("beam_constants") = std::vector<double>{},
+             py::arg("distance_constant") = 0.0, py::arg("beam_constants") = std::vector<double>{}, py::kw_only(),
+             py::arg("lateral") = zeros(2), py::arg("roll") = 0.0, py::arg("gain") = 0.0, py::arg("drift") = 0.0,
              "Raises InvalidArgument for what is no pair of finite numbers.")
         .def_readonly("distance_constant", &Misalignment::distance_constant)
         .def_readonly("beam_constants", &Misalignment::beam_constants)
+        .def_readonly("roll", &Misalignment::roll)
+        .def_readonly("gain", &Misalignment::gain)
+        .def_readonly("drift", &Misalignment::drift)
+        .def_property_readonly("lateral", [](const Misalignment& m) { return to_numpy_vector(m.lateral); })
         .def_property_readonly("reflector", [](const Misalignment& m) { return to_numpy_vector(m.reflector); })
         .def_property_readonly("laser", [](const Misalignment& m) { return to_numpy_vector(m.laser); })
         .def_property_readonly("psd_zero", [](const Misalignment& m) { return to_numpy_vector(m.psd_zero); });
@@ -128,25 +143,34 @@ void bind_simulation(py::module_& m) {
         .def_readonly("common", &Noise::common)
         .def_readonly("seed", &Noise::seed);
 
+    m.attr("largest_repeat_count") = SimulationOptions::largest_repeat_count;
     m.def(
         "simulate",
         [](const Machine& machine, const Plan& plan, const HeadLike& head,
            const std::map<std::string, Misalignment>& misalignment, const Noise& noise,
            const std::optional<Environment>& environment, const std::optional<Environment>& assumed,
-           double verified_share) {
+           double verified_share, const IntegerLike& repeats, bool backward,
+           const std::optional<double>& seconds_per_reading) {
             const Heads heads = to_heads(head, plan);
+            const SimulationOptions options{
+                misalignment,       noise, environment, assumed, verified_share, to_int(repeats, "repeats"), backward,
+                seconds_per_reading};
             py::gil_scoped_release release;
-            return simulate(machine, plan, heads, {misalignment, noise, environment, assumed, verified_share});
+            return simulate(machine, plan, heads, options);
         },
         py::arg("machine"), py::arg("plan"), py::arg("head"), py::kw_only(),
         py::arg("misalignment") = std::map<std::string, Misalignment>{}, py::arg("noise") = Noise{},
         py::arg("environment") = std::nullopt, py::arg("assumed_environment") = std::nullopt,
-        py::arg("verified_share") = SimulationOptions{}.verified_share,
+        py::arg("verified_share") = SimulationOptions{}.verified_share, py::arg("repeats") = integer(1),
+        py::arg("backward") = false, py::arg("seconds_per_reading") = std::nullopt,
         "A run on the virtual machine: lines of the plan, then its scale lines. head: one, or a dict with one for each "
         "line. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace "
         "(none: of 20 degrees Celsius for a head with a design, an index of 1 for the others); "
         "assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's "
-        "replayed poses, traced again and compared. Readings whose beam misses the mirror or does not come back are "
+        "replayed poses, traced again and compared. repeats: how often each line is measured, runs 0, 1, 2, ...; "
+        "backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; seconds_per_reading: makes "
+        "the channel time. Points of a visit are approached in the direction of its own travel. Readings whose beam "
+        "misses the mirror or does not come back are "
         "lost (NaN). Raises InvalidArgument; RuntimeError where a replay and its trace differ.");
 }
 

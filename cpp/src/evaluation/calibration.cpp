@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "core/text_file.hpp"
 #include "stepdiag/core/error.hpp"
@@ -13,7 +14,30 @@ namespace {
 constexpr std::string_view sentence_break = " | ";
 
 // An uncertainty that a file did not give is NaN in a Calibration.
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 std::optional<double> if_known(double u) { return std::isnan(u) ? std::nullopt : std::optional(u); }
+std::vector<double> or_unknown(const std::vector<std::optional<double>>& uncertainties) {
+    std::vector<double> values;
+    for (const auto& u : uncertainties) values.push_back(u.value_or(unknown));
+    return values;
+}
+
+FunctionTable negative_table(const FunctionTable& function, const CalibratedReversal& reversal) {
+    FunctionTable negative{reversal.position, {}, {}};
+    for (std::size_t k = 0; k < reversal.position.size(); ++k) {
+        negative.value.push_back(interpolate(function, reversal.position[k]) - reversal.value[k]);
+        negative.standard_uncertainty.push_back(if_known(reversal.negative_standard_uncertainty[k]));
+    }
+    return negative;
+}
+
+CalibratedReversal reversal_of(const FunctionTable& function, const FunctionTable& negative) {
+    CalibratedReversal reversal{negative.position, {}, {}, or_unknown(negative.standard_uncertainty)};
+    for (std::size_t k = 0; k < negative.position.size(); ++k)
+        reversal.value.push_back(interpolate(function, negative.position[k]) - negative.value[k]);
+    reversal.standard_uncertainty.assign(negative.position.size(), unknown);
+    return reversal;
+}
 
 std::string join(const std::vector<std::string>& parts, std::string_view separator) {
     std::string text;
@@ -72,7 +96,7 @@ bool is_anything_determined(const Calibration& calibration) {
 
 ParameterTable to_parameter_table(const Calibration& calibration) {
     ParameterTable table;
-    std::vector<std::string> slopes;
+    std::vector<std::string> slopes, constants;
     for (int i = 0; i < function_count; ++i) {
         if (!calibration.functions[i]) continue;
         const CalibratedFunction& function = *calibration.functions[i];
@@ -80,6 +104,9 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
         for (const double u : function.standard_uncertainty)
             table.functions[i]->standard_uncertainty.push_back(if_known(u));
         if (!function.slope_determined) slopes.push_back(FunctionId::at(i).name());
+        if (!calibration.reversal[i]) continue;
+        table.negative_functions[i] = negative_table(*table.functions[i], *calibration.reversal[i]);
+        if (!calibration.reversal[i]->constant_determined) constants.push_back(FunctionId::at(i).name());
     }
     for (int i = 0; i < squareness_count; ++i)
         if (const auto& entry = calibration.squarenesses[i])
@@ -90,6 +117,7 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
                     {"volume_mm", format_lengths(calibration.volume)},
                     {"tool_mm", format_lengths(calibration.tool)}};
     if (!slopes.empty()) table.header["undetermined_slopes"] = join(slopes, " ");
+    if (!constants.empty()) table.header["undetermined_reversal_constants"] = join(constants, " ");
     if (!calibration.undetermined.empty())
         table.header["undetermined"] = join(calibration.undetermined, sentence_break);
     return table;
@@ -98,6 +126,22 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
 void write_calibration(const Calibration& calibration, const std::string& path) {
     write_parameter_table(to_parameter_table(calibration), path);
 }
+
+namespace {
+
+// Names of error functions in a leading line.
+std::set<std::string> listed_functions(const ParameterTable& table, const char* key, const std::string& path) {
+    std::set<std::string> names;
+    if (const auto entry = table.header.find(key); entry != table.header.end())
+        for (const std::string& name : split(entry->second, " ")) {
+            if (!FunctionId::parse(name))
+                throw InvalidArgument(path + ": " + key + ": expected names of error functions, got \"" + name + "\"");
+            names.insert(name);
+        }
+    return names;
+}
+
+}  // namespace
 
 Calibration read_calibration(const std::string& path) {
     const ParameterTable table = ErrorMap(read_parameter_table(path)).table();
@@ -113,19 +157,17 @@ Calibration read_calibration(const std::string& path) {
                             {},
                             split(optional_value("undetermined"), sentence_break),
                             {}};
-    const auto slopes = split(optional_value("undetermined_slopes"), " ");
-    for (const auto& slope : slopes)
-        if (!FunctionId::parse(slope))
-            throw InvalidArgument(path + ": undetermined_slopes: expected names of error functions, got \"" + slope +
-                                  "\"");
-    constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+    const auto slopes = listed_functions(table, "undetermined_slopes", path);
+    const auto constants = listed_functions(table, "undetermined_reversal_constants", path);
     for (int i = 0; i < function_count; ++i) {
         if (!table.functions[i]) continue;
+        const std::string name = FunctionId::at(i).name();
         const FunctionTable& source = *table.functions[i];
-        CalibratedFunction function{source.position, source.value, {}, true};
-        for (const auto& u : source.standard_uncertainty) function.standard_uncertainty.push_back(u.value_or(unknown));
-        function.slope_determined = std::find(slopes.begin(), slopes.end(), FunctionId::at(i).name()) == slopes.end();
-        calibration.functions[i] = std::move(function);
+        calibration.functions[i] = CalibratedFunction{source.position, source.value,
+                                                      or_unknown(source.standard_uncertainty), slopes.count(name) == 0};
+        if (!table.negative_functions[i]) continue;
+        calibration.reversal[i] = reversal_of(source, *table.negative_functions[i]);
+        calibration.reversal[i]->constant_determined = constants.count(name) == 0;
     }
     for (int i = 0; i < squareness_count; ++i)
         if (const auto& entry = table.squarenesses[i])

@@ -67,7 +67,8 @@ Environment usual_environment(const Head& head) { return head.design ? Environme
 
 HeadSetup set_up(const Head& head, const Eigen::Matrix3d& machine_R_line, const Eigen::Vector3d& first_point,
                  const Eigen::Vector2d& mirror, const Misalignment& misalignment) {
-    return {first_point - head.standoff * machine_R_line.col(2), turned(machine_R_line, misalignment.laser),
+    return {first_point - head.standoff * machine_R_line.col(2) + machine_R_line.leftCols<2>() * misalignment.lateral,
+            turned(machine_R_line, misalignment.laser) * rotation_exp({0.0, 0.0, misalignment.roll}),
             turned(machine_R_line, misalignment.reflector), mirror};
 }
 

@@ -11,15 +11,6 @@
 namespace stepdiag {
 namespace {
 
-double interpolate(const FunctionTable& table, double position) {
-    const auto after = std::upper_bound(table.position.begin(), table.position.end(), position);
-    if (after == table.position.begin()) return table.value.front();
-    if (after == table.position.end()) return table.value.back();
-    const auto j = after - table.position.begin();
-    const double t = (position - table.position[j - 1]) / (table.position[j] - table.position[j - 1]);
-    return table.value[j - 1] + t * (table.value[j] - table.value[j - 1]);
-}
-
 void check_function(const FunctionTable& table, const std::string& name) {
     const auto size = table.position.size();
     if (size == 0 || table.value.size() != size || table.standard_uncertainty.size() != size)
@@ -58,14 +49,22 @@ std::vector<double> random_shape(std::uint64_t seed, int function, int intervals
 }  // namespace
 
 ErrorMap::ErrorMap(ParameterTable table) : table_(std::move(table)) {
-    for (int i = 0; i < function_count; ++i)
-        if (table_.functions[i]) check_function(*table_.functions[i], FunctionId::at(i).name());
+    for (int i = 0; i < function_count; ++i) {
+        const std::string name = FunctionId::at(i).name();
+        const auto& negative = table_.negative_functions[i];
+        if (table_.functions[i]) check_function(*table_.functions[i], name);
+        if (!negative) continue;
+        if (!table_.functions[i])
+            throw InvalidArgument(name + ": has a table of the - direction, and none of the + direction");
+        check_function(*negative, name + " in - direction");
+    }
     for (const Squareness s : all_squarenesses)
         if (!std::isfinite(squareness(s))) throw InvalidArgument(name(s) + ": must be finite");
 }
 
-double ErrorMap::function(FunctionId id, double position) const {
-    const auto& table = table_.functions[id.index()];
+double ErrorMap::function(FunctionId id, double position, Approach approach) const {
+    const auto& negative = table_.negative_functions[id.index()];
+    const auto& table = approach == Approach::negative && negative ? negative : table_.functions[id.index()];
     return table ? interpolate(*table, position) : 0.0;
 }
 
@@ -74,9 +73,9 @@ double ErrorMap::squareness(Squareness squareness) const {
     return entry ? entry->value : 0.0;
 }
 
-Eigen::Vector3d ErrorMap::delta(Axis axis, double position) const {
+Eigen::Vector3d ErrorMap::delta(Axis axis, double position, Approach approach) const {
     Eigen::Vector3d delta;
-    for (int c = 0; c < 3; ++c) delta[c] = function({axis, Component(c)}, position);
+    for (int c = 0; c < 3; ++c) delta[c] = function({axis, Component(c)}, position, approach);
     for (const Squareness s : all_squarenesses) {
         const SquarenessTerm term = squareness_term(s);
         if (term.axis == axis) delta[term.component] += term.sign * squareness(s) * position;
@@ -84,9 +83,9 @@ Eigen::Vector3d ErrorMap::delta(Axis axis, double position) const {
     return delta;
 }
 
-Eigen::Vector3d ErrorMap::theta(Axis axis, double position) const {
+Eigen::Vector3d ErrorMap::theta(Axis axis, double position, Approach approach) const {
     Eigen::Vector3d theta;
-    for (int c = 0; c < 3; ++c) theta[c] = function({axis, Component(c + 3)}, position);
+    for (int c = 0; c < 3; ++c) theta[c] = function({axis, Component(c + 3)}, position, approach);
     return theta;
 }
 

@@ -21,12 +21,13 @@ Machine::Machine(Chain chain, ErrorMap errors, const Eigen::Vector3d& tool)
     if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
 }
 
-Pose Machine::pose(const Eigen::Vector3d& commanded) const {
+Pose Machine::pose(const Eigen::Vector3d& commanded, const Approaches& approach) const {
     Pose pose;
     for (const Axis axis : chain_.order()) {
         const double p = commanded[index(axis)];
-        const Eigen::Vector3d shift = p * Eigen::Vector3d::Unit(index(axis)) + errors_.delta(axis, p);
-        const Eigen::Matrix3d turn = rotation_exp(errors_.theta(axis, p));
+        const Approach came = approach[index(axis)];
+        const Eigen::Vector3d shift = p * Eigen::Vector3d::Unit(index(axis)) + errors_.delta(axis, p, came);
+        const Eigen::Matrix3d turn = rotation_exp(errors_.theta(axis, p, came));
         if (chain_.carries_workpiece(axis)) {
             pose.rotation = pose.rotation * turn;
             pose.position += pose.rotation * shift;
@@ -39,15 +40,17 @@ Pose Machine::pose(const Eigen::Vector3d& commanded) const {
     return pose;
 }
 
-Eigen::Vector3d Machine::error(const Eigen::Vector3d& commanded) const {
-    return pose(commanded).position - commanded - tool_;
+Eigen::Vector3d Machine::error(const Eigen::Vector3d& commanded, const Approaches& approach) const {
+    return pose(commanded, approach).position - commanded - tool_;
 }
 
-Eigen::Vector3d Machine::first_order_error(const Eigen::Vector3d& commanded) const {
+Eigen::Vector3d Machine::first_order_error(const Eigen::Vector3d& commanded, const Approaches& approach) const {
     Eigen::Vector3d error = Eigen::Vector3d::Zero();
     for (const Axis axis : all_axes) {
         const double p = commanded[index(axis)];
-        error += errors_.delta(axis, p) + errors_.theta(axis, p).cross(angular_lever(chain_, tool_, axis, commanded));
+        const Approach came = approach[index(axis)];
+        error += errors_.delta(axis, p, came) +
+                 errors_.theta(axis, p, came).cross(angular_lever(chain_, tool_, axis, commanded));
     }
     return error;
 }

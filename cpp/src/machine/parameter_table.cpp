@@ -33,6 +33,8 @@ public:
         read_header();
         find_columns();
         for (const CsvRow& row : csv_.rows) read_row(row);
+        for (int i = 0; i < function_count; ++i)
+            if (!table_.functions[i]) std::swap(table_.functions[i], table_.negative_functions[i]);
         return std::move(table_);
     }
 
@@ -91,7 +93,7 @@ private:
         const auto squareness = parse_squareness(name);
         if (!function && !squareness)
             fail(row.line, "parameter: expected EXX ... ECZ, C0Y, B0Z or A0Z, got " + quoted(name));
-        if (field_[direction]) check_direction(row);
+        const std::string sign = field_[direction] ? direction_of(row) : "";
         const std::string native = !function || function->is_rotation() ? "urad" : "um";
         if (field(row, unit) != native)
             fail(row.line, "unit: expected " + quoted(native) + " for " + name + ", got " + quoted(field(row, unit)));
@@ -103,29 +105,27 @@ private:
             if (*deviation < 0.0)
                 fail(row.line, "standard_uncertainty: expected at least 0, got " + quoted(field(row, uncertainty)));
         }
-        if (function) add_node(row, *function, error, deviation);
+        if (function) add_node(row, *function, sign == "-", error, deviation);
         else add_squareness(row, *squareness, error, deviation);
     }
 
-    // One direction, or none, for all rows of a parameter.
-    void check_direction(const CsvRow& row) {
+    // "", "+" or "-". All rows of a parameter say their direction, or none does.
+    std::string direction_of(const CsvRow& row) {
         const std::string& given = field(row, direction);
         if (!given.empty() && given != "+" && given != "-" && given != "\u2212")
             fail(row.line, "direction: expected + or - or an empty field, got " + quoted(given));
         const std::string sign = given == "\u2212" ? "-" : given;
         const std::string& name = field(row, parameter);
-        const std::string& before = directions_.emplace(name, sign).first->second;
-        if (before == sign) return;
-        if (before.empty() || sign.empty())
-            fail(row.line, "direction: expected " + (before.empty() ? "an empty field" : before) +
+        const bool is_directed = is_directed_.emplace(name, !sign.empty()).first->second;
+        if (is_directed == sign.empty())
+            fail(row.line, std::string("direction: expected ") + (is_directed ? "+ or -" : "an empty field") +
                                " as in the rows of " + name + " above, got " + quoted(given));
-        fail(row.line, "direction: " + name +
-                           " is given for + and for -; tables for both directions (reversal) are not supported yet");
+        return sign;
     }
 
-    void add_node(const CsvRow& row, FunctionId id, double error, std::optional<double> deviation) {
+    void add_node(const CsvRow& row, FunctionId id, bool negative, double error, std::optional<double> deviation) {
         const double place = number(row, position, 0);
-        auto& function = table_.functions[id.index()];
+        auto& function = (negative ? table_.negative_functions : table_.functions)[id.index()];
         if (!function) function.emplace();
         if (!function->position.empty() && !(place > function->position.back()))
             fail(row.line,
@@ -147,7 +147,7 @@ private:
     const std::string& file_name_;
     CsvFile csv_;
     std::array<std::optional<std::size_t>, column_count> field_;
-    std::map<std::string, std::string> directions_;  // by parameter
+    std::map<std::string, bool> is_directed_;  // by parameter
     ParameterTable table_;
 };
 
@@ -168,6 +168,15 @@ std::string format_header(const std::map<std::string, std::string>& header) {
 
 }  // namespace
 
+double interpolate(const FunctionTable& table, double position) {
+    const auto after = std::upper_bound(table.position.begin(), table.position.end(), position);
+    if (after == table.position.begin()) return table.value.front();
+    if (after == table.position.end()) return table.value.back();
+    const auto j = after - table.position.begin();
+    const double t = (position - table.position[j - 1]) / (table.position[j] - table.position[j - 1]);
+    return table.value[j - 1] + t * (table.value[j] - table.value[j - 1]);
+}
+
 ParameterTable parse_parameter_table(std::string_view text, const std::string& file_name) {
     return Reader(text, file_name).read();
 }
@@ -178,25 +187,35 @@ ParameterTable read_parameter_table(const std::string& path) {
 
 std::string format_parameter_table(const ParameterTable& table) {
     std::string text = format_header(table.header);
-    text += "parameter,position_mm,value,unit,standard_uncertainty\n";
+    const bool directed = std::any_of(table.negative_functions.begin(), table.negative_functions.end(),
+                                      [](const auto& function) { return function.has_value(); });
+    text +=
+        std::string("parameter,position_mm,value,unit,standard_uncertainty") + (directed ? ",direction" : "") + "\n";
     const auto row = [&](const std::string& parameter, const std::string& position, double value, bool rotation,
-                         std::optional<double> uncertainty) {
+                         std::optional<double> uncertainty, const char* direction) {
         if (!std::isfinite(value) || !std::isfinite(uncertainty.value_or(0.0)))
             throw InvalidArgument(parameter + ": a value or standard uncertainty is not finite and cannot be written");
         const int shift = rotation ? -micro_to_radian : -micro_to_milli;
         text += parameter + "," + position + "," + format_decimal(value, shift) + (rotation ? ",urad," : ",um,") +
-                (uncertainty ? format_decimal(*uncertainty, shift) : "") + "\n";
+                (uncertainty ? format_decimal(*uncertainty, shift) : "") + (directed ? "," : "") + direction + "\n";
+    };
+    const auto rows = [&](FunctionId id, const FunctionTable& function, const char* direction) {
+        for (std::size_t k = 0; k < function.position.size(); ++k)
+            row(id.name(), format_decimal(function.position[k], 0), function.value[k], id.is_rotation(),
+                function.standard_uncertainty[k], direction);
     };
     for (int i = 0; i < function_count; ++i) {
-        if (!table.functions[i]) continue;
-        const FunctionTable& function = *table.functions[i];
-        for (std::size_t k = 0; k < function.position.size(); ++k)
-            row(FunctionId::at(i).name(), format_decimal(function.position[k], 0), function.value[k],
-                FunctionId::at(i).is_rotation(), function.standard_uncertainty[k]);
+        const FunctionId id = FunctionId::at(i);
+        const auto& function = table.functions[i];
+        const auto& negative = table.negative_functions[i];
+        if (negative && !function)
+            throw InvalidArgument(id.name() + ": has a table of the - direction, and none of the + direction");
+        if (function) rows(id, *function, negative ? "+" : "");
+        if (negative) rows(id, *negative, "-");
     }
     for (const Squareness s : all_squarenesses)
         if (const auto& entry = table.squarenesses[static_cast<int>(s)])
-            row(name(s), "", entry->value, true, entry->standard_uncertainty);
+            row(name(s), "", entry->value, true, entry->standard_uncertainty, "");
     return text;
 }
 

@@ -17,12 +17,22 @@ void check_options(const Plan& plan, const SimulationOptions& options) {
         const auto small = [](const Eigen::Vector2d& angles) {
             return angles.allFinite() && angles.cwiseAbs().maxCoeff() < 0.1;
         };
-        bool finite = misalignment.psd_zero.allFinite() && std::isfinite(misalignment.distance_constant);
+        bool finite = misalignment.psd_zero.allFinite() && misalignment.lateral.allFinite() &&
+                      std::isfinite(misalignment.distance_constant) && std::isfinite(misalignment.drift);
         for (const double constant : misalignment.beam_constants) finite = finite && std::isfinite(constant);
-        if (!small(misalignment.reflector) || !small(misalignment.laser) || !finite)
+        if (!small(misalignment.reflector) || !small(misalignment.laser) || !small({misalignment.roll, 0.0}) || !finite)
             throw InvalidArgument("misalignment of " + line + ": expected angles below 0.1 rad and finite lengths");
+        if (!(std::abs(misalignment.gain) <= 0.5))
+            throw InvalidArgument("misalignment of " + line + ": gain: expected a number from -0.5 to 0.5");
+        if (misalignment.drift != 0.0 && !options.seconds_per_reading)
+            throw InvalidArgument("misalignment of " + line + ": drift: expected seconds_per_reading as well");
     }
     check_noise(options.noise);
+    if (options.repeats < 1 || options.repeats > SimulationOptions::largest_repeat_count)
+        throw InvalidArgument("repeats: expected 1 to " + std::to_string(SimulationOptions::largest_repeat_count) +
+                              ", got " + std::to_string(options.repeats));
+    if (const auto& seconds = options.seconds_per_reading; seconds && !(std::isfinite(*seconds) && *seconds > 0.0))
+        throw InvalidArgument("seconds_per_reading: expected a finite time above 0");
     if (!(options.verified_share >= 0.0 && options.verified_share <= 1.0))
         throw InvalidArgument("verified_share: expected a share from 0 to 1");
 }
@@ -63,11 +73,15 @@ Environment true_environment(const Head& head, const SimulationOptions& options)
     return options.environment.value_or(options.assumed ? Environment{Air{}} : usual_environment(head));
 }
 
-void check_constants(const Misalignment& misalignment, const Head& head, const Line& line) {
+void check_misalignment(const Misalignment& misalignment, const Head& head, const Line& line) {
     const std::size_t given = misalignment.beam_constants.size(), beams = head.beam_offsets.size();
     if (given > 0 && (head.layout != HeadLayout::multi_beam || given != beams))
         throw InvalidArgument("misalignment of " + line.name() + ": expected " + std::to_string(beams) +
                               " beam constants, got " + std::to_string(given));
+    if (misalignment.gain != 0.0 && head.design && head.layout == HeadLayout::multi_beam)
+        throw InvalidArgument("misalignment of " + line.name() +
+                              ": gain: expected 0, because the beams of a traced head stand where its design and its "
+                              "pose errors put them");
 }
 
 TracedConditions conditions(const Head& head, const SimulationOptions& options) {
@@ -87,8 +101,9 @@ std::vector<SignalRow> read_traced(const TracedReader& reader, const HeadSetup& 
 bool is_distance(const std::string& channel) { return channel.front() == 'd'; }
 
 // The ideal head, traced, and the closed definitions. The air's index is taken off the path with the assumed one.
-std::vector<SignalRow> read_defined(const Head& head, const HeadSetup& setup, const std::vector<Pose>& poses,
-                                    const SimulationOptions& options) {
+std::vector<SignalRow> read_defined(Head head, const HeadSetup& setup, const std::vector<Pose>& poses,
+                                    const Misalignment& misalignment, const SimulationOptions& options) {
+    for (Eigen::Vector2d& offset : head.beam_offsets) offset *= 1.0 + misalignment.gain;
     const Environment environment = true_environment(head, options);
     const Medium air{refractive_index(environment, head.wavelength)};
     const double assumed = refractive_index(options.assumed.value_or(environment), head.wavelength);
@@ -113,9 +128,9 @@ double deviation(const Noise& noise, const std::string& channel) {
     return channel == "spot_x" || channel == "spot_y" ? noise.spot : noise.distance;
 }
 
-// What a line's set-up adds to a row, and its noise.
+// What a line's set-up makes of a row read `elapsed` seconds after its first one, and its noise.
 void add_setup_and_noise(SignalRow& row, const std::vector<std::string>& channels, const Misalignment& misalignment,
-                         const Noise& noise, std::uint64_t number) {
+                         double elapsed, const Noise& noise, std::uint64_t number) {
     constexpr std::uint64_t common_draw = 0xffff;  // no channel has this number
     const auto draw = [&](std::uint64_t c) {
         return normal_pair(noise.seed, RandomStream::reading_noise, (number << 16) | c)[0];
@@ -125,13 +140,43 @@ void add_setup_and_noise(SignalRow& row, const std::vector<std::string>& channel
         if (!row[c]) continue;
         double constant = 0.0;
         if (is_distance(channels[c]))
-            constant = misalignment.distance_constant + common +
+            constant = misalignment.distance_constant + misalignment.drift * elapsed + common +
                        (c < misalignment.beam_constants.size() ? misalignment.beam_constants[c] : 0.0);
-        else if (channels[c] == "spot_x" || channels[c] == "spot_y")
+        else *row[c] *= 1.0 + misalignment.gain;
+        if (channels[c] == "spot_x" || channels[c] == "spot_y")
             constant = misalignment.psd_zero[channels[c] == "spot_y"];
         *row[c] += constant;
         if (const double sigma = deviation(noise, channels[c]); sigma > 0.0) *row[c] += sigma * draw(c);
     }
+}
+
+// One way along a line, and the rows where it and its set-up begin.
+struct Visit {
+    Line line;
+    int run;
+    Direction direction;
+    std::uint64_t first_row;
+    std::uint64_t setup_row;
+};
+
+std::vector<Visit> visits_of(const Plan& plan, const SimulationOptions& options) {
+    std::vector<Line> lines = plan.lines();
+    lines.insert(lines.end(), plan.scale_lines().begin(), plan.scale_lines().end());
+    std::vector<Visit> visits;
+    std::uint64_t row = 0;
+    for (const Line& line : lines) {
+        const std::size_t points = plan.points(line).size();
+        for (int repeat = 0; repeat < options.repeats; ++repeat) {
+            const std::uint64_t setup_row = row;
+            const int run = options.backward ? 2 * repeat : repeat;
+            visits.push_back({line, run, Direction::forward, row, setup_row});
+            row += points;
+            if (!options.backward) continue;
+            visits.push_back({line, run + 1, Direction::backward, row, setup_row});
+            row += points;
+        }
+    }
+    return visits;
 }
 
 }  // namespace
@@ -164,33 +209,41 @@ Measurement simulate(const Machine& machine, const Plan& plan, const Heads& head
     std::vector<Station> stations;
     std::vector<Channel> channels;
     for (const std::string& name : names) channels.push_back({name, {}});
-    std::vector<Line> lines = plan.lines();
-    lines.insert(lines.end(), plan.scale_lines().begin(), plan.scale_lines().end());
-    for (const Line& line : lines) {
+    const double seconds = options.seconds_per_reading.value_or(0.0);
+    for (const Visit& visit : visits_of(plan, options)) {
+        const Line& line = visit.line;
         const Head& head = heads.of(line);
         const Eigen::Vector2d mirror = mirror_size(head, plan);
         const auto entry = options.misalignment.find(line.name());
         const Misalignment misalignment = entry == options.misalignment.end() ? Misalignment{} : entry->second;
+        check_misalignment(misalignment, head, line);
         const auto points = plan.points(line);
         const HeadSetup setup =
             set_up(head, plan.frame(line), points.front().commanded + machine.tool(), mirror, misalignment);
-        check_constants(misalignment, head, line);
         std::vector<Pose> poses;
-        for (const PlanPoint& point : points) poses.push_back(machine.pose(point.commanded));
+        for (std::size_t k = 0; k < points.size(); ++k) {
+            const std::size_t point = visit.direction == Direction::forward ? k : points.size() - 1 - k;
+            stations.push_back({visit.run, line, int(point), visit.direction, points[point].commanded});
+            poses.push_back(machine.pose(points[point].commanded, approaches(line, visit.direction)));
+        }
 
-        const std::uint64_t first_row = stations.size();
         std::vector<SignalRow> rows;
         if (head.design) {
             const auto reader = readers.try_emplace(&head, head, mirror, conditions(head, options)).first;
-            rows = read_traced(reader->second, setup, poses, first_row, count);
+            rows = read_traced(reader->second, setup, poses, visit.first_row, count);
         } else {
-            rows = read_defined(head, setup, poses, options);
+            rows = read_defined(head, setup, poses, misalignment, options);
         }
-        for (std::size_t k = 0; k < points.size(); ++k) {
-            add_setup_and_noise(rows[k], names, misalignment, options.noise, first_row + k);
-            stations.push_back({0, line, int(k), Direction::forward, points[k].commanded});
+        for (std::size_t k = 0; k < rows.size(); ++k) {
+            const std::uint64_t row = visit.first_row + k;
+            const double elapsed = double(row - visit.setup_row) * seconds;
+            add_setup_and_noise(rows[k], names, misalignment, elapsed, options.noise, row);
             for (std::size_t c = 0; c < channels.size(); ++c) channels[c].value.push_back(rows[k][c]);
         }
+    }
+    if (options.seconds_per_reading) {
+        Channel& time = channels.emplace_back(Channel{"time", {}});
+        for (std::size_t row = 0; row < stations.size(); ++row) time.value.push_back(double(row) * seconds);
     }
     return Measurement(std::move(stations), std::move(channels));
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -69,6 +70,41 @@ TEST(Calibration, FileIsReadBackToTheSameBits) {
     std::filesystem::remove(path);
 }
 
+TEST(Calibration, ReversalErrorsAreWrittenAsFunctionsOfTheOtherDirection) {
+    const auto path = (folder / "stepdiag_calibration_reversal_test.csv").string();
+    Calibration a = sample();
+    // At the function's nodes, at some of them, and between them; sums of these halves and quarters are exact.
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    a.functions[3] = stepdiag::CalibratedFunction{{0.0, 400.0, 800.0}, {0.0, 0.5, 0.25}, {0.0, 0.1, 0.2}};
+    a.reversal[3] =
+        stepdiag::CalibratedReversal{{0.0, 400.0, 800.0}, {0.75, 0.5, -1.0}, {0.1, 0.2, 0.3}, {0.4, 0.5, nan}};
+    a.reversal[17] = stepdiag::CalibratedReversal{{0.0}, {2.0}, {0.1}, {0.2}};
+    a.functions[6] = stepdiag::CalibratedFunction{{0.0, 400.0}, {0.0, 1.0}, {0.0, 0.1}};
+    a.reversal[6] = stepdiag::CalibratedReversal{{0.0, 200.0}, {0.0, 2.0}, {0.0, 0.1}, {0.3, 0.2}, false};
+    a.reversal[7] = a.reversal[6];  // of a function that is not determined: a table has no place for it
+    write_calibration(a, path);
+    const Calibration b = stepdiag::read_calibration(path);
+    const auto map = stepdiag::read_error_map(path);
+    EXPECT_EQ(map.function(stepdiag::FunctionId::at(3), 800.0), 0.25);
+    EXPECT_EQ(map.function(stepdiag::FunctionId::at(3), 800.0, stepdiag::Approach::negative), 1.25);
+    EXPECT_EQ(map.function(stepdiag::FunctionId::at(6), 200.0, stepdiag::Approach::negative), -1.5);
+    for (int i = 0; i < stepdiag::function_count; ++i) {
+        SCOPED_TRACE(i);
+        ASSERT_EQ(b.reversal[i].has_value(), i == 3 || i == 6 || i == 17);
+        if (!b.reversal[i]) continue;
+        EXPECT_TRUE(same_bits(b.reversal[i]->position, a.reversal[i]->position));
+        EXPECT_EQ(b.reversal[i]->value, a.reversal[i]->value);
+        EXPECT_EQ(b.reversal[i]->constant_determined, a.reversal[i]->constant_determined);
+        ASSERT_EQ(b.reversal[i]->standard_uncertainty.size(), a.reversal[i]->position.size());
+        for (const double u : b.reversal[i]->standard_uncertainty) EXPECT_TRUE(std::isnan(u));
+        EXPECT_TRUE(
+            same_bits(b.reversal[i]->negative_standard_uncertainty, a.reversal[i]->negative_standard_uncertainty));
+    }
+    write_calibration(b, path);
+    EXPECT_EQ(stepdiag::read_calibration(path).reversal[3]->value, a.reversal[3]->value);
+    std::filesystem::remove(path);
+}
+
 TEST(Calibration, FileIsAnErrorMapToo) {
     const auto path = (folder / "stepdiag_calibration_as_map_test.csv").string();
     write_calibration(sample(), path);
@@ -93,4 +129,5 @@ TEST(Calibration, HeaderThatMakesNoSenseIsRefused) {
     expect_file_refused(chain + "# volume_mm=800 0 500\n" + tool + table, "volume_mm");
     expect_file_refused(chain + size + "# tool_mm=0 inf 0\n" + table, "tool_mm");
     expect_file_refused(chain + size + tool + "# undetermined_slopes=EXQ\n" + table, "EXQ");
+    expect_file_refused(chain + size + tool + "# undetermined_reversal_constants=C0Y\n" + table, "C0Y");
 }

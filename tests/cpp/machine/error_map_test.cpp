@@ -51,6 +51,36 @@ TEST(ErrorMap, FunctionIsLinearBetweenNodesAndHoldsItsEndValues) {
 
 TEST(ErrorMap, OneNodeIsAConstant) { EXPECT_EQ(with(exx, nodes({3.0}, {7.0})).function(exx, 100.0), 7.0); }
 
+TEST(ErrorMap, FunctionApproachedInTheOtherDirectionMayBeAnother) {
+    const FunctionId ecx{Axis::X, Component::C}, eyx{Axis::X, Component::Y};
+    ParameterTable table;
+    table.functions[exx.index()] = nodes({0.0, 10.0}, {0.0, 1.0});
+    table.functions[ecx.index()] = nodes({0.0, 10.0}, {0.0, 3e-5});
+    table.functions[eyx.index()] = nodes({0.0, 10.0}, {0.0, 0.0});
+    table.negative_functions[exx.index()] = nodes({-5.0, 5.0}, {2.0, 4.0});
+    table.negative_functions[ecx.index()] = nodes({0.0}, {-1e-5});
+    table.negative_functions[eyx.index()] = nodes({0.0, 800.0}, {5.0, 6.0});  // reversal breaks no frame choice
+    const ErrorMap map(table);
+    using stepdiag::Approach;
+    EXPECT_EQ(map.function(exx, 5.0), 0.5);
+    EXPECT_EQ(map.function(exx, 5.0, Approach::positive), 0.5);
+    EXPECT_EQ(map.function(exx, 0.0, Approach::negative), 3.0);
+    EXPECT_EQ(map.function(exx, -1e9, Approach::negative), 2.0);
+    EXPECT_EQ(map.delta(Axis::X, 0.0, Approach::negative), Vector3d(3.0, 5.0, 0.0));
+    EXPECT_EQ(map.theta(Axis::X, 10.0), Vector3d(0.0, 0.0, 3e-5));
+    EXPECT_EQ(map.theta(Axis::X, 10.0, Approach::negative), Vector3d(0.0, 0.0, -1e-5));
+    EXPECT_EQ(map.function({Axis::Y, Component::A}, 5.0, Approach::negative), 0.0);
+    EXPECT_TRUE(map.warnings(volume).empty());
+}
+
+TEST(ErrorMap, SquarenessesHaveNoDirection) {
+    ParameterTable table;
+    table.squarenesses[0] = stepdiag::SquarenessValue{1e-5, {}};
+    table.functions[6] = nodes({0.0}, {0.0});  // EXY
+    table.negative_functions[6] = nodes({0.0}, {1.0});
+    EXPECT_EQ(ErrorMap(table).delta(Axis::Y, 600.0, stepdiag::Approach::negative).x(), 1.0 - 1e-5 * 600.0);
+}
+
 TEST(ErrorMap, SquarenessesTurnTheAxesAsTheConventionsSay) {
     ParameterTable table;
     table.squarenesses = {stepdiag::SquarenessValue{1e-5, {}}, stepdiag::SquarenessValue{2e-5, {}},
@@ -143,6 +173,12 @@ TEST(ErrorMap, TableThatMakesNoSenseIsRefusedByName) {
     ParameterTable table;
     table.squarenesses[1] = stepdiag::SquarenessValue{not_a_number, {}};
     expect_refused([&] { ErrorMap{table}; }, "B0Z");
+    ParameterTable directed;
+    directed.negative_functions[0] = nodes({0.0}, {0.0});
+    expect_refused([&] { ErrorMap{directed}; }, "EXX: has a table of the - direction");
+    directed.functions[0] = nodes({0.0}, {0.0});
+    directed.negative_functions[0] = nodes({0.0, 0.0}, {0.0, 1.0});
+    expect_refused([&] { ErrorMap{directed}; }, "EXX in - direction");
 }
 
 TEST(ErrorMap, RandomMapOfNonsenseIsRefused) {

@@ -49,6 +49,11 @@ ParameterTable extreme_table() {
             }
         }
         if (i != 4) table.functions[i] = function;  // one is missing
+        if (i % 5 == 2) {                           // some are others in - direction, at other nodes too
+            for (double& value : function.value) value = any();
+            function.position.front() -= 1.0 / 7.0;
+            table.negative_functions[i] = function;
+        }
     }
     table.squarenesses[0] = stepdiag::SquarenessValue{any(), std::nullopt};
     table.squarenesses[2] = stepdiag::SquarenessValue{-0.0, 1e-300};
@@ -60,15 +65,20 @@ void expect_same_bits(const ParameterTable& a, const ParameterTable& b) {
     const auto same = [](const std::optional<double>& x, const std::optional<double>& y) {
         return x.has_value() == y.has_value() && (!x || bits(*x) == bits(*y));
     };
-    for (int i = 0; i < stepdiag::function_count; ++i) {
-        ASSERT_EQ(a.functions[i].has_value(), b.functions[i].has_value()) << i;
-        if (!a.functions[i]) continue;
-        ASSERT_EQ(a.functions[i]->position.size(), b.functions[i]->position.size());
-        for (std::size_t k = 0; k < a.functions[i]->position.size(); ++k) {
-            EXPECT_EQ(bits(a.functions[i]->position[k]), bits(b.functions[i]->position[k]));
-            EXPECT_EQ(bits(a.functions[i]->value[k]), bits(b.functions[i]->value[k]));
-            EXPECT_TRUE(same(a.functions[i]->standard_uncertainty[k], b.functions[i]->standard_uncertainty[k]));
+    const auto compare = [&](const std::optional<FunctionTable>& x, const std::optional<FunctionTable>& y) {
+        ASSERT_EQ(x.has_value(), y.has_value());
+        if (!x) return;
+        ASSERT_EQ(x->position.size(), y->position.size());
+        for (std::size_t k = 0; k < x->position.size(); ++k) {
+            EXPECT_EQ(bits(x->position[k]), bits(y->position[k]));
+            EXPECT_EQ(bits(x->value[k]), bits(y->value[k]));
+            EXPECT_TRUE(same(x->standard_uncertainty[k], y->standard_uncertainty[k]));
         }
+    };
+    for (int i = 0; i < stepdiag::function_count; ++i) {
+        SCOPED_TRACE(i);
+        compare(a.functions[i], b.functions[i]);
+        compare(a.negative_functions[i], b.negative_functions[i]);
     }
     for (int s = 0; s < stepdiag::squareness_count; ++s) {
         ASSERT_EQ(a.squarenesses[s].has_value(), b.squarenesses[s].has_value());
@@ -200,15 +210,38 @@ TEST(ParameterTable, OneDirectionOfEachParameterIsReadAsThatTable) {
     EXPECT_EQ(table.functions[0]->value, (std::vector<double>{0.0, 1e-3}));
     EXPECT_EQ(table.functions[1]->value, (std::vector<double>{0.0, 2e-3}));
     EXPECT_EQ(table.squarenesses[0]->value, 3e-6);
+    for (const auto& function : table.negative_functions) EXPECT_FALSE(function);
     for (const auto& [rows, culprit] : std::vector<std::pair<std::string, std::string>>{
-             {"+,EXX,0,0,um,\n-,EXX,0,0,um,\n",
-              "line 3: direction: EXX is given for + and for -; tables for both directions (reversal) are not "
-              "supported"},
-             {"+,C0Y,,0,urad,\n\u2212,C0Y,,0,urad,\n", "tables for both directions (reversal) are not supported yet"},
-             {"+,EXX,0,0,um,\n,EXX,10,0,um,\n", "line 3: direction: expected + as in"},
+             {"+,EXX,0,0,um,\n-,EXX,0,0,um,\n+,EXX,0,0,um,\n", "line 4: position_mm: positions of EXX must ascend"},
+             {"+,EXX,0,0,um,\n-,EXX,5,0,um,\n\u2212,EXX,5,0,um,\n", "line 4: position_mm: positions of EXX"},
+             {"+,C0Y,,0,urad,\n\u2212,C0Y,,0,urad,\n", "line 3: C0Y is given twice"},
+             {"+,EXX,0,0,um,\n,EXX,10,0,um,\n", "line 3: direction: expected + or - as in"},
              {",EXX,0,0,um,\n+,EXX,10,0,um,\n", "line 3: direction: expected an empty field"},
              {"forward,EXX,0,0,um,\n", "line 2: direction: expected + or -"}})
         expect_refused([&, &text = rows] { parse_parameter_table(directed + text, "t.csv"); }, culprit);
+}
+
+TEST(ParameterTable, BothDirectionsOfAFunctionAreReadInAnyOrder) {
+    const auto table = parse_parameter_table(
+        "parameter,position_mm,value,unit,standard_uncertainty,direction\nEXX,0,0,um,,+\nEXX,-1,3,um,0.5,-\n"
+        "EXX,10,1,um,,+\nEXX,10,4,um,,\u2212\nEYX,0,7,um,,\n",
+        "t.csv");
+    EXPECT_EQ(table.functions[0]->position, (std::vector<double>{0.0, 10.0}));
+    EXPECT_EQ(table.functions[0]->value, (std::vector<double>{0.0, 1e-3}));
+    EXPECT_EQ(table.negative_functions[0]->position, (std::vector<double>{-1.0, 10.0}));
+    EXPECT_EQ(table.negative_functions[0]->value, (std::vector<double>{3e-3, 4e-3}));
+    EXPECT_EQ(table.negative_functions[0]->standard_uncertainty[0], 0.5e-3);
+    EXPECT_EQ(format_parameter_table(table),
+              "parameter,position_mm,value,unit,standard_uncertainty,direction\nEXX,0.0,0.0,um,,+\n"
+              "EXX,10.0,1.0,um,,+\nEXX,-1.0,3.0,um,0.5,-\nEXX,10.0,4.0,um,,-\nEYX,0.0,7.0,um,,\n");
+}
+
+TEST(ParameterTable, DirectionIsWrittenOnlyWhereItMatters) {
+    ParameterTable table;
+    table.functions[0] = FunctionTable{{0.0}, {0.0}, {std::nullopt}};
+    EXPECT_EQ(format_parameter_table(table), header + "EXX,0.0,0.0,um,\n");
+    table.negative_functions[3] = table.functions[0];
+    expect_refused([&] { format_parameter_table(table); }, "EAX: has a table of the - direction");
 }
 
 TEST(ParameterTable, FormatChainVolumeAndToolAreWrittenFirst) {

@@ -123,3 +123,27 @@ TEST(Pose, ToolThatIsNotFiniteIsRefused) {
     expect_refused([] { Machine(Chain::parse("[w b X Y Z t]"), ErrorMap(), {0.0, std::nan(""), 0.0}); }, "tool");
     expect_refused([] { Machine(Chain::parse("[w b X Y Z t]"), ErrorMap(), {0.0, 0.0, INFINITY}); }, "tool");
 }
+
+TEST(Pose, EachAxisHasTheErrorsOfItsOwnApproach) {
+    using stepdiag::Approach;
+    const ErrorMap positive = random_map(1.0), negative = random_map(0.5);
+    stepdiag::ParameterTable table = positive.table();
+    table.negative_functions = negative.table().functions;
+    for (const char* chain : {"[w X' b Y Z t]", "[w Z' Y' b X t]"}) {
+        const Machine both(Chain::parse(chain), ErrorMap(table), tool), plus(Chain::parse(chain), positive, tool);
+        const Vector3d c(123.4, 567.8, 91.0);
+        EXPECT_EQ(both.pose(c).position, plus.pose(c).position);
+        EXPECT_EQ(both.pose(c).rotation, plus.pose(c).rotation);
+        for (const Axis axis : stepdiag::all_axes) {
+            stepdiag::ParameterTable one = positive.table();  // that axis has the other tables whichever the direction
+            for (int i = 6 * index(axis); i < 6 * index(axis) + 6; ++i) one.functions[i] = table.negative_functions[i];
+            const Machine expected(Chain::parse(chain), ErrorMap(one), tool);
+            stepdiag::Approaches approach = stepdiag::all_positive;
+            approach[index(axis)] = Approach::negative;
+            EXPECT_EQ(both.pose(c, approach).position, expected.pose(c).position);
+            EXPECT_EQ(both.pose(c, approach).rotation, expected.pose(c).rotation);
+            EXPECT_EQ(both.error(c, approach), expected.error(c));
+            EXPECT_EQ(both.first_order_error(c, approach), expected.first_order_error(c));
+        }
+    }
+}

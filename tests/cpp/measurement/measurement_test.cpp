@@ -99,6 +99,21 @@ Station station(int point, const char* line = "ppp", int run = 0) {
 
 }  // namespace
 
+TEST(Measurement, VisitApproachesItsPointsInTheDirectionOfItsOwnTravel) {
+    using stepdiag::Approach;
+    constexpr Approach plus = Approach::positive, minus = Approach::negative;
+    const auto expect = [](const char* line, stepdiag::Direction direction, stepdiag::Approaches expected) {
+        EXPECT_EQ(approaches(stepdiag::Line::parse(line), direction), expected) << line;
+    };
+    expect("ppp", stepdiag::Direction::forward, {plus, plus, plus});
+    expect("ppp", stepdiag::Direction::backward, {minus, minus, minus});
+    expect("npp", stepdiag::Direction::forward, {minus, plus, plus});
+    expect("npp", stepdiag::Direction::backward, {plus, minus, minus});
+    expect("0n0", stepdiag::Direction::forward, {plus, minus, plus});  // X and Z stand at home
+    expect("0n0", stepdiag::Direction::backward, {plus, plus, plus});
+    expect("p00", stepdiag::Direction::backward, {minus, plus, plus});
+}
+
 TEST(Measurement, TextIsReadBackToTheSameBits) {
     for (const auto& names :
          std::vector<std::vector<std::string>>{{"distance"},

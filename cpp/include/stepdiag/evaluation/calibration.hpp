@@ -59,10 +59,13 @@ struct Calibration {
 };
 
 bool is_anything_determined(const Calibration& calibration);
+// Where there is a reversal error the function's table is that of the + direction, and function - reversal that of the
+// - direction. A reversal error without its function has no place in a table.
 ParameterTable to_parameter_table(const Calibration& calibration);
 
-// CSV with format, chain, volume_mm, tool_mm, method, undetermined_slopes and undetermined in the leading lines; the
-// covariance is not kept. Reading throws InvalidArgument naming file and line, also where chain, volume or tool is
+// CSV with format, chain, volume_mm, tool_mm, method, undetermined_slopes, undetermined_reversal_constants and
+// undetermined in the leading lines; not kept are the covariance and the uncertainty of a reversal error, which is not
+// that of its two tables. Reading throws InvalidArgument naming file and line, also where chain, volume or tool is
 // missing.
 void write_calibration(const Calibration& calibration, const std::string& path);
 Calibration read_calibration(const std::string& path);

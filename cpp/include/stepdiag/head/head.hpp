@@ -67,12 +67,16 @@ struct Misalignment {
     Eigen::Vector2d psd_zero = Eigen::Vector2d::Zero();   // layout psd: what a centred spot reads, mm
     double distance_constant = 0.0;                       // of all distances, mm
     std::vector<double> beam_constants = {};              // layout multi_beam: of d1 ... dn each, mm; empty: none
+    Eigen::Vector2d lateral = Eigen::Vector2d::Zero();    // moves o along local x and y, mm
+    double roll = 0.0;                                    // rad: sensor axes F Exp(laser) Exp(0, 0, roll)
+    double gain = 0.0;   // tilts read 1 + gain times themselves; psd: spots; multi_beam: beams stand there
+    double drift = 0.0;  // mm/s: of all distances since the set-up's first reading
 };
 
 // A head and its mirror set up on one line.
 struct HeadSetup {
     Eigen::Vector3d origin;            // o, machine frame, mm
-    Eigen::Matrix3d machine_R_sensor;  // F Exp(laser)
+    Eigen::Matrix3d machine_R_sensor;  // F Exp(laser) Exp(roll)
     Eigen::Matrix3d tool_R_mirror;     // F Exp(reflector)
     Eigen::Vector2d mirror;            // width and height, mm
 };

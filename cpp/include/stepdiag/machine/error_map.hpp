@@ -2,7 +2,8 @@
 // the rotation vector theta_a(p). Linear between nodes; outside the table the end value holds, the squareness terms go
 // on.
 //   delta_Y.x = EXY(y) - C0Y y,  delta_Z.x = EXZ(z) + B0Z z,  delta_Z.y = EYZ(z) - A0Z z
-// Frame choice (CONVENTIONS): functions are 0 at home, straightnesses 0 at both ends of travel.
+// Frame choice (CONVENTIONS): functions are 0 at home, straightnesses 0 at both ends of travel. A function may have
+// another table for nodes approached in - direction, in the same frame; what it says at the ends is reversal.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,15 +21,15 @@ public:
     ErrorMap() = default;                     // no errors
     explicit ErrorMap(ParameterTable table);  // a missing parameter is 0; checks nodes and finiteness
 
-    Eigen::Vector3d delta(Axis axis, double position) const;  // mm
-    Eigen::Vector3d theta(Axis axis, double position) const;  // rad
-    double function(FunctionId id, double position) const;
+    Eigen::Vector3d delta(Axis axis, double position, Approach approach = Approach::positive) const;  // mm
+    Eigen::Vector3d theta(Axis axis, double position, Approach approach = Approach::positive) const;  // rad
+    double function(FunctionId id, double position, Approach approach = Approach::positive) const;
     double squareness(Squareness squareness) const;
     const ParameterTable& table() const { return table_; }
 
     // Where the map breaks the frame choice (a function not 0 at home, a straightness not 0 at the end of travel
-    // `volume`): one sentence each. Such a map is used as given. Throws InvalidArgument for a volume that is not
-    // finite.
+    // `volume`, approached in + direction): one sentence each. Such a map is used as given. Throws InvalidArgument for
+    // a volume that is not finite.
     std::vector<std::string> warnings(const Eigen::Vector3d& volume) const;
 
 private:

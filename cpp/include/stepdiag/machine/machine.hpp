@@ -3,6 +3,7 @@
 //   axis before the bed:  Rot(Exp theta_a) Trans(p e_a + delta_a)
 //   axis after the bed:   Trans(p e_a + delta_a) Rot(Exp theta_a)
 //   last:                 Trans(tool offset)
+// with the errors of the direction in which each axis came to where it stands.
 #pragma once
 
 #include <Eigen/Core>
@@ -28,10 +29,11 @@ public:
     // `tool` is the offset of the functional point from the tool's origin, mm.
     Machine(Chain chain, ErrorMap errors, const Eigen::Vector3d& tool = Eigen::Vector3d::Zero());
 
-    Pose pose(const Eigen::Vector3d& commanded) const;
+    Pose pose(const Eigen::Vector3d& commanded, const Approaches& approach = all_positive) const;
     // Actual minus nominal functional point, exact / to first order in the errors, mm.
-    Eigen::Vector3d error(const Eigen::Vector3d& commanded) const;
-    Eigen::Vector3d first_order_error(const Eigen::Vector3d& commanded) const;
+    Eigen::Vector3d error(const Eigen::Vector3d& commanded, const Approaches& approach = all_positive) const;
+    Eigen::Vector3d first_order_error(const Eigen::Vector3d& commanded,
+                                      const Approaches& approach = all_positive) const;
 
     const Chain& chain() const { return chain_; }
     const ErrorMap& errors() const { return errors_; }

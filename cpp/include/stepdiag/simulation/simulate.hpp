@@ -31,9 +31,14 @@ void check_noise(const Noise& noise);
 struct SimulationOptions {
     std::map<std::string, Misalignment> misalignment = {};  // by line name; a line without an entry is aligned
     Noise noise = {};
-    std::optional<Environment> environment = {};  // the air that light runs in; none: usual_environment
-    std::optional<Environment> assumed = {};      // the air that readings are reduced with; none: the same
-    double verified_share = 1e-3;                 // of a traced head's replayed poses (ReplayOptions)
+    std::optional<Environment> environment = {};     // the air that light runs in; none: usual_environment
+    std::optional<Environment> assumed = {};         // the air that readings are reduced with; none: the same
+    double verified_share = 1e-3;                    // of a traced head's replayed poses (ReplayOptions)
+    int repeats = 1;                                 // how often each line is measured; its set-up stays as it is
+    bool backward = false;                           // each forward run of a line is followed by a backward run
+    std::optional<double> seconds_per_reading = {};  // makes the channel time, which counts from the first reading
+
+    static constexpr int largest_repeat_count = 1'000;
 };
 
 // The heads of a run's lines. All of them give the same signals.
@@ -47,10 +52,13 @@ struct Heads {
     HeadCalibrations calibration() const;
 };
 
-// Rows: the plan's lines in their order, then its scale lines, points ascending. Lost readings are empty fields. Throws
-// InvalidArgument for a head that makes no sense, a mirror smaller than the plan's smallest, misalignments of 0.1 rad
-// or more or of lines that are not in the plan, heads of such lines, heads that do not give the same signals, negative
-// noise, an index below 1. Throws ReplayMismatch where a traced head's replay and its trace differ.
+// Rows in the order in which they are read: the plan's lines in their order, then its scale lines; of each line runs 0,
+// 1, 2, ...; with `backward` runs 0, 2, ... and after each its backward run 1, 3, ..., points descending. The drift of
+// distances counts from the first reading of each forward run. Lost readings are empty fields. Throws InvalidArgument
+// for a head that makes no sense, a mirror smaller than the plan's smallest, misalignments of 0.1 rad or more or of
+// lines that are not in the plan, a drift without seconds_per_reading, a gain of a traced multi_beam head, heads of
+// lines that are not in the plan, heads that do not give the same signals, negative noise, an index below 1. Throws
+// ReplayMismatch where a traced head's replay and its trace differ.
 Measurement simulate(const Machine& machine, const Plan& plan, const Heads& heads,
                      const SimulationOptions& options = {}, ReplayCount* count = nullptr);
 
