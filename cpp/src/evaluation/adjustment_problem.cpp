@@ -12,15 +12,15 @@
 namespace stepdiag {
 namespace {
 
-ReadingKind kind_of(const Measurement& measurement) {
-    if (measurement.beam_count() > 0) return ReadingKind::multi_beam;
-    return measurement.find("spot_x") ? ReadingKind::psd : ReadingKind::ideal;
+ChannelKind kind_of(const Measurement& measurement) {
+    if (measurement.beam_count() > 0) return ChannelKind::multi_beam;
+    return measurement.find("spot_x") ? ChannelKind::psd : ChannelKind::ideal;
 }
 
-std::string channel_name(ReadingKind kind, int channel) {
-    if (kind == ReadingKind::multi_beam) return "d" + std::to_string(channel + 1);
+std::string channel_name(ChannelKind kind, int channel) {
+    if (kind == ChannelKind::multi_beam) return "d" + std::to_string(channel + 1);
     constexpr const char* names[2][3] = {{"distance", "alpha", "beta"}, {"distance", "spot_x", "spot_y"}};
-    return names[kind == ReadingKind::psd][channel];
+    return names[kind == ChannelKind::psd][channel];
 }
 
 double usual_uncertainty(const ReadingUncertainty& uncertainty, const std::string& channel) {
@@ -83,7 +83,7 @@ void AdjustmentProblem::collect_setups(const Measurement& measurement, const Adj
             const Eigen::Matrix3d frame = plan_.frame(line);
             const bool scale = plan_.is_scale_line(line);
             const Eigen::Vector3d origin = planned.front().commanded + tool_ - head.standoff * frame.col(2);
-            LineSetup setup{entry.first.first, line, scale, ReadingModel(kind_, head, frame, origin), {}, {}, {}};
+            LineSetup setup{entry.first.first, line, scale, ChannelModel(kind_, head, frame, origin), {}, {}, {}};
             const int columns = setup.model.setup_size();
             setup.prior = setup_priors(options, line.name(), scale, kind_, columns);
             setup.unknown.assign(columns, no_unknown);
@@ -127,7 +127,7 @@ void AdjustmentProblem::collect_points(const Measurement& measurement, const Adj
         const LineSetup& setup = setups_[setup_of_row_[row]];
         // Without a reflector angle of their own the tilts of a scale line would be taken for the machine's.
         const bool distance_only =
-            setup.is_scale_line && kind_ != ReadingKind::multi_beam && setup.prior[setup::reflector] == fixed_unknown;
+            setup.is_scale_line && kind_ != ChannelKind::multi_beam && setup.prior[setup::reflector] == fixed_unknown;
         AdjustedPoint point{setup_of_row_[row], {no_unknown, no_unknown, no_unknown}, {}, int(readings_.size()), 0};
         for (int c = 0; c < int(names.size()) && !(distance_only && c > 0); ++c)
             if (const auto raw =
@@ -202,6 +202,8 @@ void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options) {
             }
     for (std::size_t b = 1; b < reach_.size(); ++b) reach_[b] = std::max(reach_[b], reach_[b - 1]);
 
+    sort_points();
+
     constexpr double metre = 1e3;  // mm
     prior_.assign(size(), free_unknown);
     change_scale_.assign(size(), 1.0 / metre);
@@ -215,6 +217,27 @@ void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options) {
                                 (c >= setup::psd_zero && c < setup::roll);
             if (!length) change_scale_[setup.unknown[c]] = 1.0;
         }
+}
+
+// In the order of the band, so that who goes through the points goes through the matrix once.
+void AdjustmentProblem::sort_points() {
+    const auto first_block = [&](const AdjustedPoint& point) {
+        int first = blocks();
+        for (const int node : point.node)
+            if (node != no_unknown && nodes_[node].block != no_unknown) first = std::min(first, nodes_[node].block);
+        return first;
+    };
+    std::stable_sort(points_.begin(), points_.end(),
+                     [&](const AdjustedPoint& a, const AdjustedPoint& b) { return first_block(a) < first_block(b); });
+    std::vector<AdjustedReading> sorted;
+    sorted.reserve(readings_.size());
+    for (AdjustedPoint& point : points_) {
+        const int first = int(sorted.size());
+        for (int r = point.first_reading; r < point.end_reading; ++r) sorted.push_back(readings_[r]);
+        point.first_reading = first;
+        point.end_reading = int(sorted.size());
+    }
+    readings_ = std::move(sorted);
 }
 
 std::string AdjustmentProblem::channel_name(const AdjustedReading& reading) const {

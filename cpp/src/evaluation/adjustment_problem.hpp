@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/reading_model.hpp"
+#include "evaluation/channel_model.hpp"
 #include "stepdiag/evaluation/adjustment.hpp"
 
 namespace stepdiag {
@@ -35,7 +35,7 @@ struct LineSetup {
     int run;
     Line line;
     bool is_scale_line;
-    ReadingModel model;
+    ChannelModel model;
     std::vector<PriorUncertainty> prior;  // by setup::Column and beams
     std::vector<int> unknown;             // likewise
     std::vector<int> active;              // columns that are unknown
@@ -83,6 +83,7 @@ public:
     int border() const { return border_; }
     int size() const { return 6 * blocks() + border_; }
 
+    int block_of(int node) const { return node == no_unknown ? no_unknown : nodes_[node].block; }
     // The errors of the three axes at a point, for the unknowns' values `x`.
     MachineErrors errors(const AdjustedPoint& point, const Eigen::VectorXd& x) const;
     Eigen::VectorXd setup_values(const LineSetup& setup, const Eigen::VectorXd& x) const;
@@ -95,13 +96,14 @@ private:
     void collect_setups(const Measurement& measurement, const AdjustmentOptions& options);
     void collect_points(const Measurement& measurement, const AdjustmentOptions& options);
     void number_unknowns(const AdjustmentOptions& options);
+    void sort_points();
     int node_index(Axis axis, int node, bool negative);
 
     Plan plan_;
     Chain chain_;
     Eigen::Vector3d tool_;
     std::shared_ptr<const HeadCalibrations> heads_;
-    ReadingKind kind_;
+    ChannelKind kind_;
     bool reversal_ = false, rotations_ = true;
     std::vector<AxisNode> nodes_;
     std::array<std::vector<int>, 6> node_at_;  // by axis and direction: index by node number

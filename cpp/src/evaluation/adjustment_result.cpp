@@ -145,28 +145,17 @@ std::vector<SetupEstimate> setup_estimates(const AdjustmentProblem& problem, con
 std::vector<ReadingResidual> reading_residuals(const NormalEquations& equations, const BorderedBand& inverse) {
     const AdjustmentProblem& problem = equations.problem();
     std::vector<ReadingResidual> residuals;
-    std::vector<int> unknown;
+    residuals.reserve(problem.readings().size());
+    Eigen::MatrixXd covariance;
+    Eigen::VectorXd image;
     for (const AdjustedPoint& point : problem.points()) {
-        // The covariance of the point's unknowns, once for all of its readings.
-        unknown.clear();
-        std::vector<int> place;
-        const auto first = equations.row(point, point.first_reading);
-        for (int i = 0; i < first.size; ++i)
-            if (first.unknown[i] != no_unknown) {
-                unknown.push_back(first.unknown[i]);
-                place.push_back(i);
-            }
-        const Eigen::Index size = Eigen::Index(unknown.size());
-        Eigen::MatrixXd covariance(size, size);
-        for (Eigen::Index i = 0; i < size; ++i)
-            for (Eigen::Index j = 0; j <= i; ++j)
-                covariance(i, j) = covariance(j, i) = element(inverse, unknown[i], unknown[j]);
+        equations.gather(point, inverse, covariance);
         for (int r = point.first_reading; r < point.end_reading; ++r) {
             const AdjustedReading& reading = problem.readings()[r];
             const auto row = equations.row(point, r);
-            Eigen::VectorXd derivative(size);
-            for (Eigen::Index i = 0; i < size; ++i) derivative[i] = row.derivative[place[i]];
-            const double share = derivative.dot(covariance * derivative);  // in units of the reading's own variance
+            const Eigen::Map<const Eigen::VectorXd> derivative(row.derivative, row.size);
+            image.noalias() = covariance * derivative;
+            const double share = derivative.dot(image);  // in units of the reading's own variance
             const double weighted = equations.residuals()[r];
             ReadingResidual residual{
                 reading.row, problem.channel_name(reading), weighted * reading.standard_uncertainty, 0.0, 0.0,
@@ -180,6 +169,8 @@ std::vector<ReadingResidual> reading_residuals(const NormalEquations& equations,
             residuals.push_back(residual);
         }
     }
+    std::stable_sort(residuals.begin(), residuals.end(),
+                     [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
     return residuals;
 }
 

@@ -20,10 +20,10 @@ constexpr double small_change = 1e-9;  // rad, metres
 
 AdjustmentSolver::AdjustmentSolver(const AdjustmentProblem& problem,
                                    const std::array<double, function_count>& smoothness)
-    : equations_(problem), matrix_(equations_.matrix()), factor_(matrix_, rank_threshold) {
+    : equations_(problem), matrix_(equations_.matrix()) {
     equations_.make_smooth(smoothness);
     factorize(Eigen::VectorXd::Zero(problem.size()));
-    held_ = factor_.held();
+    held_ = factor_->held();
 }
 
 void AdjustmentSolver::factorize(const Eigen::VectorXd& x) {
@@ -31,7 +31,8 @@ void AdjustmentSolver::factorize(const Eigen::VectorXd& x) {
     equations_.assemble(matrix_);
     scale_ = matrix_.diagonal().cwiseSqrt();
     for (const int j : held_) element(matrix_, j, j) = 0.0;  // which holds it again
-    factor_.factorize(matrix_);
+    if (factor_) factor_->factorize(matrix_);
+    else factor_.emplace(matrix_, rank_threshold);
 }
 
 std::vector<int> AdjustmentSolver::dependent() const {
@@ -47,7 +48,7 @@ Eigen::VectorXd AdjustmentSolver::null_vector(int held) const {
     // The second round takes off what the first left by rounding.
     for (int round = 0; round < 2; ++round) {
         Eigen::VectorXd image = equations_.product(vector);
-        factor_.solve(image);
+        factor_->solve(image);
         vector -= image;
     }
     return vector;
@@ -55,7 +56,7 @@ Eigen::VectorXd AdjustmentSolver::null_vector(int held) const {
 
 double AdjustmentSolver::step(Eigen::VectorXd& x, double& change) {
     Eigen::VectorXd dx = equations_.gradient(x);
-    factor_.solve(dx);
+    factor_->solve(dx);
     x += dx;
     change = 0.0;
     for (int j = 0; j < dx.size(); ++j)
@@ -64,10 +65,12 @@ double AdjustmentSolver::step(Eigen::VectorXd& x, double& change) {
 }
 
 int AdjustmentSolver::solve(Eigen::VectorXd& x) {
-    double change = std::numeric_limits<double>::infinity(), effect = change;
+    constexpr double infinite = std::numeric_limits<double>::infinity();
+    double change = fresh_ && x.isZero(0.0) ? 0.0 : infinite, effect = infinite;
+    fresh_ = false;
     for (int count = 1; count <= most_steps; ++count) {
         if (change > derivatives_hold) factorize(x);
-        else equations_.linearise(x, false);
+        else if (count > 1) equations_.linearise(x, false);
         if (!equations_.residuals().allFinite()) break;
         const double before = effect;
         effect = step(x, change);

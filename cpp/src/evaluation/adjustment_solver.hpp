@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "evaluation/normal_equations.hpp"
@@ -23,7 +24,7 @@ public:
     const std::vector<int>& held() const { return held_; }
     // Those of them that are unknowns of the problem: the band has places without one.
     std::vector<int> dependent() const;
-    const BorderedFactor& factor() const { return factor_; }
+    const BorderedFactor& factor() const { return *factor_; }
     const Eigen::VectorXd& scale() const { return scale_; }  // length of each column of the weighted problem
 
     // The change of all unknowns that no reading sees when the held unknown changes by 1 (at the last factorisation).
@@ -43,9 +44,10 @@ private:
 
     NormalEquations equations_;
     BorderedBand matrix_;
-    BorderedFactor factor_;
+    std::optional<BorderedFactor> factor_;
     Eigen::VectorXd scale_;  // square roots of the diagonal at the last factorisation
     std::vector<int> held_;
+    bool fresh_ = true;  // derivatives and factor are those at zero, from the beginning
 };
 
 }  // namespace stepdiag

@@ -91,14 +91,14 @@ void NormalEquations::linearise(const Eigen::VectorXd& x, bool derivatives) {
     const AdjustmentProblem& problem = *problem_;
     for (std::size_t s = 0; s < models_.size(); ++s) models_[s].set_up(problem.setup_values(problem.setups()[s], x));
     Eigen::VectorXd value;
-    ReadingDerivative derivative;
+    ChannelDerivative derivative;
     for (const AdjustedPoint& point : problem.points()) {
         const LineSetup& setup = problem.setups()[point.setup];
-        const ReadingModel& model = models_[point.setup];
+        const ChannelModel& model = models_[point.setup];
         value.resize(model.channels());
         if (derivatives) derivative.resize(model.channels(), 18 + model.setup_size());
-        const PoseDerivative pose =
-            differentiate_pose(problem.chain(), problem.tool(), point.place.commanded, problem.errors(point, x));
+        const PoseDerivative pose = differentiate_pose(problem.chain(), problem.tool(), point.place.commanded,
+                                                       problem.errors(point, x), derivatives);
         model.read(pose, point.place, value, derivatives ? &derivative : nullptr);
         for (int r = point.first_reading; r < point.end_reading; ++r) {
             const AdjustedReading& reading = problem.readings()[r];
@@ -129,6 +129,38 @@ double NormalEquations::square_sum(const Eigen::VectorXd& x) const {
         if (std::isfinite(problem_->prior()[j])) sum += std::pow(x[j] / problem_->prior()[j], 2);
     for (const SmoothRow& row : smooth_) sum += std::pow(row.value(x), 2);
     return sum;
+}
+
+// The covariance of one point's unknowns, rows and columns of those without being 0.
+void NormalEquations::gather(const AdjustedPoint& point, const BorderedBand& inverse, Square& covariance) const {
+    const Row all = row(point, point.first_reading);
+    covariance.setZero(all.size, all.size);
+    const int banded = 6 * inverse.blocks();
+    std::array<int, 3> block;
+    for (int a = 0; a < 3; ++a) block[a] = problem_->block_of(point.node[a]);
+    for (int a = 0; a < 3; ++a) {
+        if (block[a] == no_unknown) continue;
+        for (int b = 0; b < 3; ++b) {
+            if (block[b] == no_unknown || block[b] > block[a]) continue;
+            const auto part = inverse.block(block[a], block[b]);
+            if (a == b) {
+                covariance.block<6, 6>(6 * a, 6 * a) = part.selfadjointView<Eigen::Lower>();
+            } else {
+                covariance.block<6, 6>(6 * a, 6 * b) = part;
+                covariance.block<6, 6>(6 * b, 6 * a) = part.transpose();
+            }
+        }
+        const auto border = inverse.border_rows(block[a]);
+        for (int i = 0; i < all.size; ++i) {
+            if (all.unknown[i] < banded) continue;
+            covariance.block<1, 6>(i, 6 * a) = border.row(all.unknown[i] - banded);
+            covariance.block<6, 1>(6 * a, i) = border.row(all.unknown[i] - banded).transpose();
+        }
+    }
+    for (int i = 0; i < all.size; ++i)
+        for (int j = 0; j < all.size; ++j)
+            if (all.unknown[i] >= banded && all.unknown[j] >= banded)
+                covariance(i, j) = element(inverse, all.unknown[i], all.unknown[j]);
 }
 
 BorderedBand NormalEquations::matrix() const { return BorderedBand(problem_->reach(), problem_->border()); }
@@ -166,8 +198,7 @@ void NormalEquations::assemble_point(const AdjustedPoint& point, int number, Bor
 
     const int banded = 6 * matrix.blocks();
     std::array<int, 3> block;
-    for (int a = 0; a < 3; ++a)
-        block[a] = point.node[a] == no_unknown ? no_unknown : problem_->nodes()[point.node[a]].block;
+    for (int a = 0; a < 3; ++a) block[a] = problem_->block_of(point.node[a]);
     for (int a = 0; a < 3; ++a) {
         if (block[a] == no_unknown) continue;
         for (int b = 0; b < 3; ++b)

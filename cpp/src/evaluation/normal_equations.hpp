@@ -54,13 +54,16 @@ public:
         double product(const Eigen::VectorXd& v) const;
     };
     Row row(const AdjustedPoint& point, int reading) const;
+    // The part of an inverse that belongs to a point's unknowns; 0 where there is none.
+    using Square = Eigen::MatrixXd;
+    void gather(const AdjustedPoint& point, const BorderedBand& inverse, Square& covariance) const;
 
 private:
     Eigen::VectorXd transposed(const Eigen::VectorXd& w, const Eigen::VectorXd& x) const;
     void assemble_point(const AdjustedPoint& point, int number, BorderedBand& matrix) const;
 
     const AdjustmentProblem* problem_;
-    std::vector<ReadingModel> models_;       // by set-up
+    std::vector<ChannelModel> models_;       // by set-up
     std::vector<int> first_unknown_;         // by point, into unknowns_
     std::vector<int> unknowns_;              // 18 + active columns of the set-up, by point
     std::vector<std::size_t> first_weight_;  // by reading, into derivatives_

@@ -58,7 +58,7 @@ std::optional<SetupColumnName> setup_column_name(int column) {
 }
 
 std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, const std::string& line,
-                                           bool is_scale_line, ReadingKind kind, int columns) {
+                                           bool is_scale_line, ChannelKind kind, int columns) {
     const auto own = options.setup_by_line.find(line);
     const auto given = [&](SetupQuantity quantity) {
         const auto q = static_cast<std::size_t>(quantity);
@@ -74,7 +74,7 @@ std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, con
         return prior;
     };
     const auto beam_prior = given(SetupQuantity::beam_constants);
-    const bool beams_unknown = kind == ReadingKind::multi_beam && beam_prior.value_or(free_unknown) != fixed_unknown;
+    const bool beams_unknown = kind == ChannelKind::multi_beam && beam_prior.value_or(free_unknown) != fixed_unknown;
     const auto prior = [&](SetupQuantity quantity) {
         return given(quantity).value_or(usual_prior(quantity, is_scale_line, beams_unknown));
     };
@@ -83,7 +83,7 @@ std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, con
     for (int column = 0; column < columns; ++column)
         if (const auto of = setup_column_name(column)) priors[column] = prior(of->quantity);
     // Without a reflector angle of its own a scale line's spots are not used.
-    const bool has_spots = kind == ReadingKind::psd && !(is_scale_line && priors[setup::reflector] == fixed_unknown);
+    const bool has_spots = kind == ChannelKind::psd && !(is_scale_line && priors[setup::reflector] == fixed_unknown);
     if (!has_spots) priors[setup::psd_zero] = priors[setup::psd_zero + 1] = fixed_unknown;
     if (is_scale_line) {
         const PriorUncertainty angle = priors[setup::laser];

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/reading_model.hpp"
+#include "evaluation/channel_model.hpp"
 #include "stepdiag/evaluation/adjustment.hpp"
 
 namespace stepdiag {
@@ -20,6 +20,6 @@ std::optional<SetupColumnName> setup_column_name(int column);
 // Standard uncertainty of each column (setup::Column, beams) of a line's set-up. Throws InvalidArgument for a negative
 // one, and for a free laser on a scale line.
 std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, const std::string& line,
-                                           bool is_scale_line, ReadingKind kind, int columns);
+                                           bool is_scale_line, ChannelKind kind, int columns);
 
 }  // namespace stepdiag

@@ -1,4 +1,4 @@
-#include "evaluation/reading_model.hpp"
+#include "evaluation/channel_model.hpp"
 
 #include <Eigen/Geometry>
 
@@ -7,7 +7,7 @@
 namespace stepdiag {
 
 PoseDerivative differentiate_pose(const Chain& chain, const Eigen::Vector3d& tool, const Eigen::Vector3d& commanded,
-                                  const MachineErrors& errors) {
+                                  const MachineErrors& errors, bool derivatives) {
     PoseDerivative result;
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
     Eigen::Vector3d position = Eigen::Vector3d::Zero();
@@ -15,7 +15,7 @@ PoseDerivative differentiate_pose(const Chain& chain, const Eigen::Vector3d& too
         const int a = index(axis);
         const Eigen::Vector3d shift = commanded[a] * Eigen::Vector3d::Unit(a) + errors[a].head<3>();
         const Eigen::Vector3d theta = errors[a].tail<3>();
-        result.turn[a] = rotation * rotation_jacobian(theta);
+        if (derivatives) result.turn[a] = rotation * rotation_jacobian(theta);
         if (chain.carries_workpiece(axis)) {
             result.pivot[a] = position;
             rotation = rotation * rotation_exp(theta);
@@ -34,23 +34,23 @@ PoseDerivative differentiate_pose(const Chain& chain, const Eigen::Vector3d& too
 }
 
 // Length and tilts of a reading, and their derivatives by everything: rows L, alpha, beta.
-struct ReadingModel::Tilt {
+struct ChannelModel::Tilt {
     double length, alpha, beta;
     Eigen::Matrix<double, 3, 18> by_axes;
     Eigen::Matrix<double, 3, 8> by_setup;  // reflector, laser, lateral, roll: 2, 2, 2, 1; the last column is not used
 };
 
-ReadingModel::ReadingModel(ReadingKind kind, const HeadCalibration& head, const Eigen::Matrix3d& machine_R_line,
+ChannelModel::ChannelModel(ChannelKind kind, const HeadCalibration& head, const Eigen::Matrix3d& machine_R_line,
                            const Eigen::Vector3d& origin)
     : kind_(kind), head_(&head), line_(machine_R_line), origin_(origin) {
     set_up(Eigen::VectorXd::Zero(setup_size()));
 }
 
-int ReadingModel::setup_size(ReadingKind kind, const HeadCalibration& head) {
-    return setup::beam_constants + (kind == ReadingKind::multi_beam ? int(head.beam_offsets.size()) - 1 : 0);
+int ChannelModel::setup_size(ChannelKind kind, const HeadCalibration& head) {
+    return setup::beam_constants + (kind == ChannelKind::multi_beam ? int(head.beam_offsets.size()) - 1 : 0);
 }
 
-void ReadingModel::set_up(const Eigen::Ref<const Eigen::VectorXd>& values) {
+void ChannelModel::set_up(const Eigen::Ref<const Eigen::VectorXd>& values) {
     setup_ = values;
     const Eigen::Vector3d reflector(values[setup::reflector], values[setup::reflector + 1], 0.0);
     const Eigen::Vector3d laser(values[setup::laser], values[setup::laser + 1], 0.0);
@@ -70,8 +70,8 @@ void ReadingModel::set_up(const Eigen::Ref<const Eigen::VectorXd>& values) {
     beam_origin_ = origin_ + values[setup::lateral] * line_.col(0) + values[setup::lateral + 1] * line_.col(1);
 }
 
-void ReadingModel::read(const PoseDerivative& pose, const ReadingPlace& place, Eigen::Ref<Eigen::VectorXd> reading,
-                        ReadingDerivative* derivative) const {
+void ChannelModel::read(const PoseDerivative& pose, const ReadingPlace& place, Eigen::Ref<Eigen::VectorXd> reading,
+                        ChannelDerivative* derivative) const {
     const Eigen::Vector3d normal = pose.pose.rotation * normal_;
     const Eigen::Vector3d q = sensor_.transpose() * (pose.pose.position - beam_origin_);
     const Eigen::Vector3d m = sensor_.transpose() * normal;
@@ -119,8 +119,8 @@ void ReadingModel::read(const PoseDerivative& pose, const ReadingPlace& place, E
 }
 
 // From length and tilts to the channels (measurement/reading.hpp), with what the set-up adds to them.
-void ReadingModel::read_channels(const Tilt& tilt, const ReadingPlace& place, Eigen::Ref<Eigen::VectorXd> reading,
-                                 ReadingDerivative* derivative) const {
+void ChannelModel::read_channels(const Tilt& tilt, const ReadingPlace& place, Eigen::Ref<Eigen::VectorXd> reading,
+                                 ChannelDerivative* derivative) const {
     const double w = 1.0 - tilt.alpha * tilt.alpha - tilt.beta * tilt.beta;
     const double scale = 1.0 + setup_[setup::gain];
     const double constant =
@@ -151,7 +151,7 @@ void ReadingModel::read_channels(const Tilt& tilt, const ReadingPlace& place, Ei
         row[18 + setup::gain] = (tilt.alpha * offset.y() - tilt.beta * offset.x()) / w;
     };
 
-    if (kind_ == ReadingKind::multi_beam) {
+    if (kind_ == ChannelKind::multi_beam) {
         for (int i = 0; i < channels(); ++i) {
             put_distance(i, head_->beam_offsets[i]);
             if (i == 0) continue;
@@ -161,7 +161,7 @@ void ReadingModel::read_channels(const Tilt& tilt, const ReadingPlace& place, Ei
         return;
     }
     put_distance(0, Eigen::Vector2d::Zero());
-    if (kind_ == ReadingKind::ideal) {
+    if (kind_ == ChannelKind::ideal) {
         put(1, scale * tilt.alpha, {0.0, scale, 0.0});
         put(2, scale * tilt.beta, {0.0, 0.0, scale});
         if (derivative) {

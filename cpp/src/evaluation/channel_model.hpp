@@ -35,7 +35,7 @@ enum Column : int {
 };
 }  // namespace setup
 
-enum class ReadingKind { ideal, psd, multi_beam };  // channels: distance alpha beta, distance spot_x spot_y, d1 ... dn
+enum class ChannelKind { ideal, psd, multi_beam };  // channels: distance alpha beta, distance spot_x spot_y, d1 ... dn
 
 // Where and when a reading was made.
 struct ReadingPlace {
@@ -52,35 +52,36 @@ struct PoseDerivative {
     std::array<Eigen::Matrix3d, 3> turn;   // by theta_a
     std::array<Eigen::Vector3d, 3> pivot;  // about which theta_a turns
 };
+// `derivatives` false: the pose only.
 PoseDerivative differentiate_pose(const Chain& chain, const Eigen::Vector3d& tool, const Eigen::Vector3d& commanded,
-                                  const MachineErrors& errors);
+                                  const MachineErrors& errors, bool derivatives = true);
 
 // The derivative of the channels: 18 columns by the axes' errors, axis by axis, then those of the set-up.
-using ReadingDerivative = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using ChannelDerivative = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-class ReadingModel {
+class ChannelModel {
 public:
     // `origin`: of the beam on a well aligned line, o = P0 - standoff z, machine frame, mm.
-    ReadingModel(ReadingKind kind, const HeadCalibration& head, const Eigen::Matrix3d& machine_R_line,
+    ChannelModel(ChannelKind kind, const HeadCalibration& head, const Eigen::Matrix3d& machine_R_line,
                  const Eigen::Vector3d& origin);
 
-    int channels() const { return kind_ == ReadingKind::multi_beam ? int(head_->beam_offsets.size()) : 3; }
+    int channels() const { return kind_ == ChannelKind::multi_beam ? int(head_->beam_offsets.size()) : 3; }
     int setup_size() const { return setup_size(kind_, *head_); }
-    static int setup_size(ReadingKind kind, const HeadCalibration& head);
+    static int setup_size(ChannelKind kind, const HeadCalibration& head);
 
     // The set-up of the readings that follow; `setup` has setup_size() entries.
     void set_up(const Eigen::Ref<const Eigen::VectorXd>& setup);
     // What the channels read. `derivative`: channels() x (18 + setup_size()), where it is asked for. The mirror must
     // face the head.
     void read(const PoseDerivative& pose, const ReadingPlace& place, Eigen::Ref<Eigen::VectorXd> reading,
-              ReadingDerivative* derivative) const;
+              ChannelDerivative* derivative) const;
 
 private:
     struct Tilt;
     void read_channels(const Tilt& tilt, const ReadingPlace& place, Eigen::Ref<Eigen::VectorXd> reading,
-                       ReadingDerivative* derivative) const;
+                       ChannelDerivative* derivative) const;
 
-    ReadingKind kind_;
+    ChannelKind kind_;
     const HeadCalibration* head_;
     Eigen::Matrix3d line_;    // machine_R_line
     Eigen::Vector3d origin_;  // nominal
