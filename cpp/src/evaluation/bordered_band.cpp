@@ -20,7 +20,7 @@ constexpr std::ptrdiff_t six = BorderedBand::block_size;
 constexpr std::ptrdiff_t lanes = widest_vector;  // what holds a block's six rows
 constexpr int tile_blocks = 4;                   // 24 rows: whole vectors of any width
 constexpr std::ptrdiff_t panel = 48;             // columns of the corner, again whole vectors
-constexpr std::ptrdiff_t chunk = 96;             // of inner dimension: 18 kB of a tile's rows
+constexpr int chunk = 16;                        // block columns that the corner learns of at once: 18 kB of a tile
 
 std::ptrdiff_t round_up(std::ptrdiff_t n, std::ptrdiff_t step) { return (n + step - 1) / step * step; }
 
@@ -93,20 +93,36 @@ BorderedFactor::BorderedFactor(const BorderedBand& matrix, double threshold)
     factorize();
 }
 
+BorderedFactor::Corner BorderedFactor::schur() {
+    return Corner(schur_.data(), l_.border_, l_.border_, OuterStride<>(l_.border_step_));
+}
+
+BorderedFactor::ConstCorner BorderedFactor::corner_factor() const {
+    return ConstCorner(schur_.data(), corner_rank_, corner_rank_, OuterStride<>(l_.border_step_));
+}
+
 void BorderedFactor::factorize(const BorderedBand& matrix) {
     assert(matrix.reach_ == l_.reach_ && matrix.border_ == l_.border_);
     l_ = matrix;
     factorize();
 }
 
+void BorderedFactor::factorize(BorderedBand&& matrix) {
+    assert(matrix.reach_ == l_.reach_ && matrix.border_ == l_.border_);
+    std::swap(l_, matrix);
+    factorize();
+}
+
 void BorderedFactor::factorize() {
     held_.clear();
+    schur() = l_.corner_;
     int first = 0;  // block column that reaches down to `column`
     for (int column = 0; column < l_.blocks(); ++column) {
         while (l_.reach(first) < column) ++first;
         eliminate(column, first);
+        const int done = column % chunk + 1;
+        if (done == chunk || column + 1 == l_.blocks()) reduce_corner(column + 1 - done, done);
     }
-    reduce_corner();
     factorize_corner();
     std::sort(held_.begin(), held_.end());
 }
@@ -129,26 +145,22 @@ void BorderedFactor::eliminate(int column, int first) {
     divide_by_transpose(l_.border_, l_.view(column, column), l_.border_view(column));
 }
 
-// The corner less what the band explains of it: D - C C^T, both triangles.
-void BorderedFactor::reduce_corner() {
-    const Index border = l_.border_, step = l_.border_step_, unknowns = six * l_.blocks();
-    Eigen::Map<MatrixXd, 0, OuterStride<>> schur(schur_.data(), border, border, OuterStride<>(step));
-    schur = l_.corner_;
-    for (Index from = 0; from < unknowns; from += chunk) {
-        const double* c = l_.border_rows_.data() + from * step;
-        for (Index column = 0; column < border; column += six) {
-            const Index row = column / lanes * lanes;
-            subtract_product(border - row, six, std::min(chunk, unknowns - from), {c + row, step},
-                             {c + column, 1, step}, {schur_.data() + row + column * step, step});
-        }
+// The corner's lower triangle less what these block columns explain of it: D - C C^T.
+void BorderedFactor::reduce_corner(int first, int count) {
+    const Index border = l_.border_, step = l_.border_step_;
+    const double* c = l_.border_at(first);
+    for (Index column = 0; column < border; column += six) {
+        const Index row = column / lanes * lanes;
+        subtract_product(border - row, six, six * count, {c + row, step}, {c + column, 1, step},
+                         {schur_.data() + row + column * step, step});
     }
-    for (Index i = 0; i < border; ++i) schur.row(i).tail(border - i) = schur.col(i).tail(border - i).transpose();
 }
 
 // With the largest pivots first; rank is decided where nothing better is left.
 void BorderedFactor::factorize_corner() {
     const Index border = l_.border_, step = l_.border_step_;
-    Eigen::Map<MatrixXd, 0, OuterStride<>> s(schur_.data(), border, border, OuterStride<>(step));
+    auto s = schur();
+    for (Index i = 0; i < border; ++i) s.row(i).tail(border - i) = s.col(i).tail(border - i).transpose();
     order_.resize(border);
     std::iota(order_.begin(), order_.end(), 0);
     VectorXd pivots = s.diagonal();
@@ -198,8 +210,7 @@ void BorderedFactor::solve(Eigen::Ref<VectorXd> right_hand_side) const {
         subtract_columns(border, l_.border_view(column), own, y.data());
     }
 
-    Eigen::Map<const MatrixXd, 0, OuterStride<>> corner(schur_.data(), corner_rank_, corner_rank_,
-                                                        OuterStride<>(l_.border_step_));
+    const auto corner = corner_factor();
     VectorXd determined(corner_rank_);
     for (int i = 0; i < corner_rank_; ++i) determined[i] = y[order_[i]];
     corner.triangularView<Eigen::Lower>().solveInPlace(determined);
@@ -276,9 +287,8 @@ void BorderedFactor::selected_inverse(BorderedBand& z) const {
 
 void BorderedFactor::invert_corner(MatrixXd& inverse) const {
     const Index rank = corner_rank_;
-    Eigen::Map<const MatrixXd, 0, OuterStride<>> l(schur_.data(), rank, rank, OuterStride<>(l_.border_step_));
     MatrixXd inverse_of_l = MatrixXd::Identity(rank, rank);
-    l.triangularView<Eigen::Lower>().solveInPlace(inverse_of_l);
+    corner_factor().triangularView<Eigen::Lower>().solveInPlace(inverse_of_l);
     const MatrixXd determined = inverse_of_l.transpose() * inverse_of_l;
     inverse.setZero();
     for (Index i = 0; i < rank; ++i)

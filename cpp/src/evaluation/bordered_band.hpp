@@ -87,8 +87,10 @@ class BorderedFactor {
 public:
     BorderedFactor(const BorderedBand& matrix, double threshold);
 
-    // Again, of a matrix of the same pattern.
+    // Again, of a matrix of the same pattern. One that is moved here gets other numbers of that pattern in exchange, so
+    // that nothing is copied.
     void factorize(const BorderedBand& matrix);
+    void factorize(BorderedBand&& matrix);
 
     // Ascending, 0 ... size - 1.
     const std::vector<int>& held() const { return held_; }
@@ -102,9 +104,14 @@ public:
     void selected_inverse(BorderedBand& inverse) const;  // into a matrix of the same pattern
 
 private:
+    using Corner = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+    using ConstCorner = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+    Corner schur();                     // all of it
+    ConstCorner corner_factor() const;  // as far as it has rank
+
     void factorize();
     void eliminate(int column, int first);
-    void reduce_corner();
+    void reduce_corner(int first, int count);
     void factorize_corner();
     void invert_corner(Eigen::MatrixXd& inverse) const;
 

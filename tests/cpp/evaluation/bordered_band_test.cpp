@@ -197,11 +197,15 @@ TEST(BorderedBand, FactorIsMadeAgainInPlace) {
     const auto matrix = random_normal_matrix(reach, 7, 1), other = random_normal_matrix(reach, 7, 2);
     BorderedFactor factor(other, threshold);
     const VectorXd right = random_vector(matrix.size(), 3);
-    VectorXd again = right, once = right;
+    VectorXd again = right, moved = right, once = right;
+    BorderedFactor(matrix, threshold).solve(once);
     factor.factorize(matrix);
     factor.solve(again);
-    BorderedFactor(matrix, threshold).solve(once);
     EXPECT_EQ(again, once);
+    factor.factorize(other);
+    factor.factorize(BorderedBand(matrix));
+    factor.solve(moved);
+    EXPECT_EQ(moved, once);
     auto inverse = BorderedFactor(other, threshold).selected_inverse();
     factor.selected_inverse(inverse);
     EXPECT_EQ(dense(inverse), dense(BorderedFactor(matrix, threshold).selected_inverse()));
