@@ -187,6 +187,27 @@ def approach_of(line: str, backward: bool = False) -> Approach:
     return x, y, z
 
 
+def head_of(scenario: Scenario, line: str, a: Arithmetic = DOUBLE) -> tuple[Vector, np.ndarray]:
+    """Origin and sensor axes of the head as it is set up on a line."""
+    setup = scenario.misalignment.get(line, {})
+    local = frame(line, scenario.volume, a)
+    start = a.vector(commanded_points(scenario, line)[0]) + a.vector(scenario.tool)
+    beside = local[:, :2] @ a.vector(setup.get("lateral", (0.0, 0.0)))
+    laser = turn([*setup.get("laser", (0.0, 0.0)), 0.0], a)
+    origin = start - a.number(scenario.standoff) * local[:, 2] + beside
+    return origin, local @ laser @ turn([0.0, 0.0, setup.get("roll", 0.0)], a)
+
+
+def mirror_of(
+    scenario: Scenario, table: ErrorTable, line: str, commanded: Any, a: Arithmetic = DOUBLE, backward: bool = False
+) -> tuple[Vector, Vector]:
+    """The functional point and the mirror's normal, in the machine frame."""
+    reflector = scenario.misalignment.get(line, {}).get("reflector", (0.0, 0.0))
+    rotation, point = pose(scenario.chain, table, scenario.tool, commanded, a, approach_of(line, backward))
+    local = frame(line, scenario.volume, a)
+    return point, rotation @ local @ turn([*reflector, 0.0], a) @ a.vector([0, 0, 1])
+
+
 def readings(
     scenario: Scenario,
     table: ErrorTable,
@@ -200,16 +221,9 @@ def readings(
 
     `elapsed`: seconds since the first reading of the set-up, by which the distances have drifted."""
     setup = scenario.misalignment.get(line, {})
-    pair = {name: setup.get(name, (0.0, 0.0)) for name in ("reflector", "laser", "psd_zero", "lateral")}
     gain = 1 + a.number(setup.get("gain", 0.0))
-    local = frame(line, scenario.volume, a)
-    start = a.vector(commanded_points(scenario, line)[0]) + a.vector(scenario.tool)
-    beside = local[:, :2] @ a.vector(pair["lateral"])
-    origin = start - a.number(scenario.standoff) * local[:, 2] + beside
-    sensor = local @ turn([*pair["laser"], 0.0], a) @ turn([0.0, 0.0, setup.get("roll", 0.0)], a)
-    approach = approach_of(line, backward)
-    rotation, point = pose(scenario.chain, table, scenario.tool, commanded, a, approach)
-    normal = rotation @ local @ turn([*pair["reflector"], 0.0], a) @ a.vector([0, 0, 1])
+    origin, sensor = head_of(scenario, line, a)
+    point, normal = mirror_of(scenario, table, line, commanded, a, backward)
     beam = sensor[:, 2]
 
     def length_from(start_of_beam: Vector) -> Number:
@@ -232,7 +246,7 @@ def readings(
     if scenario.layout == "psd":
         x, y, z = sensor.T @ back
         lever = gain * (length_from(origin) + scenario.psd_distance) / -z
-        zero = pair["psd_zero"]
+        zero = setup.get("psd_zero", (0.0, 0.0))
         return {"distance": distance, "spot_x": lever * x + zero[0], "spot_y": lever * y + zero[1]}
     n = sensor.T @ normal
     return {"distance": distance, "alpha": -gain * n[1] / n[2], "beta": gain * n[0] / n[2]}

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from reference import DIGITS_40, MP, ErrorTable, Number, Scenario, Vector, commanded_points, frame, pose, turn
+from reference import DIGITS_40, MP, ErrorTable, Number, Scenario, Vector, head_of, mirror_of, turn
 
 MIRROR = "mirror"
 AXIS = {"x": 0, "y": 1, "z": 2}
@@ -174,17 +174,12 @@ def read_description(path: Path, routes: Mapping[str, str], errors: Mapping[str,
     return Description(components, {beam: [met.strip() for met in text.split(",")] for beam, text in routes.items()})
 
 
-def mirror_in_sensor_frame(scenario: Scenario, table: ErrorTable, line: str, commanded: Any) -> Plane:
+def mirror_in_sensor_frame(
+    scenario: Scenario, table: ErrorTable, line: str, commanded: Any, backward: bool = False
+) -> Plane:
     """The mirror on the tool with the machine at a commanded position, as the head of the line sees it."""
-    a = DIGITS_40
-    pairs = scenario.misalignment.get(line, {})
-    local = frame(line, scenario.volume, a)
-    start = a.vector(commanded_points(scenario, line)[0]) + a.vector(scenario.tool)
-    sensor = Frame(
-        start - a.number(scenario.standoff) * local[:, 2], local @ turn([*pairs.get("laser", (0.0, 0.0)), 0.0], a)
-    )
-    rotation, point = pose(scenario.chain, table, scenario.tool, commanded, a)
-    normal = rotation @ local @ turn([*pairs.get("reflector", (0.0, 0.0)), 0.0], a) @ vector(0, 0, 1)
+    sensor = Frame(*head_of(scenario, line, DIGITS_40))
+    point, normal = mirror_of(scenario, table, line, commanded, DIGITS_40, backward)
     return Plane(sensor.local(point), sensor.axes.T @ normal)
 
 

@@ -22,6 +22,7 @@ from reference_optics import (
     spot,
     tilted_mirror,
 )
+from test_truth_runs import with_reversal
 from test_truth_simulation import table_of
 from truth import DIAGONALS, VOLUME, Setup
 
@@ -124,16 +125,20 @@ def errors_of(description: Description, seed: int) -> Errors:
     }
 
 
+@pytest.mark.parametrize(("steps", "backward"), [(50, False), (8, True)], ids=["forward", "backward"])
 @pytest.mark.parametrize("shipped", SHIPPED, ids=lambda shipped: shipped.file)
-def test_signals_of_a_whole_run_hold_against_forty_digits(shipped: Shipped) -> None:
-    """All 604 poses of four diagonals of 50 steps: machine, reflector, laser and every component out of true."""
-    setup = Setup(scale_lines=[])
-    errors = setup.errors(21)  # 20 um, 60 urad
+def test_signals_of_a_whole_run_hold_against_forty_digits(shipped: Shipped, steps: int, backward: bool) -> None:
+    """All 604 poses of four diagonals of 50 steps: machine, reflector, laser and every component out of true.
+
+    And backward runs of a machine with reversal errors; a lateral offset, roll and gain in both."""
+    setup = Setup(steps, scale_lines=[])
+    errors = with_reversal(setup.errors(21), setup.errors(23), 18)  # 20 um, 60 urad
     pose_errors = errors_of(read_description(HEADS / f"{shipped.file}.toml", shipped.routes), 22)
     design = sd.read_head_design(HEADS / f"{shipped.file}.toml")
     head = sd.Head.from_design(design, standoff=110.0, pose_errors=dict(pose_errors))
     pairs = {
         line: {"reflector": (100e-6 * k, -150e-6 + 50e-6 * k), "laser": (200e-6, -70e-6 * k)}
+        | {"lateral": (0.2 * k, -0.5), "roll": 2e-3 * k, "gain": 0.01 * k if shipped.laser else 0.0}
         for k, line in enumerate(DIAGONALS, start=1)
     }
     run = sd.simulate(
@@ -143,18 +148,21 @@ def test_signals_of_a_whole_run_hold_against_forty_digits(shipped: Shipped) -> N
         misalignment={line: sd.Misalignment(**pair) for line, pair in pairs.items()},
         environment=sd.Environment.from_air(**TRUE_AIR),
         assumed_environment=sd.Environment.from_air(**ASSUMED_AIR),
+        backward=backward,
     )
-    assert len(run) == 604
+    assert len(run) == 4 * (3 * steps + 1) * (2 if backward else 1)
     assert list(run.channels) == shipped.signals
 
     reference = Reference(shipped, pose_errors, 110.0)
-    scenario = Scenario(VOLUME, setup.chain, DIAGONALS, 50, standoff=110.0, misalignment=pairs)
+    scenario = Scenario(VOLUME, setup.chain, DIAGONALS, steps, standoff=110.0, misalignment=pairs)
     table = table_of(errors)
     worst = dict.fromkeys(shipped.signals, 0.0)
     for i in range(len(run)):
-        mirror = mirror_in_sensor_frame(scenario, table, run.line[i], run.position[i])
+        line = run.line[i]
+        mirror = mirror_in_sensor_frame(scenario, table, line, run.position[i], run.direction[i] == "backward")
         for name, exact in zip(shipped.signals, reference.signals(mirror), strict=True):
-            worst[name] = max(worst[name], abs(float(run.channels[name][i] - exact)))
+            gain = 1 + MP.mpf(pairs[line]["gain"]) if name.startswith("spot") else 1
+            worst[name] = max(worst[name], abs(float(run.channels[name][i] - gain * exact)))
     for name, error in worst.items():
         assert error <= (SPOT if name.startswith("spot") else PATH), worst
 
