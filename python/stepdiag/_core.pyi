@@ -710,6 +710,14 @@ class Calibration:
     """
     The 21 parameters as far as the readings determine them, with standard uncertainties; native units (mm, rad).
     """
+    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '') -> None:
+        """
+        A calibration from its parts, each as the property of its name gives it; a standard uncertainty that is not known is NaN. Raises InvalidArgument naming the parameter for what is none: nodes that do not ascend, values that are not finite, a covariance that is not one of these values.
+        """
+    def dated(self, date: str) -> Calibration:
+        """
+        The same calibration with this date. Raises InvalidArgument for more than one line.
+        """
     def to_error_map(self) -> ErrorMap:
         """
         The calibration as a machine's errors; what is undetermined is 0 there.
@@ -734,6 +742,11 @@ class Calibration:
     def covariance_labels(self) -> list[tuple[str, float | None]]:
         """
         (parameter, position in mm or None) of each row.
+        """
+    @property
+    def date(self) -> str:
+        """
+        When it was evaluated: ISO 8601, UTC; empty where it is not known.
         """
     @property
     def functions(self) -> dict[str, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]]:

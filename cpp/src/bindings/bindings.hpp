@@ -80,6 +80,7 @@ void bind_simulation(py::module_& m);
 void bind_detectors(py::module_& m);
 void bind_evaluation(py::module_& m);
 void bind_adjustment(py::module_& m);
+void bind_calibration(py::module_& m);  // after bind_evaluation
 
 }  // namespace stepdiag::bindings
 

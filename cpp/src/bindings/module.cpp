@@ -158,4 +158,5 @@ PYBIND11_MODULE(_core, m) {
     bind_traced_head(m);
     bind_evaluation(m);
     bind_adjustment(m);
+    bind_calibration(m);
 }

@@ -116,6 +116,7 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
                     {"chain", calibration.chain.name()},
                     {"volume_mm", format_lengths(calibration.volume)},
                     {"tool_mm", format_lengths(calibration.tool)}};
+    if (!calibration.date.empty()) table.header["date"] = calibration.date;
     if (!slopes.empty()) table.header["undetermined_slopes"] = join(slopes, " ");
     if (!constants.empty()) table.header["undetermined_reversal_constants"] = join(constants, " ");
     if (!calibration.undetermined.empty())
@@ -157,6 +158,7 @@ Calibration read_calibration(const std::string& path) {
                             {},
                             split(optional_value("undetermined"), sentence_break),
                             {}};
+    calibration.date = optional_value("date");
     const auto slopes = listed_functions(table, "undetermined_slopes", path);
     const auto constants = listed_functions(table, "undetermined_reversal_constants", path);
     for (int i = 0; i < function_count; ++i) {

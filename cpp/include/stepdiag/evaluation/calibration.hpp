@@ -56,14 +56,20 @@ struct Calibration {
     Eigen::MatrixXd covariance;
 
     std::array<std::optional<CalibratedReversal>, function_count> reversal = {};  // where backward runs tell it
+    std::string date = {};  // of the evaluation: ISO 8601, UTC; empty where it is not known
 };
+
+// Throws InvalidArgument naming the parameter where a calibration put together by hand is none: a volume that is not
+// positive, nodes that do not ascend, values that are not finite, uncertainties below 0, a covariance that is no matrix
+// of these values (its size, symmetry, |c_ij| <= u_i u_j, c_ii = u_i^2), sentences of more than one line.
+void check(const Calibration& calibration);
 
 bool is_anything_determined(const Calibration& calibration);
 // Where there is a reversal error the function's table is that of the + direction, and function - reversal that of the
 // - direction. A reversal error without its function has no place in a table.
 ParameterTable to_parameter_table(const Calibration& calibration);
 
-// CSV with format, chain, volume_mm, tool_mm, method, undetermined_slopes, undetermined_reversal_constants and
+// CSV with format, chain, volume_mm, tool_mm, method, date, undetermined_slopes, undetermined_reversal_constants and
 // undetermined in the leading lines; not kept are the covariance and the uncertainty of a reversal error, which is not
 // that of its two tables. Reading throws InvalidArgument naming file and line, also where chain, volume or tool is
 // missing.

@@ -1,0 +1,122 @@
+// A calibration put together from its parts, as readers of other formats need it. What an evaluation makes is bound in
+// bind_evaluation.cpp.
+#include <limits>
+
+#include "bindings.hpp"
+#include "stepdiag/evaluation/calibration.hpp"
+
+namespace stepdiag::bindings {
+namespace {
+
+using Table = std::tuple<ArrayLike, ArrayLike, ArrayLike>;  // position, value, standard uncertainty
+using Tables = std::map<std::string, Table>;
+using Arrays = std::map<std::string, ArrayLike>;
+using Names = std::vector<std::string>;
+
+std::vector<double> to_values(const ArrayLike& array, const std::string& name) {
+    const Eigen::VectorXd vector = to_vector(array, name.c_str());
+    return {vector.begin(), vector.end()};
+}
+
+int function_index(const std::string& name, const char* argument) {
+    const auto id = FunctionId::parse(name);
+    if (!id) throw InvalidArgument(std::string(argument) + ": expected names EXX ... ECZ, got \"" + name + "\"");
+    return id->index();
+}
+
+CalibratedFunction to_function(const Table& table, const std::string& name) {
+    const auto& [position, value, uncertainty] = table;
+    return {to_values(position, name + " position"), to_values(value, name + " value"),
+            to_values(uncertainty, name + " standard uncertainty"), true};
+}
+
+CalibratedReversal to_reversal(const Table& table, const std::string& name) {
+    CalibratedFunction values = to_function(table, "reversal of " + name);
+    // Not known unless given.
+    std::vector<double> negative(values.position.size(), std::numeric_limits<double>::quiet_NaN());
+    return {std::move(values.position), std::move(values.value), std::move(values.standard_uncertainty),
+            std::move(negative), true};
+}
+
+Eigen::MatrixXd to_matrix(const ArrayLike& object, const char* name) {
+    const DoubleArray array = DoubleArray::ensure(object);
+    if (!array || array.ndim() != 2) {
+        PyErr_Clear();
+        throw InvalidArgument(std::string(name) + ": expected an array of numbers in rows and columns");
+    }
+    return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+        array.data(), array.shape(0), array.shape(1));
+}
+
+template <class Entry>
+Entry& known(std::optional<Entry>& entry, const std::string& name, const char* argument) {
+    if (!entry) throw InvalidArgument(std::string(argument) + ": there is no table of " + name);
+    return *entry;
+}
+
+Calibration make_calibration(const std::string& method, const ChainLike& chain, const ArrayLike& volume,
+                             const ArrayLike& tool, const Tables& functions,
+                             const std::map<std::string, std::pair<double, double>>& squareness,
+                             const Names& undetermined_slopes, const Names& undetermined,
+                             const std::optional<ArrayLike>& covariance, const Tables& reversal,
+                             const Arrays& reversal_negative_uncertainty, const Names& undetermined_reversal_constants,
+                             const std::string& date) {
+    Calibration calibration{
+        method, to_chain(chain), to_vector3(volume, "volume"), to_vector3(tool, "tool"), {}, {}, undetermined, {}};
+    for (const auto& [name, table] : functions)
+        calibration.functions[function_index(name, "functions")] = to_function(table, name);
+    for (const auto& [text, entry] : squareness) {
+        const auto id = parse_squareness(text);
+        if (!id) throw InvalidArgument("squareness: expected names C0Y, B0Z, A0Z, got \"" + text + "\"");
+        calibration.squarenesses[static_cast<int>(*id)] = CalibratedSquareness{entry.first, entry.second};
+    }
+    for (const auto& [name, table] : reversal)
+        calibration.reversal[function_index(name, "reversal")] = to_reversal(table, name);
+
+    const auto function = [&](const std::string& name, const char* argument) -> CalibratedFunction& {
+        return known(calibration.functions[function_index(name, argument)], name, argument);
+    };
+    const auto reversal_of = [&](const std::string& name, const char* argument) -> CalibratedReversal& {
+        return known(calibration.reversal[function_index(name, argument)], "the reversal of " + name, argument);
+    };
+    for (const auto& name : undetermined_slopes) function(name, "undetermined_slopes").slope_determined = false;
+    for (const auto& [name, array] : reversal_negative_uncertainty)
+        reversal_of(name, "reversal_negative_uncertainty").negative_standard_uncertainty =
+            to_values(array, "reversal_negative_uncertainty of " + name);
+    for (const auto& name : undetermined_reversal_constants)
+        reversal_of(name, "undetermined_reversal_constants").constant_determined = false;
+    if (covariance) calibration.covariance = to_matrix(*covariance, "covariance");
+    if (covariance && calibration.covariance.size() == 0 && is_anything_determined(calibration))
+        throw InvalidArgument("covariance: expected one row and column a value, got none");
+    calibration.date = date;
+    check(calibration);
+    return calibration;
+}
+
+}  // namespace
+
+void bind_calibration(py::module_& m) {
+    auto calibration = py::reinterpret_borrow<py::class_<Calibration>>(m.attr("Calibration"));
+    calibration
+        .def(py::init(&make_calibration), py::arg("method"), py::arg("chain"), py::arg("volume"), py::arg("tool"),
+             py::arg("functions"), py::arg("squareness") = std::map<std::string, std::pair<double, double>>{},
+             py::kw_only(), py::arg("undetermined_slopes") = Names{}, py::arg("undetermined") = Names{},
+             py::arg("covariance") = std::nullopt, py::arg("reversal") = Tables{},
+             py::arg("reversal_negative_uncertainty") = Arrays{}, py::arg("undetermined_reversal_constants") = Names{},
+             py::arg("date") = "",
+             "A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: "
+             "name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises "
+             "InvalidArgument naming the parameter for what is none: nodes that do not "
+             "ascend, values that are not finite, a covariance that is not one of these values.")
+        .def_readonly("date", &Calibration::date, "When it was evaluated: ISO 8601, UTC; empty where it is not known.")
+        .def(
+            "dated",
+            [](Calibration c, const std::string& date) {
+                c.date = date;
+                check(c);
+                return c;
+            },
+            py::arg("date"), "The same calibration with this date. Raises InvalidArgument for more than one line.");
+}
+
+}  // namespace stepdiag::bindings
