@@ -712,7 +712,7 @@ class Calibration:
     """
     def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '') -> None:
         """
-        A calibration from its parts, each as the property of its name gives it; a standard uncertainty that is not known is NaN. Raises InvalidArgument naming the parameter for what is none: nodes that do not ascend, values that are not finite, a covariance that is not one of these values.
+        A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises InvalidArgument naming the parameter for what is none: nodes that do not ascend, values that are not finite, a covariance that is not one of these values.
         """
     def dated(self, date: str) -> Calibration:
         """
