@@ -1,98 +1,61 @@
-// The exact adjustment of a run with the ideal head: four body diagonals of 800 x 600 x 500 mm and three scale lines,
-// set-ups up to 1 mrad off, no noise, 50 ... 1,000 steps per axis. All from the measurement to the calibration with the
-// variance of every value, residuals and redundancies. Processor time of one thread.
-//   three_quantities  of the set-ups reflector, laser and distance constant free, all others fixed: 20 unknowns
-//   defaults          also lateral offset, roll and gain, which have priors
-//   follow_up         another noise on the readings of the same plan: the calibration's values again
-//   exponent          of three_quantities against the number of steps, from 50 to 1,000
-#include "stepdiag/evaluation/adjustment.hpp"
-
+// The exact adjustment of the run of adjustment_run.hpp, without noise, 50 ... 1,000 steps per axis.
+//   adjusted   from the measurement to the calibration with the variance of every value, residuals and redundancies
+//   solve      of that the unknowns alone: Gauss-Newton from zero to the floor of double precision
+//   variances  of that the variances of all unknowns: factor and inverse on its pattern
+//   follow_up  another noise on the readings of the same plan: the calibration's values again
+//   exponent   of `adjusted` against the number of steps, from 50 to 1,000
+// three_quantities: reflector, laser and distance constant of the set-ups free, all others fixed, 20 and three
+// unknowns; defaults: also lateral offset, roll and gain, and the lasers of scale lines, all of which have priors.
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
 #include <cmath>
 #include <ctime>
 
-#include "expect.hpp"
-#include "stepdiag/simulation/simulate.hpp"
+#include "adjustment_run.hpp"
+#include "evaluation/adjustment_solver.hpp"
 
 namespace {
 
-using stepdiag::Line;
-using stepdiag::SetupQuantity;
-
-stepdiag::AdjustmentOptions three_quantities() {
-    stepdiag::AdjustmentOptions options;
-    for (const auto quantity : {SetupQuantity::lateral, SetupQuantity::roll, SetupQuantity::gain})
-        options.setup[static_cast<int>(quantity)] = stepdiag::fixed_unknown;
-    return options;
-}
-
-struct Bench {
-    Eigen::Vector3d volume{800.0, 600.0, 500.0};
-    stepdiag::Plan plan;
-    stepdiag::Head head;
-    stepdiag::Machine machine{stepdiag::Chain::parse("[w X' b Y Z t]"), stepdiag::make_random_error_map(volume, {})};
-
-    explicit Bench(int steps)
-        : plan(volume, {Line::parse("ppp"), Line::parse("npp"), Line::parse("pnp"), Line::parse("nnp")}, steps,
-               stepdiag::all_axes, {Line::parse("p00"), Line::parse("0p0"), Line::parse("00p")}) {}
-
-    stepdiag::Measurement run(const stepdiag::Noise& noise = {}) const {
-        stepdiag::SimulationOptions options;
-        options.noise = noise;
-        options.misalignment["ppp"] = {{1e-3, -0.5e-3}, {0.4e-3, 0.8e-3}};
-        options.misalignment["npp"] = {{-0.7e-3, 0.2e-3}, {-0.9e-3, 0.1e-3}};
-        options.misalignment["pnp"] = {{0.3e-3, 0.6e-3}, {0.2e-3, -1e-3}};
-        options.misalignment["nnp"] = {{-0.1e-3, -0.8e-3}, {-0.3e-3, 0.5e-3}};
-        return simulate(machine, plan, head, options);
-    }
-    stepdiag::Adjustment adjust(const stepdiag::Measurement& run, const stepdiag::AdjustmentOptions& options) const {
-        return stepdiag::adjust(run, plan, machine.chain(), machine.tool(), head.calibration(), options);
-    }
-
-    // Largest deviations from the machine's errors: mm, rad.
-    Eigen::Vector2d worst(const stepdiag::Calibration& calibration) const {
-        Eigen::Vector2d worst = Eigen::Vector2d::Zero();
-        for (int i = 0; i < stepdiag::function_count; ++i) {
-            const auto id = stepdiag::FunctionId::at(i);
-            const auto& function = calibration.functions[i];
-            expect_near(function ? double(function->position.size()) : 0.0, plan.steps() + 1.0, 0.0, "nodes");
-            for (std::size_t k = 0; k < function->position.size(); ++k) {
-                const double difference = function->value[k] - machine.errors().function(id, function->position[k]);
-                worst[id.is_rotation()] = std::max(worst[id.is_rotation()], std::abs(difference));
-                if (k > 0 && !(function->standard_uncertainty[k] > 0.0) &&
-                    !(id.is_straightness() && k + 1 == function->position.size()))
-                    expect_near(0.0, 1.0, 0.0, "a standard uncertainty");
-            }
-        }
-        return worst;
-    }
-
-    void check(const stepdiag::Adjustment& adjustment) const {
-        // Roundings of 1e-13 mm a reading, of which a function adds up as many as there are steps.
-        const double roundings = plan.steps() / 50.0;
-        const Eigen::Vector2d worst = this->worst(adjustment.calibration);
-        expect_near(worst[0], 0.0, 2e-11 * roundings, "largest error of position");
-        expect_near(worst[1], 0.0, 1e-13 * roundings, "largest error of angle");
-        expect_near(adjustment.iterations, 0.0, 6.0, "iterations");
-    }
-};
-
 void adjusted(benchmark::State& state, const stepdiag::AdjustmentOptions& options) {
-    const Bench bench(int(state.range(0)));
+    const AdjustmentRun bench(int(state.range(0)));
     const auto run = bench.run();
     const auto adjustment = bench.adjust(run, options);
-    bench.check(adjustment);
-    for (auto _ : state) benchmark::DoNotOptimize(bench.adjust(run, options));
     const Eigen::Vector2d worst = bench.worst(adjustment.calibration);
+    bench.check(worst);
+    expect_near(adjustment.iterations, 0.0, 6.0, "iterations");
+    for (auto _ : state) benchmark::DoNotOptimize(bench.adjust(run, options));
     state.counters["mm"] = worst[0];
     state.counters["rad"] = worst[1];
     state.counters["iterations"] = adjustment.iterations;
 }
 
+stepdiag::AdjustmentProblem problem_of(const AdjustmentRun& bench) {
+    return stepdiag::AdjustmentProblem(bench.run(), bench.plan, bench.machine.chain(), bench.machine.tool(),
+                                       bench.head.calibration(), three_quantities());
+}
+
+void solve(benchmark::State& state) {
+    const auto problem = problem_of(AdjustmentRun(int(state.range(0))));
+    for (auto _ : state) {
+        Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
+        stepdiag::AdjustmentSolver solver(problem, {});
+        benchmark::DoNotOptimize(solver.solve(x));
+    }
+}
+
+void variances(benchmark::State& state) {
+    const auto problem = problem_of(AdjustmentRun(int(state.range(0))));
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
+    stepdiag::AdjustmentSolver solver(problem, {});
+    solver.solve(x);
+    for (auto _ : state) {
+        solver.factorize(x);
+        benchmark::DoNotOptimize(solver.factor().selected_inverse().diagonal());
+    }
+}
+
 void follow_up(benchmark::State& state) {
-    const Bench bench(int(state.range(0)));
+    const AdjustmentRun bench(int(state.range(0)));
     const auto options = three_quantities();
     const auto first = bench.run(), second = bench.run({1e-4, 1e-6, 0.0, 7});
     stepdiag::Adjuster adjuster(first, bench.plan, bench.machine.chain(), bench.machine.tool(),
@@ -128,7 +91,7 @@ void exponent(benchmark::State& state) {
     for (auto _ : state) {
         Eigen::Vector2d log_time;
         for (const int end : {0, 1}) {
-            const Bench bench(end == 0 ? 50 : 1000);
+            const AdjustmentRun bench(end == 0 ? 50 : 1000);
             const auto run = bench.run();
             double best = 1e9;
             for (int repeat = 0; repeat < (end == 0 ? 20 : 5); ++repeat) {
@@ -150,6 +113,8 @@ void steps(benchmark::internal::Benchmark* benchmark) {
 
 BENCHMARK_CAPTURE(adjusted, three_quantities, three_quantities())->Apply(steps);
 BENCHMARK_CAPTURE(adjusted, defaults, {})->Arg(50)->Arg(1000)->Unit(benchmark::kMillisecond);
+BENCHMARK(solve)->Arg(50)->Arg(1000)->Unit(benchmark::kMillisecond);
+BENCHMARK(variances)->Arg(50)->Arg(1000)->Unit(benchmark::kMillisecond);
 BENCHMARK(follow_up)->Arg(50)->Arg(1000)->Unit(benchmark::kMillisecond);
 BENCHMARK(exponent)->Iterations(1)->Unit(benchmark::kMillisecond);
 
