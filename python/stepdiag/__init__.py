@@ -56,15 +56,14 @@ from stepdiag._core import (
     locate,
     power_inside,
     random_error_map,
-    read_calibration,
     read_distance,
     read_error_map,
     read_head,
-    read_measurement,
     simulate,
     trace_beams,
 )
 from stepdiag.comparison import Deviation, largest_deviations
+from stepdiag.data_files import read_calibration, read_measurement, write_calibration, write_measurement
 
 if TYPE_CHECKING:
     from stepdiag.head_description import parse_head_design, read_head_design, shipped_head
@@ -136,6 +135,8 @@ __all__ = [
     "simulate",
     "simulate_scenario",
     "trace_beams",
+    "write_calibration",
+    "write_measurement",
 ]
 
 # Where to find what has to do with our TOML files.

@@ -45,13 +45,14 @@ def cli() -> None:
 
 @cli.command(short_help=SHORT["simulate"], epilog="\b\nExample: stepdiag simulate scenario.toml -o run.csv")
 @click.argument("scenario", type=PATH)
-@out_file("Measurement file (CSV) to write.")
+@out_file("Measurement file to write, CSV or netCDF (.nc).")
 def simulate(scenario: Path, output: Path) -> None:
     """Simulate the run that SCENARIO (TOML) describes.
 
     The virtual machine moves through the plan with its errors, and the head reads the mirror at every point.
-    Lost readings are empty fields.
+    Lost readings are empty fields, in netCDF missing values.
     """
+    from stepdiag.data_files import write_measurement
     from stepdiag.files import check_output
     from stepdiag.map_warnings import scenario_warnings
     from stepdiag.scenario import read_scenario, simulate_scenario
@@ -62,7 +63,7 @@ def simulate(scenario: Path, output: Path) -> None:
     keep_map(output, described.error_map)
     for warning in scenario_warnings(described):
         tell("warning", warning)
-    simulate_scenario(described).write(output)
+    write_measurement(simulate_scenario(described), output)
 
 
 @cli.command(short_help=SHORT["demo"], epilog="\b\nExample: stepdiag demo -o demo")
@@ -93,8 +94,8 @@ def demo(folder: Path) -> None:
 def check(context: click.Context, files: tuple[Path, ...]) -> None:
     """Tell what kind each FILE is, and whether it is sound.
 
-    Knows scenarios (TOML), measurements, error maps and calibrations (CSV). A scenario is checked together
-    with the error map that it names. Exit code 2 if any file is not sound.
+    Knows scenarios and heads (TOML), measurements and calibrations (CSV or netCDF), and error maps (CSV). A
+    scenario is checked together with the error map that it names. Exit code 2 if any file is not sound.
     """
     from stepdiag.kinds import examine
 

@@ -3,12 +3,16 @@
 import os
 import stat
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from stepdiag._core import InvalidArgument
 
 # No scenario is larger; a device that never ends is not read to its end.
 LARGEST_TEXT = 16 * 2**20
+# The whole covariance of a thousand steps has 2.6 GB.
+LARGEST_BINARY = 8 * 2**30
 
 
 def read_text(path: Path) -> str:
@@ -32,6 +36,22 @@ def read_beginning(path: Path) -> str:
     return _read(path, 2**16).decode("utf-8-sig", errors="replace")
 
 
+def read_bytes(path: Path) -> bytes:
+    """The file's bytes. Raises InvalidArgument where it cannot be read, is empty, or is no regular file."""
+    try:
+        status = path.stat()
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        raise InvalidArgument(f"{path}: cannot be read: {reason(error)}") from None
+    if not stat.S_ISREG(status.st_mode):
+        raise InvalidArgument(f"{path}: expected a file, got a folder or a device")
+    if status.st_size > LARGEST_BINARY:
+        raise InvalidArgument(f"{path}: larger than {LARGEST_BINARY // 2**30} GiB")
+    content = _read(path, status.st_size)
+    if not content:
+        raise InvalidArgument(f"{path}: the file is empty")
+    return content
+
+
 def _read(path: Path, size: int) -> bytes:
     try:
         with open(path, "rb") as file:
@@ -49,22 +69,32 @@ def check_input(path: Path) -> None:
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Writes a temporary file beside `path` and renames it: `path` is the old file or the whole new one."""
+    """Writes a file as a whole: `path` is the old file or the whole new one."""
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A temporary file beside `path` to write, which takes its place when the block ends without an error."""
     check_output(path)
+    target = Path(os.path.realpath(path))  # a symbolic link stays one
     try:
-        handle, temporary = tempfile.mkstemp(prefix=f"{path.name}.", dir=path.parent)
+        handle, temporary = tempfile.mkstemp(prefix=f"{target.name}.", dir=target.parent)
     except OSError as error:
         raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content.encode() if isinstance(content, str) else content)
-            os.fchmod(handle, 0o666 & ~_umask())
-        os.replace(temporary, path)
+        yield Path(temporary)
+        os.fchmod(handle, target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~_umask())
+        os.fsync(handle)
+        os.replace(temporary, target)
     except BaseException as error:
         Path(temporary).unlink(missing_ok=True)
         if isinstance(error, OSError):
             raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
         raise
+    finally:
+        os.close(handle)
 
 
 def check_output(path: Path) -> None:

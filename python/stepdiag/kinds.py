@@ -10,6 +10,7 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
+from stepdiag.data_files import is_netcdf, read_calibration, read_measurement
 from stepdiag.files import check_input, read_beginning
 
 
@@ -27,6 +28,8 @@ def examine(path: Path) -> Finding:
     check_input(path)
     if path.suffix.lower() == ".toml":
         return _toml(path)
+    if is_netcdf(path):
+        return _netcdf(path)
     comments, header = _head_of(read_beginning(path))
     leading = dict(re.findall(r"(?m)^#\s*(\w+)\s*=\s*(.*?)\s*$", "\n".join(comments)))
     columns = {column.strip().strip('"') for column in header.split(",")}
@@ -42,8 +45,10 @@ def examine(path: Path) -> Finding:
         return _toml(path)
     if not header.strip():
         raise InvalidArgument(f"{path}: the file is empty, or has only comments")
+    if header.startswith(("\ufffdHDF", "CDF")):
+        raise InvalidArgument(f"{path}: is a netCDF file; the names of such files must end in .nc")
     raise InvalidArgument(
-        f"{path}: expected a scenario or a head (TOML), a measurement, an error map or a calibration (CSV); "
+        f"{path}: expected a scenario or a head (TOML), a measurement, an error map or a calibration (CSV or .nc); "
         f'a CSV file begins with "line,point,..." or "parameter,position_mm,..."'
     )
 
@@ -87,8 +92,14 @@ def _scenario(path: Path) -> Finding:
     return Finding("scenario", summary, tuple(scenario_warnings(scenario)))
 
 
+def _netcdf(path: Path) -> Finding:
+    from stepdiag.netcdf_read import kind_of_netcdf
+
+    return _measurement(path) if kind_of_netcdf(path) == "measurement" else _calibration(path)
+
+
 def _measurement(path: Path) -> Finding:
-    measurement = _core.read_measurement(path)
+    measurement = read_measurement(path)
     channels = measurement.channels
     lost = int(np.count_nonzero(np.any([np.isnan(values) for values in channels.values()], axis=0))) if channels else 0
     summary = f"{len(measurement)} points on {len(set(measurement.line))} lines, {', '.join(channels)}"
@@ -102,7 +113,7 @@ def _error_map(path: Path) -> Finding:
 
 
 def _calibration(path: Path) -> Finding:
-    calibration = _core.read_calibration(path)
+    calibration = read_calibration(path)
     count = len(calibration.functions) + len(calibration.squareness)
     slopes = calibration.undetermined_slopes
     summary = f"{calibration.method}, {calibration.chain.name}, {count} of 21 parameters"
