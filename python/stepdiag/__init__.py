@@ -64,6 +64,8 @@ from stepdiag._core import (
 )
 from stepdiag.comparison import Deviation, largest_deviations
 from stepdiag.data_files import read_calibration, read_measurement, write_calibration, write_measurement
+from stepdiag.functional_point import functional_point_straightness
+from stepdiag.side_by_side import Comparison, Difference, compare_calibrations
 
 if TYPE_CHECKING:
     from stepdiag.head_description import parse_head_design, read_head_design, shipped_head
@@ -82,7 +84,9 @@ __all__ = [
     "Calibration",
     "Camera",
     "Chain",
+    "Comparison",
     "Deviation",
+    "Difference",
     "Environment",
     "ErrorMap",
     "GaussianMode",
@@ -112,11 +116,13 @@ __all__ = [
     "__version__",
     "adjust",
     "beam_radius",
+    "compare_calibrations",
     "couple",
     "cramer_rao_bound",
     "evaluate",
     "evaluate_scenario",
     "expose",
+    "functional_point_straightness",
     "head_sensitivities",
     "largest_deviations",
     "locate",

@@ -1,4 +1,4 @@
-"""The command line: simulate, evaluate, demo, check, init.
+"""The command line: simulate, demo, check, init, and those of the other cli_ modules.
 
 What is imported inside a command keeps the others fast.
 """
@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from stepdiag._core import InvalidArgument, ReplayMismatch, __version__
+from stepdiag.cli_calibrations import compare, report
 from stepdiag.cli_evaluate import evaluate
 from stepdiag.cli_head import head
 from stepdiag.cli_options import PATH, InOrder, keep_apart, keep_map, out_file, tell
@@ -30,6 +31,8 @@ SHORT = {
     "init": "Begin with your own machine: scenario and sheet.",
     "simulate": "Simulate the run of a scenario.",
     "evaluate": "Calibrate the machine from a run.",
+    "report": "Tell what a calibration says.",
+    "compare": "Set two calibrations side by side.",
     "check": "Tell what a file is, and whether it is sound.",
     "head": "Look at the description of a laser head.",
 }
@@ -162,7 +165,7 @@ def init(folder: Path, scenario: Path | None, head_name: str | None) -> None:
         click.echo(f"wrote {path}")
 
 
-for command, name in ((evaluate, "evaluate"), (head, "head")):
+for command, name in ((evaluate, "evaluate"), (report, "report"), (compare, "compare"), (head, "head")):
     command.short_help = SHORT[name]
     cli.add_command(command)
 cli.commands = {name: cli.commands[name] for name in SHORT}  # the order in which help lists them

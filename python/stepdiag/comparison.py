@@ -29,6 +29,11 @@ def kind_of(parameter: str) -> Kind:
     return "positioning" if parameter[1] == parameter[2] else "straightness"
 
 
+def units_of(parameter: str) -> str:
+    """The native unit of a parameter."""
+    return "rad" if kind_of(parameter) in ("angle", "squareness") else "mm"
+
+
 def largest_deviations(calibration: Calibration, truth: ErrorMap) -> dict[Kind, Deviation]:
     """Largest deviations of a calibration from the truth, at the calibration's nodes.
 

@@ -10,8 +10,9 @@ from typing import Any, Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Measurement
+from stepdiag.comparison import units_of
 from stepdiag.netcdf import NetcdfFile, open_dataset
-from stepdiag.tables import channel_units, units_of
+from stepdiag.tables import channel_units
 from stepdiag.toml_text import located
 
 MEASUREMENT_FORMAT: Final = "stepdiag measurement 1"

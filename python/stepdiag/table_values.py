@@ -20,10 +20,13 @@ class Term(NamedTuple):
 
 
 class TableValues:
-    """The error functions of a calibration between and at their nodes, with what is known of their covariance."""
+    """The error functions of a calibration between and at their nodes, with what is known of their covariance.
+
+    Reversal errors are functions too, NAME_reversal; their covariances are not known."""
 
     def __init__(self, calibration: Calibration) -> None:
-        self.functions = calibration.functions
+        reversal = {f"{name}_reversal": table for name, table in calibration.reversal.items()}
+        self.functions = calibration.functions | reversal
         self.covariance = calibration.covariance
         self._first_row: dict[str, int] = {}
         for row, (name, _) in enumerate(calibration.covariance_labels):
@@ -35,7 +38,8 @@ class TableValues:
         Functions are linear between nodes, and hold their end values outside, as the tables do. Without a full
         covariance different terms are taken as independent, and neighbouring nodes as fully correlated."""
         value = np.sum([t.factor * np.interp(t.position, *self.functions[t.function][:2]) for t in terms], axis=0)
-        variance = self._variance(terms) if self.covariance is not None else self._variance_if_independent(terms)
+        known = self.covariance is not None and all(term.function in self._first_row for term in terms)
+        variance = self._variance(terms) if known else self._variance_if_independent(terms)
         return value, np.sqrt(variance)
 
     def _variance_if_independent(self, terms: Sequence[Term]) -> FloatArray:

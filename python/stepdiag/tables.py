@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from stepdiag._core import Calibration, Measurement
+from stepdiag.comparison import units_of
 from stepdiag.functional_point import functional_point_straightness, straightness_reference
 
 _COMPONENT = {
@@ -131,11 +132,6 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
 def channel_units(name: str) -> str | None:
     """The native unit of a measurement's channel; none for a name that is no channel's."""
     return _CHANNEL[name][0] if name in _CHANNEL else "mm" if re.fullmatch(r"d[1-9][0-9]*", name) else None
-
-
-def units_of(parameter: str) -> str:
-    """The native unit of EXX ... ECZ, C0Y, B0Z, A0Z."""
-    return "mm" if parameter[0] == "E" and parameter[1] in "XYZ" else "rad"
 
 
 def _order(function: str) -> tuple[int, int]:
