@@ -33,10 +33,9 @@ std::array<double, function_count> smoothness_at_start(const AdjustmentOptions& 
 
 int degrees_of_freedom(const AdjustmentSolver& solver) {
     const AdjustmentProblem& problem = solver.equations().problem();
-    int count = int(solver.equations().smooth_rows().size()) - (problem.size() - int(solver.held().size()));
+    int count = int(solver.equations().smooth_rows().size()) - problem.unknowns() + int(solver.dependent().size());
     for (const AdjustedReading& reading : problem.readings()) count += reading.used;
     for (const double prior : problem.prior()) count += std::isfinite(prior);
-    for (const int held : solver.held()) count -= std::isfinite(problem.prior()[held]);
     return count;
 }
 
@@ -125,6 +124,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     AdjustmentTables tables(problem);
     const Observability observability(solver, tables);
     const CalibratedForms forms = choose_forms(problem, tables);
+    solver.assume_usual(observability.determined());
 
     Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
     Adjustment result{
@@ -139,13 +139,14 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     solver.factorize(x);
     const BorderedBand inverse = solver.factor().selected_inverse();
     result.calibration = make_calibration(problem, tables, forms, x, inverse);
-    result.calibration.undetermined = observability.sentences();
+    const std::vector<bool> known = known_unknowns(problem, observability.determined(), inverse);
+    result.calibration.undetermined = observability.sentences(known);
     if (!is_anything_determined(result.calibration))
         throw InvalidArgument(
             "adjustment: nothing can be determined. " +
             (result.calibration.undetermined.empty() ? std::string() : result.calibration.undetermined.front()));
     if (options.full_covariance) result.calibration.covariance = full_covariance(problem, forms, solver.factor());
-    result.setup = setup_estimates(problem, observability, x, inverse);
+    result.setup = setup_estimates(problem, known, x, inverse);
     result.residuals = reading_residuals(solver.equations(), inverse);
     result.combinations = describe(observability, x, inverse);
     result.weighted_square_sum = solver.equations().square_sum(x);
@@ -171,6 +172,7 @@ struct Adjuster::State {
         const Observability observability(solver, tables);
         const CalibratedForms chosen = choose_forms(problem, tables);
         for (const LinearForm* form : chosen.in_order()) forms.push_back(*form);
+        solver.assume_usual(observability.determined());
         start.setZero(problem.size());
         solver.solve(start);
         solver.factorize(start);

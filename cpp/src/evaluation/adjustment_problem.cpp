@@ -204,18 +204,30 @@ void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options) {
 
     sort_points();
 
-    constexpr double metre = 1e3;  // mm
+    weigh_unknowns();
+}
+
+void AdjustmentProblem::weigh_unknowns() {
+    constexpr double metre = 1e3;                                 // mm
+    constexpr double usual_translation = 0.1, usual_turn = 3e-4;  // of an axis, mm and rad
+    constexpr double usual_angle = 2e-3, usual_psd_zero = 10.0;   // of a set-up, rad and mm
     prior_.assign(size(), free_unknown);
+    usual_.assign(size(), usual_translation);
     change_scale_.assign(size(), 1.0 / metre);
     for (const AxisNode& node : nodes_)
         for (int c = 3; c < 6; ++c)
-            if (node.unknown[c] != no_unknown) change_scale_[node.unknown[c]] = 1.0;
+            if (node.unknown[c] != no_unknown) {
+                usual_[node.unknown[c]] = usual_turn;
+                change_scale_[node.unknown[c]] = 1.0;
+            }
     for (const LineSetup& setup : setups_)
         for (const int c : setup.active) {
-            prior_[setup.unknown[c]] = setup.prior[c];
-            const bool length = c == setup::distance_constant || c == setup::drift || c >= setup::beam_constants ||
-                                (c >= setup::psd_zero && c < setup::roll);
-            if (!length) change_scale_[setup.unknown[c]] = 1.0;
+            const int j = setup.unknown[c];
+            prior_[j] = setup.prior[c];
+            const bool angle = c < setup::distance_constant;
+            const bool psd_zero = c == setup::psd_zero || c == setup::psd_zero + 1;
+            usual_[j] = angle ? usual_angle : psd_zero ? usual_psd_zero : free_unknown;
+            if (angle || c == setup::roll || c == setup::gain || c == setup::cosine) change_scale_[j] = 1.0;
         }
 }
 

@@ -82,6 +82,7 @@ public:
     int blocks() const { return int(reach_.size()); }
     int border() const { return border_; }
     int size() const { return 6 * blocks() + border_; }
+    int unknowns() const { return size() - (has_rotations() ? 0 : 3 * blocks()); }  // the band has places without one
 
     int block_of(int node) const { return node == no_unknown ? no_unknown : nodes_[node].block; }
     // The errors of the three axes at a point, for the unknowns' values `x`.
@@ -89,6 +90,8 @@ public:
     Eigen::VectorXd setup_values(const LineSetup& setup, const Eigen::VectorXd& x) const;
     // Of an unknown of the set-ups: its prior's standard uncertainty; infinite elsewhere.
     const std::vector<double>& prior() const { return prior_; }
+    // How far from 0 each unknown usually is.
+    const std::vector<double>& usual() const { return usual_; }
     // What makes changes of unknowns comparable: 1 for angles (rad), 1/metre for lengths (mm).
     const std::vector<double>& change_scale() const { return change_scale_; }
 
@@ -97,6 +100,7 @@ private:
     void collect_points(const Measurement& measurement, const AdjustmentOptions& options);
     void number_unknowns(const AdjustmentOptions& options);
     void sort_points();
+    void weigh_unknowns();
     int node_index(Axis axis, int node, bool negative);
 
     Plan plan_;
@@ -113,7 +117,7 @@ private:
     std::vector<AdjustedReading> readings_;
     std::vector<int> reach_;
     int border_ = 0;
-    std::vector<double> prior_, change_scale_;
+    std::vector<double> prior_, usual_, change_scale_;
 };
 
 }  // namespace stepdiag

@@ -123,7 +123,20 @@ Eigen::MatrixXd full_covariance(const AdjustmentProblem& problem, const Calibrat
     return 0.5 * (covariance + covariance.transpose());
 }
 
-std::vector<SetupEstimate> setup_estimates(const AdjustmentProblem& problem, const Observability& observability,
+std::vector<bool> known_unknowns(const AdjustmentProblem& problem, std::vector<bool> known,
+                                 const BorderedBand& inverse) {
+    for (const LineSetup& setup : problem.setups())
+        for (const int column : setup.active) {
+            const auto of = setup_column_name(column);
+            const int unknown = setup.unknown[column];
+            if (!of || setup.prior[column] < broadest_prior(of->quantity)) continue;
+            const double u = std::sqrt(element(inverse, unknown, unknown));
+            if (u > 0.5 * setup.prior[column]) known[unknown] = false;
+        }
+    return known;
+}
+
+std::vector<SetupEstimate> setup_estimates(const AdjustmentProblem& problem, const std::vector<bool>& known,
                                            const Eigen::VectorXd& x, const BorderedBand& inverse) {
     std::vector<SetupEstimate> estimates;
     for (const LineSetup& setup : problem.setups())
@@ -133,7 +146,7 @@ std::vector<SetupEstimate> setup_estimates(const AdjustmentProblem& problem, con
             SetupEstimate estimate{setup.run, setup.line.name(),  of->quantity, of->component, std::nullopt,
                                    0.0,       setup.prior[column]};
             const int unknown = setup.unknown[column];
-            if (observability.is_determined(unknown)) {
+            if (known[unknown]) {
                 estimate.value = x[unknown];
                 estimate.standard_uncertainty = std::sqrt(element(inverse, unknown, unknown));
             }

@@ -22,7 +22,10 @@ Calibration make_calibration(const AdjustmentProblem& problem, const AdjustmentT
                              const CalibratedForms& forms, const Eigen::VectorXd& x, const BorderedBand& inverse);
 Eigen::MatrixXd full_covariance(const AdjustmentProblem& problem, const CalibratedForms& forms,
                                 const BorderedFactor& factor);
-std::vector<SetupEstimate> setup_estimates(const AdjustmentProblem& problem, const Observability& observability,
+// `determined`, less the unknowns of set-ups of which the readings tell hardly more than that "free" has its limits.
+std::vector<bool> known_unknowns(const AdjustmentProblem& problem, std::vector<bool> determined,
+                                 const BorderedBand& inverse);
+std::vector<SetupEstimate> setup_estimates(const AdjustmentProblem& problem, const std::vector<bool>& known,
                                            const Eigen::VectorXd& x, const BorderedBand& inverse);
 // Of all readings, at the last linearisation.
 std::vector<ReadingResidual> reading_residuals(const NormalEquations& equations, const BorderedBand& inverse);

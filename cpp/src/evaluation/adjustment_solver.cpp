@@ -24,6 +24,16 @@ AdjustmentSolver::AdjustmentSolver(const AdjustmentProblem& problem,
     equations_.make_smooth(smoothness);
     factorize(Eigen::VectorXd::Zero(problem.size()));
     held_ = factor_->held();
+    for (const int j : held_)  // the band has places without an unknown
+        if (j >= 6 * problem.blocks() || j % 6 < 3 || problem.has_rotations()) dependent_.push_back(j);
+}
+
+void AdjustmentSolver::assume_usual(const std::vector<bool>& determined) {
+    if (dependent_.empty()) return;
+    equations_.assume_usual(determined);
+    held_.clear();
+    factorize(Eigen::VectorXd::Zero(matrix_.size()));
+    held_ = factor_->held();
 }
 
 void AdjustmentSolver::factorize(const Eigen::VectorXd& x) {
@@ -33,14 +43,6 @@ void AdjustmentSolver::factorize(const Eigen::VectorXd& x) {
     for (const int j : held_) element(matrix_, j, j) = 0.0;  // which holds it again
     if (factor_) factor_->factorize(matrix_);
     else factor_.emplace(matrix_, rank_threshold);
-}
-
-std::vector<int> AdjustmentSolver::dependent() const {
-    std::vector<int> dependent;
-    for (const int j : held_)
-        if (j >= 6 * equations_.problem().blocks() || j % 6 < 3 || equations_.problem().has_rotations())
-            dependent.push_back(j);
-    return dependent;
 }
 
 Eigen::VectorXd AdjustmentSolver::null_vector(int held) const {

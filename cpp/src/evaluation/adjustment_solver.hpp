@@ -20,10 +20,10 @@ public:
 
     NormalEquations& equations() { return equations_; }
     const NormalEquations& equations() const { return equations_; }
-    // The unknowns held at 0, because the readings do not tell them apart from the others; ascending. Decided at zero.
-    const std::vector<int>& held() const { return held_; }
-    // Those of them that are unknowns of the problem: the band has places without one.
-    std::vector<int> dependent() const;
+    // One unknown for each dimension that the readings leave open, decided at zero: those which depend on the others.
+    const std::vector<int>& dependent() const { return dependent_; }
+    // From here on unknowns that are not determined are what is usual, so that there is one solution.
+    void assume_usual(const std::vector<bool>& determined);
     const BorderedFactor& factor() const { return *factor_; }
     const Eigen::VectorXd& scale() const { return scale_; }  // length of each column of the weighted problem
 
@@ -46,7 +46,7 @@ private:
     BorderedBand matrix_;
     std::optional<BorderedFactor> factor_;
     Eigen::VectorXd scale_;  // square roots of the diagonal at the last factorisation
-    std::vector<int> held_;
+    std::vector<int> held_, dependent_;
     bool fresh_ = true;  // derivatives and factor are those at zero, from the beginning
 };
 

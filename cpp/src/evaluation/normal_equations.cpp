@@ -56,6 +56,14 @@ NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&p
     first_unknown_.push_back(int(unknowns_.size()));
     derivatives_.resize(weights);
     residuals_.setZero(Eigen::Index(problem.readings().size()));
+    assume_usual(std::vector<bool>(problem.size(), true));
+}
+
+void NormalEquations::assume_usual(const std::vector<bool>& determined) {
+    prior_weight_.resize(problem_->size());
+    for (int j = 0; j < problem_->size(); ++j)
+        prior_weight_[j] =
+            std::pow(problem_->prior()[j], -2) + (determined[j] ? 0.0 : std::pow(problem_->usual()[j], -2));
 }
 
 void NormalEquations::make_smooth(const std::array<double, function_count>& deviation) {
@@ -168,8 +176,7 @@ BorderedBand NormalEquations::matrix() const { return BorderedBand(problem_->rea
 void NormalEquations::assemble(BorderedBand& matrix) const {
     matrix.set_zero();
     for (std::size_t p = 0; p < problem_->points().size(); ++p) assemble_point(problem_->points()[p], int(p), matrix);
-    for (int j = 0; j < problem_->size(); ++j)
-        if (std::isfinite(problem_->prior()[j])) element(matrix, j, j) += 1.0 / std::pow(problem_->prior()[j], 2);
+    for (int j = 0; j < problem_->size(); ++j) element(matrix, j, j) += prior_weight_[j];
     for (const SmoothRow& row : smooth_)
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j <= i; ++j)
@@ -228,8 +235,7 @@ Eigen::VectorXd NormalEquations::transposed(const Eigen::VectorXd& w, const Eige
             for (int i = 0; i < row.size; ++i)
                 if (row.unknown[i] != no_unknown) gradient[row.unknown[i]] += row.derivative[i] * w[r];
         }
-    for (int j = 0; j < x.size(); ++j)
-        if (std::isfinite(problem_->prior()[j])) gradient[j] -= x[j] / std::pow(problem_->prior()[j], 2);
+    gradient -= prior_weight_.cwiseProduct(x);
     for (const SmoothRow& row : smooth_) {
         const double value = row.value(x);
         for (int i = 0; i < 3; ++i)

@@ -33,12 +33,15 @@ public:
     // Second differences of each function's neighbouring nodes, by the standard deviation of each function (0: none).
     void make_smooth(const std::array<double, function_count>& deviation);
     const std::vector<SmoothRow>& smooth_rows() const { return smooth_; }
+    // Takes the unknowns that the readings leave open as known to be 0 as well as is usual for such a thing. What the
+    // readings determine does not change by it.
+    void assume_usual(const std::vector<bool>& determined);
 
     // Residuals and, if asked for, derivatives at x. Values that are not finite come out as such.
     void linearise(const Eigen::VectorXd& x, bool derivatives = true);
     // Weighted residual of each reading, used or not, at the last linearise.
     const Eigen::VectorXd& residuals() const { return residuals_; }
-    double square_sum(const Eigen::VectorXd& x) const;  // of residuals, priors and smoothness
+    double square_sum(const Eigen::VectorXd& x) const;  // of residuals, priors and smoothness, not of what is usual
 
     BorderedBand matrix() const;
     void assemble(BorderedBand& matrix) const;                 // J^T J + P
@@ -71,6 +74,7 @@ private:
     std::vector<double> derivatives_;
     Eigen::VectorXd residuals_;
     std::vector<SmoothRow> smooth_;
+    Eigen::VectorXd prior_weight_;  // of each unknown, with that of what is usual
 };
 
 }  // namespace stepdiag

@@ -84,7 +84,7 @@ Observability::Observability(const AdjustmentSolver& solver, AdjustmentTables& t
     for (KnownCombination& difference : differences) forms.push_back(&difference.form);
 
     const Eigen::VectorXd units = column_units(solver);
-    const std::vector<int> held = solver.dependent();
+    const std::vector<int>& held = solver.dependent();
     Eigen::MatrixXd slopes(sloped.size(), held.size());
     for (std::size_t h = 0; h < held.size(); ++h) {
         const Eigen::VectorXd vector = solver.null_vector(held[h]);
@@ -97,8 +97,7 @@ Observability::Observability(const AdjustmentSolver& solver, AdjustmentTables& t
             slopes(i, h) = tables.slope(sloped[i])->value(vector) / problem_.plan().volume()[index(sloped[i].axis)];
     }
     for (const KnownCombination& difference : differences)
-        if (difference.form.determined && !is_determined(difference.form.unknown[0]))
-            combinations_.push_back(difference);
+        if (difference.form.determined && !determined_[difference.form.unknown[0]]) combinations_.push_back(difference);
     combine_slopes(slopes, sloped);
 }
 
@@ -137,10 +136,10 @@ void Observability::combine_slopes(const Eigen::MatrixXd& slopes, const std::vec
     }
 }
 
-std::vector<std::string> Observability::sentences() const {
+std::vector<std::string> Observability::sentences(const std::vector<bool>& known) const {
     std::vector<std::string> sentences;
     add_function_sentences(sentences);
-    add_setup_sentences(sentences);
+    add_setup_sentences(known, sentences);
     return sentences;
 }
 
@@ -212,11 +211,11 @@ void Observability::add_function_sentences(std::vector<std::string>& sentences) 
                             "backward");
 }
 
-void Observability::add_setup_sentences(std::vector<std::string>& sentences) const {
+void Observability::add_setup_sentences(const std::vector<bool>& known, std::vector<std::string>& sentences) const {
     std::map<int, std::vector<std::string>> lines;  // by column
     for (const LineSetup& setup : problem_.setups())
         for (const int column : setup.active)
-            if (!is_determined(setup.unknown[column])) lines[column].push_back(place(setup));
+            if (!known[setup.unknown[column]]) lines[column].push_back(place(setup));
     bool scale_open = false;
     for (const Axis axis : all_axes) {
         const auto& slope = tables_.slope({axis, Component(index(axis))});

@@ -22,15 +22,16 @@ public:
     // Marks the tables' forms.
     Observability(const AdjustmentSolver& solver, AdjustmentTables& tables);
 
-    bool is_determined(int unknown) const { return determined_[unknown]; }
+    const std::vector<bool>& determined() const { return determined_; }
     // One sentence each: what is missing, why, and what would help.
-    std::vector<std::string> sentences() const;
+    // `known`: by unknown; determined(), or less.
+    std::vector<std::string> sentences(const std::vector<bool>& known) const;
     const std::vector<KnownCombination>& combinations() const { return combinations_; }
 
 private:
     void combine_slopes(const Eigen::MatrixXd& slopes, const std::vector<FunctionId>& functions);
     void add_function_sentences(std::vector<std::string>& sentences) const;
-    void add_setup_sentences(std::vector<std::string>& sentences) const;
+    void add_setup_sentences(const std::vector<bool>& known, std::vector<std::string>& sentences) const;
 
     const AdjustmentProblem& problem_;
     const AdjustmentTables& tables_;

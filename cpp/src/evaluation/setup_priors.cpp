@@ -1,5 +1,6 @@
 #include "evaluation/setup_priors.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "stepdiag/core/error.hpp"
@@ -7,9 +8,13 @@
 namespace stepdiag {
 namespace {
 
-constexpr PriorUncertainty usual_lateral = 1.0;           // mm
-constexpr PriorUncertainty usual_roll = 20e-3;            // rad
-constexpr PriorUncertainty usual_gain = 0.01;             // 1
+constexpr PriorUncertainty usual_lateral = 1.0;  // mm
+constexpr PriorUncertainty usual_roll = 20e-3;   // rad
+constexpr PriorUncertainty usual_gain = 0.01;    // 1
+// What "free" means where an unknown acts on tilts only that are 0 on a perfect machine.
+constexpr PriorUncertainty broad_lateral = 1e3;           // mm
+constexpr PriorUncertainty broad_roll = 1.0;              // rad
+constexpr PriorUncertainty broad_gain = 1.0;              // 1
 constexpr PriorUncertainty laser_beside_beams = 2e-3;     // rad, where the constants of the beams are unknown
 constexpr PriorUncertainty laser_of_scale_line = 500e-6;  // rad
 
@@ -35,6 +40,15 @@ std::string name(SetupQuantity quantity) {
     constexpr const char* names[setup_quantity_count] = {
         "reflector", "laser", "distance_constant", "beam_constants", "psd_zero", "lateral", "roll", "gain", "drift"};
     return names[static_cast<int>(quantity)];
+}
+
+PriorUncertainty broadest_prior(SetupQuantity quantity) {
+    switch (quantity) {
+        case SetupQuantity::lateral: return broad_lateral;
+        case SetupQuantity::roll: return broad_roll;
+        case SetupQuantity::gain: return broad_gain;
+        default: return free_unknown;
+    }
 }
 
 std::optional<SetupColumnName> setup_column_name(int column) {
@@ -81,7 +95,8 @@ std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, con
 
     std::vector<PriorUncertainty> priors(columns, fixed_unknown);
     for (int column = 0; column < columns; ++column)
-        if (const auto of = setup_column_name(column)) priors[column] = prior(of->quantity);
+        if (const auto of = setup_column_name(column))
+            priors[column] = std::min(prior(of->quantity), broadest_prior(of->quantity));
     // Without a reflector angle of its own a scale line's spots are not used.
     const bool has_spots = kind == ChannelKind::psd && !(is_scale_line && priors[setup::reflector] == fixed_unknown);
     if (!has_spots) priors[setup::psd_zero] = priors[setup::psd_zero + 1] = fixed_unknown;

@@ -17,6 +17,9 @@ struct SetupColumnName {
 };
 std::optional<SetupColumnName> setup_column_name(int column);
 
+// What "free" means: infinite but for the quantities that act by tilts only, which are 0 on a perfect machine.
+PriorUncertainty broadest_prior(SetupQuantity quantity);
+
 // Standard uncertainty of each column (setup::Column, beams) of a line's set-up. Throws InvalidArgument for a negative
 // one, and for a free laser on a scale line.
 std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, const std::string& line,

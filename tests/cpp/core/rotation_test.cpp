@@ -74,6 +74,23 @@ TEST(Rotation, ExpIsOrthonormalAndRightHanded) {
     }
 }
 
+TEST(Rotation, JacobianIsTheDerivativeOfExp) {
+    for (const double length : {1e-9, 1e-4, 0.0999, 0.1001, 1.0}) {
+        for (const auto& v : vectors_of_length(length, 20)) {
+            const Eigen::Matrix3d jacobian = stepdiag::rotation_jacobian(v);
+            for (int i = 0; i < 3; ++i) {
+                const double step = 1e-5;
+                const Eigen::Vector3d dv = step * Eigen::Vector3d::Unit(i);
+                const Eigen::Matrix3d turned =
+                    stepdiag::rotation_exp(v + dv) * stepdiag::rotation_exp(v - dv).transpose();
+                const Eigen::Vector3d turn(turned(2, 1), turned(0, 2), turned(1, 0));
+                // Lost: step^2 of the third derivative, and 1e-16 over the step.
+                EXPECT_LE((jacobian.col(i) - turn / (2.0 * step)).norm(), 1e-9) << "|v| = " << length;
+            }
+        }
+    }
+}
+
 TEST(Rotation, QuarterTurnAboutZTakesXToY) {
     const Eigen::Matrix3d r = stepdiag::rotation_exp({0.0, 0.0, std::acos(0.0)});
     EXPECT_LE((r * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm(), 1e-15);  // pi/2 is rounded

@@ -41,7 +41,9 @@ inline constexpr PriorUncertainty fixed_unknown = 0.0;
 
 // By SetupQuantity; none: the default. Defaults of measured lines: reflector, distance_constant, beam_constants and
 // psd_zero free; laser free, but known to 2000 urad where the constants of the layout's beams are not fixed; lateral
-// known to 1 mm, roll to 20,000 urad, gain to 0.01; drift fixed. Defaults of scale lines: reflector fixed, and their
+// known to 1 mm, roll to 20,000 urad, gain to 0.01; drift fixed. A lateral offset, roll or gain acts by the tilts only,
+// which are 0 on a perfect machine: free means known to 1 m, 1 rad, 1, and one whose uncertainty stays above half of
+// that is not determined. Defaults of scale lines: reflector fixed, and their
 // tilts and spots then are not used; beams have a constant each; the laser's angles are fixed at 0, and what is given
 // as their standard uncertainty (500 urad) makes the cosine error travel (a^2 + b^2)/2 by which their distances read
 // short; roll and gain fixed; the others as on measured lines.
