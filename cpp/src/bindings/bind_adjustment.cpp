@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "bindings.hpp"
@@ -37,6 +38,8 @@ struct Outlier {
     std::string channel;
     double residual;
     double normalised;
+    int number;
+    bool left_out;
 };
 
 // What Python sees: an adjustment, and the run's rows that it belongs to.
@@ -121,14 +124,19 @@ void bind_result(py::module_& m) {
         .def_readonly("standard_uncertainty", &SetupEstimate::standard_uncertainty)
         .def_readonly("prior", &SetupEstimate::prior, "Standard uncertainty of its prior; infinite where it is free.");
 
-    py::class_<Outlier>(m, "Outlier", "A reading that did not fit and was left out.")
+    py::class_<Outlier>(m, "Outlier", "A reading that did not fit.")
         .def_readonly("row", &Outlier::row)
         .def_readonly("run", &Outlier::run)
         .def_readonly("line", &Outlier::line)
         .def_readonly("point", &Outlier::point)
         .def_readonly("channel", &Outlier::channel)
         .def_readonly("residual", &Outlier::residual, "mm or rad")
-        .def_readonly("normalised", &Outlier::normalised, "In its standard uncertainties.");
+        .def_readonly("normalised", &Outlier::normalised, "In its standard uncertainties.")
+        .def_readonly("number", &Outlier::number, "Counted from 1, the worst first.")
+        .def_readonly(
+            "left_out", &Outlier::left_out,
+            "False: fitted as badly as the outlier of this number, and no other reading tells which of them is "
+            "wrong; the other was left out because the error functions are smoother without it.");
 
     using Result = AdjustmentOfRun;
     py::class_<Result>(m, "Adjustment", "What an adjustment found: calibration, set-ups, and how the readings fit.")
@@ -155,22 +163,25 @@ void bind_result(py::module_& m) {
         .def_property_readonly(
             "used",
             [](const Result& r) {
-                py::dict used = r.by_channel(0.0, [](const ReadingResidual& x) { return x.used ? 1.0 : 0.0; });
+                py::dict used = r.by_channel(0.0, [](const ReadingResidual& x) { return x.used() ? 1.0 : 0.0; });
                 for (const auto& item : used) used[item.first] = item.second.attr("astype")("bool");
                 return py::typing::Dict<py::str, py::array_t<bool>>(used);
             },
             "channel -> (n,) whether a reading was used: it was there, and is no outlier.")
-        .def_property_readonly(
-            "outliers",
-            [](const Result& r) {
-                std::vector<Outlier> list;
-                for (const std::size_t i : r.adjustment.outliers()) {
-                    const ReadingResidual& x = r.adjustment.residuals[i];
-                    const Station& s = r.stations[x.row];
-                    list.push_back({x.row, s.run, s.line.name(), s.point, x.channel, x.residual, x.normalised});
-                }
-                return list;
-            })
+        .def_property_readonly("outliers",
+                               [](const Result& r) {
+                                   std::vector<Outlier> list;
+                                   for (const ReadingResidual& x : r.adjustment.residuals) {
+                                       if (x.used() && x.suspect == 0) continue;
+                                       const Station& s = r.stations[x.row];
+                                       list.push_back({x.row, s.run, s.line.name(), s.point, x.channel, x.residual,
+                                                       x.normalised, x.used() ? x.suspect : x.outlier, !x.used()});
+                                   }
+                                   std::stable_sort(list.begin(), list.end(), [](const Outlier& a, const Outlier& b) {
+                                       return std::pair(a.number, b.left_out) < std::pair(b.number, a.left_out);
+                                   });
+                                   return list;
+                               })
         .def_property_readonly("weighted_square_sum", [](const Result& r) { return r.adjustment.weighted_square_sum; })
         .def_property_readonly("variance_factor", [](const Result& r) { return r.adjustment.variance_factor(); })
         .def_property_readonly("degrees_of_freedom", [](const Result& r) { return r.adjustment.degrees_of_freedom; })

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <limits>
 #include <sstream>
 #include <unsupported/Eigen/SpecialFunctions>
 
@@ -34,7 +34,7 @@ std::array<double, function_count> smoothness_at_start(const AdjustmentOptions& 
 int degrees_of_freedom(const AdjustmentSolver& solver) {
     const AdjustmentProblem& problem = solver.equations().problem();
     int count = int(solver.equations().smooth_rows().size()) - problem.unknowns() + int(solver.dependent().size());
-    for (const AdjustedReading& reading : problem.readings()) count += reading.used;
+    for (const AdjustedReading& reading : problem.readings()) count += reading.used();
     for (const double prior : problem.prior()) count += std::isfinite(prior);
     return count;
 }
@@ -43,46 +43,79 @@ int degrees_of_freedom(const AdjustmentSolver& solver) {
 // say of it), and adjusts again; puts them back where they are too many.
 class OutlierSearch {
 public:
-    OutlierSearch(AdjustmentProblem& problem, AdjustmentSolver& solver, double probability)
+    OutlierSearch(AdjustmentProblem& problem, AdjustmentSolver& solver, const AdjustmentOptions& options)
         : problem_(problem), solver_(solver) {
         const double count = double(problem.readings().size());
-        limit_ = -Eigen::numext::ndtri(probability / (2.0 * count));
-        most_ = std::max<std::size_t>(10, problem.readings().size() / 50);
+        limit_ = -Eigen::numext::ndtri(options.outlier_probability / (2.0 * count));
+        most_ = std::max(10, int(problem.readings().size() / 50));
+        roughness_ = second_differences(
+            problem, given_deviations({options.uncertainty.distance, options.uncertainty.tilt, false}));
     }
 
     void run(Eigen::VectorXd& x) {
         const Eigen::VectorXd before = x;
-        for (std::size_t found = 0;; ++found) {
-            const std::optional<std::size_t> worst = worst_reading(x);
-            if (!worst) return;
-            if (found == most_) break;
-            problem_.readings()[*worst].used = false;
+        for (int found = 1;; ++found) {
+            const std::vector<std::size_t> worst = worst_readings(x);
+            if (worst.empty()) return;
+            if (found > most_) break;
+            for (const std::size_t r : worst) problem_.readings()[r].suspect = found;
+            AdjustedReading& reading = problem_.readings()[roughest(worst, x)];
+            reading.suspect = 0;
+            reading.outlier = found;
             solver_.solve(x);
         }
-        for (AdjustedReading& reading : problem_.readings()) reading.used = true;
+        for (AdjustedReading& reading : problem_.readings()) reading.outlier = reading.suspect = 0;
         x = before;
     }
 
 private:
-    std::optional<std::size_t> worst_reading(const Eigen::VectorXd& x) {
+    // Of readings that no other tells apart, the one without which the error functions are smoothest.
+    std::size_t roughest(const std::vector<std::size_t>& candidates, const Eigen::VectorXd& x) {
+        if (candidates.size() == 1) return candidates.front();
+        double least = std::numeric_limits<double>::infinity();
+        std::size_t chosen = candidates.front();
+        for (const std::size_t r : candidates) {
+            problem_.readings()[r].outlier = 1;
+            solver_.factorize(x);
+            Eigen::VectorXd without = solver_.equations().gradient(x);
+            problem_.readings()[r].outlier = 0;
+            solver_.factor().solve(without);
+            without += x;
+            double roughness = 0.0;
+            for (const SmoothRow& row : roughness_) roughness += std::pow(row.value(without), 2);
+            if (roughness >= least) continue;
+            least = roughness;
+            chosen = r;
+        }
+        return chosen;
+    }
+
+    // The reading that fits worst, if it is an outlier, and those that no other reading tells from it.
+    std::vector<std::size_t> worst_readings(const Eigen::VectorXd& x) {
+        constexpr double alike = 0.99;
         solver_.factorize(x);
         const auto residuals = reading_residuals(solver_.equations(), solver_.factor().selected_inverse());
         const double square_sum = solver_.equations().square_sum(x);
         const int freedom = degrees_of_freedom(solver_);
-        std::size_t worst = 0;
-        for (std::size_t r = 1; r < residuals.size(); ++r)
-            if (size(residuals[r]) > size(residuals[worst])) worst = r;
+        double worst = 0.0;
+        for (const ReadingResidual& residual : residuals) worst = std::max(worst, size(residual));
         // Where all readings scatter more than was said, the worst is measured against that.
-        const double w = size(residuals[worst]);
-        const double others = freedom > 1 ? std::max(1.0, (square_sum - w * w) / (freedom - 1)) : 1.0;
-        return w > limit_ * std::sqrt(others) ? std::optional(worst) : std::nullopt;
+        const double others = freedom > 1 ? std::max(1.0, (square_sum - worst * worst) / (freedom - 1)) : 1.0;
+        std::vector<std::size_t> found;
+        if (worst > limit_ * std::sqrt(others))
+            for (std::size_t r = 0; r < residuals.size(); ++r)
+                if (size(residuals[r]) >= alike * worst) found.push_back(r);
+        return found;
     }
-    static double size(const ReadingResidual& residual) { return residual.used ? std::abs(residual.normalised) : 0.0; }
+    static double size(const ReadingResidual& residual) {
+        return residual.used() ? std::abs(residual.normalised) : 0.0;
+    }
 
     AdjustmentProblem& problem_;
     AdjustmentSolver& solver_;
     double limit_;
-    std::size_t most_;
+    int most_;
+    std::vector<SmoothRow> roughness_;
 };
 
 std::vector<std::string> describe(const Observability& observability, const Eigen::VectorXd& x,
@@ -108,10 +141,9 @@ double Adjustment::variance_factor() const {
 std::vector<std::size_t> Adjustment::outliers() const {
     std::vector<std::size_t> list;
     for (std::size_t r = 0; r < residuals.size(); ++r)
-        if (!residuals[r].used) list.push_back(r);
-    std::sort(list.begin(), list.end(), [&](std::size_t i, std::size_t j) {
-        return std::abs(residuals[i].normalised) > std::abs(residuals[j].normalised);
-    });
+        if (!residuals[r].used()) list.push_back(r);
+    std::stable_sort(list.begin(), list.end(),
+                     [&](std::size_t i, std::size_t j) { return residuals[i].outlier < residuals[j].outlier; });
     return list;
 }
 
@@ -123,20 +155,20 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     AdjustmentSolver solver(problem, smoothness_at_start(options));
     AdjustmentTables tables(problem);
     const Observability observability(solver, tables);
-    const CalibratedForms forms = choose_forms(problem, tables);
+    const CalibratedForms forms = choose_forms(tables);
     solver.assume_usual(observability.determined());
 
     Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
     Adjustment result{
         {"", chain, {}, {}, {}, {}, {}, {}, {}}, {}, {}, 0.0, 0, 1.0, 0, {}, smoothness_at_start(options)};
-    result.iterations = solver.solve(x);
-    if (options.outlier_probability > 0.0) OutlierSearch(problem, solver, options.outlier_probability).run(x);
+    result.iterations = solver.solve_open(observability.determined(), x);
+    if (options.outlier_probability > 0.0) OutlierSearch(problem, solver, options).run(x);
     if (options.smoothness && options.smoothness->cross_validated) {
         result.smoothness = cross_validate(solver, x, options);
         solver.solve(x);
     }
 
-    solver.factorize(x);
+    solver.refresh(x);
     const BorderedBand inverse = solver.factor().selected_inverse();
     result.calibration = make_calibration(problem, tables, forms, x, inverse);
     const std::vector<bool> known = known_unknowns(problem, observability.determined(), inverse);
@@ -148,6 +180,8 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     if (options.full_covariance) result.calibration.covariance = full_covariance(problem, forms, solver.factor());
     result.setup = setup_estimates(problem, known, x, inverse);
     result.residuals = reading_residuals(solver.equations(), inverse);
+    std::stable_sort(result.residuals.begin(), result.residuals.end(),
+                     [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
     result.combinations = describe(observability, x, inverse);
     result.weighted_square_sum = solver.equations().square_sum(x);
     result.degrees_of_freedom = degrees_of_freedom(solver);
@@ -170,11 +204,11 @@ struct Adjuster::State {
         check_options(options, plan);
         AdjustmentTables tables(problem);
         const Observability observability(solver, tables);
-        const CalibratedForms chosen = choose_forms(problem, tables);
+        const CalibratedForms chosen = choose_forms(tables);
         for (const LinearForm* form : chosen.in_order()) forms.push_back(*form);
         solver.assume_usual(observability.determined());
         start.setZero(problem.size());
-        solver.solve(start);
+        solver.solve_open(observability.determined(), start);
         solver.factorize(start);
         for (const Channel& channel : measurement.channels()) channels.push_back(channel.name);
         channel_of_reading.reserve(problem.readings().size());

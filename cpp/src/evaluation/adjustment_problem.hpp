@@ -47,7 +47,9 @@ struct AdjustedReading {
     int channel;  // of the head: a row of the model
     double value;
     double standard_uncertainty;
-    bool used = true;
+    int outlier = 0, suspect = 0;  // as in ReadingResidual
+
+    bool used() const { return outlier == 0; }
 };
 
 // One point of one visit, and its readings: readings[first_reading .. end_reading).

@@ -16,10 +16,6 @@ int count_determined(const FunctionForms& forms) {
                              [](const LinearForm& form) { return form.size > 0 && form.determined; }));
 }
 
-bool says_anything(const FunctionForms& forms) {
-    return std::any_of(forms.value.begin(), forms.value.end(), [](const LinearForm& form) { return form.size > 0; });
-}
-
 FunctionForms determined_part(const FunctionForms& forms) {
     FunctionForms part;
     for (std::size_t k = 0; k < forms.value.size(); ++k)
@@ -46,20 +42,18 @@ std::vector<const LinearForm*> CalibratedForms::in_order() const {
     return forms;
 }
 
-CalibratedForms choose_forms(const AdjustmentProblem& problem, const AdjustmentTables& tables) {
+CalibratedForms choose_forms(const AdjustmentTables& tables) {
     CalibratedForms chosen;
     for (int i = 0; i < function_count; ++i) {
         const FunctionId id = FunctionId::at(i);
         const FunctionForms &values = tables.values(id), &shapes = tables.shapes(id);
+        // Where its slope is open, a function keeps its shape, unless more of its values are known.
+        const int known_values = count_determined(values), known_shapes = count_determined(shapes);
         const auto& slope = tables.slope(id);
-        chosen.slope_determined[i] = id.is_straightness() || !slope || slope->determined;
+        const bool slope_open = !id.is_straightness() && slope && !slope->determined;
+        chosen.slope_determined[i] = !slope_open || known_values >= known_shapes;
         const FunctionForms& known = chosen.slope_determined[i] ? values : shapes;
-        if (id.is_rotation() && !problem.has_rotations()) continue;
-        if (known.position.size() < 2) continue;  // never visited
-        // A single step has no shape: a straightness then is 0 at both of its nodes.
-        if (count_determined(known) > 0 || !says_anything(known)) chosen.functions[i] = determined_part(known);
-        // A function whose slope alone is open keeps its shape; one step without its slope has none.
-        if (!chosen.slope_determined[i] && !says_anything(known)) chosen.functions[i].reset();
+        if (count_determined(known) > 0) chosen.functions[i] = determined_part(known);
     }
     for (const Squareness s : all_squarenesses)
         if (const auto& form = tables.squareness(s); form && form->determined)
@@ -170,20 +164,22 @@ std::vector<ReadingResidual> reading_residuals(const NormalEquations& equations,
             image.noalias() = covariance * derivative;
             const double share = derivative.dot(image);  // in units of the reading's own variance
             const double weighted = equations.residuals()[r];
-            ReadingResidual residual{
-                reading.row, problem.channel_name(reading), weighted * reading.standard_uncertainty, 0.0, 0.0,
-                reading.used};
-            residual.redundancy = reading.used ? std::max(0.0, 1.0 - share) : 1.0 / (1.0 + share);
+            ReadingResidual residual{reading.row,
+                                     problem.channel_name(reading),
+                                     weighted * reading.standard_uncertainty,
+                                     0.0,
+                                     0.0,
+                                     reading.outlier,
+                                     reading.suspect};
+            residual.redundancy = reading.used() ? std::max(0.0, 1.0 - share) : 1.0 / (1.0 + share);
             // Below this a residual is rounding.
             constexpr double controlled = 1e-8;
-            if (reading.used && residual.redundancy < controlled) residual.redundancy = 0.0;
-            else if (reading.used) residual.normalised = weighted / std::sqrt(residual.redundancy);
+            if (reading.used() && residual.redundancy < controlled) residual.redundancy = 0.0;
+            else if (reading.used()) residual.normalised = weighted / std::sqrt(residual.redundancy);
             else residual.normalised = weighted * std::sqrt(residual.redundancy);
             residuals.push_back(residual);
         }
     }
-    std::stable_sort(residuals.begin(), residuals.end(),
-                     [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
     return residuals;
 }
 

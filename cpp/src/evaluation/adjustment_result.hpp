@@ -16,7 +16,7 @@ struct CalibratedForms {
 
     std::vector<const LinearForm*> in_order() const;  // that of Calibration::covariance
 };
-CalibratedForms choose_forms(const AdjustmentProblem& problem, const AdjustmentTables& tables);
+CalibratedForms choose_forms(const AdjustmentTables& tables);
 
 Calibration make_calibration(const AdjustmentProblem& problem, const AdjustmentTables& tables,
                              const CalibratedForms& forms, const Eigen::VectorXd& x, const BorderedBand& inverse);
@@ -27,7 +27,7 @@ std::vector<bool> known_unknowns(const AdjustmentProblem& problem, std::vector<b
                                  const BorderedBand& inverse);
 std::vector<SetupEstimate> setup_estimates(const AdjustmentProblem& problem, const std::vector<bool>& known,
                                            const Eigen::VectorXd& x, const BorderedBand& inverse);
-// Of all readings, at the last linearisation.
+// Of all readings in the problem's order, at the last linearisation.
 std::vector<ReadingResidual> reading_residuals(const NormalEquations& equations, const BorderedBand& inverse);
 
 }  // namespace stepdiag

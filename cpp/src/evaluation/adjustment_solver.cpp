@@ -8,12 +8,11 @@
 namespace stepdiag {
 namespace {
 
-constexpr int most_steps = 30;
-// A step that changes angles by less (rad, and lengths by less of a metre) leaves the derivatives good enough to go on
-// with: the next step then is in error by this part of itself.
-constexpr double derivatives_hold = 1e-5;
+constexpr int most_steps = 50;
+// A step that changes angles by less (rad, and lengths by less of a metre) leaves the factor as good as new.
+constexpr double factor_holds = 1e-9;
 // A step's effect on the readings, in standard uncertainties, below which it may be rounding.
-constexpr double small_effect = 1e-3;
+constexpr double small_effect = 1e-3, no_effect = 1e-6;
 constexpr double small_change = 1e-9;  // rad, metres
 
 }  // namespace
@@ -22,7 +21,9 @@ AdjustmentSolver::AdjustmentSolver(const AdjustmentProblem& problem,
                                    const std::array<double, function_count>& smoothness)
     : equations_(problem), matrix_(equations_.matrix()) {
     equations_.make_smooth(smoothness);
-    factorize(Eigen::VectorXd::Zero(problem.size()));
+    equations_.linearise(Eigen::VectorXd::Zero(problem.size()));
+    equations_.drop_roundings();
+    factorize();
     held_ = factor_->held();
     for (const int j : held_)  // the band has places without an unknown
         if (j >= 6 * problem.blocks() || j % 6 < 3 || problem.has_rotations()) dependent_.push_back(j);
@@ -30,19 +31,32 @@ AdjustmentSolver::AdjustmentSolver(const AdjustmentProblem& problem,
 
 void AdjustmentSolver::assume_usual(const std::vector<bool>& determined) {
     if (dependent_.empty()) return;
-    equations_.assume_usual(determined);
+    equations_.assume_usual(determined, Eigen::VectorXd::Zero(matrix_.size()));
     held_.clear();
-    factorize(Eigen::VectorXd::Zero(matrix_.size()));
+    factorize();
     held_ = factor_->held();
 }
 
 void AdjustmentSolver::factorize(const Eigen::VectorXd& x) {
     equations_.linearise(x);
+    factorize();
+    factorized_at_ = x;
+}
+
+void AdjustmentSolver::factorize() {
     equations_.assemble(matrix_);
     scale_ = matrix_.diagonal().cwiseSqrt();
     for (const int j : held_) element(matrix_, j, j) = 0.0;  // which holds it again
     if (factor_) factor_->factorize(matrix_);
     else factor_.emplace(matrix_, rank_threshold);
+}
+
+void AdjustmentSolver::refresh(const Eigen::VectorXd& x) {
+    double change = 0.0;
+    for (int j = 0; j < x.size(); ++j)
+        change = std::max(change, std::abs(x[j] - factorized_at_[j]) * equations_.problem().change_scale()[j]);
+    if (change > factor_holds) factorize(x);
+    else equations_.linearise(x);
 }
 
 Eigen::VectorXd AdjustmentSolver::null_vector(int held) const {
@@ -66,19 +80,28 @@ double AdjustmentSolver::step(Eigen::VectorXd& x, double& change) {
     return dx.cwiseProduct(scale_).cwiseAbs().maxCoeff();
 }
 
+int AdjustmentSolver::solve_open(const std::vector<bool>& determined, Eigen::VectorXd& x) {
+    const int count = solve(x);
+    if (dependent_.empty()) return count;
+    equations_.assume_usual(determined, x);
+    return count + solve(x);
+}
+
 int AdjustmentSolver::solve(Eigen::VectorXd& x) {
+    constexpr double enough = 1e-8;  // of a standard uncertainty
     constexpr double infinite = std::numeric_limits<double>::infinity();
     double change = fresh_ && x.isZero(0.0) ? 0.0 : infinite, effect = infinite;
     fresh_ = false;
     for (int count = 1; count <= most_steps; ++count) {
-        if (change > derivatives_hold) factorize(x);
-        else if (count > 1) equations_.linearise(x, false);
+        if (change > factor_holds) factorize(x);
+        else if (count > 1) equations_.linearise(x);
         if (!equations_.residuals().allFinite()) break;
         const double before = effect;
         effect = step(x, change);
-        // Rounding is what no longer shrinks.
-        if (effect >= 0.25 * before && (effect < small_effect || change < small_change)) return count;
-        if (effect == 0.0) return count;
+        if (effect < enough) return count;
+        // Rounding is what no longer shrinks. With noise the last steps shrink slowly, too, down to no effect at all.
+        if (effect >= 0.25 * before && effect < no_effect) return count;
+        if (effect >= 0.7 * before && (effect < small_effect || change < small_change)) return count;
     }
     throw InvalidArgument(
         "adjustment: finds no machine and set-up that explain the readings; check plan, chain, head and units");
@@ -86,12 +109,14 @@ int AdjustmentSolver::solve(Eigen::VectorXd& x) {
 
 void AdjustmentSolver::solve_nearby(Eigen::VectorXd& x) {
     constexpr int most_nearby = 6;
+    constexpr double enough = 1e-3;  // of a standard uncertainty
     const Eigen::VectorXd start = x;
-    double change = 0.0;
+    double change = 0.0, effect = std::numeric_limits<double>::infinity();
     for (int count = 0; count < most_nearby; ++count) {
         equations_.linearise(x, false);
-        // The step after one of this size is smaller by what the derivatives are off, and no reading sees it.
-        if (step(x, change) < small_effect * small_effect) return;
+        const double before = effect;
+        effect = step(x, change);
+        if (effect * (effect / before) < enough) return;  // by the step that would be next
     }
     x = start;
     solve(x);

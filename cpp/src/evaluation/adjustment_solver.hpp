@@ -32,21 +32,29 @@ public:
 
     // From x to the minimum: returns the number of steps. Throws InvalidArgument where there is none to be found.
     int solve(Eigen::VectorXd& x);
-    // The same with derivatives and factor as they are, for readings that differ little; falls back to solve.
+    // The same where unknowns may be open: what they are assumed to be pulls at the others, too, by its square; so once
+    // more around what came out.
+    int solve_open(const std::vector<bool>& determined, Eigen::VectorXd& x);
+    // The same with derivatives and factor as they are, for readings that differ by little more than noise; falls back
+    // to solve. What it leaves is the product of noise and of the derivatives' change: a hundredth of an uncertainty.
     void solve_nearby(Eigen::VectorXd& x);
     // Derivatives and factor at x, for what has changed (readings left out, smoothness) or for uncertainties.
     void factorize(const Eigen::VectorXd& x);
+    // Derivatives at x, and the factor where it is of somewhere else.
+    void refresh(const Eigen::VectorXd& x);
 
 private:
     // One Gauss-Newton step with the derivatives and the factor that there are. Returns its largest effect on the
     // readings, in standard uncertainties.
     double step(Eigen::VectorXd& x, double& change);
+    void factorize();  // with the derivatives that there are
 
     NormalEquations equations_;
     BorderedBand matrix_;
     std::optional<BorderedFactor> factor_;
     Eigen::VectorXd scale_;  // square roots of the diagonal at the last factorisation
     std::vector<int> held_, dependent_;
+    Eigen::VectorXd factorized_at_;
     bool fresh_ = true;  // derivatives and factor are those at zero, from the beginning
 };
 

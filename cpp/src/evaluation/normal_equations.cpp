@@ -56,20 +56,22 @@ NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&p
     first_unknown_.push_back(int(unknowns_.size()));
     derivatives_.resize(weights);
     residuals_.setZero(Eigen::Index(problem.readings().size()));
-    assume_usual(std::vector<bool>(problem.size(), true));
+    prior_weight_.resize(problem.size());
+    for (int j = 0; j < problem.size(); ++j) prior_weight_[j] = std::pow(problem.prior()[j], -2);
+    usual_weight_ = centre_ = Eigen::VectorXd::Zero(problem.size());
 }
 
-void NormalEquations::assume_usual(const std::vector<bool>& determined) {
-    prior_weight_.resize(problem_->size());
+void NormalEquations::assume_usual(const std::vector<bool>& determined, const Eigen::VectorXd& centre) {
     for (int j = 0; j < problem_->size(); ++j)
-        prior_weight_[j] =
-            std::pow(problem_->prior()[j], -2) + (determined[j] ? 0.0 : std::pow(problem_->usual()[j], -2));
+        usual_weight_[j] = determined[j] ? 0.0 : std::pow(problem_->usual()[j], -2);
+    centre_ = centre;
 }
 
-void NormalEquations::make_smooth(const std::array<double, function_count>& deviation) {
-    smooth_.clear();
-    const auto& nodes = problem_->nodes();
-    for (std::vector<int> chain : problem_->node_chains()) {
+std::vector<SmoothRow> second_differences(const AdjustmentProblem& problem,
+                                          const std::array<double, function_count>& deviation) {
+    std::vector<SmoothRow> rows;
+    const auto& nodes = problem.nodes();
+    for (std::vector<int> chain : problem.node_chains()) {
         if (chain.empty()) continue;
         const AxisNode& first = nodes[chain.front()];
         if (first.node > 0 && !first.negative) chain.insert(chain.begin(), no_unknown);  // home
@@ -89,10 +91,11 @@ void NormalEquations::make_smooth(const std::array<double, function_count>& devi
                     const int node = chain[k - 1 + i];
                     row.unknown[i] = node == no_unknown ? no_unknown : nodes[node].unknown[c];
                 }
-                smooth_.push_back(row);
+                rows.push_back(row);
             }
         }
     }
+    return rows;
 }
 
 void NormalEquations::linearise(const Eigen::VectorXd& x, bool derivatives) {
@@ -123,6 +126,24 @@ void NormalEquations::linearise(const Eigen::VectorXd& x, bool derivatives) {
     }
 }
 
+void NormalEquations::drop_roundings() {
+    constexpr double rounding = 1e-13;  // of what a metre or a radian of the largest does to the reading
+    for (const AdjustedPoint& point : problem_->points())
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            const Row row = this->row(point, r);
+            double* derivative = derivatives_.data() + first_weight_[r];
+            const auto size = [&](int i) {
+                return row.unknown[i] == no_unknown
+                           ? 0.0
+                           : std::abs(derivative[i]) / problem_->change_scale()[row.unknown[i]];
+            };
+            double largest = 0.0;
+            for (int i = 0; i < row.size; ++i) largest = std::max(largest, size(i));
+            for (int i = 0; i < row.size; ++i)
+                if (size(i) < rounding * largest) derivative[i] = 0.0;
+        }
+}
+
 NormalEquations::Row NormalEquations::row(const AdjustedPoint& point, int reading) const {
     const std::size_t p = std::size_t(&point - problem_->points().data());
     return {unknowns_.data() + first_unknown_[p], derivatives_.data() + first_weight_[reading],
@@ -132,7 +153,7 @@ NormalEquations::Row NormalEquations::row(const AdjustedPoint& point, int readin
 double NormalEquations::square_sum(const Eigen::VectorXd& x) const {
     double sum = 0.0;
     for (Eigen::Index r = 0; r < residuals_.size(); ++r)
-        if (problem_->readings()[r].used) sum += residuals_[r] * residuals_[r];
+        if (problem_->readings()[r].used()) sum += residuals_[r] * residuals_[r];
     for (int j = 0; j < x.size(); ++j)
         if (std::isfinite(problem_->prior()[j])) sum += std::pow(x[j] / problem_->prior()[j], 2);
     for (const SmoothRow& row : smooth_) sum += std::pow(row.value(x), 2);
@@ -176,7 +197,7 @@ BorderedBand NormalEquations::matrix() const { return BorderedBand(problem_->rea
 void NormalEquations::assemble(BorderedBand& matrix) const {
     matrix.set_zero();
     for (std::size_t p = 0; p < problem_->points().size(); ++p) assemble_point(problem_->points()[p], int(p), matrix);
-    for (int j = 0; j < problem_->size(); ++j) element(matrix, j, j) += prior_weight_[j];
+    for (int j = 0; j < problem_->size(); ++j) element(matrix, j, j) += prior_weight_[j] + usual_weight_[j];
     for (const SmoothRow& row : smooth_)
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j <= i; ++j)
@@ -195,7 +216,7 @@ void NormalEquations::assemble_point(const AdjustedPoint& point, int number, Bor
     thread_local Rows square;
     square.setZero(size, size);
     for (int r = 0; r < readings; ++r) {
-        if (!problem_->readings()[point.first_reading + r].used) continue;
+        if (!problem_->readings()[point.first_reading + r].used()) continue;
         for (int i = 0; i < size; ++i) {
             const double left = rows(r, i);
             double* out = square.data() + i * size;
@@ -223,14 +244,16 @@ void NormalEquations::assemble_point(const AdjustedPoint& point, int number, Bor
     }
 }
 
-Eigen::VectorXd NormalEquations::gradient(const Eigen::VectorXd& x) const { return transposed(residuals_, x); }
+Eigen::VectorXd NormalEquations::gradient(const Eigen::VectorXd& x) const {
+    return transposed(residuals_, x) - usual_weight_.cwiseProduct(x - centre_);
+}
 
 // J^T w - P x
 Eigen::VectorXd NormalEquations::transposed(const Eigen::VectorXd& w, const Eigen::VectorXd& x) const {
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(problem_->size());
     for (const AdjustedPoint& point : problem_->points())
         for (int r = point.first_reading; r < point.end_reading; ++r) {
-            if (!problem_->readings()[r].used) continue;
+            if (!problem_->readings()[r].used()) continue;
             const Row row = this->row(point, r);
             for (int i = 0; i < row.size; ++i)
                 if (row.unknown[i] != no_unknown) gradient[row.unknown[i]] += row.derivative[i] * w[r];

@@ -25,20 +25,26 @@ struct SmoothRow {
     double value(const Eigen::VectorXd& x) const;
 };
 
+// Second differences of each function's neighbouring nodes, by the standard deviation of each function (0: none).
+std::vector<SmoothRow> second_differences(const AdjustmentProblem& problem,
+                                          const std::array<double, function_count>& deviation);
+
 class NormalEquations {
 public:
     explicit NormalEquations(const AdjustmentProblem& problem);
 
     const AdjustmentProblem& problem() const { return *problem_; }
-    // Second differences of each function's neighbouring nodes, by the standard deviation of each function (0: none).
-    void make_smooth(const std::array<double, function_count>& deviation);
+    void make_smooth(const std::array<double, function_count>& deviation) {
+        smooth_ = second_differences(*problem_, deviation);
+    }
     const std::vector<SmoothRow>& smooth_rows() const { return smooth_; }
-    // Takes the unknowns that the readings leave open as known to be 0 as well as is usual for such a thing. What the
-    // readings determine does not change by it.
-    void assume_usual(const std::vector<bool>& determined);
+    // Takes the unknowns that the readings leave open as known to be at `centre` as well as is usual for such a thing.
+    void assume_usual(const std::vector<bool>& determined, const Eigen::VectorXd& centre);
 
     // Residuals and, if asked for, derivatives at x. Values that are not finite come out as such.
     void linearise(const Eigen::VectorXd& x, bool derivatives = true);
+    // Takes derivatives that are roundings of 0 for 0, so that a column of nothing but them does not count.
+    void drop_roundings();
     // Weighted residual of each reading, used or not, at the last linearise.
     const Eigen::VectorXd& residuals() const { return residuals_; }
     double square_sum(const Eigen::VectorXd& x) const;  // of residuals, priors and smoothness, not of what is usual
@@ -74,7 +80,7 @@ private:
     std::vector<double> derivatives_;
     Eigen::VectorXd residuals_;
     std::vector<SmoothRow> smooth_;
-    Eigen::VectorXd prior_weight_;  // of each unknown, with that of what is usual
+    Eigen::VectorXd prior_weight_, usual_weight_, centre_;  // of each unknown
 };
 
 }  // namespace stepdiag

@@ -160,25 +160,28 @@ void Observability::add_function_sentences(std::vector<std::string>& sentences) 
         };
         const auto& slope = tables_.slope(id);
         const bool slope_open = slope && !slope->determined && !id.is_straightness();
-        const FunctionForms& known = slope_open ? shapes : values;
-        if (slope_open && (count(shapes, true) > 0 || problem_.plan().steps() == 1)) {
+        const bool shape_only = slope_open && count(shapes, true) > count(values, true);
+        const FunctionForms& known = shape_only ? shapes : values;
+        if (slope_open && (shape_only || (id.is_positioning() && count(values, true) == 0))) {
             const std::string line = std::array<const char*, 3>{"p00", "0p0", "00p"}[index(id.axis)];
             sentences.push_back(slope_name(id) + (id.is_positioning()
                                                       ? ": add the line " + line
                                                       : ": read tilts on lines of other directions, or give a prior to "
                                                         "the set-up"));
-        } else if (count(known, true) == 0 && count(known, false) > 0) {
+        }
+        if (count(known, true) == 0) {
             open.push_back(id.name());
             continue;
         }
-        if (const auto lost = count(known, false); lost > 0 && count(known, true) > 0) {
+        if (const auto lost = count(known, false); lost > 0) {
             std::ostringstream text;
             text << id.name() << " at " << lost << " of its positions (";
             int listed = 0;
             for (std::size_t k = 0; k < known.value.size(); ++k)
                 if (known.value[k].size > 0 && !known.value[k].determined && ++listed <= 4)
                     text << (listed > 1 ? ", " : "") << known.position[k];
-            text << (lost > 4 ? ", ... mm)" : " mm)") << ": measure the lost points there, or lines that visit them";
+            text << (lost > 4 ? ", ... mm)" : " mm)")
+                 << ": the readings do not tell it there; measure points that were lost, or more lines that visit them";
             sentences.push_back(text.str());
         }
     }

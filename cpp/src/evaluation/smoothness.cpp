@@ -21,12 +21,12 @@ double validation_score(AdjustmentSolver& solver, const Eigen::VectorXd& x, cons
     int count = 0;
     for (const AdjustedPoint& point : equations.problem().points())
         for (int r = point.first_reading; r < point.end_reading; ++r) {
-            if (!equations.problem().readings()[r].used) continue;
+            if (!equations.problem().readings()[r].used()) continue;
             square_sum += std::pow(equations.residuals()[r] - equations.row(point, r).product(dx), 2);
             ++count;
         }
     for (const ReadingResidual& residual : reading_residuals(equations, inverse))
-        if (residual.used) freedom += residual.redundancy;
+        if (residual.used()) freedom += residual.redundancy;
     return freedom > 0.0 ? count * square_sum / (freedom * freedom) : 0.0;
 }
 

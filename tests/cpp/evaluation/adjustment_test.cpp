@@ -139,8 +139,8 @@ TEST(Adjustment, SaysWhatWithoutScaleLinesStaysOpenAndKeepsTheShapes) {
     // The scales are not known one by one, but along the diagonal they are.
     ASSERT_FALSE(result.combinations.empty());
     EXPECT_NE(result.combinations.back().find("scale of X + "), std::string::npos);
-    // Slopes held at 0 leave products with the angles: 25e-6 x 60e-6 x 800 mm.
-    EXPECT_LE(worst(result.calibration, shop.machine().errors()).angle, 1e-8);
+    // Open slopes leave products of angles: 300 urad x 60 urad and a few of them.
+    EXPECT_LE(worst(result.calibration, shop.machine().errors()).angle, 1e-7);
 }
 
 TEST(Adjustment, FindsAndNamesReadingsThatDoNotFit) {
@@ -150,13 +150,16 @@ TEST(Adjustment, FindsAndNamesReadingsThatDoNotFit) {
     const Measurement run = simulate(shop.machine(), shop.plan(), shop.head, options);
     const Measurement spoilt = changed(changed(run, "distance", 30, 2e-3), "beta", 61, -20e-6);
     const Adjustment result = shop.adjust(spoilt);
-    const auto outliers = result.outliers();
-    ASSERT_EQ(outliers.size(), 2u);
     std::vector<std::pair<std::size_t, std::string>> found;
-    for (const std::size_t i : outliers) found.emplace_back(result.residuals[i].row, result.residuals[i].channel);
+    for (const std::size_t i : result.outliers())
+        found.emplace_back(result.residuals[i].row, result.residuals[i].channel);
     std::sort(found.begin(), found.end());
+    ASSERT_EQ(found.size(), 2u);
     EXPECT_EQ(found[0], std::pair(std::size_t(30), std::string("distance")));
     EXPECT_EQ(found[1], std::pair(std::size_t(61), std::string("beta")));
+    // The distance of the same point on another line fits as badly.
+    EXPECT_TRUE(std::any_of(result.residuals.begin(), result.residuals.end(),
+                            [](const auto& residual) { return residual.suspect > 0; }));
     EXPECT_GT(result.chi_square_probability, 1e-3);
     AdjustmentOptions keep;
     keep.outlier_probability = 0.0;
@@ -199,7 +202,8 @@ TEST(Adjustment, AdjusterGivesWhatAdjustGives) {
     const auto calibration = shop.adjust(second, keep).calibration;
     Eigen::Index i = 0;
     for (const auto& function : calibration.functions)
-        for (const double value : function->value) EXPECT_NEAR(values[i++], value, 1e-10);  // a millionth of the noise
+        for (const double value : function->value)
+            EXPECT_NEAR(values[i++], value, 2e-5);  // mm and rad: a hundredth of the uncertainty of positions
     EXPECT_EQ(i + 3, values.size());
 }
 
@@ -217,8 +221,10 @@ TEST(Adjustment, TellsReversalWhereRunsGoBothWays) {
     const auto& reversal = result.calibration.reversal[FunctionId::parse("EXX")->index()];
     ASSERT_TRUE(reversal);
     EXPECT_TRUE(reversal->constant_determined);
-    for (const double value : reversal->value) EXPECT_NEAR(value, -3e-3, floor_mm);
-    EXPECT_LE(worst(result.calibration, shop.machine().errors()).position, floor_mm);
+    // Reversals of straightness are open at home: micrometres of them, times angles of 1 mrad.
+    constexpr double second_order = 1e-5;  // mm
+    for (const double value : reversal->value) EXPECT_NEAR(value, -3e-3, second_order);
+    EXPECT_LE(worst(result.calibration, shop.machine().errors()).position, second_order);
 }
 
 TEST(Adjustment, RefusesWhatMakesNoSense) {

@@ -46,7 +46,8 @@ inline constexpr PriorUncertainty fixed_unknown = 0.0;
 // that is not determined. Defaults of scale lines: reflector fixed, and their
 // tilts and spots then are not used; beams have a constant each; the laser's angles are fixed at 0, and what is given
 // as their standard uncertainty (500 urad) makes the cosine error travel (a^2 + b^2)/2 by which their distances read
-// short; roll and gain fixed; the others as on measured lines.
+// short; roll and gain fixed; the others as on measured lines. What is said of all lines reaches scale lines for
+// distance_constant, lateral and drift only; the rest of a scale line's set-up is said by its own name.
 using SetupPriors = std::array<std::optional<PriorUncertainty>, setup_quantity_count>;
 
 // Standard deviation with which the second difference of neighbouring nodes is known to be 0: real axes are smooth.
@@ -91,7 +92,12 @@ struct ReadingResidual {
     double residual;    // read - model, native units
     double redundancy;  // 0: nothing controls this reading; 1: all others know it better
     double normalised;  // residual/(u sqrt(redundancy)); 0 where nothing controls it
-    bool used = true;   // false: left out as an outlier; redundancy and normalised then are those of a control reading
+    int outlier = 0;    // n: left out as the n-th outlier; redundancy and normalised are those of a control reading
+    // n: fitted as badly as the n-th outlier, and no other reading tells which of them is wrong (distances of one point
+    // number on four body diagonals come in such pairs). The one was left out that made the error functions smoother.
+    int suspect = 0;
+
+    bool used() const { return outlier == 0; }
 };
 
 struct Adjustment {
@@ -106,7 +112,7 @@ struct Adjustment {
     std::array<double, function_count> smoothness = {};  // deviations of second differences in force; 0: none
 
     double variance_factor() const;             // weighted_square_sum/degrees_of_freedom; 1 without freedom
-    std::vector<std::size_t> outliers() const;  // into `residuals`, the largest normalised residual first
+    std::vector<std::size_t> outliers() const;  // into `residuals`, by their number
 };
 
 // Throws InvalidArgument for readings that do not belong to the plan, channels that do not fit the head, a free drift
