@@ -848,11 +848,16 @@ class SetupEstimate:
         """
 class Outlier:
     """
-    A reading that did not fit and was left out.
+    A reading that did not fit.
     """
     @property
     def channel(self) -> str:
         ...
+    @property
+    def left_out(self) -> bool:
+        """
+        False: fitted as badly as the outlier of this number, and no other reading tells which of them is wrong; the other was left out because the error functions are smoother without it.
+        """
     @property
     def line(self) -> str:
         ...
@@ -860,6 +865,11 @@ class Outlier:
     def normalised(self) -> float:
         """
         In its standard uncertainties.
+        """
+    @property
+    def number(self) -> int:
+        """
+        Counted from 1, the worst first.
         """
     @property
     def point(self) -> int:
