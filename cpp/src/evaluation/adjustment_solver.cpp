@@ -88,7 +88,8 @@ int AdjustmentSolver::solve_open(const std::vector<bool>& determined, Eigen::Vec
 }
 
 int AdjustmentSolver::solve(Eigen::VectorXd& x) {
-    constexpr double enough = 1e-8;  // of a standard uncertainty
+    constexpr double enough = 1e-9;    // of a standard uncertainty
+    constexpr double rounding = 1e-6;  // of a step: of double precision, the condition takes this much
     constexpr double infinite = std::numeric_limits<double>::infinity();
     double change = fresh_ && x.isZero(0.0) ? 0.0 : infinite, effect = infinite;
     fresh_ = false;
@@ -98,7 +99,7 @@ int AdjustmentSolver::solve(Eigen::VectorXd& x) {
         if (!equations_.residuals().allFinite()) break;
         const double before = effect;
         effect = step(x, change);
-        if (effect < enough) return count;
+        if (effect * std::max(effect / before, rounding) < enough) return count;  // as the next step would be
         // Rounding is what no longer shrinks. With noise the last steps shrink slowly, too, down to no effect at all.
         if (effect >= 0.25 * before && effect < no_effect) return count;
         if (effect >= 0.7 * before && (effect < small_effect || change < small_change)) return count;

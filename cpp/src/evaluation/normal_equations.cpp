@@ -213,14 +213,15 @@ void NormalEquations::assemble_point(const AdjustedPoint& point, int number, Bor
     const int readings = point.end_reading - point.first_reading;
     using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     const Eigen::Map<const Rows> rows(derivatives_.data() + first_weight_[point.first_reading], readings, size);
-    thread_local Rows square;
+    thread_local Rows square;  // its lower triangle
     square.setZero(size, size);
     for (int r = 0; r < readings; ++r) {
         if (!problem_->readings()[point.first_reading + r].used()) continue;
+        const double* row = rows.row(r).data();
         for (int i = 0; i < size; ++i) {
-            const double left = rows(r, i);
-            double* out = square.data() + i * size;
-            for (int j = 0; j < size; ++j) out[j] += left * rows(r, j);
+            const double left = row[i];
+            double* out = square.data() + std::ptrdiff_t(i) * size;
+            for (int j = 0; j <= i; ++j) out[j] += left * row[j];
         }
     }
 
@@ -229,18 +230,27 @@ void NormalEquations::assemble_point(const AdjustedPoint& point, int number, Bor
     for (int a = 0; a < 3; ++a) block[a] = problem_->block_of(point.node[a]);
     for (int a = 0; a < 3; ++a) {
         if (block[a] == no_unknown) continue;
-        for (int b = 0; b < 3; ++b)
-            if (block[b] != no_unknown && block[b] <= block[a])
-                matrix.block(block[a], block[b]) += square.block<6, 6>(6 * a, 6 * b);
+        for (int b = 0; b <= a; ++b) {
+            if (block[b] == no_unknown) continue;
+            const auto part = square.block<6, 6>(6 * a, 6 * b);
+            if (block[b] <= block[a]) matrix.block(block[a], block[b]) += part;
+            else matrix.block(block[b], block[a]) += part.transpose();
+        }
         auto border = matrix.border_rows(block[a]);
-        for (int i = 0; i < size; ++i)
-            if (unknown[i] >= banded) border.row(unknown[i] - banded) += square.block<1, 6>(i, 6 * a);
+        for (int i = 0; i < size; ++i) {
+            if (unknown[i] < banded) continue;
+            auto row = border.row(unknown[i] - banded);
+            if (i > 6 * a) row += square.block<1, 6>(i, 6 * a);
+            else row += square.block<6, 1>(6 * a, i).transpose();
+        }
     }
     for (int i = 0; i < size; ++i) {
         if (unknown[i] < banded) continue;
-        for (int j = 0; j < size; ++j)
-            if (unknown[j] >= banded && unknown[j] <= unknown[i])
-                matrix.corner()(unknown[i] - banded, unknown[j] - banded) += square(i, j);
+        for (int j = 0; j <= i; ++j) {
+            if (unknown[j] < banded) continue;
+            const int low = std::min(unknown[i], unknown[j]) - banded, high = std::max(unknown[i], unknown[j]) - banded;
+            matrix.corner()(high, low) += square(i, j);
+        }
     }
 }
 

@@ -30,6 +30,24 @@ double validation_score(AdjustmentSolver& solver, const Eigen::VectorXd& x, cons
     return freedom > 0.0 ? count * square_sum / (freedom * freedom) : 0.0;
 }
 
+// What was found may be smoother than what comes out with it, where curvature is coherent: not below that.
+Deviations not_below_own_roughness(AdjustmentSolver& solver, const Eigen::VectorXd& x, Deviations deviations) {
+    solver.equations().make_smooth(deviations);
+    solver.factorize(x);
+    Eigen::VectorXd smoothed = solver.equations().gradient(x);
+    solver.factor().solve(smoothed);
+    smoothed += x;
+    std::array<double, function_count> sum{};
+    std::array<int, function_count> count{};
+    for (const SmoothRow& row : solver.equations().smooth_rows()) {
+        sum[row.function] += std::pow(row.value(smoothed) * deviations[row.function], 2);
+        ++count[row.function];
+    }
+    for (int i = 0; i < function_count; ++i)
+        if (count[i] > 0) deviations[i] = std::max(deviations[i], std::sqrt(sum[i] / count[i]));
+    return deviations;
+}
+
 }  // namespace
 
 std::array<double, function_count> given_deviations(const Smoothness& smoothness) {
@@ -80,6 +98,7 @@ std::array<double, function_count> cross_validate(AdjustmentSolver& solver, cons
         }
         if (!better) break;
     }
+    best = not_below_own_roughness(solver, x, best);
     solver.equations().make_smooth(best);
     return best;
 }
