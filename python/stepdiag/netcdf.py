@@ -35,7 +35,7 @@ def write_dataset(dataset: xr.Dataset, path: Path, attributes: dict[str, Any]) -
     dataset.encoding["unlimited_dims"] = set()
     for name, variable in dataset.variables.items():
         if variable.dtype.kind in "US":
-            variable.encoding = {"dtype": "S1", "char_dim_name": f"{name}_length"}
+            variable.encoding = {"dtype": "S1", "char_dim_name": f"{name}_length", "fletcher32": True}
             continue
         variable.encoding = {"fletcher32": variable.ndim > 0}
         if variable.dtype.kind == "f" and not np.isnan(variable.values).any():
