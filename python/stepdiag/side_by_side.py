@@ -1,6 +1,7 @@
 """Two calibrations of one machine side by side: what differs, and whether by more than their uncertainties."""
 
 import math
+import sys
 from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Final
@@ -82,7 +83,7 @@ class Comparison:
     @property
     def threshold(self) -> float:
         """The normalised difference beyond which one of all values is significant (Bonferroni, two-sided)."""
-        return NormalDist().inv_cdf(1.0 - 0.5 * self.limit / max(self.count, 1))
+        return -NormalDist().inv_cdf(max(0.5 * self.limit / max(self.count, 1), sys.float_info.min))
 
     def probability(self, difference: Difference) -> float | None:
         """That chance alone makes any of all values compared differ by as many uncertainties as this parameter's worst.
