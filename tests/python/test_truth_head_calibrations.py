@@ -102,7 +102,7 @@ def test_heads_by_line_give_what_one_head_gives() -> None:
     by_line = sd.simulate(machine, setup.plan, same, misalignment=misalignment)
     for name, values in run.channels.items():
         assert np.array_equal(values, by_line.channels[name])
-    one, four = (sd.evaluate(run, setup.plan, used, setup.chain, setup.tool) for used in (head, same))
+    one, four = (sd.evaluate(run, setup.plan, used, setup.chain, setup.tool, method="enhanced") for used in (head, same))
     for name, columns in one.functions.items():
         assert np.array_equal(columns[1], four.functions[name][1])
 
@@ -122,7 +122,7 @@ def test_heads_of_different_kinds_on_different_lines_agree() -> None:
         **{line: sd.Head("multi_beam", beam_offsets=[(0.0, 0.0), (30.0, 0.0), (0.0, 30.0)]) for line in SCALE_LINES},
     }
     run = sd.simulate(machine, setup.plan, different, misalignment=dict.fromkeys(DIAGONALS, REFLECTOR))
-    calibration = sd.evaluate(run, setup.plan, different, setup.chain, setup.tool)
+    calibration = sd.evaluate(run, setup.plan, different, setup.chain, setup.tool, method="enhanced")
     error = worst(calibration, truth)
     assert error.position <= TURNED[0]
     assert error.angle <= TURNED[1]
@@ -143,7 +143,7 @@ def test_evaluation_sees_no_pose_errors(name: str) -> None:
     setup = Setup(steps=12, head=displaced)
     truth = setup.errors(6)
     run = setup.simulate(truth)
-    with_errors, without = (sd.evaluate(run, setup.plan, head, setup.chain) for head in (displaced, sound))
+    with_errors, without = (sd.evaluate(run, setup.plan, head, setup.chain, method="enhanced") for head in (displaced, sound))
     for function, columns in with_errors.functions.items():
         assert np.array_equal(columns[1], without.functions[function][1])
     # What they did is in the readings, and so in the result.

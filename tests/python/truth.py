@@ -55,8 +55,8 @@ class Setup:
         by_line = dict.fromkeys(self.lines, misalignment) if misalignment else {}
         return sd.simulate(machine, self.plan, self.head, misalignment=by_line, noise=noise or sd.Noise())
 
-    def evaluate(self, run: sd.Measurement, **options: Any) -> sd.Calibration:
-        return sd.evaluate(run, self.plan, self.head, sd.Chain(self.chain), self.tool, **options)
+    def evaluate(self, run: sd.Measurement, *, method: str = "enhanced", **options: Any) -> sd.Calibration:
+        return sd.evaluate(run, self.plan, self.head, sd.Chain(self.chain), self.tool, method=method, **options)
 
 
 def changed(

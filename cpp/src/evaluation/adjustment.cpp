@@ -151,7 +151,8 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
                   const HeadCalibrations& heads, const AdjustmentOptions& options) {
     check_options(options, plan);
     AdjustmentProblem problem(measurement, plan, chain, tool, heads, options);
-    if (problem.readings().empty()) throw InvalidArgument("adjustment: the run has no readings");
+    if (problem.readings().empty())
+        throw InvalidArgument("adjustment: nothing can be determined: the run has no readings that count");
     AdjustmentSolver solver(problem, smoothness_at_start(options));
     AdjustmentTables tables(problem);
     const Observability observability(solver, tables);

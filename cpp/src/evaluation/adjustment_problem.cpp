@@ -37,6 +37,14 @@ Direction direction_of(const Measurement& measurement, const std::vector<std::si
     return direction;
 }
 
+// A mirror that is turned by 45 degrees sends no beam back to its head.
+double usable(const RawValue& raw, const Measurement& measurement, std::size_t row, const std::string& channel) {
+    const bool tilt = channel == "alpha" || channel == "beta";
+    if (tilt && !(std::abs(raw.value) < 1.0))
+        throw InvalidArgument(row_name(measurement, row) + ": expected tilts below 45 degrees");
+    return raw.value;
+}
+
 // The frame choice: straightnesses that are 0 at the end of travel and have no squareness to take their slope.
 bool is_zero_at_end(Axis axis, int component) {
     const FunctionId id{axis, Component(component)};
@@ -132,7 +140,7 @@ void AdjustmentProblem::collect_points(const Measurement& measurement, const Adj
         for (int c = 0; c < int(names.size()) && !(distance_only && c > 0); ++c)
             if (const auto raw =
                     raw_value(measurement.find(names[c]), row, usual_uncertainty(options.uncertainty, names[c])))
-                readings_.push_back({row, c, raw->value, raw->standard_uncertainty});
+                readings_.push_back({row, c, usable(*raw, measurement, row, names[c]), raw->standard_uncertainty});
         point.end_reading = int(readings_.size());
         if (point.end_reading == point.first_reading) continue;
 
