@@ -1,17 +1,14 @@
 """Two calibrations side by side: what differs, by how much, and whether chance explains it."""
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 from calibrations import CHAIN, FUNCTIONS, LINES, TOOL, VOLUME, calibrate, parts_of
 from refusal import refused
 
 import stepdiag as sd
-from stepdiag.cli import main
 
 NODES = np.linspace(0.0, 80.0, 6)
 
@@ -240,81 +237,3 @@ def test_another_tool_is_noted() -> None:
 @pytest.mark.parametrize("limit", [0.0, 1.0, -1.0, math.nan])
 def test_limit_is_a_probability(limit: float) -> None:
     refused(sd.compare_calibrations, noisy(1), noisy(2), limit=limit, names="limit")
-
-
-# --- the command -----------------------------------------------------------------------------------------------------
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    sd.write_calibration(calibrate(1, method="enhanced").dated("2026-01-02T03:04:05Z"), "a.csv")
-    parts = parts_of(calibrate(2, full_covariance=True))
-    parts["functions"]["EXX"][1][3] += 5e-3
-    sd.write_calibration(sd.Calibration(**parts), "b.nc")
-    return tmp_path
-
-
-def test_command_tells_methods_dates_and_marks_what_is_significant(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["compare", "a.csv", "b.nc"]) == 0
-    said = capsys.readouterr().out.splitlines()
-    assert said[0] == "A: a.csv: enhanced, 2026-01-02T03:04:05Z"
-    assert said[1].startswith("B: b.nc: adjustment, 2026-11-21T")
-    assert [line.split()[0] for line in said if line.endswith("significant")] == ["EXX"]
-    assert any("Bonferroni" in line for line in said)
-    assert any("as if A and B were independent" in line for line in said)
-    assert sum(line[:3] in FUNCTIONS for line in said) == 18
-
-
-def test_command_with_a_small_limit_marks_nothing(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["compare", "a.csv", "b.nc", "--limit", "1e-300"]) == 0
-    assert "significant: 0 of 21 parameters" in capsys.readouterr().out
-
-
-def test_differences_are_written(here: Path) -> None:
-    assert main(["compare", "a.csv", "b.nc", "-o", "differences.csv"]) == 0
-    assert main(["compare", "a.csv", "b.nc", "-o", "differences.nc"]) == 0
-    comparison = sd.compare_calibrations(sd.read_calibration("a.csv"), sd.read_calibration("b.nc"))
-    lines = Path("differences.csv").read_text().splitlines()
-    assert "# date_a=2026-01-02T03:04:05Z" in lines
-    rows = [line.split(",") for line in lines if not line.startswith("#")]
-    assert rows[0][:4] == ["parameter", "position_mm", "difference", "unit"]
-    with xr.open_dataset("differences.nc") as table:
-        for difference in comparison.differences:
-            name = difference.parameter
-            mine = [row for row in rows if row[0] == name]
-            scale = {"um": 1e-3, "urad": 1e-6}[mine[0][3]]
-            # The power of ten is moved exactly in the text, and then multiplied here.
-            np.testing.assert_allclose([float(row[2]) * scale for row in mine], difference.value, rtol=1e-15)
-            np.testing.assert_array_equal(np.atleast_1d(table[f"{name}_difference"]), difference.value)
-            np.testing.assert_array_equal(np.atleast_1d(table[f"{name}_difference_u"]), difference.standard_uncertainty)
-            assert (
-                table[f"{name}_difference"].attrs["significant"] == str(comparison.is_significant(difference)).lower()
-            )
-        assert table.attrs["method_a"] == "enhanced"
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["a.csv"], "Missing argument 'B'"),
-        (["a.csv", "absent.nc"], "absent.nc: cannot be read"),
-        (["a.csv", "other.csv"], "a.csv, other.csv: the chains differ"),
-        (["a.csv", "b.nc", "-o", "b.nc"], "b.nc: is also an input"),
-        (["a.csv", "b.nc", "-o", "no/such.csv"], "no/such.csv: cannot be written"),
-        (["a.csv", "b.nc", "--limit", "2"], "--limit: expected a probability between 0 and 1, got 2"),
-        (["a.csv", "map.csv"], "map.csv"),
-    ],
-)
-def test_mistakes_of_a_comparison_are_told_in_a_line(
-    here: Path, arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    calibrate(1).to_error_map().write("map.csv")
-    Path("map.csv").write_text("parameter,position_mm,value,unit,standard_uncertainty\nEXX,0,0,um,\n")
-    sd.write_calibration(sd.Calibration(**(parts_of(noisy(1)) | {"chain": "[w b X Y Z t]"})), "other.csv")
-    before = {path.name: path.read_bytes() for path in here.iterdir()}
-    assert main(["compare", *arguments]) == 2
-    said = capsys.readouterr().err
-    assert message in said
-    assert said.count("\n") == 1
-    assert {path.name: path.read_bytes() for path in here.iterdir()} == before
