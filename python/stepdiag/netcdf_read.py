@@ -20,6 +20,7 @@ CALIBRATION_FORMAT: Final = "stepdiag calibration 1"
 
 _STATION: Final = frozenset(("line", "point", "run", "direction", "x", "y", "z"))
 _FUNCTION = re.compile(r"E[XYZABC][XYZ]")
+_REVERSAL = re.compile(r"E[XYZABC][XYZ]_reversal")
 _SQUARENESS = re.compile(r"C0Y|B0Z|A0Z")
 
 
@@ -59,7 +60,7 @@ def read_calibration_netcdf(path: Path) -> Calibration:
     with open_dataset(path) as file:
         _check_format(file, CALIBRATION_FORMAT)
         functions = {name: _function(file, name) for name in file.names if _FUNCTION.fullmatch(name)}
-        reversals = {name: f"{name}_reversal" for name in functions if f"{name}_reversal" in file}
+        reversals = {name[:3]: name for name in file.names if _REVERSAL.fullmatch(name)}
         parts: dict[str, Any] = {
             "method": file.text("method", ""),
             "chain": file.text("chain"),

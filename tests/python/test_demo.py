@@ -110,7 +110,9 @@ def test_traced_readings_are_the_defined_ones_to_second_order(results: dict[str,
 def test_traced_run_evaluated_with_the_defined_head_gives_the_defined_calibration(results: dict[str, Result]) -> None:
     traced, defined = results["3"], results["3d"]
     scenario, head = traced.scenario, defined.scenario.head
-    ours = sd.evaluate(traced.measurement, scenario.plan, head, scenario.chain, scenario.tool, method="enhanced").functions
+    ours = sd.evaluate(
+        traced.measurement, scenario.plan, head, scenario.chain, scenario.tool, method="enhanced"
+    ).functions
     theirs = defined.calibrations["enhanced"].functions
     for name in theirs:
         # 34 nm of spot over an arm of twice 131 mm are 130 nrad, most of it constant along a line; over a lateral

@@ -84,7 +84,11 @@ def test_odd_calibration_comes_back_with_the_same_bits(tmp_path: Path) -> None:
         {"B0Z": (-1e-5, nan)},
         undetermined_slopes=["EXX"],
         undetermined=["squareness C0Y: µ", "more"],
-        reversal={"EXX": ([0.0, 80.0], [0.0, 1e-3], [nan, 1e-4]), "EYX": ([0.0, 40.0], [0.0, 1e-3], [0.0, 1e-4])},
+        reversal={
+            "EXX": ([0.0, 80.0], [0.0, 1e-3], [nan, 1e-4]),
+            "EYX": ([0.0, 40.0], [0.0, 1e-3], [0.0, 1e-4]),
+            "EAZ": ([0.0, 40.0], [0.0, 1e-6], [0.0, 1e-7]),  # of a function that is not determined
+        },
         reversal_negative_uncertainty={"EXX": [1e-4, nan]},
         undetermined_reversal_constants=["EXX"],
     )

@@ -102,7 +102,9 @@ def test_heads_by_line_give_what_one_head_gives() -> None:
     by_line = sd.simulate(machine, setup.plan, same, misalignment=misalignment)
     for name, values in run.channels.items():
         assert np.array_equal(values, by_line.channels[name])
-    one, four = (sd.evaluate(run, setup.plan, used, setup.chain, setup.tool, method="enhanced") for used in (head, same))
+    one, four = (
+        sd.evaluate(run, setup.plan, used, setup.chain, setup.tool, method="enhanced") for used in (head, same)
+    )
     for name, columns in one.functions.items():
         assert np.array_equal(columns[1], four.functions[name][1])
 
@@ -143,7 +145,9 @@ def test_evaluation_sees_no_pose_errors(name: str) -> None:
     setup = Setup(steps=12, head=displaced)
     truth = setup.errors(6)
     run = setup.simulate(truth)
-    with_errors, without = (sd.evaluate(run, setup.plan, head, setup.chain, method="enhanced") for head in (displaced, sound))
+    with_errors, without = (
+        sd.evaluate(run, setup.plan, head, setup.chain, method="enhanced") for head in (displaced, sound)
+    )
     for function, columns in with_errors.functions.items():
         assert np.array_equal(columns[1], without.functions[function][1])
     # What they did is in the readings, and so in the result.

@@ -26,6 +26,7 @@ Calibration sample() {
         stepdiag::CalibratedFunction{{0.0, 1.0 / 3.0, 800.0}, {-0.0, 5e-324, 1e300}, {0.0, 1e-300, 0.1}, false};
     calibration.functions[17] = stepdiag::CalibratedFunction{{0.0, 500.0}, {0.0, 1.0 / 7.0 * 1e-6}, {0.0, 3e-7}, true};
     calibration.squarenesses[1] = stepdiag::CalibratedSquareness{-1e-5 / 3.0, 1e-6 / 3.0};
+    calibration.date = "2026-11-21T12:00:00Z";
     calibration.undetermined = {"slope of EXX: add the scale line p00", "C0Y: \"add\" body diagonals, or faces"};
     return calibration;
 }
@@ -48,6 +49,7 @@ TEST(Calibration, FileIsReadBackToTheSameBits) {
     write_calibration(a, path);
     const Calibration b = stepdiag::read_calibration(path);
     EXPECT_EQ(b.method, a.method);
+    EXPECT_EQ(b.date, a.date);
     EXPECT_EQ(b.chain, a.chain);
     EXPECT_EQ(b.volume, a.volume);
     EXPECT_EQ(b.tool, a.tool);
