@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     from stepdiag.head_description import parse_head_design, read_head_design, shipped_head
     from stepdiag.scenario import (
         Scenario,
+        adjust_scenario,
         evaluate_scenario,
         parse_scenario,
         read_scenario,
@@ -115,6 +116,7 @@ __all__ = [
     "SpotSensor",
     "__version__",
     "adjust",
+    "adjust_scenario",
     "beam_radius",
     "compare_calibrations",
     "couple",
@@ -148,6 +150,7 @@ __all__ = [
 # Where to find what has to do with our TOML files.
 _LATER = {
     "Scenario": "scenario",
+    "adjust_scenario": "scenario",
     "evaluate_scenario": "scenario",
     "parse_scenario": "scenario",
     "read_scenario": "scenario",

@@ -104,9 +104,9 @@ class Plan:
     The lines measured through a volume, in single-axis steps. Lines are named by the travel signs of X, Y, Z: three of p n 0.
     """
     largest_step_count: typing.ClassVar[int] = 2000
-    def __init__(self, volume: numpy.typing.ArrayLike, lines: collections.abc.Sequence[str], steps: typing.SupportsIndex, order: str = 'XYZ', scale_lines: collections.abc.Sequence[str] = []) -> None:
+    def __init__(self, volume: numpy.typing.ArrayLike, lines: collections.abc.Sequence[str], steps: typing.SupportsIndex, order: str | collections.abc.Sequence[str] = 'XYZ', scale_lines: collections.abc.Sequence[str] = []) -> None:
         """
-        volume: edges in mm. steps: per axis. Raises InvalidArgument for an unknown or doubled line, a volume without extent, steps outside 1 .. 2000.
+        volume: edges in mm. steps: per axis. order: in which a step moves the axes, "XYZ" ...; of several, run r goes in the order r modulo their number. Raises InvalidArgument for an unknown or doubled line, a volume without extent, steps outside 1 .. 2000.
         """
     def frame(self, line: str) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -120,7 +120,7 @@ class Plan:
         """
         Node positions of axis "X", "Y" or "Z", (steps + 1,), mm.
         """
-    def points(self, line: str) -> numpy.typing.NDArray[numpy.float64]:
+    def points(self, line: str, run: typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
         """
         Commanded points of a line of this plan, (n, 3), mm.
         """
@@ -133,6 +133,11 @@ class Plan:
         ...
     @property
     def order(self) -> str:
+        """
+        The order of run 0.
+        """
+    @property
+    def orders(self) -> list[str]:
         ...
     @property
     def scale_lines(self) -> list[str]:

@@ -58,13 +58,14 @@ class AdjustmentKeys(Section):
 
 
 class AdjustmentSection(AdjustmentKeys):
-    """What the adjustment takes each unknown of the set-up for, on all of `plan.lines`.
+    """What the adjustment takes each unknown of the set-up for. Other methods use nothing of it.
 
     That is "free", "fixed" at 0, or a number: the standard uncertainty with which it is known to be 0.
-    `[adjustment.LINE]` replaces, for one line, the keys it names. Scale lines have defaults of their own unless they
-    have such a table: `reflector_urad`, `roll_urad` and `gain` fixed, the others as above; their laser stands along the
-    axis, and `laser_urad` (default 500) says how well: a number, by which the length reads short as a cosine does.
-    The methods `enhanced` and `conventional` use nothing of this section."""
+    `[adjustment.LINE]` replaces, for one line, the keys it names. Scale lines take only `distance_constant_mm`,
+    `lateral_mm` and `drift_um_per_h` from here. Of the others they have, unless a table of their own names them,
+    `reflector_urad` (their tilts then are not used), `roll_urad` and `gain` fixed and beams with a constant each;
+    their laser stands along the axis, and `laser_urad` (by default 500, never "free") says how well: the length
+    reads short as a cosine does."""
 
     angles: Literal["free", "fixed"] = key(
         '"free" or "fixed"', "Rotations of the machine's axes; fixed: it has none.", "free"

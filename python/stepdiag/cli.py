@@ -11,7 +11,7 @@ import click
 
 from stepdiag._core import InvalidArgument, ReplayMismatch, __version__
 from stepdiag.cli_calibrations import compare, report
-from stepdiag.cli_evaluate import evaluate
+from stepdiag.cli_evaluate import evaluate, observe
 from stepdiag.cli_head import head
 from stepdiag.cli_options import PATH, InOrder, keep_apart, keep_map, out_file, tell
 
@@ -29,6 +29,7 @@ Your own measurement: fill in machine/measurement.csv, then evaluate it in place
 SHORT = {
     "demo": "Show the method on the machine of its paper.",
     "init": "Begin with your own machine: scenario and sheet.",
+    "observe": "Tell what a plan and head can determine, before measuring.",
     "simulate": "Simulate the run of a scenario.",
     "evaluate": "Calibrate the machine from a run.",
     "report": "Tell what a calibration says.",
@@ -137,7 +138,7 @@ def init(folder: Path, scenario: Path | None, head_name: str | None) -> None:
     """
     from stepdiag.files import make_folder, read_text, write_whole
     from stepdiag.head_description import find_shipped_head
-    from stepdiag.scenario import parse_scenario, read_scenario
+    from stepdiag.scenario import parse_scenario, read_scenario, runs_of
     from stepdiag.scenario_text import template
     from stepdiag.sheet import empty_sheet
 
@@ -160,13 +161,15 @@ def init(folder: Path, scenario: Path | None, head_name: str | None) -> None:
     make_folder(folder)
     for name, text in texts.items():
         write_whole(folder / name, text)
-    empty_sheet(plan.plan, plan.signals).write(folder / "measurement.csv")
+    empty_sheet(plan.plan, plan.signals, repeats=runs_of(plan.keys.plan), backward=plan.keys.plan.backward).write(
+        folder / "measurement.csv"
+    )
     for path in written:
         click.echo(f"wrote {path}")
 
 
-for command, name in ((evaluate, "evaluate"), (report, "report"), (compare, "compare"), (head, "head")):
-    command.short_help = SHORT[name]
+for command in (evaluate, observe, report, compare, head):
+    command.short_help = SHORT[str(command.name)]
     cli.add_command(command)
 cli.commands = {name: cli.commands[name] for name in SHORT}  # the order in which help lists them
 

@@ -1,8 +1,8 @@
 """A scenario: one TOML file that says which machine, plan and head a run is made with.
 
-docs/scenario.md lists every key. An evaluator may ask a scenario for `chain`, `tool`, `plan`, `heads`, `signals`
-and `uncertainty` only; the truth behind a simulated run (`machine()`, `actual_heads()`, `misalignment`, `noise`,
-`environment`) is not touched, and need not exist.
+docs/scenario.md lists every key. An evaluator may ask a scenario for `chain`, `tool`, `plan`, `heads`, `signals`,
+`uncertainty`, and what stands in [adjustment] and [smoothness]; the truth behind a simulated run (`machine()`,
+`actual_heads()`, `misalignment`, `noise`, `environment`) is not touched, and need not exist.
 """
 
 from collections.abc import Mapping
@@ -16,8 +16,9 @@ from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.files import check_input, read_text
 from stepdiag.key_errors import models_of, show
+from stepdiag.scenario_adjustment import setup_priors, smoothness_of
 from stepdiag.scenario_heads import DescribedHead, actual_heads, heads_by_line, nominal_heads, of_run, signals_of
-from stepdiag.scenario_keys import TABLES_BY_NAME, RandomSection, ScenarioKeys
+from stepdiag.scenario_keys import TABLES_BY_NAME, PlanSection, RandomSection, ScenarioKeys
 from stepdiag.scenario_setup import environments, misalignments, noise_of, weights
 from stepdiag.sections import MICROMETRE, MICRORADIAN
 from stepdiag.sheet import only
@@ -41,6 +42,9 @@ class Scenario:
     environment: _core.Environment | None
     assumed_environment: _core.Environment | None
     uncertainty: _core.ReadingUncertainty
+    setup: _core.SetupPriors
+    setup_by_line: Mapping[str, _core.SetupPriors]
+    smoothness: _core.Smoothness | None
 
     @property
     def head(self) -> _core.Head:
@@ -86,7 +90,7 @@ def simulate_scenario(scenario: Scenario) -> _core.Measurement:
             environment=scenario.environment,
             assumed_environment=scenario.assumed_environment,
             verified_share=scenario.keys.head.verified_share,
-            repeats=scenario.keys.plan.repeats,
+            repeats=runs_of(scenario.keys.plan),
             backward=scenario.keys.plan.backward,
             seconds_per_reading=scenario.keys.plan.seconds_per_reading,
         )
@@ -97,10 +101,12 @@ def evaluate_scenario(
     scenario: Scenario,
     measurement: _core.Measurement,
     *,
-    method: Literal["conventional", "enhanced"] = "enhanced",
+    method: Literal["conventional", "enhanced", "adjustment"] = "adjustment",
     full_covariance: bool = False,
 ) -> _core.Calibration:
     """Evaluates a run of a scenario's plan, and sees nothing of its truth."""
+    if method == "adjustment":
+        return adjust_scenario(scenario, measurement, full_covariance=full_covariance).calibration
     return _core.evaluate(
         only(measurement, scenario.signals),
         scenario.plan,
@@ -109,6 +115,30 @@ def evaluate_scenario(
         scenario.tool,
         method=method,
         uncertainty=scenario.uncertainty,
+        full_covariance=full_covariance,
+    )
+
+
+def adjust_scenario(
+    scenario: Scenario, measurement: _core.Measurement, *, full_covariance: bool = False
+) -> _core.Adjustment:
+    """The exact adjustment of a run, with the unknowns that the scenario's [adjustment] and [smoothness] name: the
+    calibration, and with it the set-up that was found, residuals, outliers and how well it all fits."""
+    keys = scenario.keys.adjustment
+    return _core.adjust(
+        only(measurement, scenario.signals),
+        scenario.plan,
+        of_run(scenario.heads),
+        scenario.chain,
+        scenario.tool,
+        uncertainty=scenario.uncertainty,
+        setup=scenario.setup,
+        setup_by_line=dict(scenario.setup_by_line),
+        one_setup_per_line=keys.one_setup_per_line,
+        reversal=keys.reversal,
+        rotations=keys.angles == "free",
+        smoothness=scenario.smoothness,
+        outlier_probability=keys.outlier_probability,
         full_covariance=full_covariance,
     )
 
@@ -125,7 +155,7 @@ def parse_scenario(text: str, path: str | PathLike[str] = "scenario.toml") -> Sc
     if not content:
         raise InvalidArgument(f"{file}: has no sections; expected [volume], [machine], [plan] and [head]")
     content = {name: _by_name(name, section, file) for name, section in content.items()}
-    return _build(check_keys(content, ScenarioKeys, file), Path(path))
+    return build_scenario(check_keys(content, ScenarioKeys, file), Path(path))
 
 
 def _by_name(name: str, section: Any, file: str) -> Any:
@@ -140,7 +170,7 @@ def _by_name(name: str, section: Any, file: str) -> Any:
     return {key: value for key, value in section.items() if key not in named} | {place: named}
 
 
-def _build(keys: ScenarioKeys, path: Path) -> Scenario:
+def build_scenario(keys: ScenarioKeys, path: Path) -> Scenario:
     """Makes the core's types, whose own checks get file and section put in front."""
     machine, plan_keys = keys.machine, keys.plan
     if machine.errors is not None and machine.random is not None:
@@ -154,7 +184,7 @@ def _build(keys: ScenarioKeys, path: Path) -> Scenario:
             (keys.volume.x_mm, keys.volume.y_mm, keys.volume.z_mm),
             list(plan_keys.lines),
             plan_keys.steps,
-            order=plan_keys.order,
+            order=_orders(plan_keys),
             scale_lines=list(plan_keys.scale_lines),
         )
     described = heads_by_line(keys, plan, path)
@@ -162,6 +192,8 @@ def _build(keys: ScenarioKeys, path: Path) -> Scenario:
     environment, assumed = environments(keys.environment, path)
     with located(str(path)):
         uncertainty = weights(keys)
+    signals = signals_of(keys, next(iter(heads.values())), path)
+    setup, setup_by_line = setup_priors(keys, next(iter(heads.values())).layout, path)
     return Scenario(
         path=path,
         keys=keys,
@@ -170,13 +202,27 @@ def _build(keys: ScenarioKeys, path: Path) -> Scenario:
         plan=plan,
         described_heads=MappingProxyType(described),
         heads=MappingProxyType(heads),
-        signals=tuple(signals_of(keys, next(iter(heads.values())), path)),
+        signals=tuple(signals),
         misalignment=MappingProxyType(misalignments(keys, heads, path)),
         noise=noise_of(keys.noise),
         environment=environment,
         assumed_environment=assumed,
         uncertainty=uncertainty,
+        setup=setup,
+        setup_by_line=MappingProxyType(setup_by_line),
+        smoothness=smoothness_of(keys.smoothness, path),
     )
+
+
+def _orders(keys: PlanSection) -> list[str]:
+    """By run: a backward run goes the way of the forward run before it."""
+    orders = [keys.order] if isinstance(keys.order, str) else keys.order
+    return [order for order in orders for _ in range(2 if keys.backward and len(orders) > 1 else 1)]
+
+
+def runs_of(keys: PlanSection) -> int:
+    """How often each line is measured, backward runs not counted."""
+    return keys.repeats * (1 if isinstance(keys.order, str) else len(keys.order))
 
 
 def _random_errors(keys: ScenarioKeys, random: RandomSection) -> _core.ErrorMap:

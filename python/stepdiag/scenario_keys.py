@@ -102,7 +102,12 @@ class PlanSection(Section):
     steps: Annotated[int, Field(ge=1, le=LARGEST_STEPS)] = key(
         f"an integer from 1 to {LARGEST_STEPS}", "Steps per axis on each line.", example=10
     )
-    order: str = key("a permutation of XYZ", "The order in which a step moves the axes.", "XYZ")
+    order: str | tuple[str, ...] = key(
+        "a permutation of XYZ, or a list of them",
+        "The order in which a step moves the axes. Of several, every line is measured in each of them: in the first in "
+        "run 0, in the second in run 1 (with `backward`: runs 0 and 1, 2 and 3), and so on in turn.",
+        "XYZ",
+    )
     scale_lines: tuple[str, ...] = key(
         'a list of single-axis lines such as "p00"',
         "Lines measured at their two ends only; they fix the slopes of the positioning errors.",
@@ -111,7 +116,7 @@ class PlanSection(Section):
     )
     repeats: Annotated[int, Field(ge=1, le=LARGEST_REPEATS)] = key(
         f"an integer from 1 to {LARGEST_REPEATS}",
-        "How often each line is measured, with head and mirror as they are; runs 0, 1, 2, ... "
+        "How often each line is measured in each order, with head and mirror as they are; runs 0, 1, 2, ... "
         "Used by `simulate` only, as are the next two.",
         1,
     )

@@ -7,18 +7,27 @@ import numpy as np
 from stepdiag._core import Measurement, Plan
 
 
-def empty_sheet(plan: Plan, signals: Sequence[str]) -> Measurement:
+def empty_sheet(plan: Plan, signals: Sequence[str], *, repeats: int = 1, backward: bool = False) -> Measurement:
     """The plan's rows in measuring order, with all readings lost."""
     line: list[str] = []
     point: list[int] = []
+    run: list[int] = []
+    direction: list[str] = []
     positions = []
+    ways = ("forward", "backward") if backward else ("forward",)
     for name in [*plan.lines, *plan.scale_lines]:
-        points = plan.points(name)
-        line += [name] * len(points)
-        point += range(len(points))
-        positions.append(points)
+        for number, way in enumerate(ways * repeats):
+            points = plan.points(name, number)
+            numbers = range(len(points))[:: 1 if way == "forward" else -1]
+            positions.append(points[list(numbers)])
+            line += [name] * len(points)
+            point += numbers
+            run += [number] * len(points)
+            direction += [way] * len(points)
     lost = np.full(len(line), np.nan)
-    return Measurement(line, point, np.concatenate(positions), dict.fromkeys(signals, lost))
+    return Measurement(
+        line, point, np.concatenate(positions), dict.fromkeys(signals, lost), run=run, direction=direction
+    )
 
 
 def lost_readings(measurement: Measurement, plan: Plan, signals: Sequence[str]) -> tuple[int, int]:

@@ -12,10 +12,12 @@ from typing import Any
 
 import pytest
 import tomlkit
+import xarray as xr
 from conftest import SCENARIO, of_map
 
 import stepdiag as sd
 from stepdiag.cli import main
+from stepdiag.data_files import write_calibration
 
 RUNS = Path(__file__).parents[1] / "data" / "runs"
 CASES = sorted(path.name for path in RUNS.iterdir() if path.is_dir())
@@ -25,6 +27,12 @@ def run(*arguments: str) -> int:
     return main(list(arguments))
 
 
+@pytest.fixture(autouse=True)
+def one_moment(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Calibrations carry the date of their making."""
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1790000000")
+
+
 # --- the round trip --------------------------------------------------------------------------------------------------
 def test_simulate_writes_what_the_library_simulates(here: Path) -> None:
     scenario = sd.read_scenario("scenario.toml")
@@ -32,22 +40,31 @@ def test_simulate_writes_what_the_library_simulates(here: Path) -> None:
     assert Path("run.csv").read_bytes() == Path("library.csv").read_bytes()
 
 
-@pytest.mark.parametrize("method", ["conventional", "enhanced"])
+@pytest.mark.parametrize("method", ["conventional", "enhanced", "adjustment"])
 def test_evaluate_writes_what_the_library_evaluates(
     here: Path, method: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run("evaluate", "scenario.toml", "run.csv", "-m", method, "-o", "calibration.csv") == 0
     scenario = sd.read_scenario("scenario.toml")
-    sd.evaluate_scenario(scenario, sd.read_measurement("run.csv"), method=method).write("library.csv")
+    calibration = sd.evaluate_scenario(scenario, sd.read_measurement("run.csv"), method=method)
+    write_calibration(calibration, "library.csv")
     assert Path("calibration.csv").read_bytes() == Path("library.csv").read_bytes()
     said = capsys.readouterr().out
     assert f"method: {method}" in said
     assert "positioning" in said
 
 
-def test_enhanced_is_the_default(here: Path) -> None:
+def test_adjustment_is_the_default(here: Path) -> None:
     run("evaluate", "scenario.toml", "run.csv", "-o", "default.csv")
-    assert sd.read_calibration("default.csv").method == "enhanced"
+    assert sd.read_calibration("default.csv").method == "adjustment"
+
+
+def test_netcdf_keeps_the_covariance_and_the_set_up(here: Path) -> None:
+    assert run("evaluate", "scenario.toml", "run.csv", "--covariance", "-o", "calibration.nc") == 0
+    with xr.open_dataset("calibration.nc") as table:
+        assert table["covariance"].shape == (18 * 6 + 3,) * 2
+        assert "reflector" in table["setup_quantity"].values.tolist()
+        assert table.sizes["reading"] == len(sd.read_measurement("run.csv"))
 
 
 def test_report_counts_lost_readings_and_lost_points(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -63,7 +80,7 @@ def test_report_says_what_is_undetermined(here: Path, capsys: pytest.CaptureFixt
     Path("no_scales.toml").write_text(SCENARIO.replace('["p00", "0p0", "00p"]', "[]"))
     assert run("simulate", "no_scales.toml", "-o", "no_scales.csv") == 0
     assert run("evaluate", "no_scales.toml", "no_scales.csv", "-o", "calibration.csv") == 0
-    assert "undetermined: slope of EXX" in capsys.readouterr().out
+    assert "undetermined: scale of X: add the line p00" in capsys.readouterr().out
 
 
 # --- an evaluator sees no truth --------------------------------------------------------------------------------------
@@ -77,7 +94,7 @@ def without_truth(scenario: str) -> str:
     return tomlkit.dumps(content)
 
 
-@pytest.mark.parametrize("method", ["conventional", "enhanced"])
+@pytest.mark.parametrize("method", ["conventional", "enhanced", "adjustment"])
 @pytest.mark.parametrize("case", CASES)
 def test_calibration_has_the_same_bytes_when_the_truth_is_deleted(case: str, method: str, tmp_path: Path) -> None:
     scenario = (RUNS / case / "scenario.toml").read_text()
@@ -106,7 +123,7 @@ def test_library_evaluates_without_asking_for_the_truth(monkeypatch: pytest.Monk
     scenario = parse_scenario(SCENARIO)
     measurement = sd.simulate_scenario(scenario)
     monkeypatch.setattr(Scenario, "machine", forbidden)
-    assert sd.evaluate_scenario(scenario, measurement).method == "enhanced"
+    assert sd.evaluate_scenario(scenario, measurement).method == "adjustment"
 
 
 # --- mistakes --------------------------------------------------------------------------------------------------------
@@ -126,6 +143,7 @@ MISTAKES: list[tuple[list[str], str]] = [
     (["simulate", "scenario.toml", "-o", "scenario.toml"], "is also an input"),
     (["evaluate", "scenario.toml", "run.csv", "-m", "magic", "-o", "out.csv"], "'magic' is not one of"),
     (["evaluate", "scenario.toml", "scenario.toml", "-o", "out.csv"], "scenario.toml"),
+    (["evaluate", "scenario.toml", "run.csv", "--covariance", "-o", "out.csv"], "expected an output named .nc"),
     (["evaluate", "scenario.toml", "no.csv", "-o", "out.csv"], "no.csv: cannot be read"),
     (["evaluate", "scenario.toml", "/dev/zero", "-o", "out.csv"], "/dev/zero: expected a file, got a device"),
     (["evaluate", "scenario.toml", "run.csv", "-o", "./run.csv"], "is also an input"),
@@ -170,7 +188,7 @@ def test_no_arguments_show_the_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert "stepdiag init -o machine" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("command", ["simulate", "evaluate", "demo", "check", "init"])
+@pytest.mark.parametrize("command", ["simulate", "evaluate", "observe", "demo", "check", "init"])
 def test_help_of_every_command_has_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(command, "--help") == 0
     assert f"Example: stepdiag {command}" in capsys.readouterr().out

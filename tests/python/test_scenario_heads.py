@@ -192,7 +192,7 @@ def test_coupled_mode_reads_a_tilted_mirror_short_and_the_axis_long() -> None:
 
 # --- an evaluator sees no truth --------------------------------------------------------------------------------------
 @pytest.mark.parametrize("head", ["beam_and_psd", "three_beams"])
-@pytest.mark.parametrize("method", ["conventional", "enhanced"])
+@pytest.mark.parametrize("method", ["conventional", "enhanced", "adjustment"])
 def test_calibration_has_the_same_bits_when_the_truth_is_deleted(head: str, method: str) -> None:
     truth = TRUTH
     if head == "three_beams":
@@ -222,7 +222,7 @@ def test_library_evaluates_without_asking_for_the_actual_heads(monkeypatch: pyte
     run = sd.simulate_scenario(scenario)
     for owner, name in ((Scenario, "actual_heads"), (DescribedHead, "actual"), (Scenario, "machine")):
         monkeypatch.setattr(owner, name, forbidden)
-    assert sd.evaluate_scenario(scenario, run).method == "enhanced"
+    assert sd.evaluate_scenario(scenario, run).method == "adjustment"
 
 
 # --- distances only --------------------------------------------------------------------------------------------------

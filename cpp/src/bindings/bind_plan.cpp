@@ -1,3 +1,5 @@
+#include <variant>
+
 #include "bindings.hpp"
 #include "stepdiag/plan/plan.hpp"
 
@@ -16,6 +18,19 @@ std::vector<std::string> line_names(const std::vector<Line>& lines) {
     return names;
 }
 
+std::string order_name(const StepOrder& order) {
+    std::string text;
+    for (const Axis axis : order) text += letter(axis);
+    return text;
+}
+
+std::vector<StepOrder> parse_orders(const std::variant<std::string, std::vector<std::string>>& names) {
+    if (const auto* name = std::get_if<std::string>(&names)) return {parse_order(*name)};
+    std::vector<StepOrder> orders;
+    for (const auto& name : std::get<std::vector<std::string>>(names)) orders.push_back(parse_order(name));
+    return orders;
+}
+
 }  // namespace
 
 void bind_plan(py::module_& m) {
@@ -23,35 +38,40 @@ void bind_plan(py::module_& m) {
                      "The lines measured through a volume, in single-axis steps. Lines are named by the travel signs "
                      "of X, Y, Z: three of p n 0.")
         .def(py::init([](const ArrayLike& volume, const std::vector<std::string>& lines, const IntegerLike& steps,
-                         const std::string& order, const std::vector<std::string>& scale_lines) {
+                         const std::variant<std::string, std::vector<std::string>>& order,
+                         const std::vector<std::string>& scale_lines) {
                  const int count = int(to_integer(steps, "steps", 1, Plan::largest_step_count));
-                 return Plan(to_vector3(volume, "volume"), parse_lines(lines), count, parse_order(order),
+                 return Plan(to_vector3(volume, "volume"), parse_lines(lines), count, parse_orders(order),
                              parse_lines(scale_lines));
              }),
              py::arg("volume"), py::arg("lines"), py::arg("steps"), py::arg("order") = "XYZ",
              py::arg("scale_lines") = std::vector<std::string>{},
-             "volume: edges in mm. steps: per axis. Raises InvalidArgument for an unknown or doubled line, a volume "
+             "volume: edges in mm. steps: per axis. order: in which a step moves the axes, \"XYZ\" ...; of several, "
+             "run r goes in the order r modulo their number. Raises InvalidArgument for an unknown or doubled line, a "
+             "volume "
              "without extent, steps outside 1 .. 2000.")
         .def_property_readonly_static("largest_step_count", [](const py::object&) { return Plan::largest_step_count; })
         .def_property_readonly("volume", [](const Plan& plan) { return to_numpy_vector(plan.volume()); })
         .def_property_readonly("lines", [](const Plan& plan) { return line_names(plan.lines()); })
         .def_property_readonly("scale_lines", [](const Plan& plan) { return line_names(plan.scale_lines()); })
         .def_property_readonly("steps", &Plan::steps)
-        .def_property_readonly("order",
+        .def_property_readonly(
+            "order", [](const Plan& plan) { return order_name(plan.order()); }, "The order of run 0.")
+        .def_property_readonly("orders",
                                [](const Plan& plan) {
-                                   std::string text;
-                                   for (const Axis axis : plan.order()) text += letter(axis);
-                                   return text;
+                                   std::vector<std::string> names;
+                                   for (const auto& order : plan.orders()) names.push_back(order_name(order));
+                                   return names;
                                })
         .def(
             "points",
-            [](const Plan& plan, const std::string& line) {
-                const auto points = plan.points(Line::parse(line));
+            [](const Plan& plan, const std::string& line, const IntegerLike& run) {
+                const auto points = plan.points(Line::parse(line), to_int(run, "run"));
                 Eigen::MatrixXd positions(points.size(), 3);
                 for (std::size_t k = 0; k < points.size(); ++k) positions.row(k) = points[k].commanded.transpose();
                 return to_numpy(positions);
             },
-            py::arg("line"), "Commanded points of a line of this plan, (n, 3), mm.")
+            py::arg("line"), py::arg("run") = integer(0), "Commanded points of a line of this plan, (n, 3), mm.")
         .def(
             "nodes", [](const Plan& plan, const std::string& axis) { return to_numpy(plan.nodes(to_axis(axis))); },
             py::arg("axis"), "Node positions of axis \"X\", \"Y\" or \"Z\", (steps + 1,), mm.")

@@ -121,13 +121,13 @@ int AdjustmentProblem::node_index(Axis axis, int node, bool negative) {
 }
 
 void AdjustmentProblem::collect_points(const Measurement& measurement, const AdjustmentOptions& options) {
-    std::map<std::string, std::vector<PlanPoint>> planned;
+    std::map<std::pair<std::string, StepOrder>, std::vector<PlanPoint>> planned;
     const Channel* time = measurement.find("time");
     std::vector<std::string> names;
     for (int c = 0; c < std::max(3, measurement.beam_count()); ++c) names.push_back(stepdiag::channel_name(kind_, c));
     for (std::size_t row = 0; row < measurement.size(); ++row) {
         const Station& station = measurement.stations()[row];
-        const auto place = planned.try_emplace(station.line.name());
+        const auto place = planned.try_emplace({station.line.name(), plan_.order(station.run)});
         if (place.second) place.first->second = planned_points(measurement, row, plan_);
         const std::vector<PlanPoint>& line = place.first->second;
         check_station(measurement, row, line);

@@ -56,7 +56,7 @@ void check_heads_fit(const Measurement& measurement, const HeadCalibrations& hea
 
 std::vector<PlanPoint> planned_points(const Measurement& measurement, std::size_t row, const Plan& plan) {
     try {
-        return plan.points(measurement.stations()[row].line);
+        return plan.points(measurement.stations()[row].line, measurement.stations()[row].run);
     } catch (const InvalidArgument& error) {
         throw InvalidArgument(row_name(measurement, row) + ": " + error.what());
     }

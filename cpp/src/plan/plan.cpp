@@ -7,24 +7,33 @@
 
 namespace stepdiag {
 
-std::array<Axis, 3> parse_order(std::string_view text) {
+StepOrder parse_order(std::string_view text) {
     std::string sorted(text);
     std::sort(sorted.begin(), sorted.end());
     if (sorted != "XYZ") throw InvalidArgument("order \"" + std::string(text) + "\": expected a permutation of XYZ");
-    std::array<Axis, 3> order;
+    StepOrder order;
     for (int i = 0; i < 3; ++i) order[i] = Axis(text[i] - 'X');
     return order;
 }
 
-Plan::Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::array<Axis, 3> order,
+Plan::Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, StepOrder order,
            std::vector<Line> scale_lines)
-    : volume_(volume), lines_(std::move(lines)), steps_(steps), order_(order), scale_lines_(std::move(scale_lines)) {
+    : Plan(volume, std::move(lines), steps, std::vector{order}, std::move(scale_lines)) {}
+
+Plan::Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::vector<StepOrder> orders,
+           std::vector<Line> scale_lines)
+    : volume_(volume),
+      lines_(std::move(lines)),
+      steps_(steps),
+      orders_(std::move(orders)),
+      scale_lines_(std::move(scale_lines)) {
     if (!volume_.allFinite() || volume_.minCoeff() < 1e-3 || volume_.maxCoeff() > 1e6)
         throw InvalidArgument("volume: expected three edges in mm, each from 0.001 to 1e6");
     if (steps_ < 1 || steps_ > largest_step_count)
         throw InvalidArgument("steps: expected 1 to " + std::to_string(largest_step_count) + ", got " +
                               std::to_string(steps_));
     if (lines_.empty() && scale_lines_.empty()) throw InvalidArgument("lines: expected at least one line");
+    if (orders_.empty()) throw InvalidArgument("order: expected at least one permutation of XYZ");
     std::vector<std::string> seen;
     for (const auto* group : {&lines_, &scale_lines_})
         for (const Line& line : *group) {
@@ -52,7 +61,12 @@ std::vector<double> Plan::nodes(Axis axis) const {
     return nodes;
 }
 
-std::vector<PlanPoint> Plan::points(const Line& line) const {
+const StepOrder& Plan::order(int run) const {
+    const int count = int(orders_.size());
+    return orders_[((run % count) + count) % count];  // run numbers may be negative
+}
+
+std::vector<PlanPoint> Plan::points(const Line& line, int run) const {
     const bool scale = is_scale_line(line);
     if (!contains(line)) throw InvalidArgument("line \"" + line.name() + "\" is not in the plan");
     PlanPoint point{Eigen::Vector3d::Zero(), {0, 0, 0}, std::nullopt};
@@ -65,7 +79,7 @@ std::vector<PlanPoint> Plan::points(const Line& line) const {
     std::vector<PlanPoint> points{point};
     const int stride = scale ? steps_ : 1;
     for (int step = 0; step < steps_; step += stride)
-        for (const Axis axis : order_) {
+        for (const Axis axis : order(run)) {
             if (!line.moves(axis)) continue;
             place(axis, point.node[index(axis)] + line.sign(axis) * stride);
             point.moved = axis;
@@ -76,14 +90,16 @@ std::vector<PlanPoint> Plan::points(const Line& line) const {
 
 LateralExcursion Plan::lateral_excursion(const Line& line) const {
     // The travel repeats itself step by step, so the first step shows all of it.
-    const Plan one_step(volume_, {line}, 1, order_);
+    const Plan one_step(volume_, {line}, 1, orders_);
     const Eigen::Matrix<double, 3, 2> lateral = frame(line).leftCols<2>();
     LateralExcursion excursion{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
-    const auto points = one_step.points(line);
-    for (const PlanPoint& point : points) {
-        const Eigen::Vector2d offset = lateral.transpose() * (point.commanded - points.front().commanded) / steps_;
-        excursion.lowest = excursion.lowest.cwiseMin(offset);
-        excursion.highest = excursion.highest.cwiseMax(offset);
+    for (int run = 0; run < int(orders_.size()); ++run) {
+        const auto points = one_step.points(line, run);
+        for (const PlanPoint& point : points) {
+            const Eigen::Vector2d offset = lateral.transpose() * (point.commanded - points.front().commanded) / steps_;
+            excursion.lowest = excursion.lowest.cwiseMin(offset);
+            excursion.highest = excursion.highest.cwiseMax(offset);
+        }
     }
     return excursion;
 }

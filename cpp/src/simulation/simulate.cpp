@@ -217,7 +217,7 @@ Measurement simulate(const Machine& machine, const Plan& plan, const Heads& head
         const auto entry = options.misalignment.find(line.name());
         const Misalignment misalignment = entry == options.misalignment.end() ? Misalignment{} : entry->second;
         check_misalignment(misalignment, head, line);
-        const auto points = plan.points(line);
+        const auto points = plan.points(line, visit.run);
         const HeadSetup setup =
             set_up(head, plan.frame(line), points.front().commanded + machine.tool(), mirror, misalignment);
         std::vector<Pose> poses;

@@ -112,6 +112,33 @@ TEST(Plan, SingleAxisLinesNeedNoMirrorToSpeakOf) {
     EXPECT_LE(Plan(volume, lines({"p00", "00n"}), 10).smallest_mirror().norm(), 1e-14);
 }
 
+TEST(Plan, RunsTakeTheirOrdersInTurn) {
+    const std::vector orders{stepdiag::parse_order("XYZ"), stepdiag::parse_order("ZXY")};
+    const Plan both(volume, lines({"ppp", "np0"}), 3, orders, lines({"p00"}));
+    EXPECT_EQ(both.order(), orders[0]);
+    for (int run = -2; run < 5; ++run) {
+        const auto& order = orders[run % 2 != 0];
+        const Plan one(volume, lines({"ppp", "np0"}), 3, order, lines({"p00"}));
+        EXPECT_EQ(both.order(run), order) << run;
+        for (const char* name : {"ppp", "np0", "p00"}) {
+            const auto points = both.points(Line::parse(name), run), expected = one.points(Line::parse(name));
+            ASSERT_EQ(points.size(), expected.size());
+            for (std::size_t k = 0; k < points.size(); ++k) {
+                EXPECT_EQ(points[k].node, expected[k].node);
+                EXPECT_EQ(points[k].moved, expected[k].moved);
+            }
+        }
+    }
+}
+
+TEST(Plan, SmallestMirrorHoldsTheBeamInEveryOrder) {
+    const auto size = [](std::vector<stepdiag::StepOrder> orders) {
+        return Plan(volume, lines({"ppp", "npp"}), 4, std::move(orders)).smallest_mirror();
+    };
+    const auto xyz = stepdiag::parse_order("XYZ"), zyx = stepdiag::parse_order("ZYX");
+    EXPECT_EQ(size({xyz, zyx}), size({xyz}).cwiseMax(size({zyx})));
+}
+
 TEST(Plan, WhatMakesNoPlanIsRefused) {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     const auto make = [](Vector3d edges, std::vector<Line> l, int steps, std::vector<Line> scale = {}) {
@@ -130,6 +157,7 @@ TEST(Plan, WhatMakesNoPlanIsRefused) {
     expect_refused([&] { make(volume, lines({"ppp", "ppp"}), 5); }, "lines: \"ppp\"");
     expect_refused([&] { make(volume, lines({"ppp", "p00"}), 5, lines({"p00"})); }, "\"p00\"");
     expect_refused([&] { make(volume, four, 5, lines({"pp0"})); }, "scale_lines");
+    expect_refused([&] { Plan(volume, four, 5, std::vector<stepdiag::StepOrder>{}); }, "order");
     expect_refused([&] { Plan(volume, four, 5).points(Line::parse("ppn")); }, "\"ppn\"");
     for (const char* order : {"", "XY", "XYY", "xyz", "XYZX", "ABC"})
         expect_refused([&] { stepdiag::parse_order(order); }, "order \"" + std::string(order) + "\"");

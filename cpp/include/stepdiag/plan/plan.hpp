@@ -25,22 +25,29 @@ struct LateralExcursion {
     Eigen::Vector2d highest;
 };
 
+// The axes in the order in which a step moves them.
+using StepOrder = std::array<Axis, 3>;
+
 class Plan {
 public:
     // A thousand steps an axis are far beyond any run; the covariance of an evaluation costs their square.
     static constexpr int largest_step_count = 2'000;
 
-    // `volume`: edges X, Y, Z, mm. `order`: the axes in the order in which a step moves them. Scale lines are
-    // single-axis lines of two points. Throws InvalidArgument for an empty or doubled line, a volume without extent,
-    // steps outside 1 .. largest_step_count, a scale line that moves more than one axis.
-    Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::array<Axis, 3> order = all_axes,
+    // `volume`: edges X, Y, Z, mm. Scale lines are single-axis lines of two points. Throws InvalidArgument for an empty
+    // or doubled line, a volume without extent, steps outside 1 .. largest_step_count, a scale line that moves more
+    // than one axis, no order.
+    Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, StepOrder order = all_axes,
+         std::vector<Line> scale_lines = {});
+    // Run r goes in the order r modulo their number.
+    Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::vector<StepOrder> orders,
          std::vector<Line> scale_lines = {});
 
     const Eigen::Vector3d& volume() const { return volume_; }
     const std::vector<Line>& lines() const { return lines_; }
     const std::vector<Line>& scale_lines() const { return scale_lines_; }
     int steps() const { return steps_; }
-    const std::array<Axis, 3>& order() const { return order_; }
+    const std::vector<StepOrder>& orders() const { return orders_; }
+    const StepOrder& order(int run = 0) const;
 
     bool contains(const Line& line) const;  // among the lines or the scale lines
     bool is_scale_line(const Line& line) const;
@@ -50,9 +57,9 @@ public:
 
     // The points of a line of this plan, from 0; 3N+1 on a body diagonal, 2N+1 on a face diagonal, N+1 on a single
     // axis, 2 on a scale line.
-    std::vector<PlanPoint> points(const Line& line) const;
+    std::vector<PlanPoint> points(const Line& line, int run = 0) const;
 
-    LateralExcursion lateral_excursion(const Line& line) const;
+    LateralExcursion lateral_excursion(const Line& line) const;  // in any of the orders
     // Width (local x) and height (local y) of the smallest mirror, centred on the functional point, for all lines, mm.
     // A beam of finite diameter needs that much more.
     Eigen::Vector2d smallest_mirror() const;
@@ -61,10 +68,10 @@ private:
     Eigen::Vector3d volume_;
     std::vector<Line> lines_;
     int steps_;
-    std::array<Axis, 3> order_;
+    std::vector<StepOrder> orders_;
     std::vector<Line> scale_lines_;
 };
 
-std::array<Axis, 3> parse_order(std::string_view text);  // "XYZ", "YZX", ...: a permutation
+StepOrder parse_order(std::string_view text);  // "XYZ", "YZX", ...: a permutation
 
 }  // namespace stepdiag
