@@ -35,13 +35,13 @@ def test_choices_become_native_units() -> None:
 
 
 def test_every_key_reaches_the_core() -> None:
-    numbers = "\n".join(f"{key} = 7.0" for key in QUANTITIES if key != "beam_constants_um")
+    numbers = "\n".join(f"{key} = 0.5" for key in QUANTITIES if key != "beam_constants_um")
     text = (
         PSD.split("[misalignment]")[0].replace("[plan]", "[plan]\nseconds_per_reading = 1.0")
         + f"[adjustment]\n{numbers}\n"
     )
     known = priors(text, "npp")
-    assert known == pytest.approx({name: 7.0 * unit for name, unit in QUANTITIES.values() if name in known}, rel=1e-15)
+    assert known == pytest.approx({name: 0.5 * unit for name, unit in QUANTITIES.values() if name in known}, rel=1e-15)
     assert known.keys() == {name for name, _ in QUANTITIES.values()} - {"beam_constants"}
     assert priors(BEAMS + "[adjustment]\nbeam_constants_um = 7.0\n", "npp")["beam_constants"] == pytest.approx(7e-3)
 

@@ -52,6 +52,7 @@ void AdjustmentSolver::factorize() {
 }
 
 void AdjustmentSolver::refresh(const Eigen::VectorXd& x) {
+    if (factorized_at_.size() == 0) factorized_at_.setZero(x.size());  // by the constructor
     double change = 0.0;
     for (int j = 0; j < x.size(); ++j)
         change = std::max(change, std::abs(x[j] - factorized_at_[j]) * equations_.problem().change_scale()[j]);
