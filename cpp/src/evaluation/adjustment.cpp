@@ -44,31 +44,98 @@ int degrees_of_freedom(const AdjustmentSolver& solver) {
 class OutlierSearch {
 public:
     OutlierSearch(AdjustmentProblem& problem, AdjustmentSolver& solver, const AdjustmentOptions& options)
-        : problem_(problem), solver_(solver) {
+        : problem_(problem), solver_(solver), inverse_(solver.equations().matrix()) {
         const double count = double(problem.readings().size());
-        limit_ = -Eigen::numext::ndtri(options.outlier_probability / (2.0 * count));
+        limit_ = options.outlier_probability > 0.0 ? -Eigen::numext::ndtri(options.outlier_probability / (2.0 * count))
+                                                   : std::numeric_limits<double>::infinity();
         most_ = std::max(10, int(problem.readings().size() / 50));
         roughness_ = second_differences(
             problem, given_deviations({options.uncertainty.distance, options.uncertainty.tilt, false}));
     }
 
-    void run(Eigen::VectorXd& x) {
-        const Eigen::VectorXd before = x;
-        for (int found = 1;; ++found) {
-            const std::vector<std::size_t> worst = worst_readings(x);
-            if (worst.empty()) return;
-            if (found > most_) break;
-            for (const std::size_t r : worst) problem_.readings()[r].suspect = found;
-            AdjustedReading& reading = problem_.readings()[roughest(worst, x)];
-            reading.suspect = 0;
-            reading.outlier = found;
-            solver_.solve(x);
+    // From zero. A reading that is a thousand uncertainties off may keep Gauss-Newton from settling, or settle it far
+    // away: where readings scatter that much, the worst is left out by what the first step says, which is linear, and
+    // the adjustment begins anew. Returns the number of steps of the one that settled.
+    int solve_without_gross(const std::vector<bool>& determined, Eigen::VectorXd& x) {
+        constexpr double gross_scatter = 25.0;  // of the square sum a reading
+        constexpr double gross_likeness = 0.9;  // the first step is not exact
+        // More are no slips of single readings, but a head that lost count, or a wrong plan.
+        constexpr int most_gross = 5;
+        for (bool search = true;;) {
+            const std::optional<int> count = solve_from_zero(determined, x);
+            const double scatter = solver_.equations().square_sum(x) / double(problem_.readings().size());
+            if (count && (scatter < gross_scatter || !search)) return *count;
+            Eigen::VectorXd first = Eigen::VectorXd::Zero(x.size());
+            if (search) solver_.try_solve(first, 1);
+            if (search && found_ < most_gross && leave_out(worst_readings(first, gross_likeness), first)) continue;
+            if (!search)
+                throw InvalidArgument(
+                    "adjustment: finds no machine and set-up that explain the readings; check the plan, the head, and "
+                    "units and signs of the readings");
+            // It is not a few readings that do not fit: all stay, and chi-square tells.
+            search = false;
+            for (AdjustedReading& reading : problem_.readings()) reading.outlier = reading.suspect = 0;
+            found_ = 0;
+            looked_at_.reset();
         }
-        for (AdjustedReading& reading : problem_.readings()) reading.outlier = reading.suspect = 0;
-        x = before;
     }
 
+    // All that remain, after the adjustment without the gross ones.
+    void run(Eigen::VectorXd& x) {
+        constexpr double likeness = 0.99;
+        const int gross = found_;
+        const Eigen::VectorXd before = x;
+        for (;;) {
+            const std::vector<std::size_t> worst = worst_readings(x, likeness);
+            if (worst.empty()) return;
+            if (!leave_out(worst, x) || !solver_.try_solve(x)) break;
+        }
+        for (AdjustedReading& reading : problem_.readings()) {
+            if (reading.outlier > gross) reading.outlier = 0;
+            if (reading.suspect > gross) reading.suspect = 0;
+        }
+        x = before;
+        looked_at_.reset();
+    }
+
+    // Residuals and the inverse at x, and the equations linearised there.
+    void look(const Eigen::VectorXd& x) {
+        if (looked_at_ && *looked_at_ == x) return;
+        solver_.refresh(x);
+        solver_.factor().selected_inverse(inverse_);
+        looked_at_ = x;
+        residuals_ = reading_residuals(solver_.equations(), inverse_);
+    }
+    const std::vector<ReadingResidual>& residuals() const { return residuals_; }
+    const BorderedBand& inverse() const { return inverse_; }
+
 private:
+    // What is open is assumed to be at 0 first, and then, because that pulls at what is determined by its square, where
+    // it came out.
+    std::optional<int> solve_from_zero(const std::vector<bool>& determined, Eigen::VectorXd& x) {
+        x.setZero();
+        solver_.equations().assume_usual(determined, x);
+        const std::optional<int> count = solver_.try_solve(x);
+        if (!count || solver_.dependent().empty()) return count;
+        Eigen::VectorXd again = x;
+        solver_.equations().assume_usual(determined, x);
+        const std::optional<int> more = solver_.try_solve(again);
+        if (!more) return count;
+        x = again;
+        return *count + *more;
+    }
+
+    bool leave_out(const std::vector<std::size_t>& worst, const Eigen::VectorXd& x) {
+        if (worst.empty() || found_ == most_) return false;
+        ++found_;
+        looked_at_.reset();
+        for (const std::size_t r : worst) problem_.readings()[r].suspect = found_;
+        AdjustedReading& reading = problem_.readings()[roughest(worst, x)];
+        reading.suspect = 0;
+        reading.outlier = found_;
+        return true;
+    }
+
     // Of readings that no other tells apart, the one without which the error functions are smoothest.
     std::size_t roughest(const std::vector<std::size_t>& candidates, const Eigen::VectorXd& x) {
         if (candidates.size() == 1) return candidates.front();
@@ -91,10 +158,9 @@ private:
     }
 
     // The reading that fits worst, if it is an outlier, and those that no other reading tells from it.
-    std::vector<std::size_t> worst_readings(const Eigen::VectorXd& x) {
-        constexpr double alike = 0.99;
-        solver_.factorize(x);
-        const auto residuals = reading_residuals(solver_.equations(), solver_.factor().selected_inverse());
+    std::vector<std::size_t> worst_readings(const Eigen::VectorXd& x, double alike) {
+        look(x);
+        const auto& residuals = residuals_;
         const double square_sum = solver_.equations().square_sum(x);
         const int freedom = degrees_of_freedom(solver_);
         double worst = 0.0;
@@ -114,9 +180,26 @@ private:
     AdjustmentProblem& problem_;
     AdjustmentSolver& solver_;
     double limit_;
-    int most_;
+    int most_, found_ = 0;
+    std::vector<ReadingResidual> residuals_;
+    BorderedBand inverse_;
+    std::optional<Eigen::VectorXd> looked_at_;
     std::vector<SmoothRow> roughness_;
 };
+
+// No machine is off by a hundredth of its travel: then it is not the machine that the readings tell of.
+void refuse_absurd(const Calibration& calibration) {
+    for (int i = 0; i < function_count; ++i) {
+        const FunctionId id = FunctionId::at(i);
+        if (!calibration.functions[i] || id.is_rotation()) continue;
+        for (const double value : calibration.functions[i]->value)
+            if (std::abs(value) > 1e-2 * calibration.volume[index(id.axis)])
+                throw InvalidArgument(
+                    "adjustment: " + id.name() + " comes out as " + std::to_string(value) +
+                    " mm, more than a hundredth of the travel; expected distances in mm that grow along "
+                    "the line, half of the way to the mirror and back");
+    }
+}
 
 std::vector<std::string> describe(const Observability& observability, const Eigen::VectorXd& x,
                                   const BorderedBand& inverse) {
@@ -162,15 +245,16 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
     Adjustment result{
         {"", chain, {}, {}, {}, {}, {}, {}, {}}, {}, {}, 0.0, 0, 1.0, 0, {}, smoothness_at_start(options)};
-    result.iterations = solver.solve_open(observability.determined(), x);
-    if (options.outlier_probability > 0.0) OutlierSearch(problem, solver, options).run(x);
+    OutlierSearch outliers(problem, solver, options);
+    result.iterations = outliers.solve_without_gross(observability.determined(), x);
+    if (options.outlier_probability > 0.0) outliers.run(x);
     if (options.smoothness && options.smoothness->cross_validated) {
         result.smoothness = cross_validate(solver, x, options);
         solver.solve(x);
     }
 
-    solver.refresh(x);
-    const BorderedBand inverse = solver.factor().selected_inverse();
+    outliers.look(x);
+    const BorderedBand& inverse = outliers.inverse();
     result.calibration = make_calibration(problem, tables, forms, x, inverse);
     const std::vector<bool> known = known_unknowns(problem, observability.determined(), inverse);
     result.calibration.undetermined = observability.sentences(known);
@@ -178,9 +262,10 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
         throw InvalidArgument(
             "adjustment: nothing can be determined. " +
             (result.calibration.undetermined.empty() ? std::string() : result.calibration.undetermined.front()));
+    refuse_absurd(result.calibration);
     if (options.full_covariance) result.calibration.covariance = full_covariance(problem, forms, solver.factor());
     result.setup = setup_estimates(problem, known, x, inverse);
-    result.residuals = reading_residuals(solver.equations(), inverse);
+    result.residuals = outliers.residuals();
     std::stable_sort(result.residuals.begin(), result.residuals.end(),
                      [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
     result.combinations = describe(observability, x, inverse);
@@ -209,7 +294,9 @@ struct Adjuster::State {
         for (const LinearForm* form : chosen.in_order()) forms.push_back(*form);
         solver.assume_usual(observability.determined());
         start.setZero(problem.size());
-        solver.solve_open(observability.determined(), start);
+        solver.solve(start);
+        solver.equations().assume_usual(observability.determined(), start);
+        solver.solve(start);
         solver.factorize(start);
         for (const Channel& channel : measurement.channels()) channels.push_back(channel.name);
         channel_of_reading.reserve(problem.readings().size());

@@ -45,6 +45,10 @@ double usable(const RawValue& raw, const Measurement& measurement, std::size_t r
     return raw.value;
 }
 
+bool has_tilts(const Measurement& measurement) {
+    return measurement.find("alpha") != nullptr || measurement.find("spot_x") != nullptr;
+}
+
 // The frame choice: straightnesses that are 0 at the end of travel and have no squareness to take their slope.
 bool is_zero_at_end(Axis axis, int component) {
     const FunctionId id{axis, Component(component)};
@@ -93,7 +97,8 @@ void AdjustmentProblem::collect_setups(const Measurement& measurement, const Adj
             const Eigen::Vector3d origin = planned.front().commanded + tool_ - head.standoff * frame.col(2);
             LineSetup setup{entry.first.first, line, scale, ChannelModel(kind_, head, frame, origin), {}, {}, {}};
             const int columns = setup.model.setup_size();
-            setup.prior = setup_priors(options, line.name(), scale, kind_, columns);
+            setup.prior = setup_priors(options, line.name(), scale, line.moved_axes() == 1,
+                                       kind_ == ChannelKind::multi_beam || has_tilts(measurement), kind_, columns);
             setup.unknown.assign(columns, no_unknown);
             current[line.name()] = int(setups_.size());
             setups_.push_back(std::move(setup));

@@ -1,5 +1,6 @@
 #include "evaluation/adjustment_solver.hpp"
 
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
 
@@ -8,13 +9,8 @@
 namespace stepdiag {
 namespace {
 
-constexpr int most_steps = 50;
 // A step that changes angles by less (rad, and lengths by less of a metre) leaves the factor as good as new.
 constexpr double factor_holds = 1e-9;
-// A step's effect on the readings, in standard uncertainties, below which it may be rounding.
-constexpr double small_effect = 1e-3, no_effect = 1e-6;
-constexpr double small_change = 1e-9;  // rad, metres
-
 }  // namespace
 
 AdjustmentSolver::AdjustmentSolver(const AdjustmentProblem& problem,
@@ -71,58 +67,111 @@ Eigen::VectorXd AdjustmentSolver::null_vector(int held) const {
     return vector;
 }
 
-double AdjustmentSolver::step(Eigen::VectorXd& x, double& change) {
-    Eigen::VectorXd dx = equations_.gradient(x);
-    factor_->solve(dx);
-    x += dx;
-    change = 0.0;
-    for (int j = 0; j < dx.size(); ++j)
-        change = std::max(change, std::abs(dx[j]) * equations_.problem().change_scale()[j]);
-    return dx.cwiseProduct(scale_).cwiseAbs().maxCoeff();
+AdjustmentSolver::Step AdjustmentSolver::step(const Eigen::VectorXd& x) const {
+    const Eigen::VectorXd gradient = equations_.gradient(x);
+    Step step{gradient, 0.0, 0.0, 0.0};
+    factor_->solve(step.dx);
+    step.decrement = gradient.dot(step.dx);
+    step.effect = step.dx.cwiseProduct(scale_).cwiseAbs().maxCoeff();
+    for (int j = 0; j < x.size(); ++j)
+        step.change = std::max(step.change, std::abs(step.dx[j]) * equations_.problem().change_scale()[j]);
+    return step;
 }
 
-int AdjustmentSolver::solve_open(const std::vector<bool>& determined, Eigen::VectorXd& x) {
-    const int count = solve(x);
-    if (dependent_.empty()) return count;
-    equations_.assume_usual(determined, x);
-    return count + solve(x);
+bool AdjustmentSolver::is_settled(const Step& step, double ratio, const Eigen::VectorXd& x) const {
+    constexpr double enough = 1e-9;     // of a standard uncertainty
+    constexpr double rounding = 1e-6;   // of a step: of double precision, the condition takes this much
+    constexpr double no_effect = 1e-6;  // where a step may be rounding
+    constexpr double settled = 1e-12;   // square of what is left, in uncertainties of whatever is known worst
+    if (step.effect * std::max(ratio, rounding) < enough) return true;  // as the next step would be
+    if (ratio >= 0.25 && step.effect < no_effect) return true;          // rounding is what no longer shrinks
+    const double scatter = equations_.square_sum(x) / double(equations_.problem().readings().size());
+    return ratio > 1e-3 && step.decrement < settled * std::max(1.0, scatter);
 }
 
-int AdjustmentSolver::solve(Eigen::VectorXd& x) {
-    constexpr double enough = 1e-9;    // of a standard uncertainty
-    constexpr double rounding = 1e-6;  // of a step: of double precision, the condition takes this much
+std::optional<int> AdjustmentSolver::try_solve(Eigen::VectorXd& x, int most_steps) {
+    constexpr double slow = 0.1;
     constexpr double infinite = std::numeric_limits<double>::infinity();
     double change = fresh_ && x.isZero(0.0) ? 0.0 : infinite, effect = infinite;
     fresh_ = false;
+    StepHistory history;
     for (int count = 1; count <= most_steps; ++count) {
         if (change > factor_holds) factorize(x);
         else if (count > 1) equations_.linearise(x);
         if (!equations_.residuals().allFinite()) break;
-        const double before = effect;
-        effect = step(x, change);
-        if (effect * std::max(effect / before, rounding) < enough) return count;  // as the next step would be
-        // Rounding is what no longer shrinks. With noise the last steps shrink slowly, too, down to no effect at all.
-        if (effect >= 0.25 * before && effect < no_effect) return count;
-        if (effect >= 0.7 * before && (effect < small_effect || change < small_change)) return count;
+        const Step step = this->step(x);
+        const double ratio = step.effect / effect;
+        if (is_settled(step, ratio, x)) {
+            x += step.dx;
+            return count;
+        }
+        // Where residuals are large, steps shrink slowly, along a few directions: the sequence then tells its limit.
+        if (ratio < slow) history.clear();
+        history.add(x, step.dx, scale_);
+        x += ratio < slow ? step.dx : history.accelerated();
+        effect = step.effect;
+        change = infinite;
+        if (ratio < slow) change = step.change;
     }
-    throw InvalidArgument(
-        "adjustment: finds no machine and set-up that explain the readings; check plan, chain, head and units");
+    return std::nullopt;
+}
+
+int AdjustmentSolver::solve(Eigen::VectorXd& x) {
+    if (const auto count = try_solve(x)) return *count;
+    throw InvalidArgument("adjustment: finds no machine and set-up that explain the readings");
 }
 
 void AdjustmentSolver::solve_nearby(Eigen::VectorXd& x) {
     constexpr int most_nearby = 6;
     constexpr double enough = 1e-3;  // of a standard uncertainty
     const Eigen::VectorXd start = x;
-    double change = 0.0, effect = std::numeric_limits<double>::infinity();
+    double effect = std::numeric_limits<double>::infinity();
     for (int count = 0; count < most_nearby; ++count) {
         equations_.linearise(x, false);
-        const double before = effect;
-        effect = step(x, change);
-        if (effect * (effect / before) < enough) return;  // by the step that would be next
+        const Step step = this->step(x);
+        x += step.dx;
+        if (step.effect * (step.effect / effect) < enough) return;  // by the step that would be next
+        effect = step.effect;
     }
     x = start;
     solve(x);
     factorize(start);
+}
+
+// Anderson acceleration (D. G. Anderson, J. ACM 12 (1965) 547) of the sequence x + dx(x): the combination of the last
+// steps that is least says where they lead.
+void AdjustmentSolver::StepHistory::add(const Eigen::VectorXd& x, const Eigen::VectorXd& dx,
+                                        const Eigen::VectorXd& scale) {
+    constexpr std::size_t most = 6;
+    if (last_x.size() > 0) {
+        moves.push_back(x - last_x);
+        changes.push_back(dx - last_dx);
+        if (moves.size() > most) {
+            moves.erase(moves.begin());
+            changes.erase(changes.begin());
+        }
+    }
+    last_x = x;
+    last_dx = dx;
+    weight = scale;
+}
+
+Eigen::VectorXd AdjustmentSolver::StepHistory::accelerated() const {
+    const Eigen::Index count = Eigen::Index(changes.size());
+    Eigen::VectorXd result = last_dx;
+    if (count == 0) return result;
+    Eigen::MatrixXd square(count, count);
+    Eigen::VectorXd right(count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+        const Eigen::VectorXd weighted = changes[i].cwiseProduct(weight).cwiseProduct(weight);
+        right[i] = weighted.dot(last_dx);
+        for (Eigen::Index j = 0; j < count; ++j) square(i, j) = weighted.dot(changes[j]);
+    }
+    square.diagonal() *= 1.0 + 1e-10;  // of steps that are all alike
+    const Eigen::VectorXd share = square.ldlt().solve(right);
+    if (!share.allFinite()) return result;
+    for (Eigen::Index i = 0; i < count; ++i) result -= share[i] * (moves[i] + changes[i]);
+    return result;
 }
 
 }  // namespace stepdiag

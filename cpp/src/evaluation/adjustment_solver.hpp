@@ -30,11 +30,11 @@ public:
     // The change of all unknowns that no reading sees when the held unknown changes by 1 (at the last factorisation).
     Eigen::VectorXd null_vector(int held) const;
 
-    // From x to the minimum: returns the number of steps. Throws InvalidArgument where there is none to be found.
+    static constexpr int usual_most_steps = 100;
+    // From x to the minimum: the number of steps, or none where it is not reached in `most_steps`, x being the last.
+    std::optional<int> try_solve(Eigen::VectorXd& x, int most_steps = usual_most_steps);
+    // Throws InvalidArgument where it is not reached.
     int solve(Eigen::VectorXd& x);
-    // The same where unknowns may be open: what they are assumed to be pulls at the others, too, by its square; so once
-    // more around what came out.
-    int solve_open(const std::vector<bool>& determined, Eigen::VectorXd& x);
     // The same with derivatives and factor as they are, for readings that differ by little more than noise; falls back
     // to solve. What it leaves is the product of noise and of the derivatives' change: a hundredth of an uncertainty.
     void solve_nearby(Eigen::VectorXd& x);
@@ -44,9 +44,24 @@ public:
     void refresh(const Eigen::VectorXd& x);
 
 private:
-    // One Gauss-Newton step with the derivatives and the factor that there are. Returns its largest effect on the
-    // readings, in standard uncertainties.
-    double step(Eigen::VectorXd& x, double& change);
+    // One Gauss-Newton step with the derivatives and the factor that there are.
+    struct Step {
+        Eigen::VectorXd dx;
+        double effect;     // largest of one unknown's on the readings, in standard uncertainties
+        double change;     // largest, rad and metres
+        double decrement;  // of the square sum, were the problem linear
+    };
+    Step step(const Eigen::VectorXd& x) const;
+    bool is_settled(const Step& step, double ratio, const Eigen::VectorXd& x) const;
+
+    struct StepHistory {
+        Eigen::VectorXd last_x, last_dx, weight;
+        std::vector<Eigen::VectorXd> moves, changes;
+
+        void clear() { *this = {}; }
+        void add(const Eigen::VectorXd& x, const Eigen::VectorXd& dx, const Eigen::VectorXd& scale);
+        Eigen::VectorXd accelerated() const;
+    };
     void factorize();  // with the derivatives that there are
 
     NormalEquations equations_;

@@ -164,10 +164,17 @@ void Observability::add_function_sentences(std::vector<std::string>& sentences) 
         const FunctionForms& known = shape_only ? shapes : values;
         if (slope_open && (shape_only || (id.is_positioning() && count(values, true) == 0))) {
             const std::string line = std::array<const char*, 3>{"p00", "0p0", "00p"}[index(id.axis)];
-            sentences.push_back(slope_name(id) + (id.is_positioning()
-                                                      ? ": add the line " + line
-                                                      : ": read tilts on lines of other directions, or give a prior to "
-                                                        "the set-up"));
+            const auto& lines = problem_.setups();
+            const bool measured = std::any_of(lines.begin(), lines.end(), [&](const LineSetup& setup) {
+                return setup.line.moves(id.axis) && setup.line.moved_axes() == 1;
+            });
+            sentences.push_back(
+                slope_name(id) +
+                (id.is_positioning() && measured ? ": its line does not tell it from rotations that move the tool; "
+                                                   "add body diagonals, or give priors to the line's set-up"
+                 : id.is_positioning()           ? ": add the line " + line
+                                                 : ": read tilts on lines of other directions, or give a prior to "
+                                                   "the set-up"));
         }
         if (count(known, true) == 0) {
             open.push_back(id.name());

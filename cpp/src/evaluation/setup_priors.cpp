@@ -16,6 +16,7 @@ constexpr PriorUncertainty broad_lateral = 1e3;           // mm
 constexpr PriorUncertainty broad_roll = 1.0;              // rad
 constexpr PriorUncertainty broad_gain = 1.0;              // 1
 constexpr PriorUncertainty laser_beside_beams = 2e-3;     // rad, where the constants of the beams are unknown
+constexpr PriorUncertainty usual_laser = 2e-3;            // rad, of a free one that nothing tells
 constexpr PriorUncertainty laser_of_scale_line = 500e-6;  // rad
 
 PriorUncertainty usual_prior(SetupQuantity quantity, bool is_scale_line, bool beams_unknown) {
@@ -72,7 +73,8 @@ std::optional<SetupColumnName> setup_column_name(int column) {
 }
 
 std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, const std::string& line,
-                                           bool is_scale_line, ChannelKind kind, int columns) {
+                                           bool is_scale_line, bool is_single_axis, bool has_tilts, ChannelKind kind,
+                                           int columns) {
     const auto own = options.setup_by_line.find(line);
     const auto given = [&](SetupQuantity quantity) {
         const auto q = static_cast<std::size_t>(quantity);
@@ -100,15 +102,23 @@ std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, con
     // Without a reflector angle of its own a scale line's spots are not used.
     const bool has_spots = kind == ChannelKind::psd && !(is_scale_line && priors[setup::reflector] == fixed_unknown);
     if (!has_spots) priors[setup::psd_zero] = priors[setup::psd_zero + 1] = fixed_unknown;
+    // E[((a^2 + b^2)/2)^2] = 2 s^4 for two normal angles of standard deviation s.
+    const auto cosine_error = [](PriorUncertainty angle) { return std::sqrt(2.0) * angle * angle; };
     if (is_scale_line) {
         const PriorUncertainty angle = priors[setup::laser];
         if (std::isinf(angle))
             throw InvalidArgument("adjustment laser of " + line +
                                   ": a scale line's angle acts at second order only; expected fixed or its standard "
                                   "uncertainty, not free");
-        // E[((a^2 + b^2)/2)^2] = 2 s^4 for two normal angles of standard deviation s.
-        priors[setup::cosine] = std::sqrt(2.0) * angle * angle;
+        priors[setup::cosine] = cosine_error(angle);
         priors[setup::laser] = priors[setup::laser + 1] = fixed_unknown;
+    } else if (is_single_axis) {
+        // Tilts tell the laser from a known reflector. Without them mirror and laser stand by themselves, and a laser
+        // that turns alone reads long by three times as much as one that the mirror follows reads short.
+        const bool tilts_tell = has_tilts && !beams_unknown;
+        const PriorUncertainty laser = std::min(priors[setup::laser], usual_laser);
+        priors[setup::cosine] =
+            tilts_tell ? cosine_error(std::min(laser, priors[setup::reflector])) : 3.0 * cosine_error(laser);
     }
     return priors;
 }

@@ -45,7 +45,8 @@ inline constexpr PriorUncertainty fixed_unknown = 0.0;
 // which are 0 on a perfect machine: free means known to 1 m, 1 rad, 1, and one whose uncertainty stays above half of
 // that is not determined. Defaults of scale lines: reflector fixed, and their
 // tilts and spots then are not used; beams have a constant each; the laser's angles are fixed at 0, and what is given
-// as their standard uncertainty (500 urad) makes the cosine error travel (a^2 + b^2)/2 by which their distances read
+// as their standard uncertainty (500 urad) makes the cosine error travel (a^2 + b^2)/2 by which, with a mirror that is
+// square to the beam, their distances read
 // short; roll and gain fixed; the others as on measured lines. What is said of all lines reaches scale lines for
 // distance_constant, lateral and drift only; the rest of a scale line's set-up is said by its own name.
 using SetupPriors = std::array<std::optional<PriorUncertainty>, setup_quantity_count>;
