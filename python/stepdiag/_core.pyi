@@ -777,6 +777,11 @@ class Calibration:
         name -> (value, standard uncertainty), rad.
         """
     @property
+    def straightness_reference(self) -> str:
+        """
+        To which point the straightnesses refer, and what they are at the functional point; one line.
+        """
+    @property
     def tool(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
     @property

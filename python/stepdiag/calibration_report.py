@@ -8,7 +8,7 @@ import numpy as np
 from stepdiag._core import Calibration
 from stepdiag.comparison import KINDS, kind_of
 from stepdiag.comparison_report import decimal
-from stepdiag.functional_point import functional_point_straightness, straightness_reference
+from stepdiag.functional_point import functional_point_straightness
 from stepdiag.report import UNIT, in_report_units
 
 FUNCTIONAL_POINT_FORMAT: Final = "stepdiag functional point 1"
@@ -29,7 +29,7 @@ def calibration_report(calibration: Calibration) -> Iterator[str]:
             largest = _largest(kind, [(value, place) for value, _, place in values])
             uncertain = _largest(kind, [(u, place) for _, u, place in values])
             yield f"{kind:<14}{largest:<32}{uncertain}"
-    yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
+    yield f"reference: {calibration.straightness_reference}"
     yield from _functional_point(calibration)
     for sentence in calibration.undetermined:
         yield f"undetermined: {sentence}"
@@ -74,7 +74,7 @@ def functional_point_csv(calibration: Calibration) -> str:
         "tool_mm": _lengths(calibration.tool),
         "method": calibration.method,
         "date": calibration.date,
-        "reference": straightness_reference(calibration.chain, calibration.tool),
+        "straightness_reference": calibration.straightness_reference,
         "covariance": "counted" if counted else "not known: straightness and rotations are taken as independent",
     }
     lines = [f"# {key}={value}" for key, value in leading.items() if value]

@@ -9,12 +9,12 @@ Its straightness is that of the table plus the two components of theta_a x L_a: 
 that carries the workpiece, if the tool offset is 0. Squareness terms are not in it, nor in the table's.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
 
-from stepdiag._core import Calibration, Chain
+from stepdiag._core import Calibration
 from stepdiag.table_values import FloatArray, TableValues, Term
 
 # (theta x L) along X is B L_Z - C L_Y, and so on: rotation, lever, sign.
@@ -47,20 +47,6 @@ def functional_point_straightness(
             if levers and needed <= tables.functions.keys() - set(calibration.undetermined_slopes):
                 found[name] = (position, *tables.sum([Term(name, position, np.ones_like(position)), *levers]))
     return found
-
-
-def straightness_reference(chain: Chain, tool: Sequence[float] | FloatArray) -> str:
-    """One line that says to which point a calibration's straightnesses refer."""
-    terms = []
-    for axis in filter(chain.carries_workpiece, "XYZ"):
-        for component in "XYZ".replace(axis, ""):
-            rotation, _, sign = next(term for term in _CROSS_PRODUCT[component] if term[1] == axis)
-            terms.append(f"E{component}{axis} {'+' if sign > 0 else '-'} p E{rotation}{axis}")
-    there = [", ".join(terms)] if terms else []
-    if np.any(tool):
-        there.append("plus rotation x tool offset" if terms else "those plus rotation x tool offset")
-    own = "straightnesses refer to the origin of each axis' own frame"
-    return f"{own}; at the functional point they are {', '.join(there) if there else 'the same'}"
 
 
 def _lever_terms(calibration: Calibration, component: str, axis: str, position: FloatArray) -> list[Term]:

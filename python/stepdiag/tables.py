@@ -8,7 +8,7 @@ import xarray as xr
 
 from stepdiag._core import Calibration, Measurement
 from stepdiag.comparison import units_of
-from stepdiag.functional_point import functional_point_straightness, straightness_reference
+from stepdiag.functional_point import functional_point_straightness
 
 _COMPONENT = {
     "X": "displacement along X",
@@ -123,7 +123,7 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
             "chain": calibration.chain.name,
             "volume_mm": calibration.volume,
             "tool_mm": calibration.tool,
-            "straightness_reference": straightness_reference(calibration.chain, calibration.tool),
+            "straightness_reference": calibration.straightness_reference,
             "undetermined": "\n".join(calibration.undetermined),
         },
     )

@@ -9,7 +9,6 @@ from calibrations import CHAIN, FUNCTIONS, calibrate
 
 import stepdiag as sd
 from stepdiag.cli import main
-from stepdiag.functional_point import straightness_reference
 
 VOLUME = (800.0, 600.0, 500.0)
 CHAINS = ["[w X' b Y Z t]", "[w Z' Y' b X t]", "[w Y' X' Z' b t]", "[w b X Y Z t]"]
@@ -108,10 +107,14 @@ def test_nodes_of_rotations_are_interpolated() -> None:
         ("[w b X Y Z t]", (0, 0, 0), "the same"),
     ],
 )
-def test_reference_is_told_in_one_line(chain: str, tool: tuple[float, float, float], there: str) -> None:
-    said = straightness_reference(sd.Chain(chain), tool)
+def test_reference_is_told_in_one_line(
+    tmp_path: Path, chain: str, tool: tuple[float, float, float], there: str
+) -> None:
     own = "straightnesses refer to the origin of each axis' own frame; at the functional point they are "
-    assert said == own + there
+    calibration = sd.Calibration("", chain, VOLUME, tool, {})
+    assert calibration.straightness_reference == own + there
+    calibration.write(tmp_path / "calibration.csv")
+    assert f"# straightness_reference={own}{there}\n" in (tmp_path / "calibration.csv").read_text()
 
 
 def test_report_tells_the_reference_and_exports_the_functional_point(
@@ -123,7 +126,7 @@ def test_report_tells_the_reference_and_exports_the_functional_point(
     sd.write_calibration(calibration, "calibration.csv")
     assert main(["report", "calibration.nc", "--functional-point", "point.csv"]) == 0
     said = capsys.readouterr().out
-    assert f"reference: {straightness_reference(calibration.chain, calibration.tool)}" in said
+    assert f"reference: {calibration.straightness_reference}" in said
     assert "functional point: EYX " in said
     assert "method: adjustment, date: 2026-11-21T" in said
     assert "squareness" in said

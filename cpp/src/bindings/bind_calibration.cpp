@@ -109,6 +109,9 @@ void bind_calibration(py::module_& m) {
              "InvalidArgument naming the parameter for what is none: nodes that do not "
              "ascend, values that are not finite, a covariance that is not one of these values.")
         .def_readonly("date", &Calibration::date, "When it was evaluated: ISO 8601, UTC; empty where it is not known.")
+        .def_property_readonly(
+            "straightness_reference", [](const Calibration& c) { return straightness_reference(c.chain, c.tool); },
+            "To which point the straightnesses refer, and what they are at the functional point; one line.")
         .def(
             "dated",
             [](Calibration c, const std::string& date) {

@@ -88,6 +88,22 @@ Chain parse_chain(const ParameterTable& table, const std::string& path) {
 
 }  // namespace
 
+std::string straightness_reference(const Chain& chain, const Eigen::Vector3d& tool) {
+    std::vector<std::string> there;
+    for (const Axis axis : all_axes)
+        for (int across = 0; across < 3; ++across) {
+            if (across == index(axis) || !chain.carries_workpiece(axis)) continue;
+            const int about = 3 - index(axis) - across;
+            const bool cyclic = (about + 1) % 3 == index(axis);  // then about x axis = +across
+            there.push_back(FunctionId{axis, Component(across)}.name() + (cyclic ? " + p " : " - p ") +
+                            FunctionId{axis, Component(about + 3)}.name());
+        }
+    if (tool != Eigen::Vector3d::Zero())
+        there.push_back(there.empty() ? "those plus rotation x tool offset" : "plus rotation x tool offset");
+    return "straightnesses refer to the origin of each axis' own frame; at the functional point they are " +
+           (there.empty() ? "the same" : join(there, ", "));
+}
+
 bool is_anything_determined(const Calibration& calibration) {
     const auto known = [](const auto& parameter) { return parameter.has_value(); };
     return std::any_of(calibration.functions.begin(), calibration.functions.end(), known) ||
@@ -116,6 +132,7 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
                     {"chain", calibration.chain.name()},
                     {"volume_mm", format_lengths(calibration.volume)},
                     {"tool_mm", format_lengths(calibration.tool)}};
+    table.header["straightness_reference"] = straightness_reference(calibration.chain, calibration.tool);
     if (!calibration.date.empty()) table.header["date"] = calibration.date;
     if (!slopes.empty()) table.header["undetermined_slopes"] = join(slopes, " ");
     if (!constants.empty()) table.header["undetermined_reversal_constants"] = join(constants, " ");

@@ -64,15 +64,19 @@ struct Calibration {
 // of these values (its size, symmetry, |c_ij| <= u_i u_j, c_ii = u_i^2), sentences of more than one line.
 void check(const Calibration& calibration);
 
+// One line that says to which point the straightnesses of a calibration refer, and what they are at the functional
+// point of an axis that carries the workpiece: "... EYX + p ECX, EZX - p EBX" (theta x p along the axis).
+std::string straightness_reference(const Chain& chain, const Eigen::Vector3d& tool);
+
 bool is_anything_determined(const Calibration& calibration);
 // Where there is a reversal error the function's table is that of the + direction, and function - reversal that of the
 // - direction. A reversal error without its function has no place in a table.
 ParameterTable to_parameter_table(const Calibration& calibration);
 
-// CSV with format, chain, volume_mm, tool_mm, method, date, undetermined_slopes, undetermined_reversal_constants and
-// undetermined in the leading lines; not kept are the covariance and the uncertainty of a reversal error, which is not
-// that of its two tables. Reading throws InvalidArgument naming file and line, also where chain, volume or tool is
-// missing.
+// CSV with format, chain, volume_mm, tool_mm, method, date, straightness_reference, undetermined_slopes,
+// undetermined_reversal_constants and undetermined in the leading lines; not kept are the covariance and the
+// uncertainty of a reversal error, which is not that of its two tables. Reading throws InvalidArgument naming file and
+// line, also where chain, volume or tool is missing.
 void write_calibration(const Calibration& calibration, const std::string& path);
 Calibration read_calibration(const std::string& path);
 
