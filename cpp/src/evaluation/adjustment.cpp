@@ -19,8 +19,9 @@ void check_options(const AdjustmentOptions& options, const Plan& plan) {
         throw InvalidArgument("adjustment outlier_probability: expected a probability from 0 to 0.5");
     if (const auto& s = options.smoothness)
         for (const auto& [key, value] : {std::pair("translation", s->translation), std::pair("rotation", s->rotation)})
-            if (!(value >= 0.0 && std::isfinite(value)))
-                throw InvalidArgument(std::string("smoothness ") + key + ": expected a finite deviation, at least 0");
+            if (!(value == 0.0 || (value >= 1e-9 && value <= 1e6)))
+                throw InvalidArgument(std::string("smoothness ") + key +
+                                      ": expected 0 or a deviation of 1e-9 to 1e6 mm or rad");
     for (const auto& entry : options.setup_by_line)
         if (!plan.contains(Line::parse(entry.first)))
             throw InvalidArgument("adjustment: line \"" + entry.first + "\" is not in the plan");
@@ -35,7 +36,7 @@ int degrees_of_freedom(const AdjustmentSolver& solver) {
     const AdjustmentProblem& problem = solver.equations().problem();
     int count = int(solver.equations().smooth_rows().size()) - problem.unknowns() + int(solver.dependent().size());
     for (const AdjustedReading& reading : problem.readings()) count += reading.used();
-    for (const double prior : problem.prior()) count += std::isfinite(prior);
+    count += problem.informative_priors();
     return count;
 }
 
@@ -115,8 +116,15 @@ private:
     std::optional<int> solve_from_zero(const std::vector<bool>& determined, Eigen::VectorXd& x) {
         x.setZero();
         solver_.equations().assume_usual(determined, x);
-        const std::optional<int> count = solver_.try_solve(x);
-        if (!count || solver_.dependent().empty()) return count;
+        std::optional<int> count = solver_.try_solve(x);
+        if (solver_.dependent().empty()) return count;
+        if (!count) {
+            // Its second order may lead astray: then it is held.
+            constexpr double hold = 1e-4;
+            x.setZero();
+            solver_.equations().assume_usual(determined, x, hold);
+            return solver_.try_solve(x);
+        }
         Eigen::VectorXd again = x;
         solver_.equations().assume_usual(determined, x);
         const std::optional<int> more = solver_.try_solve(again);
@@ -279,6 +287,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
 
 struct Adjuster::State {
     AdjustmentProblem problem;
+    Eigen::Index rows;
     std::vector<std::string> channels;
     AdjustmentSolver solver;
     std::vector<LinearForm> forms;
@@ -286,7 +295,9 @@ struct Adjuster::State {
 
     State(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
           const HeadCalibrations& heads, const AdjustmentOptions& options)
-        : problem(measurement, plan, chain, tool, heads, options), solver(problem, smoothness_at_start(options)) {
+        : problem(measurement, plan, chain, tool, heads, options),
+          rows(Eigen::Index(measurement.size())),
+          solver(problem, smoothness_at_start(options)) {
         check_options(options, plan);
         AdjustmentTables tables(problem);
         const Observability observability(solver, tables);
@@ -315,9 +326,17 @@ Adjuster::Adjuster(Adjuster&&) noexcept = default;
 
 Eigen::VectorXd Adjuster::evaluate(const Eigen::MatrixXd& readings) {
     State& s = *state_;
+    if (readings.rows() != Eigen::Index(s.channels.size()) || readings.cols() != s.rows)
+        throw InvalidArgument("readings: expected " + std::to_string(s.channels.size()) + " rows, one a channel, and " +
+                              std::to_string(s.rows) + " columns, one a row of the measurement, got " +
+                              std::to_string(readings.rows()) + " x " + std::to_string(readings.cols()));
     auto& list = s.problem.readings();
-    for (std::size_t r = 0; r < list.size(); ++r)
+    for (std::size_t r = 0; r < list.size(); ++r) {
         list[r].value = readings(s.channel_of_reading[r], Eigen::Index(list[r].row));
+        if (!std::isfinite(list[r].value))
+            throw InvalidArgument("readings: " + s.channels[s.channel_of_reading[r]] + " of row " +
+                                  std::to_string(list[r].row) + " was read at first, and is not finite now");
+    }
     Eigen::VectorXd x = s.start;
     s.solver.solve_nearby(x);
     Eigen::VectorXd values(s.forms.size());

@@ -12,6 +12,8 @@
 namespace stepdiag {
 namespace {
 
+constexpr int largest_border = 10'000;  // a dense matrix of them: 800 MB, minutes
+
 ChannelKind kind_of(const Measurement& measurement) {
     if (measurement.beam_count() > 0) return ChannelKind::multi_beam;
     return measurement.find("spot_x") ? ChannelKind::psd : ChannelKind::ideal;
@@ -193,6 +195,11 @@ void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options) {
                 setup.active.push_back(c);
             }
 
+    if (border_ > largest_border)
+        throw InvalidArgument("adjustment: " + std::to_string(setups_.size()) + " set-ups have more than " +
+                              std::to_string(largest_border) +
+                              " unknowns; where runs of a line have one set-up in common, say so (one_setup_per_line)");
+
     reach_.resize(banded.size());
     for (std::size_t b = 0; b < banded.size(); ++b) reach_[b] = int(b);
     const auto couple = [&](int i, int j) {
@@ -242,6 +249,16 @@ void AdjustmentProblem::weigh_unknowns() {
             usual_[j] = angle ? usual_angle : psd_zero ? usual_psd_zero : free_unknown;
             if (angle || c == setup::roll || c == setup::gain || c == setup::cosine) change_scale_[j] = 1.0;
         }
+}
+
+int AdjustmentProblem::informative_priors() const {
+    int count = 0;
+    for (const LineSetup& setup : setups_)
+        for (const int c : setup.active) {
+            const auto of = setup_column_name(c);
+            count += setup.prior[c] < (of ? broadest_prior(of->quantity) : free_unknown);
+        }
+    return count;
 }
 
 // In the order of the band, so that who goes through the points goes through the matrix once.

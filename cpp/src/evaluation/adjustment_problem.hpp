@@ -92,6 +92,7 @@ public:
     Eigen::VectorXd setup_values(const LineSetup& setup, const Eigen::VectorXd& x) const;
     // Of an unknown of the set-ups: its prior's standard uncertainty; infinite elsewhere.
     const std::vector<double>& prior() const { return prior_; }
+    int informative_priors() const;  // those that are no limits of what is called free
     // How far from 0 each unknown usually is.
     const std::vector<double>& usual() const { return usual_; }
     // What makes changes of unknowns comparable: 1 for angles (rad), 1/metre for lengths (mm).

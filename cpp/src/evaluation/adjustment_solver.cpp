@@ -10,7 +10,7 @@ namespace stepdiag {
 namespace {
 
 // A step that changes angles by less (rad, and lengths by less of a metre) leaves the factor as good as new.
-constexpr double factor_holds = 1e-9;
+constexpr double factor_holds = 3e-11;
 }  // namespace
 
 AdjustmentSolver::AdjustmentSolver(const AdjustmentProblem& problem,

@@ -61,9 +61,9 @@ NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&p
     usual_weight_ = centre_ = Eigen::VectorXd::Zero(problem.size());
 }
 
-void NormalEquations::assume_usual(const std::vector<bool>& determined, const Eigen::VectorXd& centre) {
+void NormalEquations::assume_usual(const std::vector<bool>& determined, const Eigen::VectorXd& centre, double part) {
     for (int j = 0; j < problem_->size(); ++j)
-        usual_weight_[j] = determined[j] ? 0.0 : std::pow(problem_->usual()[j], -2);
+        usual_weight_[j] = determined[j] ? 0.0 : std::pow(part * problem_->usual()[j], -2);
     centre_ = centre;
 }
 

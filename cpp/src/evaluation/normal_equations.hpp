@@ -38,8 +38,9 @@ public:
         smooth_ = second_differences(*problem_, deviation);
     }
     const std::vector<SmoothRow>& smooth_rows() const { return smooth_; }
-    // Takes the unknowns that the readings leave open as known to be at `centre` as well as is usual for such a thing.
-    void assume_usual(const std::vector<bool>& determined, const Eigen::VectorXd& centre);
+    // Takes the unknowns that the readings leave open as known to be at `centre` as well as is usual for such a thing,
+    // or to this part of it.
+    void assume_usual(const std::vector<bool>& determined, const Eigen::VectorXd& centre, double part = 1.0);
 
     // Residuals and, if asked for, derivatives at x. Values that are not finite come out as such.
     void linearise(const Eigen::VectorXd& x, bool derivatives = true);

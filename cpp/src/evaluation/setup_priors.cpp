@@ -80,13 +80,15 @@ std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, con
         const auto q = static_cast<std::size_t>(quantity);
         std::optional<PriorUncertainty> prior;
         // Scale lines are aligned by themselves: what is said of all lines is said of the others.
-        const bool of_all = !is_scale_line || quantity == SetupQuantity::distance_constant ||
-                            quantity == SetupQuantity::lateral || quantity == SetupQuantity::drift;
+        const bool of_all =
+            !is_scale_line || quantity == SetupQuantity::distance_constant || quantity == SetupQuantity::lateral;
         if (of_all) prior = options.setup[q];
         if (own != options.setup_by_line.end() && own->second[q]) prior = own->second[q];
-        if (prior && !(*prior >= 0.0))
+        const bool usable =
+            !prior || *prior == fixed_unknown || *prior == free_unknown || is_usable_uncertainty(*prior);
+        if (!usable)
             throw InvalidArgument("adjustment " + name(quantity) + " of " + line +
-                                  ": expected free, fixed or a positive standard uncertainty");
+                                  ": expected free, fixed or a standard uncertainty of 1e-12 to 1e6 mm or rad");
         return prior;
     };
     const auto beam_prior = given(SetupQuantity::beam_constants);
@@ -112,7 +114,7 @@ std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, con
                                   "uncertainty, not free");
         priors[setup::cosine] = cosine_error(angle);
         priors[setup::laser] = priors[setup::laser + 1] = fixed_unknown;
-    } else if (is_single_axis) {
+    } else if (is_single_axis || !has_tilts) {
         // Tilts tell the laser from a known reflector. Without them mirror and laser stand by themselves, and a laser
         // that turns alone reads long by three times as much as one that the mirror follows reads short.
         const bool tilts_tell = has_tilts && !beams_unknown;

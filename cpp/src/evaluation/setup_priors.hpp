@@ -20,9 +20,9 @@ std::optional<SetupColumnName> setup_column_name(int column);
 // What "free" means: infinite but for the quantities that act by tilts only, which are 0 on a perfect machine.
 PriorUncertainty broadest_prior(SetupQuantity quantity);
 
-// Standard uncertainty of each column (setup::Column, beams) of a line's set-up. A measured line of a single axis has a
-// cosine error, too, as far as neither its laser nor, with tilts, its reflector is known. Throws InvalidArgument for a
-// negative one, and for a free laser on a scale line.
+// Standard uncertainty of each column (setup::Column, beams) of a line's set-up. A measured line of a single axis, or
+// without tilts, has a cosine error, too, as far as neither its laser nor, with tilts, its reflector is known: there
+// the laser acts at second order only. Throws InvalidArgument for a negative one, and for a free laser on a scale line.
 std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, const std::string& line,
                                            bool is_scale_line, bool is_single_axis, bool has_tilts, ChannelKind kind,
                                            int columns);

@@ -48,7 +48,7 @@ inline constexpr PriorUncertainty fixed_unknown = 0.0;
 // as their standard uncertainty (500 urad) makes the cosine error travel (a^2 + b^2)/2 by which, with a mirror that is
 // square to the beam, their distances read
 // short; roll and gain fixed; the others as on measured lines. What is said of all lines reaches scale lines for
-// distance_constant, lateral and drift only; the rest of a scale line's set-up is said by its own name.
+// distance_constant and lateral only; the rest of a scale line's set-up is said by its own name.
 using SetupPriors = std::array<std::optional<PriorUncertainty>, setup_quantity_count>;
 
 // Standard deviation with which the second difference of neighbouring nodes is known to be 0: real axes are smooth.
@@ -64,7 +64,8 @@ struct AdjustmentOptions {
     ReadingUncertainty uncertainty;
     SetupPriors setup = {};
     std::map<std::string, SetupPriors> setup_by_line = {};  // replaces the quantities that it names
-    // A set-up serves a run's line and the backward runs that follow it; or, if true, all runs of the line.
+    // A set-up serves a run's line and the backward runs that follow it; or, if true, all runs of the line. The time
+    // for many set-ups grows with the third power of their number: 50 runs of seven lines take seconds.
     bool one_setup_per_line = false;
     bool reversal = true;   // where there are backward runs: tables of their own for nodes approached in - direction
     bool rotations = true;  // false: the machine is taken to have no angular errors
