@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['Adjustment', 'BeamSegment', 'BeamSpot', 'Calibration', 'Camera', 'Chain', 'Environment', 'ErrorMap', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'Noise', 'Outlier', 'Plan', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'adjust', 'beam_radius', 'couple', 'cramer_rao_bound', 'evaluate', 'expose', 'head_sensitivities', 'largest_repeat_count', 'locate', 'power_inside', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'simulate', 'trace_beams']
+__all__: list[str] = ['Adjustment', 'BeamSegment', 'BeamSpot', 'Calibration', 'Camera', 'Chain', 'Environment', 'ErrorMap', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'Noise', 'Outlier', 'Plan', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'adjust', 'beam_radius', 'couple', 'cramer_rao_bound', 'evaluate', 'expose', 'head_sensitivities', 'largest_repeat_count', 'locate', 'power_inside', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'simulate', 'straightness_reference', 'trace_beams']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -779,7 +779,7 @@ class Calibration:
     @property
     def straightness_reference(self) -> str:
         """
-        To which point the straightnesses refer, and what they are at the functional point; one line.
+        One line: to which point the straightnesses refer, and what they are at the functional point.
         """
     @property
     def tool(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1024,6 +1024,10 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
 def simulate(machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[str, Head], *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment | None = None, assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001, repeats: typing.SupportsIndex = 1, backward: bool = False, seconds_per_reading: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Measurement:
     """
     A run on the virtual machine: lines of the plan, then its scale lines. head: one, or a dict with one for each line. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace (none: of 20 degrees Celsius for a head with a design, an index of 1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's replayed poses, traced again and compared. repeats: how often each line is measured, runs 0, 1, 2, ...; backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; seconds_per_reading: makes the channel time. Points of a visit are approached in the direction of its own travel. Readings whose beam misses the mirror or does not come back are lost (NaN). Raises InvalidArgument; RuntimeError where a replay and its trace differ.
+    """
+def straightness_reference(chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0)) -> str:
+    """
+    One line: to which point straightnesses refer, and what they are at the functional point.
     """
 def trace_beams(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment | None = None) -> list[BeamSegment]:
     """

@@ -14,8 +14,10 @@ from typing import Final
 
 import numpy as np
 
-from stepdiag._core import Calibration
+from stepdiag._core import Calibration, straightness_reference
 from stepdiag.table_values import FloatArray, TableValues, Term
+
+__all__ = ["functional_point_straightness", "straightness_reference"]
 
 # (theta x L) along X is B L_Z - C L_Y, and so on: rotation, lever, sign.
 _CROSS_PRODUCT: Final[Mapping[str, tuple[tuple[str, str, float], ...]]] = {

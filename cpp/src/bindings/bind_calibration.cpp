@@ -96,6 +96,13 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
 }  // namespace
 
 void bind_calibration(py::module_& m) {
+    m.def(
+        "straightness_reference",
+        [](const ChainLike& chain, const ArrayLike& tool) {
+            return straightness_reference(to_chain(chain), to_vector3(tool, "tool"));
+        },
+        py::arg("chain"), py::arg("tool") = zeros(3),
+        "One line: to which point straightnesses refer, and what they are at the functional point.");
     auto calibration = py::reinterpret_borrow<py::class_<Calibration>>(m.attr("Calibration"));
     calibration
         .def(py::init(&make_calibration), py::arg("method"), py::arg("chain"), py::arg("volume"), py::arg("tool"),
@@ -111,7 +118,7 @@ void bind_calibration(py::module_& m) {
         .def_readonly("date", &Calibration::date, "When it was evaluated: ISO 8601, UTC; empty where it is not known.")
         .def_property_readonly(
             "straightness_reference", [](const Calibration& c) { return straightness_reference(c.chain, c.tool); },
-            "To which point the straightnesses refer, and what they are at the functional point; one line.")
+            "One line: to which point the straightnesses refer, and what they are at the functional point.")
         .def(
             "dated",
             [](Calibration c, const std::string& date) {
