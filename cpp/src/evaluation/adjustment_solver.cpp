@@ -89,7 +89,7 @@ bool AdjustmentSolver::is_settled(const Step& step, double ratio, const Eigen::V
     return ratio > 1e-3 && step.decrement < settled * std::max(1.0, scatter);
 }
 
-std::optional<int> AdjustmentSolver::try_solve(Eigen::VectorXd& x, int most_steps) {
+std::optional<int> AdjustmentSolver::try_solve(Eigen::VectorXd& x, int most_steps, bool accelerated) {
     constexpr double slow = 0.1;
     constexpr double infinite = std::numeric_limits<double>::infinity();
     double change = fresh_ && x.isZero(0.0) ? 0.0 : infinite, effect = infinite;
@@ -101,17 +101,17 @@ std::optional<int> AdjustmentSolver::try_solve(Eigen::VectorXd& x, int most_step
         if (!equations_.residuals().allFinite()) break;
         const Step step = this->step(x);
         const double ratio = step.effect / effect;
+        const bool is_slow = accelerated && ratio >= slow;
         if (is_settled(step, ratio, x)) {
             x += step.dx;
             return count;
         }
         // Where residuals are large, steps shrink slowly, along a few directions: the sequence then tells its limit.
-        if (ratio < slow) history.clear();
+        if (!is_slow) history.clear();
         history.add(x, step.dx, scale_);
-        x += ratio < slow ? step.dx : history.accelerated();
+        x += is_slow ? history.accelerated() : step.dx;
         effect = step.effect;
-        change = infinite;
-        if (ratio < slow) change = step.change;
+        change = is_slow ? infinite : step.change;
     }
     return std::nullopt;
 }

@@ -32,7 +32,7 @@ public:
 
     static constexpr int usual_most_steps = 100;
     // From x to the minimum: the number of steps, or none where it is not reached in `most_steps`, x being the last.
-    std::optional<int> try_solve(Eigen::VectorXd& x, int most_steps = usual_most_steps);
+    std::optional<int> try_solve(Eigen::VectorXd& x, int most_steps = usual_most_steps, bool accelerated = true);
     // Throws InvalidArgument where it is not reached.
     int solve(Eigen::VectorXd& x);
     // The same with derivatives and factor as they are, for readings that differ by little more than noise; falls back

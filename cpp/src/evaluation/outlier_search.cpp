@@ -87,17 +87,32 @@ void OutlierSearch::look(const Eigen::VectorXd& x) {
 // What is open is assumed to be at 0 first, and then, because that pulls at what is determined by its square, where
 // it came out.
 std::optional<int> OutlierSearch::solve_from_zero(const std::vector<bool>& determined, Eigen::VectorXd& x) {
-    x.setZero();
-    solver_.equations().assume_usual(determined, x);
-    std::optional<int> count = solver_.try_solve(x);
-    if (solver_.dependent().empty()) return count;
-    if (!count) {
-        // Its second order may lead astray: then it is held.
-        constexpr double hold = 1e-4;
-        x.setZero();
-        solver_.equations().assume_usual(determined, x, hold);
-        return solver_.try_solve(x);
+    // The second order of what is open may lead astray: other ways from zero then, the last of them with the open
+    // unknowns held, and whichever fits best.
+    struct Way {
+        double part;
+        bool accelerated;
+    };
+    constexpr Way ways[] = {{1.0, true}, {1.0, false}, {1e-4, true}, {1e-4, false}};
+    constexpr double good_fit = 4.0;
+    std::optional<int> count;
+    double least = std::numeric_limits<double>::infinity();
+    Way best = ways[0];
+    for (const Way& way : ways) {
+        Eigen::VectorXd solution = Eigen::VectorXd::Zero(x.size());
+        solver_.equations().assume_usual(determined, solution, way.part);
+        const std::optional<int> steps =
+            solver_.try_solve(solution, AdjustmentSolver::usual_most_steps, way.accelerated);
+        const double square_sum = solver_.equations().square_sum(solution);
+        if (steps && square_sum < least) {
+            count = steps;
+            x = solution;
+            least = square_sum;
+            best = way;
+        }
+        if (solver_.dependent().empty() || (count && least < good_fit * double(problem_.readings().size()))) break;
     }
+    if (!count || solver_.dependent().empty() || best.part < 1.0) return count;
     Eigen::VectorXd again = x;
     solver_.equations().assume_usual(determined, x);
     const std::optional<int> more = solver_.try_solve(again);
