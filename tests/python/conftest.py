@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+import one_thread  # noqa: F401 (for what its import does)
 import pytest
 
 from stepdiag.cli import main
