@@ -840,7 +840,7 @@ class SetupEstimate:
     @property
     def prior(self) -> float:
         """
-        Standard uncertainty of its prior; infinite where it is free.
+        Standard uncertainty of its prior; infinite where it is free (1 m, 1 rad, 1 for a free lateral offset, roll, gain).
         """
     @property
     def quantity(self) -> str:

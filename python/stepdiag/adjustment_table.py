@@ -146,7 +146,7 @@ def _setup(setup: list[SetupEstimate]) -> dict[str, Any]:
             np.array([unknown.prior for unknown in setup]),
             {
                 "long_name": "standard uncertainty with which it was known to be 0",
-                "comment": f"{own_units}; infinite: free, 0: fixed at 0",
+                "comment": f"{own_units}; infinite: free, 0: fixed at 0; a free lateral offset, roll or gain has 1 m, 1 rad, 1",
             },
         ),
     }
@@ -157,7 +157,21 @@ def _outliers(outliers: list[Outlier]) -> dict[str, Any]:
         "outlier_row": (
             "outlier",
             [outlier.row for outlier in outliers],
-            {"long_name": "row of the measurement, from 0", "comment": "the worst first; outliers were left out"},
+            {"long_name": "row of the measurement, from 0"},
+        ),
+        "outlier_number": (
+            "outlier",
+            [outlier.number for outlier in outliers],
+            {"long_name": "number of the outlier", "comment": "from 1, the worst first"},
+        ),
+        "outlier_left_out": (
+            "outlier",
+            np.array([outlier.left_out for outlier in outliers], dtype=np.int8),
+            {
+                "long_name": "whether the reading was left out",
+                "comment": "0: fitted as badly as the one of the same number that was left out, and no other reading "
+                "tells which of them is wrong; without that one the error functions are smoother",
+            },
         ),
         "outlier_run": ("outlier", [outlier.run for outlier in outliers], {"long_name": "run"}),
         "outlier_line": ("outlier", np.array([outlier.line for outlier in outliers]), {"long_name": "line"}),

@@ -122,7 +122,10 @@ void bind_result(py::module_& m) {
         .def_readonly("component", &SetupEstimate::component, "0 or 1 of pairs; of beam_constants 1 for d2, ...")
         .def_readonly("value", &SetupEstimate::value, "None where it is not determined.")
         .def_readonly("standard_uncertainty", &SetupEstimate::standard_uncertainty)
-        .def_readonly("prior", &SetupEstimate::prior, "Standard uncertainty of its prior; infinite where it is free.");
+        .def_readonly(
+            "prior", &SetupEstimate::prior,
+            "Standard uncertainty of its prior; infinite where it is free (1 m, 1 rad, 1 for a free lateral offset, "
+            "roll, gain).");
 
     py::class_<Outlier>(m, "Outlier", "A reading that did not fit.")
         .def_readonly("row", &Outlier::row)
