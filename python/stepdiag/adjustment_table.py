@@ -146,7 +146,8 @@ def _setup(setup: list[SetupEstimate]) -> dict[str, Any]:
             np.array([unknown.prior for unknown in setup]),
             {
                 "long_name": "standard uncertainty with which it was known to be 0",
-                "comment": f"{own_units}; infinite: free, 0: fixed at 0; a free lateral offset, roll or gain has 1 m, 1 rad, 1",
+                "comment": f"{own_units}; infinite: free, 0: fixed at 0; "
+                "a free lateral offset, roll or gain has 1 m, 1 rad, 1",
             },
         ),
     }
