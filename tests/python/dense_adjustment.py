@@ -140,12 +140,33 @@ class DenseAdjustment:
         if self.is_scale(line) and quantity == "laser":
             return 0.0  # known as a cosine error
         if quantity == "cosine":
-            if not self.is_scale(line):
-                return 0.0
-            s = self.knowledge.given(line, "laser", True)
-            s = 500e-6 if s is None else {"fixed": 0.0, "free": np.inf}.get(s, s) if isinstance(s, str) else s
-            return float(np.sqrt(2) * s * s)
+            return self.cosine_prior(line)
         return deviation(self.scenario, self.knowledge, line, quantity)
+
+    def cosine_prior(self, line: str) -> float:
+        """How well it is known that a line whose laser's angles no tilt tells does not read short, by travel.
+
+        (a^2 + b^2)/2 of two angles of standard deviation s is sqrt(2) s^2 in the mean square, with a mirror square to
+        the beam; a laser that turns alone reads long by three times that."""
+
+        def error(angle: float) -> float:
+            return float(np.sqrt(2) * angle * angle)
+
+        if self.is_scale(line):
+            s = self.knowledge.given(line, "laser", True)
+            return error(500e-6 if s is None else 0.0 if s == "fixed" else float(s))
+        has_tilts = self.scenario.layout == "multi_beam" or any(
+            np.any(np.isfinite(self.run.channels[name])) for name in self.channels if name != "distance"
+        )
+        if has_tilts and line.count("0") < 2:
+            return 0.0
+
+        def prior(quantity: str) -> float:
+            return deviation(self.scenario, self.knowledge, line, quantity)
+
+        laser = min(prior("laser"), 2e-3)
+        beams_unknown = self.scenario.layout == "multi_beam" and prior("beam_constants") > 0
+        return error(min(laser, prior("reflector"))) if has_tilts and not beams_unknown else 3 * error(laser)
 
     # --- what is known beside the readings, as rows of the scaled problem with 0 on the right ---
 

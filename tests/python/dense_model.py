@@ -91,7 +91,8 @@ class DenseModel:
         self.frame = np.array([frames[line] for line in stations.line])
         corner = np.array([[s == "n" for s in line] for line in stations.line]) * volume
         self.origin = corner + np.array(scenario.tool) - scenario.standoff * self.frame[:, :, 2]
-        self.travelled = np.abs(np.sum(self.position - corner, axis=1))  # of a scale line's rows: they move one axis
+        travel = self.position - corner
+        self.travelled = np.einsum("ni,ni->n", travel, self.frame[:, :, 2])
         self.tables = self.table_unknowns(reversal)
         self.setups = self.setup_unknowns()
         self.unknowns: list[Unknown] = [*self.tables, *self.setups]

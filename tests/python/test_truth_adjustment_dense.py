@@ -7,11 +7,22 @@ from typing import Any
 import numpy as np
 import pytest
 import reference
-from adjusted import adjust, assert_as_dense, assert_rank
-from dense_adjustment import DenseAdjustment, Knowledge, deviation
+from adjusted import adjust, assert_as_dense, assert_rank, claims, statement
+from dense_adjustment import DenseAdjustment, Knowledge, Prior, deviation
 from dense_model import SQUARENESS, Setup, Table
 from noisy_repetitions import ratios
-from virtual_runs import FACES, measured, noisy, random_scenario, random_table, truth_of, within
+from virtual_runs import (
+    DIAGONALS,
+    FACES,
+    SCALE_LINES,
+    lost,
+    measured,
+    noisy,
+    random_scenario,
+    random_table,
+    truth_of,
+    within,
+)
 
 import stepdiag as sd
 
@@ -86,6 +97,31 @@ def test_everything_is_that_of_the_dense_adjustment(case: str) -> None:
     relative = 10 * EPSILON * dense.condition**2
     assert relative <= 1e-6, "the case is too ill-conditioned to say anything"
     assert_as_dense(adjustment, dense, value=max(relative, 1e-7), relative=max(relative, 1e-10))
+
+
+@pytest.mark.parametrize("case", ["single axes", "distances", "distances of diagonals and a machine without angles"])
+def test_uncertainties_hold_where_something_is_open(case: str) -> None:
+    """What is not determined is held near 0, here tightly, there as is usual, and is seen in second order only."""
+    rng = np.random.default_rng(19)
+    turning = 0.0 if case.endswith("without angles") else 60e-6
+    given = {"lines": SCALE_LINES, "scale_lines": []} if case == "single axes" else {"lines": [*FACES, *DIAGONALS]}
+    scenario = random_scenario(rng, **({"steps": 3, "misalignment": {}} | given))
+    table = random_table(rng, scenario.volume, 3, rotation=turning)
+    run = noisy(measured(reference.simulate(scenario, table)), rng)
+    if case != "single axes":
+        run = lost(run, channels=("alpha", "beta"))
+    # Without tilts the laser's second order is as large as the noise, where the machine turns.
+    laser: Prior = "fixed" if case == "distances" else "free"
+    knowledge = Knowledge({"reflector": "fixed", "laser": laser}, rotations=turning > 0)
+    dense = DenseAdjustment(run, scenario, knowledge).solve()
+    adjustment = adjust(run, scenario, knowledge, outlier_probability=0.0)
+    assert_rank(adjustment, dense)
+    assert len(adjustment.calibration.functions) >= 9
+    for key, weights in claims(adjustment.calibration, dense).items():
+        found, u = statement(adjustment.calibration, dense, key)
+        expected = dense.standard_uncertainty(weights)
+        assert u == pytest.approx(expected, rel=5e-3), key
+        assert abs(found - dense.value(weights)) <= 0.05 * expected, key
 
 
 @pytest.mark.parametrize("layout", ["ideal", "psd"])
