@@ -88,6 +88,18 @@ def claims(calibration: sd.Calibration, dense: DenseAdjustment) -> dict[tuple[st
     return found
 
 
+def reversal_claims(calibration: sd.Calibration, dense: DenseAdjustment) -> dict[tuple[str, int], dict[Unknown, float]]:
+    """The same of reversal errors; where the constant is open, of their change from home, which is none at home."""
+    found: dict[tuple[str, int], dict[Unknown, float]] = {}
+    for name, columns in calibration.reversal.items():
+        is_open = name in calibration.undetermined_reversal_constants
+        for k in nodes_of(dense, name, columns[0]):
+            home: dict[Unknown, float] = {Table(name, 0, True): -1.0}
+            change = (dense.node(name, k, reversal=True) | home) if k else {}
+            found[name, k] = change if is_open else dense.node(name, k, reversal=True)
+    return found
+
+
 def statement(calibration: sd.Calibration, dense: DenseAdjustment, key: tuple[str, int]) -> tuple[float, float]:
     """Value and standard uncertainty."""
     name, node = key
@@ -105,11 +117,14 @@ def assert_rank(adjustment: sd.Adjustment, dense: DenseAdjustment) -> None:
     calibration = adjustment.calibration
     for key, weights in claims(calibration, dense).items():
         assert dense.determines(weights), f"{key} is claimed and is not determined"
+    for key, weights in reversal_claims(calibration, dense).items():
+        assert dense.determines(weights), f"reversal of {key} is claimed and is not determined"
     for name in FUNCTIONS:
         if name[1] in "ABC" and not dense.knowledge.rotations:
             assert name not in calibration.functions, f"{name} is known to be 0, and no result"
         elif dense.scenario.steps > 1 or name[1] == name[2] or name[1] in "ABC":  # straightness has inner nodes only
             assert_function_is_there(calibration, dense, name)
+            assert_reversal_is_there(calibration, dense, name)
     said = " ".join(calibration.undetermined)
     for name in SQUARENESS:
         assert dense.squareness_is_determined(name) == (name in calibration.squareness), name
@@ -118,6 +133,20 @@ def assert_rank(adjustment: sd.Adjustment, dense: DenseAdjustment) -> None:
         unknown = Setup(s.run, s.line, s.quantity, s.component)
         if unknown in dense.place:
             assert (s.value is not None) == dense.determines({unknown: 1.0}), unknown
+
+
+def assert_reversal_is_there(calibration: sd.Calibration, dense: DenseAdjustment, name: str) -> None:
+    nodes = [dense.node(name, k, reversal=True) for k in range(dense.scenario.steps + 1)]
+    if name not in calibration.functions or not np.any(dense.vector(nodes[0]) * dense.seen):
+        return  # a reversal error stands beside its function, and begins at home
+    home: dict[Unknown, float] = {Table(name, 0, True): -1.0}
+    seen = [w for w in nodes[1:] if np.any(dense.vector(w) * dense.seen)]
+    known = [dense.determines(w) and dense.determines(home) for w in seen] + [dense.determines(w | home) for w in seen]
+    if any(known):
+        assert name in calibration.reversal, f"reversal of {name} is determined in part and missing"
+    if all(dense.determines(w) and np.any(dense.vector(w) * dense.seen) for w in nodes):
+        assert len(calibration.reversal[name][0]) == len(nodes), f"reversal of {name} has not all of its nodes"
+        assert name not in calibration.undetermined_reversal_constants
 
 
 def assert_function_is_there(calibration: sd.Calibration, dense: DenseAdjustment, name: str) -> None:
