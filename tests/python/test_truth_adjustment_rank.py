@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 import reference
-from adjusted import adjust, assert_nothing_is_determined, assert_rank, distance_from, is_complete
+from adjusted import adjust, assert_nothing_is_determined, assert_rank, distance_from, error_map, is_complete
 from dense_adjustment import DenseAdjustment, Knowledge
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from truth import deviations
 from virtual_runs import (
     CHAINS,
     DIAGONALS,
@@ -230,3 +231,21 @@ def test_nothing_at_all_is_a_refusal() -> None:
     )
     with pytest.raises(sd.InvalidArgument, match=r"determined|reading"):
         adjust(nothing, scenario)
+
+
+@pytest.mark.parametrize("channel", ["alpha", "beta"])
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_open_stays_within_the_uncertainties(channel: str, seed: int) -> None:
+    """Without one of the tilts an angle of each laser is open, up to 2 mrad; by its square it moves micrometres."""
+    rng = np.random.default_rng(90 + seed)
+    scenario = random_scenario(rng, steps=5)
+    table = random_table(rng, scenario.volume, 5)
+    run = measured(reference.simulate(scenario, table))
+    channels = dict(run.channels) | {channel: np.full(len(run), np.nan)}
+    adjustment = adjust(sd.Measurement(run.line, run.point, run.position, channels), scenario)
+    calibration = adjustment.calibration
+    assert any("laser tilt" in sentence for sentence in calibration.undetermined)
+    assert len(calibration.functions) >= 9
+    for name, deviation in deviations(calibration, error_map(table)).items():
+        u = calibration.squareness[name][1] if name in calibration.squareness else calibration.functions[name][2]
+        assert np.all(np.abs(deviation) <= 4.5 * u + 1e-11), name  # noise-free: it is all of this kind
