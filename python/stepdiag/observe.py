@@ -12,7 +12,7 @@ from typing import Final, TypeVar
 import numpy as np
 
 from stepdiag import _core
-from stepdiag._core import Adjustment, InvalidArgument
+from stepdiag._core import Adjustment, Calibration, InvalidArgument
 from stepdiag.comparison import KINDS, Kind
 from stepdiag.report import (
     UNIT,
@@ -84,13 +84,13 @@ def observation_report(found: Adjustment, run: _core.Measurement, scenario: Scen
     incomplete, _ = lost_readings(run, plan, scenario.signals)
     if incomplete:
         yield f"lost: {incomplete} rows without a complete reading, by the beam's way alone"
-    names = [*calibration.functions, *calibration.squareness]
-    shapes = calibration.undetermined_slopes
-    whole = [name for name in names if name not in shapes]
     yield "for a perfect machine, head and mirror set up without error:"
-    yield f"determined: {'all 21 parameters' if len(whole) == PARAMETERS else ', '.join(whole) or 'nothing'}"
+    whole, shapes, parts = extents(calibration, plan)
+    yield f"determined: {'all 21 parameters' if len(whole) == PARAMETERS else ', '.join(whole) or 'none as a whole'}"
     if shapes:
         yield f"determined but for a slope: {', '.join(shapes)}"
+    if parts:
+        yield f"determined at some of the positions: {', '.join(parts)}"
     # All values are 0 here, to rounding.
     known = [f"{what.partition(' = ')[0]}, ±{what.partition(' +- ')[2]}" for what in found.combinations]
     yield from undetermined_rows(calibration, known)
@@ -100,6 +100,15 @@ def observation_report(found: Adjustment, run: _core.Measurement, scenario: Scen
         yield "set-up, standard uncertainties:"
         yield from rows
     yield from cosine_rows(scenario)
+
+
+def extents(calibration: Calibration, plan: _core.Plan) -> tuple[list[str], list[str], list[str]]:
+    """The parameters of a calibration that are determined as a whole, but for a slope, and at some nodes only."""
+    functions = calibration.functions
+    parts = [name for name in functions if len(functions[name][0]) < plan.steps + 1]
+    shapes = [name for name in calibration.undetermined_slopes if name not in parts]
+    whole = [name for name in functions if name not in (*parts, *shapes)]
+    return [*whole, *calibration.squareness], shapes, parts
 
 
 def without_errors(scenario: Scenario, steps: int) -> Scenario:

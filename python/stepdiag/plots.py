@@ -15,29 +15,37 @@ from stepdiag.figures import own_style, save
 
 FloatArray = npt.NDArray[np.float64]
 
-# One colour per axis, after Okabe and Ito: told apart with any colour vision. One line style per method.
+# One colour per axis, after Okabe and Ito: told apart with any colour vision. One line style per method; the
+# adjustment, which lies on the truth, is black on its colour.
 COLOUR = {"X": "#0072B2", "Y": "#D55E00", "Z": "#009E73"}
 TRUTH: Mapping[str, Any] = {"linewidth": 4.0, "alpha": 0.32, "solid_capstyle": "butt"}
 ENHANCED: Mapping[str, Any] = {"linewidth": 1.0}
 CONVENTIONAL: Mapping[str, Any] = {"linewidth": 1.0, "linestyle": (0, (4, 1.6))}
+ADJUSTMENT: Mapping[str, Any] = {"linewidth": 1.3, "linestyle": (0, (1, 1.8)), "color": "black"}
 DOTS: Mapping[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.0}
-METHODS: Mapping[str, Mapping[str, Any]] = {"enhanced": ENHANCED, "conventional": CONVENTIONAL}
+METHODS: Mapping[str, Mapping[str, Any]] = {
+    "conventional": CONVENTIONAL,
+    "enhanced": ENHANCED,
+    "adjustment": ADJUSTMENT,
+}
 
 STRAIGHTNESS = ("EYX", "EZY", "EXZ")
 ANGLES = ("ECX", "EAY", "EBZ")
 
+ALL = ("conventional", "enhanced", "adjustment")
+
 # Panel: title, case, functions, methods.
 PANELS: Mapping[str, tuple[str, str, Sequence[str], Sequence[str]]] = {
-    "1a": ("kinematic errors only", "1a", POSITIONING, ("enhanced", "conventional")),
-    "1b": ("reflector 100, 300 µrad", "1b", POSITIONING, ("enhanced", "conventional")),
-    "1c": ("laser 700, 1000 µrad", "1c", POSITIONING, ("enhanced", "conventional")),
-    "1d": ("laser, mirror 700, 1000 µrad", "1d", POSITIONING, ("enhanced", "conventional")),
-    "2a": ("as 1a", "1a", STRAIGHTNESS, ("enhanced", "conventional")),
-    "2b": ("as 1b", "1b", STRAIGHTNESS, ("enhanced", "conventional")),
-    "2c": ("as 1c", "1c", STRAIGHTNESS, ("enhanced", "conventional")),
-    "2d": ("as 1d", "1d", STRAIGHTNESS, ("enhanced", "conventional")),
-    "3a": ("PSD displaced by 1.5, 2 mm", "3", POSITIONING, ("enhanced",)),
-    "3b": ("as 3a", "3", ANGLES, ("enhanced",)),
+    "1a": ("kinematic errors only", "1a", POSITIONING, ALL),
+    "1b": ("reflector 100, 300 µrad", "1b", POSITIONING, ALL),
+    "1c": ("laser 700, 1000 µrad", "1c", POSITIONING, ALL),
+    "1d": ("laser, mirror 700, 1000 µrad", "1d", POSITIONING, ALL),
+    "2a": ("as 1a", "1a", STRAIGHTNESS, ALL),
+    "2b": ("as 1b", "1b", STRAIGHTNESS, ALL),
+    "2c": ("as 1c", "1c", STRAIGHTNESS, ALL),
+    "2d": ("as 1d", "1d", STRAIGHTNESS, ALL),
+    "3a": ("PSD displaced by 1.5, 2 mm", "3", POSITIONING, ("enhanced", "adjustment")),
+    "3b": ("as 3a", "3", ANGLES, ("enhanced", "adjustment")),
 }
 DEFINED = ("3a", "3b")  # traced, with what the definition of the readings gives beside it
 YLABEL = {
@@ -66,7 +74,7 @@ def draw_figure(results: Sequence[Result]) -> dict[str, bytes]:
             panels[name].set_ylabel(label)
         for name in ("3a", "3b", "4"):
             panels[name].set_xlabel("position (mm)")
-        figure.legend(handles=legend_handles(), loc="outside upper center", ncols=4, handlelength=3.0)
+        figure.legend(handles=legend_handles(), loc="outside upper center", ncols=5, handlelength=3.0)
         return {"figure.png": save(figure, "png"), "figure.svg": save(figure, "svg")}
 
 
@@ -76,7 +84,7 @@ def set_title(axes: Axes, name: str, title: str) -> None:
 
 def legend_handles() -> list[Any]:
     styles = {"truth": TRUTH, **METHODS, "enhanced, by definition of the readings (3a, 3b)": DOTS}
-    return [Line2D([], [], color="black", label=name, **style) for name, style in styles.items()]
+    return [Line2D([], [], label=name, **{"color": "black", **style}) for name, style in styles.items()]
 
 
 def draw_functions(axes: Axes, result: Result, names: Sequence[str], methods: Sequence[str]) -> None:
@@ -88,7 +96,7 @@ def draw_functions(axes: Axes, result: Result, names: Sequence[str], methods: Se
         for method in methods:
             function = result.calibrations[method].functions.get(name)
             if function is not None:
-                axes.plot(function[0], function[1] * scale, color=COLOUR[name[2]], **METHODS[method])
+                axes.plot(function[0], function[1] * scale, **{"color": COLOUR[name[2]], **METHODS[method]})
     name_functions(axes, names)
 
 

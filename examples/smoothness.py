@@ -1,0 +1,102 @@
+"""What smoothness does to noise, to uncertainty, and to a screw error of 10 mm pitch that it must not hide.
+
+python examples/smoothness.py
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import stepdiag as sd
+from stepdiag.comparison import kind_of
+
+VOLUME = (800.0, 600.0, 500.0)  # mm
+STEPS = 50
+PLAN = sd.Plan(VOLUME, ["ppp", "npp", "pnp", "nnp"], STEPS, scale_lines=["p00", "0p0", "00p"])
+CHAIN = sd.Chain("[w X' b Y Z t]")
+SEEDS = range(8)
+
+CHOICES = {
+    "none": None,
+    "1 µm, 3 µrad": sd.Smoothness(translation=1e-3, rotation=3e-6),
+    "0.5 µm, 1 µrad": sd.Smoothness(translation=0.5e-3, rotation=1e-6),
+    "0.1 µm, 0.3 µrad": sd.Smoothness(translation=0.1e-3, rotation=0.3e-6),
+    "cross-validated": sd.Smoothness(cross_validated=True),
+}
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def machine(**screw: float) -> sd.Machine:
+    return sd.Machine(CHAIN, sd.random_error_map(VOLUME, seed=0, intervals=STEPS, **screw))
+
+
+def adjusted(virtual: sd.Machine, seed: int, smoothness: sd.Smoothness | None) -> sd.Adjustment:
+    """Of a run with noise of 0.1 µm and 1 µrad."""
+    run = sd.simulate(virtual, PLAN, sd.Head(), noise=sd.Noise(distance=0.1e-3, tilt=1e-6, seed=seed))
+    return sd.adjust(run, PLAN, sd.Head(), CHAIN, smoothness=smoothness)
+
+
+def errors(found: sd.Adjustment, truth: sd.ErrorMap) -> dict[str, FloatArray]:
+    functions = found.calibration.functions
+    return {name: value - truth.function(name, position) for name, (position, value, _) in functions.items()}
+
+
+def rms(arrays: list[FloatArray]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate([values**2 for values in arrays]))))
+
+
+def main() -> None:
+    plain, screwed = machine(), machine(screw_pitch=10.0, screw_amplitude=3e-3)
+    ripple = {
+        name: np.asarray(screwed.errors.functions[name][1] - plain.errors.functions[name][1]) for name in ("EXX", "EYY")
+    }
+    print("| Smoothness | largest u | | rms error | | rms error, node to node | | variance factor | screw found | |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    print("| | µm | µrad | µm | µrad | µm | µrad | with screw | EXX | EYY |")
+    for name, smoothness in CHOICES.items():
+        without = [adjusted(plain, seed, smoothness) for seed in SEEDS]
+        with_screw = [adjusted(screwed, seed, smoothness) for seed in SEEDS]
+        cells: list[Any] = []
+        columns = [(kinds_u(without, angles), values(without, plain, angles)) for angles in (False, True)]
+        cells += [f"{largest:.2f}" for largest, _ in columns]
+        cells += [f"{rms(found):.2f}" for _, found in columns]
+        cells += [f"{rms([np.diff(row) for row in found]):.2f}" for _, found in columns]
+        cells.append(f"{np.mean([found.variance_factor for found in with_screw]):.1f}")
+        for function, true in ripple.items():
+            # The same noise in both runs: what differs is the answer to the screw error.
+            pairs = zip(with_screw, without, strict=True)
+            answers = [
+                one.calibration.functions[function][1] - other.calibration.functions[function][1]
+                for one, other in pairs
+            ]
+            curved = np.diff(true, 2)
+            share = np.mean([np.diff(answer, 2) @ curved for answer in answers]) / (curved @ curved)
+            cells.append(f"{100.0 * share:.0f} %")
+        print(f"| {name} | {' | '.join(cells)} |")
+
+
+def kinds_u(found: list[sd.Adjustment], angles: bool) -> float:
+    """The largest standard uncertainty of lengths (µm) or angles (µrad)."""
+    functions = [one.calibration.functions for one in found]
+    scale = 1e6 if angles else 1e3
+    return scale * max(
+        float(np.max(u)) for all_of in functions for name, (_, _, u) in all_of.items() if is_angle(name) == angles
+    )
+
+
+def values(found: list[sd.Adjustment], virtual: sd.Machine, angles: bool) -> list[FloatArray]:
+    """Errors of all lengths (µm) or angles (µrad)."""
+    scale = 1e6 if angles else 1e3
+    return [
+        scale * row for one in found for name, row in errors(one, virtual.errors).items() if is_angle(name) == angles
+    ]
+
+
+def is_angle(name: str) -> bool:
+    return kind_of(name) == "angle"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,83 @@
+"""What each published variant of the method can determine, from the same machine's volume and plan of 20 steps.
+
+python examples/variants.py
+"""
+
+from stepdiag.observe import extents, observe
+from stepdiag.report import in_report_units, largest_uncertainties
+from stepdiag.scenario import parse_scenario
+
+SCENARIO = """
+[volume]
+x_mm = 800.0
+y_mm = 600.0
+z_mm = 500.0
+[machine]
+chain = "[w X' b Y Z t]"
+[plan]
+steps = 20
+lines = [{lines}]
+order = [{orders}]
+scale_lines = [{scale_lines}]
+[head]
+layout = "ideal"
+tilts = {tilts}
+[adjustment]
+angles = "{angles}"
+one_setup_per_line = true
+"""
+
+BODY = ("ppp", "npp", "pnp", "nnp")
+FACE = ("pp0", "np0", "p0p", "n0p", "0pp", "0np")
+SCALE = ("p00", "0p0", "00p")
+THREE = ("XYZ", "YZX", "ZXY")
+
+# Name: lines, scale lines, orders of the steps, whether tilts are read, whether the machine has angles.
+VARIANTS = {
+    "Wang 2000: distances, machine without angles": (BODY, SCALE, ("XYZ",), False, False),
+    "Ibaraki, Hata: the same, no scale lines": (BODY, (), ("XYZ",), False, False),
+    "distances, machine with angles": (BODY, SCALE, ("XYZ",), False, True),
+    "Soons: the same in three orders": (BODY, SCALE, THREE, False, True),
+    "the same with six face diagonals": (BODY + FACE, SCALE, THREE, False, True),
+    "Bui: face diagonals with tilts, no scale lines": (FACE, (), ("XYZ",), True, True),
+    "Dahlem 2018: distances and tilts": (BODY, SCALE, ("XYZ",), True, True),
+    "the same, no scale lines": (BODY, (), ("XYZ",), True, True),
+}
+
+
+def row(
+    lines: tuple[str, ...], scale_lines: tuple[str, ...], orders: tuple[str, ...], tilts: bool, angles: bool
+) -> str:
+    def quoted(names: tuple[str, ...]) -> str:
+        return ", ".join(f'"{name}"' for name in names)
+
+    scenario = parse_scenario(
+        SCENARIO.format(
+            lines=quoted(lines),
+            scale_lines=quoted(scale_lines),
+            orders=quoted(orders),
+            tilts=str(tilts).lower(),
+            angles="free" if angles else "fixed",
+        )
+    )
+    calibration = observe(scenario)[1].calibration
+    whole, shapes, parts = extents(calibration, scenario.plan)
+    largest = largest_uncertainties(calibration)
+    sizes = [
+        f"{in_report_units(kind, largest[kind][0]):.2g}" if kind in largest else "-"
+        for kind in ("positioning", "straightness", "angle", "squareness")
+    ]
+    wanted = 21 if angles else 12
+    determined = "all" if len(whole) == wanted else " ".join(whole) or "-"
+    return " | ".join([determined, " ".join(shapes) or "-", " ".join(parts) or "-", *sizes])
+
+
+def main() -> None:
+    print("| Readings | Determined | but for a slope | at some nodes | EXX µm | EXY µm | EAX µrad | C0Y µrad |")
+    print("|---|---|---|---|---|---|---|---|")
+    for name, variant in VARIANTS.items():
+        print(f"| {name} | {row(*variant)} |")
+
+
+if __name__ == "__main__":
+    main()
