@@ -1,8 +1,8 @@
-// Evaluates a measured run and prints the machine's error at the far corner: what a controller would correct there.
+// Adjusts a measured run and prints the machine's error at the far corner: what a controller would correct there.
 #include <cstdio>
 #include <stepdiag/core/error.hpp>
 #include <stepdiag/core/units.hpp>
-#include <stepdiag/evaluation/enhanced.hpp>
+#include <stepdiag/evaluation/adjustment.hpp>
 #include <stepdiag/machine/machine.hpp>
 
 int main(int count, char** arguments) try {
@@ -13,8 +13,8 @@ int main(int count, char** arguments) try {
     const Plan plan(volume, {Line::parse("ppp"), Line::parse("npp"), Line::parse("pnp"), Line::parse("nnp")}, 20,
                     all_axes, {Line::parse("p00"), Line::parse("0p0"), Line::parse("00p")});
 
-    const Calibration calibration = evaluate_enhanced(read_measurement(arguments[1]), plan, chain, tool, {});
-    const Machine machine(chain, ErrorMap(to_parameter_table(calibration)), tool);
+    const Adjustment found = adjust(read_measurement(arguments[1]), plan, chain, tool, {});
+    const Machine machine(chain, ErrorMap(to_parameter_table(found.calibration)), tool);
     const Eigen::Vector3d error = machine.error(volume) / micrometre;
     std::printf("error at the far corner: %.3f %.3f %.3f um\n", error.x(), error.y(), error.z());
 } catch (const stepdiag::InvalidArgument& error) {

@@ -1,4 +1,4 @@
-"""Simulate a machine, calibrate it both ways, and compare with what is known of it.
+"""Simulate a machine, calibrate it by each method, and compare with what is known of it.
 
 python examples/quickstart.py
 """
@@ -14,7 +14,11 @@ head = sd.Head("ideal")
 misalignment = {line: sd.Misalignment(reflector=(100e-6, 300e-6)) for line in plan.lines}
 run = sd.simulate(machine, plan, head, misalignment=misalignment)
 
-for method in ("conventional", "enhanced"):
+for method in ("conventional", "enhanced", "adjustment"):
     calibration = sd.evaluate(run, plan, head, machine.chain, method=method)
     worst = sd.largest_deviations(calibration, machine.errors)["positioning"]
-    print(f"{method}: positioning known to {abs(worst.value) * 1e3:.3f} µm (worst: {worst.parameter})")
+    print(f"{method}: positioning known to {abs(worst.value) * 1e3:.6f} µm")
+
+found = sd.adjust(run, plan, head, machine.chain)
+tilts = [e.value * 1e6 for e in found.setup if e.line == "ppp" and e.quantity == "reflector"]
+print(f"the mirror stood at {tilts[0]:.3f}, {tilts[1]:.3f} µrad on ppp")

@@ -60,7 +60,8 @@ class AdjustmentKeys(Section):
 class AdjustmentSection(AdjustmentKeys):
     """What the adjustment takes each unknown of the set-up for. Other methods use nothing of it.
 
-    That is "free", "fixed" at 0, or a number: the standard uncertainty with which it is known to be 0.
+    That is "free", "fixed" at 0, or a number: the standard uncertainty with which it is known to be 0. (Lateral
+    offset, roll and gain act on tilts only; "free" is for them 1 m, 1 rad and 1.)
     `[adjustment.LINE]` replaces, for one line, the keys it names. Scale lines take only `distance_constant_mm`,
     `lateral_mm` and `drift_um_per_h` from here. Of the others they have, unless a table of their own names them,
     `reflector_urad` (their tilts then are not used), `roll_urad` and `gain` fixed and beams with a constant each;

@@ -7,6 +7,7 @@ import numpy as np
 
 from stepdiag._core import Adjustment, Calibration, Measurement, Outlier
 from stepdiag.comparison import KINDS, Kind, kind_of
+from stepdiag.functional_point import straightness_reference
 from stepdiag.scenario import Scenario
 from stepdiag.scenario_adjustment import scale_line_angle
 from stepdiag.setup_table import setup_rows
@@ -36,6 +37,7 @@ def _published(calibration: Calibration, measurement: Measurement, scenario: Sce
     yield from _what_was_done(calibration, measurement, scenario)
     yield from uncertainty_rows(calibration)
     yield from undetermined_rows(calibration)
+    yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
     if scenario.keys.adjustment.model_fields_set:
         yield f"note: [adjustment] is not used by the method {calibration.method}"
 
@@ -44,8 +46,9 @@ def _adjusted(adjustment: Adjustment, measurement: Measurement, scenario: Scenar
     calibration = adjustment.calibration
     yield from _what_was_done(calibration, measurement, scenario)
     yield _fit(adjustment)
-    yield from map(_left_out, adjustment.outliers)
+    yield from _left_out(adjustment.outliers)
     yield from uncertainty_rows(calibration)
+    yield from reversal_rows(calibration)
     rows = list(setup_rows(adjustment.setup, [*scenario.plan.lines, *scenario.plan.scale_lines]))
     if rows:
         yield "set-up found, 12.3(45) being 12.3 with a standard uncertainty of 4.5:"
@@ -53,6 +56,7 @@ def _adjusted(adjustment: Adjustment, measurement: Measurement, scenario: Scenar
     yield from undetermined_rows(calibration, adjustment.combinations)
     yield from smoothness_rows(adjustment.smoothness)
     yield from cosine_rows(scenario)
+    yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
 
 
 def _what_was_done(calibration: Calibration, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
@@ -81,13 +85,22 @@ def _fit(adjustment: Adjustment) -> str:
     )
 
 
-def _left_out(outlier: Outlier) -> str:
-    is_angle = outlier.channel in ("alpha", "beta")
-    size = outlier.residual * (MICRO if is_angle else 1e3)
-    return (
-        f"left out: run {outlier.run}, line {outlier.line}, point {outlier.point}, {outlier.channel}: off by "
-        f"{size:.3g} {'µrad' if is_angle else 'µm'}, {abs(outlier.normalised):.1f} standard uncertainties"
-    )
+def _left_out(outliers: Sequence[Outlier]) -> Iterator[str]:
+    for outlier in outliers:
+        if not outlier.left_out:
+            continue
+        is_angle = outlier.channel in ("alpha", "beta")
+        size = outlier.residual * (MICRO if is_angle else 1e3)
+        alike = [_place(other) for other in outliers if other.number == outlier.number and not other.left_out]
+        doubt = f"; it may be {' or '.join(alike)} instead: no other reading tells" if alike else ""
+        yield (
+            f"left out: {_place(outlier)}: off by {size:.3g} {'µrad' if is_angle else 'µm'}, "
+            f"{abs(outlier.normalised):.1f} standard uncertainties{doubt}"
+        )
+
+
+def _place(outlier: Outlier) -> str:
+    return f"run {outlier.run}, line {outlier.line}, point {outlier.point}, {outlier.channel}"
 
 
 def undetermined_rows(calibration: Calibration, combinations: Sequence[str] = ()) -> Iterator[str]:
@@ -127,6 +140,22 @@ def cosine_rows(scenario: Scenario) -> Iterator[str]:
             f"short, never too long, by {angle**2 * MICRO:.2g} µm/m on average; that is in the uncertainties, "
             "not corrected"
         )
+
+
+def reversal_rows(calibration: Calibration) -> Iterator[str]:
+    """The largest reversal error of each kind."""
+    largest: dict[Kind, tuple[float, float, str]] = {}
+    for name, (position, value, uncertainty) in calibration.reversal.items():
+        kind, worst = kind_of(name), int(np.argmax(np.abs(value)))
+        if abs(value[worst]) >= abs(largest.get(kind, (0.0, 0.0, ""))[0]):
+            largest[kind] = float(value[worst]), float(uncertainty[worst]), f"{name} at {position[worst]:g} mm"
+    if largest:
+        yield "largest reversal errors, + less - direction of approach:"
+    for kind in KINDS:
+        if kind in largest:
+            error, uncertainty_of_it, where = largest[kind]
+            size, u = in_report_units(kind, error), in_report_units(kind, uncertainty_of_it)
+            yield f"  {kind:<13}{size:9.3g} {UNIT[kind]:<5} ({where}; standard uncertainty {u:.2g} {UNIT[kind]})"
 
 
 def uncertainty_rows(calibration: Calibration) -> Iterator[str]:

@@ -14,15 +14,32 @@ def output_of(*arguments: str | Path) -> str:
     return done.stdout
 
 
-def test_quickstart_shows_that_enhanced_is_better() -> None:
+def test_quickstart_shows_that_each_method_is_better_than_the_one_before() -> None:
     lines = output_of(EXAMPLES / "quickstart.py").splitlines()
-    conventional, enhanced = lines
+    conventional, enhanced, adjustment, mirror = lines
     assert conventional.startswith("conventional: positioning known to 100.0")
     assert enhanced.startswith("enhanced: positioning known to 0.0")
+    assert adjustment == "adjustment: positioning known to 0.000000 µm"
+    assert mirror == "the mirror stood at 100.000, 300.000 µrad on ppp"
     readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
     assert "\n".join(f"    {line}" for line in lines) in readme
     code = (EXAMPLES / "quickstart.py").read_text(encoding="utf-8")
     assert all(line in code for line in readme.split("```python\n")[1].split("```")[0].splitlines())
+
+
+def test_readme_has_the_report_of_the_example(tmp_path: Path) -> None:
+    run, out = tmp_path / "run.csv", tmp_path / "calibration.csv"
+    sd.simulate_scenario(sd.read_scenario(EXAMPLES / "scenario.toml")).write(run)
+    said = output_of("-m", "stepdiag.cli", "evaluate", EXAMPLES / "scenario.toml", run, "-o", out)
+    readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
+    assert all(f"    {line}\n" in readme for line in said.splitlines()[:9])
+
+
+def test_method_page_has_the_tables_of_the_examples() -> None:
+    page = (EXAMPLES.parent / "docs" / "method.md").read_text(encoding="utf-8")
+    assert output_of(EXAMPLES / "variants.py") in page
+    table = output_of("-m", "stepdiag.cli", "observe", EXAMPLES / "scenario.toml").split("mirror that they take:\n")[1]
+    assert table in page
 
 
 def test_own_measurement_goes_from_files_to_a_table(tmp_path: Path) -> None:

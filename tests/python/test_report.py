@@ -71,7 +71,7 @@ def test_fit_is_said_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 
 def test_outliers_are_named_with_their_size(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    # Of a step's four distances one is more than needed: only a second run tells which of them is wrong.
+    # Of a step's four distances one is more than needed: a second run tells which of them is wrong.
     twice = NOISY.replace("[plan]", "[plan]\nrepeats = 2")
     run = simulated(tmp_path, twice)
     rows = [row for row, line in enumerate(run.line) if line == "npp"]
@@ -84,6 +84,15 @@ def test_outliers_are_named_with_their_size(tmp_path: Path, capsys: pytest.Captu
     assert "µm, " in by_channel["distance"]
     assert "point 20, alpha: off by -" in by_channel["alpha"]
     assert "µrad, " in by_channel["alpha"]
+
+
+def test_outlier_that_may_be_another_is_said_to_be_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = simulated(tmp_path, NOISY)
+    rows = [row for row, line in enumerate(run.line) if line == "npp"]
+    said = report(tmp_path, capsys, NOISY, spoilt(run, {"distance": (rows[7], 3e-3)}))
+    (left_out,) = [line for line in said.splitlines() if line.startswith("left out: ")]
+    assert "run 0, line npp, point 7, distance" in left_out
+    assert "instead: no other reading tells" in left_out
 
 
 def test_scale_lines_have_a_word_on_their_cosine_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
