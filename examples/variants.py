@@ -24,6 +24,7 @@ layout = "ideal"
 tilts = {tilts}
 [adjustment]
 angles = "{angles}"
+laser_urad = {laser}
 one_setup_per_line = true
 """
 
@@ -31,6 +32,8 @@ BODY = ("ppp", "npp", "pnp", "nnp")
 FACE = ("pp0", "np0", "p0p", "n0p", "0pp", "0np")
 SCALE = ("p00", "0p0", "00p")
 THREE = ("XYZ", "YZX", "ZXY")
+
+LASER = 500.0  # µrad; how well it stands along a line on which no tilts tell
 
 # Name: lines, scale lines, orders of the steps, whether tilts are read, whether the machine has angles.
 VARIANTS = {
@@ -58,6 +61,7 @@ def row(
             orders=quoted(orders),
             tilts=str(tilts).lower(),
             angles="free" if angles else "fixed",
+            laser='"free"' if tilts else LASER,
         )
     )
     calibration = observe(scenario)[1].calibration

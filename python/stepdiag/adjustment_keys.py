@@ -62,11 +62,11 @@ class AdjustmentSection(AdjustmentKeys):
 
     That is "free", "fixed" at 0, or a number: the standard uncertainty with which it is known to be 0. (Lateral
     offset, roll and gain act on tilts only; "free" is for them 1 m, 1 rad and 1.)
-    `[adjustment.LINE]` replaces, for one line, the keys it names. Scale lines take only `distance_constant_mm`,
-    `lateral_mm` and `drift_um_per_h` from here. Of the others they have, unless a table of their own names them,
-    `reflector_urad` (their tilts then are not used), `roll_urad` and `gain` fixed and beams with a constant each;
-    their laser stands along the axis, and `laser_urad` (by default 500, never "free") says how well: the length
-    reads short as a cosine does."""
+    `[adjustment.LINE]` replaces, for one line, the keys it names. Scale lines take only `distance_constant_mm` and
+    `lateral_mm` from here. Of the others they have, unless a table of their own names them, `reflector_urad` (their
+    tilts then are not used), `roll_urad`, `gain` and drift fixed and beams with a constant each; their laser stands
+    along the axis, and `laser_urad` (by default 500, never "free") says how well: the length reads short as a cosine
+    does. So it does on lines without tilts and on measured single axes, with a `laser_urad` of at most 2000."""
 
     angles: Literal["free", "fixed"] = key(
         '"free" or "fixed"', "Rotations of the machine's axes; fixed: it has none.", "free"

@@ -127,7 +127,12 @@ def smoothness_rows(deviations: Mapping[str, float]) -> Iterator[str]:
 
 
 def cosine_rows(scenario: Scenario) -> Iterator[str]:
-    """What the angles of scale lines may do to the scales, in words."""
+    """What angles that no reading tells may do to lengths, in words."""
+    if scenario.signals == ("distance",):
+        yield (
+            "lines without tilts: a laser at an angle to its line reads wrong by the square of it; laser_urad in "
+            "[adjustment] says how well it stands (2000 at most), and that is in the uncertainties"
+        )
     lines: dict[float, list[str]] = {}
     for line in scenario.plan.scale_lines:
         angle = scale_line_angle(scenario.keys.adjustment, line)
