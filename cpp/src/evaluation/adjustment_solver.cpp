@@ -109,11 +109,24 @@ std::optional<int> AdjustmentSolver::try_solve(Eigen::VectorXd& x, int most_step
         // Where residuals are large, steps shrink slowly, along a few directions: the sequence then tells its limit.
         if (!is_slow) history.clear();
         history.add(x, step.dx, scale_);
-        x += is_slow ? history.accelerated() : step.dx;
+        if (ratio < slow) x += step.dx;
+        else descend(x, is_slow ? history.accelerated() : step.dx, step.dx);
         effect = step.effect;
         change = is_slow ? infinite : step.change;
     }
     return std::nullopt;
+}
+
+void AdjustmentSolver::descend(Eigen::VectorXd& x, const Eigen::VectorXd& move, const Eigen::VectorXd& step) {
+    constexpr int most_halvings = 12;
+    const double before = equations_.square_sum(x);
+    Eigen::VectorXd part = move;
+    for (int i = 0; i <= most_halvings; ++i) {
+        if (i > 0) part = std::ldexp(1.0, -i) * step;
+        equations_.linearise(x + part, false);
+        if (equations_.square_sum(x + part) <= before * 1.0001 + 1.0) break;  // or nearly so: rounding, a flat valley
+    }
+    x += part;
 }
 
 int AdjustmentSolver::solve(Eigen::VectorXd& x) {

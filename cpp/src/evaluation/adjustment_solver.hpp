@@ -52,6 +52,8 @@ private:
         double decrement;  // of the square sum, were the problem linear
     };
     Step step(const Eigen::VectorXd& x) const;
+    // Moves x by `move`, or by as much of the Gauss-Newton step as does not make the square sum larger.
+    void descend(Eigen::VectorXd& x, const Eigen::VectorXd& move, const Eigen::VectorXd& step);
     bool is_settled(const Step& step, double ratio, const Eigen::VectorXd& x) const;
 
     struct StepHistory {

@@ -116,7 +116,11 @@ std::optional<int> OutlierSearch::solve_from_zero(const std::vector<bool>& deter
     Eigen::VectorXd again = x;
     solver_.equations().assume_usual(determined, x);
     const std::optional<int> more = solver_.try_solve(again);
-    if (!more) return count;
+    // Once more may lead astray, too.
+    if (!more || solver_.equations().square_sum(again) > 1.01 * std::max(least, double(problem_.readings().size()))) {
+        solver_.equations().assume_usual(determined, Eigen::VectorXd::Zero(x.size()));
+        return count;
+    }
     x = again;
     return *count + *more;
 }

@@ -10,7 +10,13 @@ namespace {
 
 using Deviations = std::array<double, function_count>;
 
-double validation_score(AdjustmentSolver& solver, const Eigen::VectorXd& x, const Deviations& deviations) {
+struct Validation {
+    double score;
+    double variance_factor;
+    double freedom;
+};
+
+Validation validate(AdjustmentSolver& solver, const Eigen::VectorXd& x, const Deviations& deviations) {
     solver.equations().make_smooth(deviations);
     solver.factorize(x);
     const NormalEquations& equations = solver.equations();
@@ -27,7 +33,8 @@ double validation_score(AdjustmentSolver& solver, const Eigen::VectorXd& x, cons
         }
     for (const ReadingResidual& residual : reading_residuals(equations, inverse))
         if (residual.used()) freedom += residual.redundancy;
-    return freedom > 0.0 ? count * square_sum / (freedom * freedom) : 0.0;
+    if (!(freedom > 0.0)) return {0.0, 1.0, 0.0};
+    return {count * square_sum / (freedom * freedom), square_sum / freedom, freedom};
 }
 
 // What was found may be smoother than what comes out with it, where curvature is coherent: not below that.
@@ -69,11 +76,15 @@ std::array<double, function_count> cross_validate(AdjustmentSolver& solver, cons
         start[i] = 16.0 * (FunctionId::at(i).is_rotation() ? options.uncertainty.tilt : options.uncertainty.distance);
 
     Deviations best{};
-    double least = validation_score(solver, x, best);
+    const Validation rough = validate(solver, x, best);
+    double least = rough.score;
+    // Cross-validation knows nothing of the readings' uncertainties: what they contradict is too smooth.
+    const double limit =
+        std::max(1.0, rough.variance_factor) * (1.0 + 2.0 * std::sqrt(2.0 / std::max(1.0, rough.freedom)));
     const auto try_out = [&](const Deviations& candidate) {
-        const double score = validation_score(solver, x, candidate);
-        if (!(score < least * (1.0 - least_gain))) return false;
-        least = score;
+        const Validation validation = validate(solver, x, candidate);
+        if (!(validation.score < least * (1.0 - least_gain)) || validation.variance_factor > limit) return false;
+        least = validation.score;
         best = candidate;
         return true;
     };
