@@ -23,6 +23,7 @@ A first round trip (uncomment [machine.random] in the scenario for a machine wit
   stepdiag simulate machine/scenario.toml -o run.csv
   stepdiag evaluate machine/scenario.toml run.csv -o calibration.csv
 Your own measurement: fill in machine/measurement.csv, then evaluate it in place of run.csv.
+What a plan would determine, before measuring: stepdiag observe machine/scenario.toml
 """
 
 # In the order in which somebody new needs them.

@@ -9,7 +9,7 @@ from conftest import SCENARIO
 
 import stepdiag as sd
 from stepdiag.cli import main
-from stepdiag.observe import growth, observe, prospect_csv, prospects, without_errors
+from stepdiag.observe import extents, growth, observe, prospect_csv, prospects, without_errors
 from stepdiag.report import largest_uncertainties
 from stepdiag.scenario import parse_scenario
 
@@ -123,3 +123,54 @@ def test_mistakes_are_said_in_one_line(
     assert said.startswith("stepdiag: error: ")
     assert message in said
     assert said.count("\n") == 1
+
+
+# --- recovered where it can be ---------------------------------------------------------------------------------------
+def recovered(text: str) -> dict[str, float]:
+    """The largest error of each parameter that is determined as a whole, mm or rad, of a run without noise."""
+    scenario = parse_scenario(text)
+    truth = scenario.machine().errors
+    calibration = sd.evaluate_scenario(scenario, sd.simulate_scenario(scenario))
+    whole, _, _ = extents(calibration, scenario.plan)
+    functions = {name: calibration.functions[name] for name in whole if name in calibration.functions}
+    errors = {name: float(np.max(np.abs(v - truth.function(name, p)))) for name, (p, v, _) in functions.items()}
+    squareness = {
+        name: abs(calibration.squareness[name][0] - truth.squareness[name]) for name in calibration.squareness
+    }
+    return errors | squareness
+
+
+ALIGNED = SCENARIO.split("[misalignment]")[0].replace('layout = "ideal"', 'layout = "ideal"\ntilts = false')
+SOONS = ALIGNED.replace("[plan]", '[plan]\norder = ["XYZ", "YZX", "ZXY"]') + (
+    "[adjustment]\none_setup_per_line = true\n"
+)
+REFLECTOR = "[misalignment]\nreflector_urad = [100.0, 300.0]\n"
+
+FLOOR = 1e-11  # mm and rad: rounding of a decimetre, 1e-14, in steps known some hundred times worse
+# What stays open (scales of 250 µrad, tilts of 300) enters what is determined by its square, over a decimetre.
+SECOND_ORDER = 1e-5  # mm; over a step of 10 mm also rad
+
+
+def test_distances_in_three_orders_give_what_they_can() -> None:
+    found = recovered(SOONS)
+    assert found.keys() == {"EBY", "ECZ", "EAZ", "EBZ", "ECY", "EXY", "EXZ", "EYZ", "EZZ"}
+    assert max(found.values()) < SECOND_ORDER
+
+
+def test_distances_in_three_orders_with_face_diagonals_give_everything() -> None:
+    faces = '["ppp", "npp", "pnp", "nnp", "pp0", "np0", "p0p", "n0p", "0pp", "0np"]'
+    text = SOONS.replace('["ppp", "npp", "pnp", "nnp"]', faces)
+    for misalignment, limit in (("", FLOOR), (REFLECTOR, SECOND_ORDER)):
+        found = recovered(text + misalignment)
+        assert len(found) == 21
+        assert max(found.values()) < limit
+
+
+def test_machine_without_angles_is_recovered_from_distances() -> None:
+    text = ALIGNED.replace("seed = 7", "seed = 7\nrotation_urad = 0.0") + '[adjustment]\nangles = "fixed"\n'
+    found = recovered(text + REFLECTOR)
+    assert found.keys() == {f"E{a}{b}" for a in "XYZ" for b in "XYZ"} | {"C0Y", "B0Z", "A0Z"}
+    assert max(found.values()) < FLOOR
+    no_scales = recovered(text.replace('["p00", "0p0", "00p"]', "[]") + REFLECTOR)
+    assert no_scales.keys() == found.keys() - {"EXX", "EYY", "EZZ"}
+    assert max(no_scales.values()) < SECOND_ORDER
