@@ -43,12 +43,13 @@ inline constexpr PriorUncertainty fixed_unknown = 0.0;
 // psd_zero free; laser free, but known to 2000 urad where the constants of the layout's beams are not fixed; lateral
 // known to 1 mm, roll to 20,000 urad, gain to 0.01; drift fixed. A lateral offset, roll or gain acts by the tilts only,
 // which are 0 on a perfect machine: free means known to 1 m, 1 rad, 1, and one whose uncertainty stays above half of
-// that is not determined. Defaults of scale lines: reflector fixed, and their
-// tilts and spots then are not used; beams have a constant each; the laser's angles are fixed at 0, and what is given
-// as their standard uncertainty (500 urad) makes the cosine error travel (a^2 + b^2)/2 by which, with a mirror that is
-// square to the beam, their distances read
-// short; roll and gain fixed; the others as on measured lines. What is said of all lines reaches scale lines for
-// distance_constant and lateral only; the rest of a scale line's set-up is said by its own name.
+// that is not determined. Where no tilt tells the laser's angles from the mirror's (lines of a single axis, distances
+// alone) they act at second order only, and the distances get a cosine error of theirs.
+// Defaults of scale lines: reflector fixed, and their tilts and spots then are not used; beams have a constant each;
+// the laser's angles are fixed at 0, and what is given as their standard uncertainty (500 urad) makes the cosine error
+// travel (a^2 + b^2)/2 by which, with a mirror that is square to the beam, their distances read short; roll and gain
+// fixed; the others as on measured lines. What is said of all lines reaches scale lines for distance_constant and
+// lateral only; the rest of a scale line's set-up is said by its own name.
 using SetupPriors = std::array<std::optional<PriorUncertainty>, setup_quantity_count>;
 
 // Standard deviation with which the second difference of neighbouring nodes is known to be 0: real axes are smooth.
