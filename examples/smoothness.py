@@ -3,8 +3,6 @@
 python examples/smoothness.py
 """
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
@@ -38,9 +36,27 @@ def adjusted(virtual: sd.Machine, seed: int, smoothness: sd.Smoothness | None) -
     return sd.adjust(run, PLAN, sd.Head(), CHAIN, smoothness=smoothness)
 
 
-def errors(found: sd.Adjustment, truth: sd.ErrorMap) -> dict[str, FloatArray]:
-    functions = found.calibration.functions
-    return {name: value - truth.function(name, position) for name, (position, value, _) in functions.items()}
+def uncertainties(found: list[sd.Adjustment], angles: bool) -> list[FloatArray]:
+    """Standard uncertainties of all angles (µrad) or lengths (µm), by run and function."""
+    functions = [one.calibration.functions for one in found]
+    return [
+        in_micro(name, u) for by_name in functions for name, (_, _, u) in by_name.items() if is_angle(name) == angles
+    ]
+
+
+def errors(found: list[sd.Adjustment], truth: sd.ErrorMap, angles: bool) -> list[FloatArray]:
+    """What the calibrations say beyond the truth."""
+    functions = [one.calibration.functions for one in found]
+    return [
+        in_micro(name, value - truth.function(name, position))
+        for by_name in functions
+        for name, (position, value, _) in by_name.items()
+        if is_angle(name) == angles
+    ]
+
+
+def in_micro(name: str, values: FloatArray) -> FloatArray:
+    return values * (1e6 if is_angle(name) else 1e3)
 
 
 def rms(arrays: list[FloatArray]) -> float:
@@ -52,17 +68,23 @@ def main() -> None:
     ripple = {
         name: np.asarray(screwed.errors.functions[name][1] - plain.errors.functions[name][1]) for name in ("EXX", "EYY")
     }
-    print("| Smoothness | largest u | | rms error | | rms error, node to node | | variance factor | screw found | |")
-    print("|---|---|---|---|---|---|---|---|---|---|")
-    print("| | µm | µrad | µm | µrad | µm | µrad | with screw | EXX | EYY |")
+    print(
+        "| Smoothness | largest u | | rms u | | rms error | | from node to node | | variance factor | ripple found | |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|")
+    print("| | µm | µrad | µm | µrad | µm | µrad | µm | µrad | with screw | EXX | EYY |")
     for name, smoothness in CHOICES.items():
         without = [adjusted(plain, seed, smoothness) for seed in SEEDS]
         with_screw = [adjusted(screwed, seed, smoothness) for seed in SEEDS]
-        cells: list[Any] = []
-        columns = [(kinds_u(without, angles), values(without, plain, angles)) for angles in (False, True)]
-        cells += [f"{largest:.2f}" for largest, _ in columns]
-        cells += [f"{rms(found):.2f}" for _, found in columns]
-        cells += [f"{rms([np.diff(row) for row in found]):.2f}" for _, found in columns]
+        uncertainty = [uncertainties(without, angles) for angles in (False, True)]
+        error = [errors(without, plain.errors, angles) for angles in (False, True)]
+        numbers = [
+            *(float(np.max(np.concatenate(u))) for u in uncertainty),
+            *(rms(u) for u in uncertainty),
+            *(rms(e) for e in error),
+            *(rms([np.diff(row) for row in e]) for e in error),
+        ]
+        cells = [f"{number:.2f}" for number in numbers]
         cells.append(f"{np.mean([found.variance_factor for found in with_screw]):.1f}")
         for function, true in ripple.items():
             # The same noise in both runs: what differs is the answer to the screw error.
@@ -75,23 +97,6 @@ def main() -> None:
             share = np.mean([np.diff(answer, 2) @ curved for answer in answers]) / (curved @ curved)
             cells.append(f"{100.0 * share:.0f} %")
         print(f"| {name} | {' | '.join(cells)} |")
-
-
-def kinds_u(found: list[sd.Adjustment], angles: bool) -> float:
-    """The largest standard uncertainty of lengths (µm) or angles (µrad)."""
-    functions = [one.calibration.functions for one in found]
-    scale = 1e6 if angles else 1e3
-    return scale * max(
-        float(np.max(u)) for all_of in functions for name, (_, _, u) in all_of.items() if is_angle(name) == angles
-    )
-
-
-def values(found: list[sd.Adjustment], virtual: sd.Machine, angles: bool) -> list[FloatArray]:
-    """Errors of all lengths (µm) or angles (µrad)."""
-    scale = 1e6 if angles else 1e3
-    return [
-        scale * row for one in found for name, row in errors(one, virtual.errors).items() if is_angle(name) == angles
-    ]
 
 
 def is_angle(name: str) -> bool:

@@ -160,3 +160,15 @@ def test_init_never_overwrites(here: Path, capsys: pytest.CaptureFixture[str]) -
     assert run("init", "-o", "machine") == 2
     assert Path("machine/measurement.csv").read_text() == "mine"
     assert not Path("machine/scenario.toml").exists()
+
+
+def test_sheet_has_the_runs_of_all_orders_and_directions(here: Path) -> None:
+    keys = 'steps = 5\norder = ["XYZ", "YZX"]\nbackward = true'
+    Path("orders.toml").write_text(SCENARIO.replace("steps = 5", keys))
+    assert run("init", "-o", "sheets", "--sheet-for", "orders.toml") == 0
+    sheet = sd.read_measurement("sheets/measurement.csv")
+    simulated = sd.simulate_scenario(sd.read_scenario("orders.toml"))
+    for name in ("line", "direction"):
+        assert getattr(sheet, name) == getattr(simulated, name)
+    for name in ("run", "point", "position"):
+        assert getattr(sheet, name).tolist() == getattr(simulated, name).tolist()
