@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "evaluation/adjustment_result.hpp"
+#include "evaluation/outlier_search.hpp"
 
 namespace stepdiag {
 namespace {
@@ -34,7 +35,12 @@ Validation validate(AdjustmentSolver& solver, const Eigen::VectorXd& x, const De
     for (const ReadingResidual& residual : reading_residuals(equations, inverse))
         if (residual.used()) freedom += residual.redundancy;
     if (!(freedom > 0.0)) return {0.0, 1.0, 0.0};
-    return {count * square_sum / (freedom * freedom), square_sum / freedom, freedom};
+    // The smoothness has to fit, too: second differences as large as was said.
+    double roughness = 0.0;
+    const Eigen::VectorXd smoothed = x + dx;
+    for (const SmoothRow& row : equations.smooth_rows()) roughness += std::pow(row.value(smoothed), 2);
+    const double all = std::max(1.0, double(degrees_of_freedom(solver)));
+    return {count * square_sum / (freedom * freedom), (square_sum + roughness) / all, all};
 }
 
 // What was found may be smoother than what comes out with it, where curvature is coherent: not below that.
