@@ -20,6 +20,7 @@ AdjustmentSolver::AdjustmentSolver(const AdjustmentProblem& problem,
     equations_.linearise(Eigen::VectorXd::Zero(problem.size()));
     equations_.drop_roundings();
     factorize();
+    factorized_at_.setZero(problem.size());
     held_ = factor_->held();
     for (const int j : held_)  // the band has places without an unknown
         if (j >= 6 * problem.blocks() || j % 6 < 3 || problem.has_rotations()) dependent_.push_back(j);
@@ -48,7 +49,6 @@ void AdjustmentSolver::factorize() {
 }
 
 void AdjustmentSolver::refresh(const Eigen::VectorXd& x) {
-    if (factorized_at_.size() == 0) factorized_at_.setZero(x.size());  // by the constructor
     double change = 0.0;
     for (int j = 0; j < x.size(); ++j)
         change = std::max(change, std::abs(x[j] - factorized_at_[j]) * equations_.problem().change_scale()[j]);

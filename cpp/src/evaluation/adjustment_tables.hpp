@@ -23,7 +23,6 @@ struct LinearForm {
     void subtract(const LinearForm& other);
     double value(const Eigen::VectorXd& x) const;
     double variance(const BorderedBand& inverse) const;
-    double covariance(const Eigen::VectorXd& inverse_column) const { return value(inverse_column); }
 };
 
 // The nodes of a function that are (or may be) determined, and what each of its values is. Home is among them, with an
