@@ -172,10 +172,9 @@ def _check_heaps(content: bytes, path: Path) -> None:
         at, end = start + 16, start + size
         while sound and at + 16 <= end:
             index, length = struct.unpack_from("<H6xQ", content, at)
-            if index == 0:  # the free rest
-                break
-            at += 16 + (length + 7) // 8 * 8
-            sound = at <= end
+            step = length if index == 0 else 16 + (length + 7) // 8 * 8  # index 0: free, its header counted
+            at += step
+            sound = step >= 16 and at <= end
         if not sound:
             raise InvalidArgument(f"{path}: expected a netCDF file: a heap in it is damaged")
         start = content.find(signature, start + 8)

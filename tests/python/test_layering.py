@@ -18,6 +18,7 @@ BELOW: dict[str, set[str]] = {
     "head": {"optics", "measurement"},
     "simulation": {"machine", "plan", "head", "measurement"},
     "evaluation": {"machine", "plan", "measurement"},
+    "uncertainty": {"simulation", "evaluation"},
 }
 
 

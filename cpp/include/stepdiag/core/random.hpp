@@ -15,6 +15,8 @@ enum class RandomStream : std::uint32_t {
     camera_shot_noise = 16,
     camera_read_noise = 17,
     position_device = 18,
+    virtual_calibration = 32,
+    monte_carlo = 33,  // inputs of a model given by the user
 };
 
 // One block of random bits: its counter, and where one counter stands for many numbers (an image) the number of the

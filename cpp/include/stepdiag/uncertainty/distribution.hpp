@@ -1,0 +1,43 @@
+// The distributions that JCGM 101 (6.4) assigns to input quantities, by expectation and spread.
+#pragma once
+
+#include <limits>
+#include <string>
+
+namespace stepdiag {
+
+enum class DistributionKind {
+    normal,                  // spread: standard deviation
+    rectangular,             // spread: half width
+    triangular,              // spread: half width
+    arcsine,                 // spread: half width (U-shaped: a sinusoid of unknown phase)
+    student_t,               // spread: scale s/sqrt(n); `degrees_of_freedom`
+    curvilinear_trapezoid,   // spread: half width, itself known to plus and minus `edge` only (JCGM 101, 6.4.3)
+};
+std::string name(DistributionKind kind);  // "normal", ..., "t", "curvilinear_trapezoid"
+
+struct Distribution {
+    DistributionKind kind = DistributionKind::normal;
+    double expectation = 0.0;
+    double spread = 0.0;  // 0: the expectation itself
+    // Of a t distribution; of others those of their standard uncertainty (GUM G.4), infinite where it is known.
+    double degrees_of_freedom = std::numeric_limits<double>::infinity();
+    double edge = 0.0;
+
+    double standard_uncertainty() const;
+};
+
+// Throws InvalidArgument, beginning with `name`, for a spread that is negative or not finite, an edge that is not
+// between 0 and the spread, degrees of freedom not above 0, or a t distribution with two or fewer: it has no standard
+// uncertainty.
+void check(const Distribution& distribution, const std::string& name);
+
+// A number drawn: from `normal`, a standard normal number, or from uniform numbers in (0, 1), as many as the kind takes:
+// normal takes `normal`; student_t takes `normal` and u; curvilinear_trapezoid u and v; the others u.
+double draw(const Distribution& distribution, double normal, double u, double v);
+
+// The quantile function: of a normal, of a t distribution (coverage factors).
+double normal_quantile(double probability);
+double t_quantile(double probability, double degrees_of_freedom);
+
+}  // namespace stepdiag

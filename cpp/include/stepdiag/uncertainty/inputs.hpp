@@ -1,0 +1,88 @@
+// What is uncertain about a virtual calibration (JCGM 101: its input quantities). Two kinds:
+//  - an input is drawn once for each virtual calibration, as a deviation that is added to what is nominal;
+//  - reading noise is drawn for every reading (or pose).
+// Signs and frames as those of the nominal quantity: Misalignment, PoseError, Environment (CONVENTIONS).
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "stepdiag/uncertainty/distribution.hpp"
+
+namespace stepdiag {
+
+enum class InputQuantity {
+    // of the set-up of one line (`line`), components a, b or x, y; beam_constant: component counts d1 ... dn from 0
+    reflector,          // rad
+    laser,              // rad
+    psd_zero,           // mm
+    distance_constant,  // mm
+    beam_constant,      // mm
+    lateral,            // mm
+    roll,               // rad
+    gain,               // 1
+    drift,              // mm/s, of the line's distances since its first reading
+    scale_length,       // mm: what the distances of the line's last point read too much (a scale line's standard)
+    scale_factor,       // 1: distances read 1 + this times their travel from the line's first reading
+    // of the head (`part`: a component of its design, by name; of all lines that have it)
+    part_shift,     // mm, component x, y, z
+    part_rotation,  // rad, component about x, y, z
+    psd_distance,   // mm, closed layout psd: the true one beside the nominal one
+    beam_offset,    // mm, closed layout multi_beam: component 2 i: u of beam i, 2 i + 1: v
+    reading_model,  // 1: distances read this times L phi^2 too much (0: chief ray; -1.5: a single-mode interferometer)
+    // of the air (true air beside the assumed one)
+    temperature,       // degrees Celsius
+    pressure,          // Pa
+    humidity,          // 1
+    refractive_index,  // 1, relative: n is 1 + this times itself
+    wavelength,        // 1, relative: of the light, known to the counter as nominal
+    // of the machine
+    machine_drift,  // mm/s, component x, y, z, of the functional point since the first reading of the run
+};
+
+struct UncertainInput {
+    InputQuantity quantity;
+    Distribution distribution;
+    std::string line = {};  // of a set-up
+    std::string part = {};  // of a head
+    int component = 0;
+};
+// "reflector a of ppp", "shift x of splitter", ...: what reports call it.
+std::string name(const UncertainInput& input);
+
+enum class NoiseQuantity {
+    channel,         // of the channel `channel`, each reading by itself
+    common,          // mm: one draw a reading, of all its distances
+    head_walk,       // mm/sqrt(s): random walk of the distances from a line's first reading
+    machine_walk,    // mm/sqrt(s): random walk of the functional point from the run's first reading; component x, y, z
+    position,        // mm: repeatability of the functional point at every pose; component x, y, z
+    orientation,     // rad: repeatability of the tool's orientation; component about x, y, z
+};
+
+struct ReadingNoise {
+    NoiseQuantity quantity;
+    Distribution distribution;  // walks: normal
+    std::string channel = {};   // "distance", "alpha", "d1", ...
+    int component = 0;
+};
+std::string name(const ReadingNoise& noise);
+
+// Inputs that are jointly normal: `members` index UncertainInputs::inputs, all of them normal.
+struct CorrelatedInputs {
+    std::vector<int> members;
+    Eigen::MatrixXd correlation;
+};
+
+struct UncertainInputs {
+    std::vector<UncertainInput> inputs = {};
+    std::vector<ReadingNoise> noise = {};
+    std::vector<CorrelatedInputs> correlations = {};
+};
+
+// Throws InvalidArgument for an input given twice, a distribution that makes no sense, members that are out of range,
+// not normal or in two correlations, a matrix that is no correlation (size, symmetry, 1 on the diagonal, not positive
+// semidefinite).
+void check(const UncertainInputs& inputs);
+
+}  // namespace stepdiag

@@ -1,0 +1,65 @@
+// Whole virtual calibrations: draw the inputs, set up head and mirror, trace every pose by replay, add noise, reduce,
+// evaluate. Samples in lanes; the sample with index i is a pure function of (seed, i).
+// Counters of random numbers: RandomBlock{sample, item, draw} of the stream `virtual_calibration`; items: see
+// cpp/src/uncertainty/draws.hpp, their one home.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "stepdiag/evaluation/batch.hpp"
+#include "stepdiag/simulation/simulate.hpp"
+#include "stepdiag/uncertainty/inputs.hpp"
+#include "stepdiag/uncertainty/sample_model.hpp"
+
+namespace stepdiag {
+
+// What a run is made of, and what is uncertain about it. Noise in `simulation` is not used: `inputs` has it.
+struct VirtualRun {
+    Machine machine;
+    Plan plan;
+    Heads heads;                    // as they are
+    HeadCalibrations calibration;   // as the evaluation takes them
+    SimulationOptions simulation;   // nominal set-ups, air, repeats
+    UncertainInputs inputs;
+    double seconds_per_reading = 1.0;  // where drifts or walks need times and the simulation says none
+};
+
+// Quantities derived from a calibration's values, appended to them as outputs: rows of a matrix on the entries.
+struct DerivedOutput {
+    std::string name;       // "e_x at (400, 300, 250)"
+    std::string unit;       // "mm", "rad"
+    Eigen::VectorXd row;    // coefficients by entry
+};
+
+// Deviations of one sample's inputs (order of UncertainInputs::inputs).
+Eigen::VectorXd drawn_inputs(const UncertainInputs& inputs, std::uint64_t seed, std::uint64_t sample);
+
+class VirtualCalibrations : public SampleModel {
+public:
+    // Throws InvalidArgument for inputs of lines, parts or channels that are not there, what simulate and the
+    // evaluation refuse.
+    VirtualCalibrations(const VirtualRun& run, const BatchOptions& evaluation, std::uint64_t seed,
+                        std::vector<DerivedOutput> derived = {});
+    ~VirtualCalibrations() override;
+
+    const std::vector<Output>& outputs() const override;
+    std::unique_ptr<Worker> worker() const override;
+
+    const BatchEvaluator& evaluator() const;
+    const Measurement& nominal() const;  // the run with every input at its expectation, without noise
+
+    // The outputs for given deviations of the inputs (a column a case), without reading noise: for propagation.
+    Eigen::MatrixXd evaluate_at(const Eigen::MatrixXd& deviations) const;
+    // Raw readings of one sample, noise included: [row * channels + channel]; for tests.
+    Eigen::VectorXd readings(std::uint64_t sample) const;
+
+private:
+    struct State;
+    std::unique_ptr<const State> state_;
+};
+
+}  // namespace stepdiag
