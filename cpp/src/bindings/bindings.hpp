@@ -51,6 +51,7 @@ Eigen::VectorXd to_vector(const py::handle& array, const char* name);  // any le
 Eigen::Vector3d to_vector3(const py::handle& array, const char* name);
 Eigen::Vector2d to_vector2(const py::handle& array, const char* name);
 Points to_points(const py::handle& array, const char* name);  // (n, 3)
+Eigen::MatrixXd to_matrix(const py::handle& array, const char* name);
 std::int64_t to_integer(const IntegerLike& number, const std::string& name, std::int64_t lowest, std::int64_t highest);
 int to_int(const IntegerLike& number, const std::string& name);  // any that an int holds
 std::uint64_t to_seed(const IntegerLike& number);
@@ -81,6 +82,7 @@ void bind_detectors(py::module_& m);
 void bind_evaluation(py::module_& m);
 void bind_adjustment(py::module_& m);
 void bind_calibration(py::module_& m);  // after bind_evaluation
+void bind_uncertain_inputs(py::module_& m);
 
 }  // namespace stepdiag::bindings
 

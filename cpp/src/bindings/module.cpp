@@ -85,6 +85,15 @@ Points to_points(const py::handle& object, const char* name) {
     return Eigen::Map<const Points>(array.data(), array.shape(0), 3);
 }
 
+Eigen::MatrixXd to_matrix(const py::handle& object, const char* name) {
+    const DoubleArray array = to_array(object, name);
+    if (array.ndim() != 2)
+        throw InvalidArgument(std::string(name) + ": expected two dimensions, got shape " +
+                              std::string(py::str(py::object(array.attr("shape")))));
+    return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+        array.data(), array.shape(0), array.shape(1));
+}
+
 std::string to_path(const PathLike& path) {
     // Any bytes may name a file, but for the one that ends a name in C.
     const auto name = py::module_::import("os").attr("fsencode")(path).cast<std::string>();
@@ -159,4 +168,5 @@ PYBIND11_MODULE(_core, m) {
     bind_evaluation(m);
     bind_adjustment(m);
     bind_calibration(m);
+    bind_uncertain_inputs(m);
 }

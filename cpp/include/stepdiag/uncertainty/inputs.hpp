@@ -41,6 +41,9 @@ enum class InputQuantity {
     machine_drift,  // mm/s, component x, y, z, of the functional point since the first reading of the run
 };
 
+std::string name(InputQuantity quantity);  // "reflector", ..., "machine_drift"
+InputQuantity parse_input_quantity(const std::string& name);
+
 struct UncertainInput {
     InputQuantity quantity;
     Distribution distribution;
@@ -48,17 +51,20 @@ struct UncertainInput {
     std::string part = {};  // of a head
     int component = 0;
 };
-// "reflector a of ppp", "shift x of splitter", ...: what reports call it.
+// "reflector a of ppp", "beam constant d1 of ppp", "shift x of splitter", "temperature", ...: what reports call it.
 std::string name(const UncertainInput& input);
 
 enum class NoiseQuantity {
-    channel,         // of the channel `channel`, each reading by itself
-    common,          // mm: one draw a reading, of all its distances
-    head_walk,       // mm/sqrt(s): random walk of the distances from a line's first reading
-    machine_walk,    // mm/sqrt(s): random walk of the functional point from the run's first reading; component x, y, z
-    position,        // mm: repeatability of the functional point at every pose; component x, y, z
-    orientation,     // rad: repeatability of the tool's orientation; component about x, y, z
+    channel,       // of the channel `channel`, each reading by itself
+    common,        // mm: one draw a reading, of all its distances
+    head_walk,     // mm/sqrt(s): random walk of the distances from a line's first reading
+    machine_walk,  // mm/sqrt(s): random walk of the functional point from the run's first reading; component x, y, z
+    position,      // mm: repeatability of the functional point at every pose; component x, y, z
+    orientation,   // rad: repeatability of the tool's orientation; component about x, y, z
 };
+
+std::string name(NoiseQuantity quantity);  // "channel", ..., "orientation"
+NoiseQuantity parse_noise_quantity(const std::string& name);
 
 struct ReadingNoise {
     NoiseQuantity quantity;
@@ -66,6 +72,7 @@ struct ReadingNoise {
     std::string channel = {};   // "distance", "alpha", "d1", ...
     int component = 0;
 };
+// "noise of distance", "common noise", "head walk", "machine walk x", "position x", "orientation x".
 std::string name(const ReadingNoise& noise);
 
 // Inputs that are jointly normal: `members` index UncertainInputs::inputs, all of them normal.
@@ -80,9 +87,13 @@ struct UncertainInputs {
     std::vector<CorrelatedInputs> correlations = {};
 };
 
-// Throws InvalidArgument for an input given twice, a distribution that makes no sense, members that are out of range,
-// not normal or in two correlations, a matrix that is no correlation (size, symmetry, 1 on the diagonal, not positive
-// semidefinite).
+// Throws InvalidArgument for an input given twice, a component, line or part that its quantity does not have, a
+// distribution that makes no sense, members that are out of range, not normal or in two correlations, a matrix that is
+// no correlation (size, symmetry, 1 on the diagonal, not positive semidefinite).
 void check(const UncertainInputs& inputs);
+
+// F with F F^T = `correlation`: F times independent standard normal numbers has that correlation. Semidefinite ones are
+// taken too. Throws InvalidArgument, beginning with `name`, for what is no correlation matrix.
+Eigen::MatrixXd correlation_factor(const Eigen::MatrixXd& correlation, const std::string& name);
 
 }  // namespace stepdiag
