@@ -14,7 +14,7 @@ namespace stepdiag {
 struct SampleBlock {
     std::uint64_t first_sample;  // a multiple of lane_group
     std::size_t samples;         // a multiple of lane_group
-    double* outputs;             // outputs[output * samples + sample]; NaN in all outputs of a sample that gave no result
+    double* outputs;  // outputs[output * samples + sample]; NaN in all outputs of a sample that gave no result
 
     double* output(std::size_t index) const { return outputs + index * samples; }
 };
@@ -24,11 +24,16 @@ public:
     virtual ~SampleModel() = default;
 
     struct Output {
-        std::string name;      // "EXX", "C0Y", ...
-        double position;       // mm; NaN where it has none
-        std::string unit;      // "mm", "rad", "1"
+        std::string name;  // "EXX", "C0Y", ...
+        double position;   // mm; NaN where it has none
+        std::string unit;  // "mm", "rad", "1"
     };
     virtual const std::vector<Output>& outputs() const = 0;
+
+    // What the bits of a sample depend on, beside the model itself: results record them, and only what agrees in them
+    // is merged.
+    virtual std::uint64_t seed() const = 0;
+    virtual std::string target() const = 0;  // the instruction set: replay_target()
 
     // One a thread: holds what a thread writes to. Outlives no model.
     class Worker {

@@ -47,6 +47,8 @@ public:
     ~VirtualCalibrations() override;
 
     const std::vector<Output>& outputs() const override;
+    std::uint64_t seed() const override;
+    std::string target() const override;
     std::unique_ptr<Worker> worker() const override;
 
     const BatchEvaluator& evaluator() const;
