@@ -83,6 +83,7 @@ void bind_evaluation(py::module_& m);
 void bind_adjustment(py::module_& m);
 void bind_calibration(py::module_& m);  // after bind_evaluation
 void bind_uncertain_inputs(py::module_& m);
+void bind_sample_model(py::module_& m);
 
 }  // namespace stepdiag::bindings
 

@@ -169,4 +169,5 @@ PYBIND11_MODULE(_core, m) {
     bind_adjustment(m);
     bind_calibration(m);
     bind_uncertain_inputs(m);
+    bind_sample_model(m);
 }
