@@ -1,0 +1,43 @@
+// Sums up what inputs contribute to the outputs' uncertainty: variances, budget, covariance, Welch-Satterthwaite. Internal.
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "stepdiag/uncertainty/propagation.hpp"
+
+namespace stepdiag {
+
+class Contributions {
+public:
+    Contributions(std::vector<SampleModel::Output> outputs, Eigen::VectorXd value, bool full_covariance);
+
+    // Independent standard normal numbers act through the columns of `effect` (a row each output). Their standard
+    // uncertainties come from one estimate, with these degrees of freedom.
+    void add(const std::string& group, const Eigen::MatrixXd& effect, double degrees_of_freedom);
+    // A covariance of the outputs themselves.
+    void add_covariance(const std::string& group, const Eigen::MatrixXd& covariance);
+    // Inputs with their c_i u_i as columns, correlated where `correlation` is not empty.
+    void add_inputs(const std::vector<PropagatedInput>& inputs, const Eigen::MatrixXd& first_order,
+                    const Eigen::MatrixXd& second_order, const Eigen::MatrixXd& correlation);
+
+    Propagation result() const;
+
+private:
+    Eigen::VectorXd& group_variance(const std::string& group);
+    void add_estimate(const Eigen::VectorXd& variance, double degrees_of_freedom);
+
+    Propagation sum_;
+    bool full_covariance_;
+    Eigen::VectorXd variance_;
+    Eigen::VectorXd satterthwaite_;  // sum u_i^4/nu_i
+    std::vector<std::string> groups_;
+    std::vector<Eigen::VectorXd> group_variances_;
+};
+
+// Throws InvalidArgument beginning with `what`: size, symmetry, 1 on the diagonal, positive semidefinite.
+void check_correlation(const Eigen::MatrixXd& correlation, Eigen::Index size, const std::string& what);
+
+}  // namespace stepdiag
