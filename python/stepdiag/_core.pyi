@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['Adjustment', 'BeamSegment', 'BeamSpot', 'Calibration', 'Camera', 'Chain', 'Environment', 'ErrorMap', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'Noise', 'Outlier', 'Plan', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'adjust', 'beam_radius', 'couple', 'cramer_rao_bound', 'evaluate', 'expose', 'head_sensitivities', 'largest_repeat_count', 'locate', 'power_inside', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'simulate', 'straightness_reference', 'trace_beams']
+__all__: list[str] = ['Adjustment', 'BeamSegment', 'BeamSpot', 'Calibration', 'Camera', 'Chain', 'Distribution', 'Environment', 'ErrorMap', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'Noise', 'Outlier', 'Plan', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'UncertainInput', 'UncertainInputs', 'adjust', 'beam_radius', 'couple', 'cramer_rao_bound', 'evaluate', 'expose', 'head_sensitivities', 'largest_repeat_count', 'locate', 'normal_quantile', 'power_inside', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -955,6 +955,98 @@ class Adjustment:
     @property
     def weighted_square_sum(self) -> float:
         ...
+class Distribution:
+    """
+    A distribution that JCGM 101 (6.4) assigns to an input quantity: "normal" (spread: standard deviation), "rectangular", "triangular", "arcsine" (half width), "t" (scale; degrees_of_freedom), "curvilinear_trapezoid" (half width, known to plus and minus edge only).
+    """
+    def __init__(self, kind: str = 'normal', *, spread: typing.SupportsFloat | typing.SupportsIndex, expectation: typing.SupportsFloat | typing.SupportsIndex = 0.0, degrees_of_freedom: typing.SupportsFloat | typing.SupportsIndex = ..., edge: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        """
+        degrees_of_freedom of a kind other than t: those of its standard uncertainty (GUM G.4). Raises InvalidArgument for a spread below 0, an edge not between 0 and the half width, degrees of freedom not above 0 (t: 2).
+        """
+    @property
+    def degrees_of_freedom(self) -> float:
+        ...
+    @property
+    def edge(self) -> float:
+        ...
+    @property
+    def expectation(self) -> float:
+        ...
+    @property
+    def kind(self) -> str:
+        ...
+    @property
+    def spread(self) -> float:
+        ...
+    @property
+    def standard_uncertainty(self) -> float:
+        ...
+class UncertainInput:
+    """
+    An input quantity that is drawn once for each virtual calibration, as a deviation added to what is nominal. quantity: "reflector", "laser" (rad, component a, b: 0, 1), "psd_zero", "lateral" (mm, x, y), "distance_constant" (mm), "beam_constant" (mm, of beam `component`), "roll" (rad), "gain" (1), "drift" (mm/s), "scale_length" (mm), "scale_factor" (1): of a line; "part_shift" (mm), "part_rotation" (rad): of a part of the head; "psd_distance", "beam_offset" (mm), "reading_model" (1): of the head; "temperature" (degrees Celsius), "pressure" (Pa), "humidity" (1), "refractive_index", "wavelength" (1, relative): of the air; "machine_drift" (mm/s, x, y, z).
+    """
+    def __init__(self, quantity: str, distribution: Distribution, *, line: str = '', part: str = '', component: typing.SupportsIndex = 0) -> None:
+        """
+        Raises InvalidArgument for a quantity that is not known.
+        """
+    @property
+    def component(self) -> int:
+        ...
+    @property
+    def distribution(self) -> Distribution:
+        ...
+    @property
+    def line(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def part(self) -> str:
+        ...
+    @property
+    def quantity(self) -> str:
+        ...
+class ReadingNoise:
+    """
+    What is drawn for every reading or pose. quantity: "channel" (of the channel named), "common" (mm, one draw a reading for all its distances), "head_walk", "machine_walk" (mm/sqrt(s), random walks), "position" (mm), "orientation" (rad): repeatability of the machine, component x, y, z.
+    """
+    def __init__(self, quantity: str, distribution: Distribution, *, channel: str = '', component: typing.SupportsIndex = 0) -> None:
+        """
+        Raises InvalidArgument for a quantity that is not known.
+        """
+    @property
+    def channel(self) -> str:
+        ...
+    @property
+    def component(self) -> int:
+        ...
+    @property
+    def distribution(self) -> Distribution:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def quantity(self) -> str:
+        ...
+class UncertainInputs:
+    """
+    What is uncertain about a virtual calibration.
+    """
+    def __init__(self, inputs: collections.abc.Sequence[UncertainInput] = [], noise: collections.abc.Sequence[ReadingNoise] = [], correlations: collections.abc.Sequence[tuple[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], numpy.typing.ArrayLike]] = []) -> None:
+        """
+        correlations: pairs of indices of normal inputs and their correlation matrix. Raises InvalidArgument for an input given twice, a line, part or component that its quantity does not have, a matrix that is no correlation.
+        """
+    @property
+    def correlations(self) -> list[tuple[list[int], numpy.typing.NDArray[numpy.float64]]]:
+        ...
+    @property
+    def inputs(self) -> list[UncertainInput]:
+        ...
+    @property
+    def noise(self) -> list[ReadingNoise]:
+        ...
 def adjust(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.01, full_covariance: bool = False) -> Adjustment:
     """
     The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. setup_by_line replaces the quantities that it names. Raises InvalidArgument.
@@ -993,6 +1085,10 @@ def locate(device: LateralEffect, spots: collections.abc.Sequence[BeamSpot], *, 
     """
     Position (2,) that the device gives for these spots, mm from its centre; None below its least power.
     """
+def normal_quantile(probability: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    The number that a standard normal number is below with this probability. Raises InvalidArgument.
+    """
 def power_inside(spot: BeamSpot, low: numpy.typing.ArrayLike, high: numpy.typing.ArrayLike) -> float:
     """
     Share of the source's power that a spot has in the rectangle between two corners (2,), mm.
@@ -1028,6 +1124,10 @@ def simulate(machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[
 def straightness_reference(chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0)) -> str:
     """
     One line: to which point straightnesses refer, and what they are at the functional point.
+    """
+def t_quantile(probability: typing.SupportsFloat | typing.SupportsIndex, degrees_of_freedom: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    The same of Student's t distribution (coverage factors, GUM G.3). Raises InvalidArgument.
     """
 def trace_beams(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment | None = None) -> list[BeamSegment]:
     """

@@ -16,6 +16,9 @@ BY_LINE: Final = "by_line"
 BY_HEAD: Final = "by_head"
 KEPT_UNDER: Final = (BY_LINE, BY_HEAD)
 
+# The type of pydantic's errors whose context says where below their key something is wrong, and what.
+OWN_WORDS: Final = "own_words"
+
 
 def explain(error: ValidationError, content: Mapping[str, Any], file: str, root: type[Section]) -> InvalidArgument:
     """The first thing wrong; unknown keys come first, for a misspelt key is also a missing one."""
@@ -48,6 +51,8 @@ def _sentence(detail: ErrorDetails, content: Mapping[str, Any], root: type[Secti
         known = [name for name in section.model_fields if name not in KEPT_UNDER]
         what = "section" if len(names) == 1 and isinstance(content[names[0]], dict) else "key"
         return f"{place}: unknown {what}; {suggest(names[-1], known)}"
+    if detail["type"] == OWN_WORDS:
+        return f"{place}{detail['ctx']['below']}: {detail['ctx']['said']}"
     expected = expectation(field) if field is not None else f"a section [{place}]"
     value: Any = content
     for name in names:

@@ -20,6 +20,7 @@ from stepdiag.scenario_adjustment import setup_priors, smoothness_of
 from stepdiag.scenario_heads import DescribedHead, actual_heads, heads_by_line, nominal_heads, of_run, signals_of
 from stepdiag.scenario_keys import TABLES_BY_NAME, PlanSection, RandomSection, ScenarioKeys
 from stepdiag.scenario_setup import environments, misalignments, noise_of, weights
+from stepdiag.scenario_uncertainty import uncertain_inputs
 from stepdiag.sections import MICROMETRE, MICRORADIAN
 from stepdiag.sheet import only
 from stepdiag.toml_text import check_keys, located, parse_toml
@@ -45,6 +46,7 @@ class Scenario:
     setup: _core.SetupPriors
     setup_by_line: Mapping[str, _core.SetupPriors]
     smoothness: _core.Smoothness | None
+    uncertain: _core.UncertainInputs
 
     @property
     def head(self) -> _core.Head:
@@ -166,8 +168,12 @@ def _by_name(name: str, section: Any, file: str) -> Any:
     if place in section:
         raise InvalidArgument(f"{file}: {name}.{place}: unknown key")
     (model,) = models_of(ScenarioKeys.model_fields[name].annotation)
-    named = {key: value for key, value in section.items() if isinstance(value, dict) and key not in model.model_fields}
+    named = {key: value for key, value in section.items() if key not in model.model_fields and _is_table(value)}
     return {key: value for key, value in section.items() if key not in named} | {place: named}
+
+
+def _is_table(value: Any) -> bool:
+    return isinstance(value, dict) and "distribution" not in value  # which is the value of a misspelt key
 
 
 def build_scenario(keys: ScenarioKeys, path: Path) -> Scenario:
@@ -211,6 +217,7 @@ def build_scenario(keys: ScenarioKeys, path: Path) -> Scenario:
         setup=setup,
         setup_by_line=MappingProxyType(setup_by_line),
         smoothness=smoothness_of(keys.smoothness, path),
+        uncertain=uncertain_inputs(keys, described, heads, path),
     )
 
 

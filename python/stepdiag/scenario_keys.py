@@ -32,6 +32,7 @@ from stepdiag.sections import (
     key,
     tables,
 )
+from stepdiag.uncertainty_keys import UncertaintySection
 
 # Limits that the core checks as well; here they keep numbers inside the integer types behind the bindings.
 LARGEST_STEPS: Final = Plan.largest_step_count
@@ -178,17 +179,6 @@ class NoiseSection(Section):
     seed: Seed = key(SEED, "Seed of the noise.", 0)
 
 
-class UncertaintySection(Section):
-    """Standard uncertainties of the readings, for an evaluation's weights and results.
-
-    By default the positive standard deviations of `[noise]`, else 0.1 µm, 1 µrad and 1 µm; each key by itself.
-    Columns u_... of a measurement file come before these."""
-
-    distance_um: Positive | None = key(POSITIVE, "Of distances (also d1, d2, ...).", None, 0.1)
-    tilt_urad: Positive | None = key(POSITIVE, "Of the tilts.", None, 1.0)
-    spot_um: Positive | None = key(POSITIVE, "Of the spot position.", None, 1.0)
-
-
 class ScenarioKeys(Section):
     """The whole file, section by section."""
 
@@ -206,5 +196,5 @@ class ScenarioKeys(Section):
 
 
 # Sections that may hold tables of the user's own names, and where these are kept.
-SECTIONS_BY_LINE: Final = ("misalignment", "adjustment")
-TABLES_BY_NAME: Final = {"misalignment": BY_LINE, "adjustment": BY_LINE, "head": BY_HEAD}
+SECTIONS_BY_LINE: Final = ("misalignment", "adjustment", "uncertainty")
+TABLES_BY_NAME: Final = {"misalignment": BY_LINE, "adjustment": BY_LINE, "uncertainty": BY_LINE, "head": BY_HEAD}

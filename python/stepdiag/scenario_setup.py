@@ -117,7 +117,9 @@ def weights(keys: ScenarioKeys) -> _core.ReadingUncertainty:
         ("spot", "spot_um", MICROMETRE),
     ):
         # A standard deviation of 0 makes a perfect simulation; it is no statement about readings.
-        value = getattr(keys.uncertainty, key) or getattr(keys.noise, key)
-        if value > 0.0:
-            given[name] = value * unit
+        stated, deviation = getattr(keys.uncertainty, key), getattr(keys.noise, key)
+        if stated is not None:
+            given[name] = stated.native(unit).standard_uncertainty
+        elif deviation > 0.0:
+            given[name] = deviation * unit
     return _core.ReadingUncertainty(**given)

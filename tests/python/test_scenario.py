@@ -187,7 +187,7 @@ MALFORMED = [
     ("seed = 7", "seed = 7\nintervals = 1", "machine.random.intervals: expected an integer from 2 to 1000000, got 1"),
     ("laser_urad = [700, 1000]", "laser_urad = [0, 1e5]", "misalignment.npp.laser_urad: expected two angles below 0.1 rad, in µrad, got [0, 100000.0]"),
     ("distance_um = 0.2", "distance_um = -0.2", "noise.distance_um: expected a standard deviation of at least 0, got -0.2"),
-    ("[noise]", "[uncertainty]\ntilt_urad = 0\n[noise]", "uncertainty.tilt_urad: expected a positive number, got 0"),
+    ("[noise]", "[uncertainty]\ntilt_urad = 0\n[noise]", "uncertainty.tilt_urad: expected a positive standard deviation or a distribution, got 0"),
     ("[noise]", "[environment]\nrefractive_index = 0.9\n[noise]", "environment.refractive_index: expected a refractive index from 1 to 2, got 0.9"),
     ("[noise]", '[adjustment]\ngain = "fre"\n[noise]', 'adjustment.gain: expected "free", "fixed" or a positive standard uncertainty, got "fre"'),
     ("[noise]", "[adjustment.ppp]\ngain = -1\n[noise]", 'adjustment.ppp.gain: expected "free", "fixed" or a positive standard uncertainty, got -1'),

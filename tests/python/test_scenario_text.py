@@ -15,7 +15,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 # Of two things that exclude each other the template can have one; these are the other ones.
 OTHERS = ("layout", "psd_distance_mm", "beam_offsets_mm", "wavelength_nm", "aperture_mm", "errors", "head")
-OTHERS += ("refractive_index", "beam_constants_um")
+OTHERS += ("refractive_index", "beam_constants_um", "beam_offsets_um")
 
 
 @pytest.mark.parametrize(("page", "root"), [("scenario.md", ScenarioKeys), ("head.md", HeadFile)])
