@@ -125,7 +125,7 @@ def _check_fit(
             raise InvalidArgument(f"{place}.{name}: goes with the layout {show(needed)}, got {show(head.layout)}")
         if name in BY_LAYOUT and designed:
             raise InvalidArgument(
-                f"{place}.{name}: goes with a head by its layout; for a description there is [uncertainty.head.COMPONENT]"
+                f"{place}.{name}: goes with a head by its layout; a description has [uncertainty.head.COMPONENT]"
             )
         if name == "gain" and designed and head.layout == "multi_beam":
             raise InvalidArgument(f"{place}.gain: the beams of a described head stand where its design says")

@@ -111,9 +111,9 @@ class UncertaintySection(SetupUncertaintyKeys):
     degrees of freedom, degrees_of_freedom of their standard uncertainty. All of it is deviations from what the other
     sections say, in the unit of the key.
 
-    `distance_um`, `tilt_urad` and `spot_um` are also all that an evaluation uses of it: their standard uncertainties are
-    its weights. By default they are the positive standard deviations of `[noise]`, else 0.1 µm, 1 µrad and 1 µm; each
-    key by itself. Columns u_... of a measurement file come before these.
+    `distance_um`, `tilt_urad` and `spot_um` are all that an evaluation uses of it: their standard uncertainties are its
+    weights. By default they are the positive standard deviations of `[noise]`, else 0.1 µm, 1 µrad and 1 µm; each key
+    by itself. Columns u_... of a measurement file come before these.
 
     Keys of a set-up, from `reflector_urad` to `drift_um_per_h`, hold for each of `plan.lines` by itself;
     `[uncertainty.LINE]` replaces, for one line, the keys it names. Scale lines have those of their own tables only, and
