@@ -128,9 +128,10 @@ double refractive_index(const Environment& environment, double wavelength) {
     if (const double* constant = std::get_if<double>(&environment.air)) {
         if (!(std::isfinite(*constant) && *constant >= 1.0))
             throw InvalidArgument("refractive_index: expected a finite value of at least 1");
-        return *constant;
+        return *constant * (1.0 + environment.relative_error);
     }
-    return refractive_index(std::get<Air>(environment.air), wavelength, environment.equation);
+    return refractive_index(std::get<Air>(environment.air), wavelength, environment.equation) *
+           (1.0 + environment.relative_error);
 }
 
 double refractive_index(const Glass& glass, double wavelength) {

@@ -37,6 +37,7 @@ double refractive_index(const Air& air, double wavelength, AirEquation equation 
 struct Environment {
     std::variant<double, Air> air = 1.0;
     AirEquation equation = AirEquation::ciddor;
+    double relative_error = 0.0;  // the index is 1 + this times what the constant or the equation says
 };
 double refractive_index(const Environment& environment, double wavelength);
 

@@ -1,5 +1,18 @@
 // Whole virtual calibrations: draw the inputs, set up head and mirror, trace every pose by replay, add noise, reduce,
 // evaluate. Samples in lanes; the sample with index i is a pure function of (seed, i).
+// Sample i is simulate() of a run in which the drawn deviations are added to what is nominal, and then the evaluation
+// with the unperturbed calibration:
+//   set-ups      Misalignment of each line
+//   head         PoseError of each component (shift and rotation vector); psd_distance, beam_offsets of closed layouts
+//   air          the true environment, n times 1 + refractive_index; readings are reduced with the nominal or assumed
+//   tool poses   p + machine_drift t + walk + position noise, R = Exp(orientation noise) R of the machine's errors,
+//                t from the run's first reading
+// A distance d of simulate(), its set-up included, is read as
+//   (d + reading_model L tan^2 phi) / (1 + wavelength) + scale_factor s + (at the line's last point) scale_length +
+//   noise
+// with L and phi of the head's axis, s the commanded travel from the line's first point, the walk of the head counting
+// from a set-up's first reading. What does not matter is left out: dispersion over the wavelength's error. A sample in
+// which a reading is lost, or whose air is out of the equation's range, has no result.
 // Counters of random numbers: RandomBlock{sample, item, draw} of the stream `virtual_calibration`; items: see
 // cpp/src/uncertainty/draws.hpp, their one home.
 #pragma once
@@ -21,18 +34,18 @@ namespace stepdiag {
 struct VirtualRun {
     Machine machine;
     Plan plan;
-    Heads heads;                    // as they are
-    HeadCalibrations calibration;   // as the evaluation takes them
-    SimulationOptions simulation;   // nominal set-ups, air, repeats
+    Heads heads;                   // as they are
+    HeadCalibrations calibration;  // as the evaluation takes them
+    SimulationOptions simulation;  // nominal set-ups, air, repeats
     UncertainInputs inputs;
     double seconds_per_reading = 1.0;  // where drifts or walks need times and the simulation says none
 };
 
 // Quantities derived from a calibration's values, appended to them as outputs: rows of a matrix on the entries.
 struct DerivedOutput {
-    std::string name;       // "e_x at (400, 300, 250)"
-    std::string unit;       // "mm", "rad"
-    Eigen::VectorXd row;    // coefficients by entry
+    std::string name;     // "e_x at (400, 300, 250)"
+    std::string unit;     // "mm", "rad"
+    Eigen::VectorXd row;  // coefficients by entry
 };
 
 // Deviations of one sample's inputs (order of UncertainInputs::inputs).
@@ -60,6 +73,7 @@ public:
     Eigen::VectorXd readings(std::uint64_t sample) const;
 
 private:
+    class Lanes;
     struct State;
     std::unique_ptr<const State> state_;
 };

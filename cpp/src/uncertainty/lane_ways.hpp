@@ -1,0 +1,55 @@
+// The ways of a head's beams as the run with every input at its expectation has them, recorded once for all samples.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "head/recorded_route.hpp"
+#include "stepdiag/head/nominal_head.hpp"
+#include "uncertainty/run_model.hpp"
+
+namespace stepdiag {
+
+// A component of a design that inputs move.
+struct MovedComponent {
+    int component;  // bodies, beams, sensors counted through
+    Placement designed;
+    PoseError nominal;
+    Placement expected;                       // where the ways were recorded
+    std::vector<std::pair<int, int>> inputs;  // number (MovedPart), input
+
+    Placement at(const std::vector<double>& deviations) const;
+};
+
+struct BeamWay {
+    int beam;
+    int channel;
+    double wavelength;
+    Ray source;
+    Placement detector;
+    double air_index;
+    RecordedRoute route;
+    std::size_t mirror_at;  // encounter with the mirror
+    std::vector<FaceFrame> frames;
+    std::vector<Outline> outlines;
+    std::vector<int> component;  // of each face
+    int source_component, detector_component;
+};
+
+struct HeadWays {
+    const Head* head;
+    Outline mirror;  // as small as a mirror that turns with the tool is at least
+    double gap;
+    std::vector<BeamWay> beams;  // of a design
+    NominalHead nominal;
+    std::vector<MovedComponent> moved;
+};
+
+// None where samples of this head cannot be replayed: its detectors see more than the axis of one beam (cameras,
+// coupled modes, ghosts), draw numbers or round, its nominal light does not arrive as designed, or another face is
+// near.
+std::optional<HeadWays> record_ways(const RunModel& model, const Head& head);
+
+}  // namespace stepdiag

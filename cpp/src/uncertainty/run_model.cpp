@@ -1,0 +1,253 @@
+#include "uncertainty/run_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "head/assembly.hpp"
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+namespace {
+
+std::vector<double> numbers_of(const Misalignment& misalignment, std::size_t beams) {
+    std::vector<double> numbers(slot::beam_constant + beams, 0.0);
+    for (int k = 0; k < 2; ++k) {
+        numbers[slot::reflector + k] = misalignment.reflector[k];
+        numbers[slot::laser + k] = misalignment.laser[k];
+        numbers[slot::lateral + k] = misalignment.lateral[k];
+        numbers[slot::psd_zero + k] = misalignment.psd_zero[k];
+    }
+    numbers[slot::roll] = misalignment.roll;
+    numbers[slot::gain] = misalignment.gain;
+    numbers[slot::distance_constant] = misalignment.distance_constant;
+    numbers[slot::drift] = misalignment.drift;
+    std::copy(misalignment.beam_constants.begin(), misalignment.beam_constants.end(),
+              numbers.begin() + slot::beam_constant);
+    return numbers;
+}
+
+// Where a quantity of a line's set-up stands, and how many components it has; none for other quantities.
+struct Place {
+    int first;
+    int count;
+};
+std::optional<Place> place_in_line(InputQuantity quantity, int beams) {
+    switch (quantity) {
+        case InputQuantity::reflector: return Place{slot::reflector, 2};
+        case InputQuantity::laser: return Place{slot::laser, 2};
+        case InputQuantity::psd_zero: return Place{slot::psd_zero, 2};
+        case InputQuantity::distance_constant: return Place{slot::distance_constant, 1};
+        case InputQuantity::beam_constant: return Place{slot::beam_constant, beams};
+        case InputQuantity::lateral: return Place{slot::lateral, 2};
+        case InputQuantity::roll: return Place{slot::roll, 1};
+        case InputQuantity::gain: return Place{slot::gain, 1};
+        case InputQuantity::drift: return Place{slot::drift, 1};
+        case InputQuantity::scale_length: return Place{slot::scale_length, 1};
+        case InputQuantity::scale_factor: return Place{slot::scale_factor, 1};
+        default: return std::nullopt;
+    }
+}
+
+std::optional<Place> place_in_shared(InputQuantity quantity, int beams) {
+    switch (quantity) {
+        case InputQuantity::psd_distance: return Place{shared_slot::psd_distance, 1};
+        case InputQuantity::beam_offset: return Place{shared_slot::beam_offset, 2 * beams};
+        case InputQuantity::reading_model: return Place{shared_slot::reading_model, 1};
+        case InputQuantity::temperature: return Place{shared_slot::temperature, 1};
+        case InputQuantity::pressure: return Place{shared_slot::pressure, 1};
+        case InputQuantity::humidity: return Place{shared_slot::humidity, 1};
+        case InputQuantity::refractive_index: return Place{shared_slot::refractive_index, 1};
+        case InputQuantity::wavelength: return Place{shared_slot::wavelength, 1};
+        case InputQuantity::machine_drift: return Place{shared_slot::machine_drift, 3};
+        default: return std::nullopt;
+    }
+}
+
+// A caller's own times come first.
+SimulationOptions with_times(SimulationOptions options, double seconds) {
+    if (!options.seconds_per_reading) options.seconds_per_reading = seconds;
+    return options;
+}
+
+void check_component(const std::string& name, int component, int count) {
+    if (count == 0) throw InvalidArgument(name + ": this run has no such quantity");
+    if (component < 0 || component >= count)
+        throw InvalidArgument(name + ": expected a component from 0 to " + std::to_string(count - 1) + ", got " +
+                              std::to_string(component));
+}
+
+}  // namespace
+
+bool Slots::is_uncertain(int first, int count) const {
+    return std::any_of(uncertain.begin(), uncertain.end(),
+                       [&](const Deviating& each) { return each.slot >= first && each.slot < first + count; });
+}
+
+bool Slots::acts(int first, int count) const {
+    return is_uncertain(first, count) ||
+           std::any_of(nominal.begin() + first, nominal.begin() + first + count, [](double x) { return x != 0.0; });
+}
+
+std::vector<double> Slots::with(const Eigen::VectorXd& deviations) const {
+    std::vector<double> numbers = nominal;
+    for (const Deviating& each : uncertain) numbers[std::size_t(each.slot)] += deviations[each.input];
+    return numbers;
+}
+
+Misalignment misalignment_of(const std::vector<double>& n) {
+    return {{n[slot::reflector], n[slot::reflector + 1]},
+            {n[slot::laser], n[slot::laser + 1]},
+            {n[slot::psd_zero], n[slot::psd_zero + 1]},
+            n[slot::distance_constant],
+            {n.begin() + slot::beam_constant, n.end()},
+            {n[slot::lateral], n[slot::lateral + 1]},
+            n[slot::roll],
+            n[slot::gain],
+            n[slot::drift]};
+}
+
+RunModel::RunModel(const VirtualRun& given, std::uint64_t seed) : run(given), draws(run.inputs, seed) {
+    if (!(std::isfinite(run.seconds_per_reading) && run.seconds_per_reading > 0.0))
+        throw InvalidArgument("seconds_per_reading: expected a finite time above 0");
+    seconds = run.simulation.seconds_per_reading.value_or(run.seconds_per_reading);
+    check_run(run.plan, run.heads, with_times(run.simulation, seconds));
+    channels = signal_names(run.heads.head);
+    const int beams = run.heads.head.layout == HeadLayout::multi_beam ? int(channels.size()) : 0;
+
+    for (const PlannedVisit& visit : planned_visits(run.plan, run.simulation)) {
+        const Line& line = visit.line;
+        const Head& head = run.heads.of(line);
+        const Misalignment misalignment = stepdiag::misalignment_of(run.simulation, line);
+        check_misalignment(misalignment, head, line);
+        if (visits.empty() || visits.back().visit.line.name() != line.name())
+            lines.push_back({numbers_of(misalignment, std::size_t(beams)), {}});
+        const std::vector<PlanPoint> points = points_of(run.plan, visit);
+        const Eigen::Vector3d first = run.plan.points(line, visit.run).front().commanded;
+        const Eigen::Matrix3d frame = run.plan.frame(line);
+        visits.push_back({visit, &head, frame, first + run.machine.tool(), mirror_size(head, run.plan), points.size(),
+                          lines.size() - 1});
+        const Eigen::Vector3d last = run.plan.points(line, visit.run).back().commanded;
+        for (std::size_t k = 0; k < points.size(); ++k) {
+            const Eigen::Vector3d& commanded = points[k].commanded;
+            const std::size_t row = rows.size();
+            rows.push_back({double(row - visit.setup_row) * seconds, frame.col(2).dot(commanded - first),
+                            (commanded - last).norm() == 0.0});
+            poses.push_back(run.machine.pose(commanded, approaches(line, visit.direction)));
+        }
+    }
+    if (rows.size() > Draws::most_rows)
+        throw InvalidArgument("virtual run: expected at most " + std::to_string(Draws::most_rows) + " rows");
+    shared.nominal.assign(shared_slot::beam_offset + 2 * std::size_t(beams), 0.0);
+    for (std::size_t i = 0; i < run.inputs.inputs.size(); ++i) add_input(run.inputs.inputs[i], int(i));
+    check_noises();
+}
+
+void RunModel::add_input(const UncertainInput& input, int index) {
+    const std::string what = name(input);
+    const int beams = run.heads.head.layout == HeadLayout::multi_beam ? int(channels.size()) : 0;
+    if (const auto place = place_in_line(input.quantity, beams)) {
+        check_component(what, input.component, place->count);
+        const auto visit = std::find_if(visits.begin(), visits.end(),
+                                        [&](const RunVisit& v) { return v.visit.line.name() == input.line; });
+        if (visit == visits.end()) throw InvalidArgument(what + ": line \"" + input.line + "\" is not in the plan");
+        if (input.quantity == InputQuantity::psd_zero && visit->head->layout != HeadLayout::psd)
+            throw InvalidArgument(what + ": expected a head of layout psd");
+        if (input.quantity == InputQuantity::gain && visit->head->design && beams > 0)
+            throw InvalidArgument(what +
+                                  ": the beams of a traced head stand where its design and its pose errors put "
+                                  "them");
+        lines[visit->line].uncertain.push_back({place->first + input.component, index});
+        return;
+    }
+    if (const auto place = place_in_shared(input.quantity, beams)) {
+        check_component(what, input.component, place->count);
+        const bool of_closed_head =
+            input.quantity == InputQuantity::psd_distance || input.quantity == InputQuantity::beam_offset;
+        const bool of_air = input.quantity == InputQuantity::temperature || input.quantity == InputQuantity::pressure ||
+                            input.quantity == InputQuantity::humidity;
+        for (const RunVisit& visit : visits) {
+            if (of_closed_head && visit.head->design)
+                throw InvalidArgument(what +
+                                      ": expected a head without a design; components of a design are moved by "
+                                      "part_shift and part_rotation");
+            if (input.quantity == InputQuantity::psd_distance && visit.head->layout != HeadLayout::psd)
+                throw InvalidArgument(what + ": expected a head of layout psd");
+            if (of_air && !std::holds_alternative<Air>(true_environment(*visit.head, run.simulation).air))
+                throw InvalidArgument(what + ": expected a state of the air as environment, got a constant index");
+        }
+        shared.uncertain.push_back({place->first + input.component, index});
+        return;
+    }
+    check_component(what, input.component, 3);
+    const auto has_part = [&](const RunVisit& visit) {
+        if (!visit.head->design) return false;
+        const auto names = component_names(*visit.head->design);
+        return std::find(names.begin(), names.end(), input.part) != names.end();
+    };
+    if (std::none_of(visits.begin(), visits.end(), has_part))
+        throw InvalidArgument(what + ": no head of this run has a component \"" + input.part + "\"");
+    const int turned = input.quantity == InputQuantity::part_rotation ? 3 : 0;
+    moved_parts.push_back({input.part, turned + input.component, index});
+}
+
+void RunModel::check_noises() const {
+    for (const ReadingNoise& noise : run.inputs.noise) {
+        const std::string what = name(noise);
+        if (noise.quantity == NoiseQuantity::channel) {
+            if (std::find(channels.begin(), channels.end(), noise.channel) == channels.end())
+                throw InvalidArgument(what + ": the head has no channel \"" + noise.channel + "\"");
+            continue;
+        }
+        const bool of_poses = noise.quantity == NoiseQuantity::machine_walk ||
+                              noise.quantity == NoiseQuantity::position || noise.quantity == NoiseQuantity::orientation;
+        check_component(what, noise.component, of_poses ? 3 : 1);
+    }
+}
+
+bool RunModel::has(NoiseQuantity quantity) const {
+    return std::any_of(run.inputs.noise.begin(), run.inputs.noise.end(),
+                       [&](const ReadingNoise& noise) { return noise.quantity == quantity; });
+}
+
+bool RunModel::moves_poses() const {
+    return has(NoiseQuantity::machine_walk) || has(NoiseQuantity::position) || has(NoiseQuantity::orientation) ||
+           shared.is_uncertain(shared_slot::machine_drift, 3);
+}
+
+bool RunModel::has_uncertain_air() const { return shared.is_uncertain(shared_slot::temperature, 4); }
+
+Environment RunModel::environment(const Head& head, const std::vector<double>& numbers) const {
+    Environment environment = true_environment(head, run.simulation);
+    environment.relative_error += numbers[shared_slot::refractive_index];
+    if (Air* air = std::get_if<Air>(&environment.air)) {
+        air->temperature += numbers[shared_slot::temperature];
+        air->pressure += numbers[shared_slot::pressure];
+        air->relative_humidity += numbers[shared_slot::humidity];
+    }
+    return environment;
+}
+
+Environment RunModel::assumed(const Head& head) const {
+    return run.simulation.assumed.value_or(true_environment(head, run.simulation));
+}
+
+Head RunModel::head(const Head& nominal, const std::vector<double>& numbers, const Eigen::VectorXd& deviations) const {
+    Head head = nominal;
+    if (!head.design) {
+        head.psd_distance += numbers[shared_slot::psd_distance];
+        if (head.layout == HeadLayout::multi_beam)
+            for (std::size_t i = 0; i < head.beam_offsets.size(); ++i)
+                head.beam_offsets[i] += Eigen::Vector2d(numbers[shared_slot::beam_offset + 2 * i],
+                                                        numbers[shared_slot::beam_offset + 2 * i + 1]);
+        return head;
+    }
+    const std::vector<std::string> names = component_names(*head.design);
+    for (const MovedPart& part : moved_parts) {
+        if (std::find(names.begin(), names.end(), part.component) == names.end()) continue;
+        PoseError& error = head.pose_errors[part.component];
+        (part.number < 3 ? error.shift : error.rotation)[part.number % 3] += deviations[part.input];
+    }
+    return head;
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,92 @@
+// What all samples of a virtual run share: its rows, what stands where nominally, and which input acts on what.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "simulation/visit_readings.hpp"
+#include "stepdiag/uncertainty/virtual_calibration.hpp"
+#include "uncertainty/draws.hpp"
+#include "uncertainty/run_slots.hpp"
+
+namespace stepdiag {
+
+// The input `input` adds to the number `slot`.
+struct Deviating {
+    int slot;
+    int input;
+};
+struct Slots {
+    std::vector<double> nominal;
+    std::vector<Deviating> uncertain;
+
+    bool is_uncertain(int first, int count = 1) const;
+    // Not what it would be in a run without errors.
+    bool acts(int first, int count = 1) const;
+    std::vector<double> with(const Eigen::VectorXd& deviations) const;
+};
+// An input that moves a component of a design: `number` 0, 1, 2 shifts it, 3, 4, 5 turns it.
+struct MovedPart {
+    std::string component;
+    int number;
+    int input;
+};
+
+struct RunRow {
+    double elapsed;  // s, since the first reading of its set-up
+    double travel;   // mm, commanded, along the line from its first point
+    bool is_last_point;
+};
+
+struct RunVisit {
+    PlannedVisit visit;
+    const Head* head;
+    Eigen::Matrix3d frame;
+    Eigen::Vector3d first_point;  // commanded, tool offset included
+    Eigen::Vector2d mirror;
+    std::size_t rows;
+    std::size_t line;  // index of its Slots
+};
+
+struct NoiseTerm {
+    std::size_t entry;             // of UncertainInputs::noise
+    int channel;                   // of channel noise
+    double spread_per_step = 1.0;  // of walks: sqrt(s)
+};
+
+// Throws InvalidArgument as VirtualCalibrations.
+struct RunModel {
+    RunModel(const VirtualRun& run, std::uint64_t seed);
+    RunModel(const RunModel&) = delete;
+
+    const VirtualRun run;
+    const Draws draws;
+    double seconds;
+    std::vector<std::string> channels;
+    std::vector<RunVisit> visits;
+    std::vector<RunRow> rows;
+    std::vector<Pose> poses;   // nominal tool, by row
+    std::vector<Slots> lines;  // by line of the plan, scale lines last
+    Slots shared;
+    std::vector<MovedPart> moved_parts;
+
+    bool has(NoiseQuantity quantity) const;
+    bool moves_poses() const;  // something displaces the tool by sample
+    bool has_uncertain_air() const;
+
+    // Of one head, at these numbers of the shared slots.
+    Environment environment(const Head& head, const std::vector<double>& shared_numbers) const;
+    Environment assumed(const Head& head) const;
+    Head head(const Head& nominal, const std::vector<double>& shared_numbers, const Eigen::VectorXd& deviations) const;
+
+private:
+    void add_inputs();
+    void add_input(const UncertainInput& input, int index);
+    void check_noises() const;
+};
+
+// As Misalignment, of `beams` beam constants.
+Misalignment misalignment_of(const std::vector<double>& numbers);
+
+}  // namespace stepdiag

@@ -1,0 +1,170 @@
+#include "stepdiag/uncertainty/virtual_calibration.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "stepdiag/core/error.hpp"
+#include "stepdiag/core/random_lanes.hpp"
+#include "uncertainty/general_way.hpp"
+#include "uncertainty/run_model.hpp"
+
+namespace stepdiag {
+namespace {
+
+Measurement measurement_of(const RunModel& model, const Eigen::VectorXd& readings) {
+    std::vector<Station> stations;
+    std::vector<Channel> channels;
+    for (const std::string& name : model.channels) channels.push_back({name, {}});
+    for (const RunVisit& visit : model.visits) {
+        const std::vector<PlanPoint> points = points_of(model.run.plan, visit.visit);
+        for (std::size_t k = 0; k < visit.rows; ++k) {
+            const std::size_t point = visit.visit.direction == Direction::forward ? k : visit.rows - 1 - k;
+            stations.push_back(
+                {visit.visit.run, visit.visit.line, int(point), visit.visit.direction, points[k].commanded});
+        }
+    }
+    for (std::size_t r = 0; r < stations.size(); ++r)
+        for (std::size_t c = 0; c < channels.size(); ++c) {
+            const double value = readings[Eigen::Index(r * channels.size() + c)];
+            channels[c].value.push_back(std::isnan(value) ? std::nullopt : std::optional(value));
+        }
+    if (model.run.simulation.seconds_per_reading) {
+        Channel& time = channels.emplace_back(Channel{"time", {}});
+        for (std::size_t r = 0; r < stations.size(); ++r) time.value.push_back(double(r) * model.seconds);
+    }
+    return Measurement(std::move(stations), std::move(channels));
+}
+
+std::string unit_of(const std::string& parameter) {
+    return parameter.size() == 3 && parameter[1] >= 'X' && parameter[1] <= 'Z' ? "mm" : "rad";
+}
+
+}  // namespace
+
+Eigen::VectorXd drawn_inputs(const UncertainInputs& inputs, std::uint64_t seed, std::uint64_t sample) {
+    return Draws(inputs, seed).inputs(sample);
+}
+
+struct VirtualCalibrations::State {
+    State(const VirtualRun& run, const BatchOptions& evaluation, std::uint64_t seed, std::vector<DerivedOutput> given)
+        : model(run, seed),
+          general(model),
+          nominal(measurement_of(model, general.readings(model.draws.expectations(), std::nullopt))),
+          evaluator(nominal, run.plan, run.machine.chain(), run.machine.tool(), run.calibration, evaluation),
+          derived(std::move(given)) {
+        for (const CalibrationEntry& entry : evaluator.entries())
+            outputs.push_back({entry.parameter, entry.position, unit_of(entry.parameter)});
+        for (const DerivedOutput& output : derived) {
+            if (output.row.size() != Eigen::Index(evaluator.entries().size()) || !output.row.allFinite())
+                throw InvalidArgument("derived output " + output.name + ": expected " +
+                                      std::to_string(evaluator.entries().size()) + " finite coefficients");
+            outputs.push_back({output.name, std::numeric_limits<double>::quiet_NaN(), output.unit});
+        }
+    }
+
+    const RunModel model;
+    const GeneralWay general;
+    const Measurement nominal;
+    const BatchEvaluator evaluator;
+    const std::vector<DerivedOutput> derived;
+    std::vector<Output> outputs;
+};
+
+namespace {
+
+constexpr std::size_t lanes = lane_group;  // at a time: readings of all rows stay in the cache
+
+}  // namespace
+
+// What a thread writes to.
+class VirtualCalibrations::Lanes : public SampleModel::Worker {
+public:
+    explicit Lanes(const State& state)
+        : state_(state),
+          worker_(state.evaluator),
+          readings_(state.model.rows.size() * state.model.channels.size() * lanes) {}
+
+    void evaluate(const SampleBlock& block) override {
+        for (std::size_t first = 0; first < block.samples; first += lanes) {
+            for (std::size_t lane = 0; lane < lanes; ++lane) {
+                const std::uint64_t sample = block.first_sample + first + lane;
+                put(lane, readings_of(sample));
+            }
+            finish(block.outputs + first, block.samples);
+        }
+    }
+    // A column of deviations each lane, the last of them repeated where there are fewer.
+    void evaluate(const Eigen::Ref<const Eigen::MatrixXd>& deviations, double* outputs, std::size_t stride) {
+        for (std::size_t lane = 0; lane < lanes; ++lane)
+            put(lane,
+                state_.general.readings(
+                    deviations.col(std::min<Eigen::Index>(Eigen::Index(lane), deviations.cols() - 1)), std::nullopt));
+        finish(outputs, stride);
+    }
+
+private:
+    // A sample that cannot be (air out of its equation's range) has lost all readings.
+    Eigen::VectorXd readings_of(std::uint64_t sample) const {
+        try {
+            return state_.general.readings(state_.model.draws.inputs(sample), sample);
+        } catch (const InvalidArgument&) {
+            return Eigen::VectorXd::Constant(Eigen::Index(readings_.size() / lanes),
+                                             std::numeric_limits<double>::quiet_NaN());
+        }
+    }
+    void put(std::size_t lane, const Eigen::VectorXd& readings) {
+        for (Eigen::Index i = 0; i < readings.size(); ++i) readings_[std::size_t(i) * lanes + lane] = readings[i];
+    }
+    void finish(double* outputs, std::size_t stride) {
+        worker_.evaluate(readings_.data(), lanes, outputs, stride);
+        const std::size_t entries = state_.evaluator.entries().size();
+        for (std::size_t d = 0; d < state_.derived.size(); ++d) {
+            double* const sum = outputs + (entries + d) * stride;
+            std::fill_n(sum, lanes, 0.0);
+            for (std::size_t e = 0; e < entries; ++e) {
+                const double factor = state_.derived[d].row[Eigen::Index(e)];
+                if (factor == 0.0) continue;
+                for (std::size_t lane = 0; lane < lanes; ++lane) sum[lane] += factor * outputs[e * stride + lane];
+            }
+        }
+    }
+
+    const State& state_;
+    BatchEvaluator::Worker worker_;
+    std::vector<double> readings_;
+};
+
+VirtualCalibrations::VirtualCalibrations(const VirtualRun& run, const BatchOptions& evaluation, std::uint64_t seed,
+                                         std::vector<DerivedOutput> derived)
+    : state_(std::make_unique<const State>(run, evaluation, seed, std::move(derived))) {}
+VirtualCalibrations::~VirtualCalibrations() = default;
+
+const std::vector<SampleModel::Output>& VirtualCalibrations::outputs() const { return state_->outputs; }
+std::uint64_t VirtualCalibrations::seed() const { return state_->model.draws.seed(); }
+std::string VirtualCalibrations::target() const { return replay_target(); }
+std::unique_ptr<SampleModel::Worker> VirtualCalibrations::worker() const { return std::make_unique<Lanes>(*state_); }
+const BatchEvaluator& VirtualCalibrations::evaluator() const { return state_->evaluator; }
+const Measurement& VirtualCalibrations::nominal() const { return state_->nominal; }
+
+Eigen::MatrixXd VirtualCalibrations::evaluate_at(const Eigen::MatrixXd& deviations) const {
+    const auto inputs = Eigen::Index(state_->model.run.inputs.inputs.size());
+    if (deviations.rows() != inputs || !deviations.allFinite())
+        throw InvalidArgument("deviations: expected " + std::to_string(inputs) + " finite rows, got " +
+                              std::to_string(deviations.rows()));
+    Lanes worker(*state_);
+    Eigen::MatrixXd result(Eigen::Index(state_->outputs.size()), deviations.cols());
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> block(result.rows(), Eigen::Index(lanes));
+    for (Eigen::Index first = 0; first < deviations.cols(); first += Eigen::Index(lanes)) {
+        const Eigen::Index count = std::min(Eigen::Index(lanes), deviations.cols() - first);
+        worker.evaluate(deviations.middleCols(first, count), block.data(), lanes);
+        result.middleCols(first, count) = block.leftCols(count);
+    }
+    return result;
+}
+
+Eigen::VectorXd VirtualCalibrations::readings(std::uint64_t sample) const {
+    return state_->general.readings(state_->model.draws.inputs(sample), sample);
+}
+
+}  // namespace stepdiag
