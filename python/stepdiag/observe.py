@@ -5,9 +5,9 @@ scenario's weights and unknowns: uncertainties and rank depend on where is read 
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from stepdiag.report import (
 )
 from stepdiag.scenario import Scenario, adjust_scenario, build_scenario, simulate_scenario
 from stepdiag.scenario_head_keys import EnvironmentSection, HeadKeys
-from stepdiag.scenario_keys import MisalignmentSection, NoiseSection, ScenarioKeys
+from stepdiag.scenario_keys import MisalignmentSection, NoiseSection, RandomSection, ScenarioKeys
 from stepdiag.setup_table import setup_rows
 from stepdiag.sheet import lost_readings
 from stepdiag.toml_text import located
@@ -113,21 +113,44 @@ def extents(calibration: Calibration, plan: _core.Plan) -> tuple[list[str], list
 
 def without_errors(scenario: Scenario, steps: int) -> Scenario:
     """The scenario of a perfect machine and a perfect set-up, with the same weights and unknowns."""
-    perfect = build_scenario(_perfect_keys(scenario.keys, steps), scenario.path)
+    perfect = build_scenario(_perfect_keys(scenario.keys, {"steps": steps}), scenario.path)
     return dataclasses.replace(perfect, uncertainty=scenario.uncertainty)
 
 
-def _perfect_keys(keys: ScenarioKeys, steps: int) -> ScenarioKeys:
+def with_usual_errors(scenario: Scenario, plan: Mapping[str, Any]) -> Scenario:
+    """The scenario with other keys of [plan], without noise, of a machine with errors: those of its [machine.random],
+    else those of that section's defaults. What it says of lines that are not measured is passed over."""
+    keys, usual = scenario.keys, _perfect_keys(scenario.keys, plan)
+    measured = {*usual.plan.lines, *usual.plan.scale_lines}
+    errors = keys.machine.random or RandomSection(seed=0)
+    by_line = {line: own for line, own in keys.misalignment.by_line.items() if line in measured}
+    sections = {
+        "machine": usual.machine.model_copy(update={"random": errors}),
+        "misalignment": keys.misalignment.model_copy(update={"by_line": by_line}),
+    }
+    built = build_scenario(usual.model_copy(update=sections), scenario.path)
+    return dataclasses.replace(built, uncertainty=scenario.uncertainty)
+
+
+def _perfect_keys(keys: ScenarioKeys, changes: Mapping[str, Any]) -> ScenarioKeys:
     heads = {name: _nominal(head) for name, head in keys.head.by_head.items()}
+    plan = keys.plan.model_copy(update=changes)
+    measured = {*plan.lines, *plan.scale_lines}
     return keys.model_copy(
         update={
             "machine": keys.machine.model_copy(update={"errors": None, "random": None}),
-            "plan": keys.plan.model_copy(update={"steps": steps}),
+            "plan": plan,
+            "line": {line: own for line, own in keys.line.items() if line in measured},
             "head": _nominal(keys.head).model_copy(update={"by_head": heads}),
             "misalignment": MisalignmentSection(),
             "environment": EnvironmentSection(),
             "noise": NoiseSection(),
-            "adjustment": keys.adjustment.model_copy(update={"outlier_probability": 0.0}),
+            "adjustment": keys.adjustment.model_copy(
+                update={
+                    "outlier_probability": 0.0,
+                    "by_line": {line: own for line, own in keys.adjustment.by_line.items() if line in measured},
+                }
+            ),
         }
     )
 

@@ -11,6 +11,7 @@ from pydantic import Field
 from stepdiag._core import Plan, largest_repeat_count
 from stepdiag.adjustment_keys import AdjustmentSection, SmoothnessSection
 from stepdiag.key_errors import BY_HEAD, BY_LINE
+from stepdiag.plan_by_time_keys import PlanByTimeSection
 from stepdiag.scenario_head_keys import EnvironmentSection, HeadSection, LineKeys
 from stepdiag.sections import (
     AMPLITUDE,
@@ -193,6 +194,7 @@ class ScenarioKeys(Section):
     uncertainty: UncertaintySection = UncertaintySection()
     adjustment: AdjustmentSection = AdjustmentSection()
     smoothness: SmoothnessSection = SmoothnessSection()
+    plan_by_time: PlanByTimeSection = PlanByTimeSection()
 
 
 # Sections that may hold tables of the user's own names, and where these are kept.
