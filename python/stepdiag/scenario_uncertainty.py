@@ -77,7 +77,10 @@ LAYOUT_OF: Final = {
     "beam_offsets_um": "multi_beam",
 }
 BY_LAYOUT: Final = ("psd_distance_mm", "beam_offsets_um")  # a description has components in their place
-CHANNEL_UNITS: Final = {"mm": ("um", MICROMETRE), "rad": ("urad", MICRORADIAN)}
+_UNIT_NAMES: Final = {
+    "um_per_sqrt_h": "µm/√h", "um_per_h": "µm/h", "um": "µm", "urad": "µrad", "mm": "mm", "ppm": "ppm", "c": "°C",
+    "hpa": "hPa", "percent": "%",
+}  # fmt: skip
 
 
 def uncertain_inputs(
@@ -241,3 +244,12 @@ def _correlations(
             if inputs[names.index(name)].distribution.kind != "normal":
                 raise InvalidArgument(f"{where}: {show(name)} is not normal; inputs are correlated as normal ones")
         yield [names.index(name) for name in correlated.names], np.array(correlated.correlation)
+
+
+def key_units(one: _core.UncertainInput | _core.ReadingNoise) -> tuple[str, float]:
+    """The unit of the key that an input or noise comes from: what it is called, and what it is in native ones."""
+    if isinstance(one, _core.ReadingNoise) and one.quantity in ("channel", "common"):
+        return ("µrad", MICRORADIAN) if kind_of_channel(one.channel) == "tilt" else ("µm", MICROMETRE)
+    everything = {**OF_SETUP, **OF_COMPONENT, **OF_ALL, **OF_NOISE}
+    key, meaning = next((k, m) for k, m in everything.items() if m.quantity == one.quantity)
+    return next((name for ending, name in _UNIT_NAMES.items() if key.endswith(f"_{ending}")), ""), meaning.unit

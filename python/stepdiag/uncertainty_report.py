@@ -1,0 +1,165 @@
+"""What `stepdiag uncertainty` tells: what is uncertain, tables by family, budgets, and the two methods side by side."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from stepdiag import _core
+from stepdiag.scenario_uncertainty import key_units
+from stepdiag.uncertainty_result import FloatArray, UncertaintyResult, in_report_units, label
+
+# Of a budget: groups that make less than this of a variance are added up.
+SMALL_SHARE: Final = 0.005
+
+
+def input_rows(inputs: _core.UncertainInputs) -> Iterator[str]:
+    """Every uncertain input by its name, with its distribution in the unit of its key."""
+    everything: list[_core.UncertainInput | _core.ReadingNoise] = [*inputs.inputs, *inputs.noise]
+    width = max((len(one.name) for one in everything), default=0)
+    for one in everything:
+        yield f"  {one.name:<{width}}  {_distribution(one.distribution, *key_units(one))}"
+
+
+def _distribution(distribution: _core.Distribution, name: str, unit: float) -> str:
+    text = f"{distribution.kind}, standard uncertainty {distribution.standard_uncertainty / unit:.3g} {name}".rstrip()
+    if distribution.expectation != 0.0:
+        text += f", expectation {distribution.expectation / unit:.3g} {name}".rstrip()
+    if math.isfinite(distribution.degrees_of_freedom):
+        text += f", {distribution.degrees_of_freedom:g} degrees of freedom"
+    return text
+
+
+def opening_rows(result: UncertaintyResult) -> Iterator[str]:
+    """What is calibrated, and how many things are uncertain about it."""
+    scenario, plan = result.scenario, result.scenario.plan
+    derived = len(result.outputs) - result.entries
+    yield (
+        f"virtual calibrations: method {result.method}, {len(plan.lines)} lines of {plan.steps} steps, "
+        f"{len(plan.scale_lines)} scale lines, readings {', '.join(scenario.signals)}"
+    )
+    yield (
+        f"uncertain: {len(scenario.uncertain.inputs)} inputs, {len(scenario.uncertain.noise)} kinds of noise; "
+        f"outputs: {result.entries} values of the 21 parameters" + (f", {derived} derived" if derived else "")
+    )
+
+
+def result_rows(result: UncertaintyResult) -> Iterator[str]:
+    """All tables of a result."""
+    if result.propagation is not None:
+        yield ""
+        yield "propagation (GUM), standard uncertainties u:"
+        yield from _propagation_table(result)
+        yield from _budgets(result)
+    if result.monte_carlo is not None:
+        yield ""
+        yield from _monte_carlo_table(result)
+    if result.entries < len(result.outputs):
+        yield ""
+        yield from _derived_table(result)
+
+
+def _propagation_table(result: UncertaintyResult) -> Iterator[str]:
+    found = result.propagation
+    assert found is not None
+    u, expanded = np.asarray(found.standard_uncertainty), np.asarray(found.expanded(result.coverage))
+    freedom = np.asarray(found.degrees_of_freedom)
+    heading = ["family", "median u", "largest u", f"U, {_percent(result)}", "freedom", "where"]
+    rows = []
+    for family, members, worst in _worst(result, u):
+        unit = result.outputs[worst].unit
+        median, largest, wide = (
+            in_report_units(unit, x)[0] for x in (np.median(u[members]), u[worst], expanded[worst])
+        )
+        name = in_report_units(unit, 0.0)[1]
+        degrees = "inf" if not freedom[worst] < 1e6 else f"{freedom[worst]:.3g}"
+        rows.append(
+            [family, *(f"{x:.3g} {name}" for x in (median, largest, wide)), degrees, label(result.outputs[worst])]
+        )
+    yield from _table(heading, rows)
+
+
+def _worst(result: UncertaintyResult, u: FloatArray) -> Iterator[tuple[str, npt.NDArray[np.intp], int]]:
+    """Families of the calibration's own values, and the output of each with the largest uncertainty."""
+    for family, members in result.families():
+        if family != "derived":
+            # Values that are 0 by the choice of frame are no statement about the others.
+            uncertain = members[u[members] > 0.0]
+            if len(uncertain):
+                yield family, uncertain, int(uncertain[np.argmax(u[uncertain])])
+
+
+def _budgets(result: UncertaintyResult) -> Iterator[str]:
+    found = result.propagation
+    assert found is not None
+    u = np.asarray(found.standard_uncertainty)
+    yield "where the largest ones come from, in shares of the variance:"
+    for family, _, worst in _worst(result, u):
+        parts = np.asarray(found.budget)[worst]
+        shares = {group: float(part / u[worst]) ** 2 for group, part in zip(found.groups, parts, strict=True)}
+        shares["between groups"] = float(np.asarray(found.between_groups)[worst]) / u[worst] ** 2
+        named = sorted(((s, g) for g, s in shares.items() if abs(s) >= SMALL_SHARE), reverse=True)
+        rest = sum(shares.values()) - sum(share for share, _ in named)
+        text = ", ".join(f"{group} {share:.1%}" for share, group in named)
+        yield f"  {family:<13} {text}" + (f", others {rest:.1%}" if rest >= SMALL_SHARE / 10.0 else "")
+
+
+def _monte_carlo_table(result: UncertaintyResult) -> Iterator[str]:
+    found = result.monte_carlo
+    assert found is not None
+    lost = f", {found.lost:,} without a result" if found.lost else ""
+    yield f"Monte Carlo (JCGM 101): {found.samples:,} samples, seed {result.seed}, {found.target}{lost}"
+    u = np.asarray(found.standard_uncertainty)
+    heading = ["family", "median u", "largest u", f"{_percent(result)} interval about the mean", "where"]
+    rows = []
+    for family, members, worst in _worst(result, u):
+        unit = result.outputs[worst].unit
+        name = in_report_units(unit, 0.0)[1]
+        low, high = (in_report_units(unit, x - found.mean[worst])[0] for x in found.symmetric[worst])
+        median, largest = (in_report_units(unit, x)[0] for x in (np.median(u[members]), u[worst]))
+        cells = [f"{median:.3g} {name}", f"{largest:.3g} {name}", f"{low:+.3g} {high:+.3g} {name}"]
+        rows.append([family, *cells, label(result.outputs[worst])])
+    yield from _table(heading, rows)
+
+
+def _derived_table(result: UncertaintyResult) -> Iterator[str]:
+    found, other = result.monte_carlo, result.propagation
+    heading = ["derived", "value", "u"]
+    heading += [f"U, {_percent(result)}"] if found is None else [f"{_percent(result)} interval", "u, propagated"]
+    rows = []
+    expanded = None if other is None else np.asarray(other.expanded(result.coverage))
+    for k in range(result.entries, len(result.outputs)):
+        output = result.outputs[k]
+        name = in_report_units(output.unit, 0.0)[1]
+
+        def show(value: float, unit: str = output.unit, name: str = name) -> str:
+            return f"{in_report_units(unit, value)[0]:.4g} {name}".rstrip()
+
+        if found is not None:
+            low, high = (in_report_units(output.unit, x)[0] for x in found.symmetric[k])
+            cells = [show(found.mean[k]), show(found.standard_uncertainty[k]), f"{low:.4g} .. {high:.4g} {name}"]
+            cells.append("-" if other is None else show(other.standard_uncertainty[k]))
+        else:
+            assert other is not None
+            assert expanded is not None
+            cells = [show(other.value[k]), show(other.standard_uncertainty[k]), show(expanded[k])]
+        rows.append([label(output), *cells])
+    yield from _table(heading, rows)
+
+
+def _percent(result: UncertaintyResult) -> str:
+    return f"{100.0 * result.coverage:.4g} %"
+
+
+def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Columns of text, the first and a last one of words to the left, numbers to the right."""
+    lines = [heading, *rows]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(heading))]
+    for line in lines:
+        cells = [
+            cell.ljust(width) if k == 0 or heading[k] == "where" else cell.rjust(width)
+            for k, (cell, width) in enumerate(zip(line, widths, strict=True))
+        ]
+        yield f"  {'  '.join(cells)}".rstrip()
