@@ -2,7 +2,6 @@
 #include <cmath>
 
 #include "bindings.hpp"
-#include "stepdiag/evaluation/adjustment.hpp"
 
 namespace stepdiag::bindings {
 namespace {
@@ -10,10 +9,6 @@ namespace {
 // None, "free", "fixed" or a standard uncertainty.
 class PriorLike : public py::object {
     PYBIND11_OBJECT_DEFAULT(PriorLike, py::object, PyObject_Type)
-};
-
-struct Priors {
-    SetupPriors value;
 };
 
 std::optional<PriorUncertainty> to_prior(const PriorLike& prior, const std::string& quantity) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/evaluation/adjustment.hpp"
 #include "stepdiag/machine/chain.hpp"
 #include "stepdiag/optics/body.hpp"
 #include "stepdiag/simulation/simulate.hpp"
@@ -45,6 +46,11 @@ class PathLike : public py::object {
 };
 class XarrayDataset : public py::object {
     PYBIND11_OBJECT_DEFAULT(XarrayDataset, py::object, PyObject_Type)
+};
+
+// What Python calls SetupPriors.
+struct Priors {
+    SetupPriors value;
 };
 
 Eigen::VectorXd to_vector(const py::handle& array, const char* name);  // any length
@@ -84,6 +90,7 @@ void bind_adjustment(py::module_& m);
 void bind_calibration(py::module_& m);  // after bind_evaluation
 void bind_uncertain_inputs(py::module_& m);
 void bind_sample_model(py::module_& m);
+void bind_virtual_calibration(py::module_& m);  // after bind_uncertain_inputs, bind_sample_model, bind_adjustment
 
 }  // namespace stepdiag::bindings
 

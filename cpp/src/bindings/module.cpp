@@ -170,4 +170,5 @@ PYBIND11_MODULE(_core, m) {
     bind_calibration(m);
     bind_uncertain_inputs(m);
     bind_sample_model(m);
+    bind_virtual_calibration(m);
 }

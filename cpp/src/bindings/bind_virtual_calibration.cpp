@@ -1,0 +1,133 @@
+#include <memory>
+#include <tuple>
+
+#include "bindings.hpp"
+#include "stepdiag/uncertainty/virtual_calibration.hpp"
+
+namespace stepdiag::bindings {
+namespace {
+
+EvaluationMethod to_method(const std::string& text) {
+    for (const auto& [name, method] :
+         {std::pair("conventional", EvaluationMethod::conventional), std::pair("enhanced", EvaluationMethod::enhanced),
+          std::pair("adjustment", EvaluationMethod::adjustment), std::pair("one_step", EvaluationMethod::one_step)})
+        if (text == name) return method;
+    throw InvalidArgument("method: expected \"conventional\", \"enhanced\", \"adjustment\" or \"one_step\", got \"" +
+                          text + "\"");
+}
+
+using Derived = std::tuple<std::string, std::string, ArrayLike>;  // name, unit, row
+
+std::unique_ptr<VirtualCalibrations> make(
+    const Machine& machine, const Plan& plan, const HeadLike& heads, const UncertainInputs& inputs,
+    const std::optional<HeadLike>& calibration_heads, const std::string& method, const IntegerLike& seed,
+    const std::map<std::string, Misalignment>& misalignment, const std::optional<Environment>& environment,
+    const std::optional<Environment>& assumed, const IntegerLike& repeats, bool backward,
+    const std::optional<double>& seconds_per_reading, double verified_share, const ReadingUncertainty& uncertainty,
+    const Priors& setup, const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
+    bool rotations, const std::optional<Smoothness>& smoothness, const std::vector<Derived>& derived) {
+    const Heads actual = to_heads(heads, plan);
+    SimulationOptions simulation;
+    simulation.misalignment = misalignment;
+    simulation.environment = environment;
+    simulation.assumed = assumed;
+    simulation.repeats = to_int(repeats, "repeats");
+    simulation.backward = backward;
+    simulation.seconds_per_reading = seconds_per_reading;
+    simulation.verified_share = verified_share;
+    const VirtualRun run{
+        machine,    plan,
+        actual,     calibration_heads ? to_heads(*calibration_heads, plan).calibration() : actual.calibration(),
+        simulation, inputs};
+    BatchOptions evaluation;
+    evaluation.method = to_method(method);
+    evaluation.uncertainty = evaluation.adjustment.uncertainty = uncertainty;
+    evaluation.adjustment.setup = setup.value;
+    for (const auto& [line, priors] : setup_by_line) evaluation.adjustment.setup_by_line[line] = priors.value;
+    evaluation.adjustment.one_setup_per_line = one_setup_per_line;
+    evaluation.adjustment.reversal = reversal;
+    evaluation.adjustment.rotations = rotations;
+    evaluation.adjustment.smoothness = smoothness;
+    std::vector<DerivedOutput> outputs;
+    for (const auto& [name, unit, row] : derived) outputs.push_back({name, unit, to_vector(row, "derived")});
+    const std::uint64_t number = to_seed(seed);
+    py::gil_scoped_release release;
+    return std::make_unique<VirtualCalibrations>(run, evaluation, number, std::move(outputs));
+}
+
+Eigen::MatrixXd to_columns(const ArrayLike& object) {
+    const DoubleArray array = DoubleArray::ensure(object);
+    if (!array || array.ndim() != 2) {
+        PyErr_Clear();
+        throw InvalidArgument("deviations: expected an array (inputs, n)");
+    }
+    return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+        array.data(), array.shape(0), array.shape(1));
+}
+
+}  // namespace
+
+void bind_virtual_calibration(py::module_& m) {
+    py::class_<VirtualCalibrations, SampleModel>(
+        m, "VirtualCalibrations",
+        "Whole virtual calibrations: a run with drawn inputs and reading noise, traced by replay and evaluated with "
+        "the unperturbed calibration. Outputs are the values of the calibration's tables, then those derived.")
+        .def(py::init(&make), py::arg("machine"), py::arg("plan"), py::arg("heads"), py::arg("inputs"), py::kw_only(),
+             py::arg("calibration_heads") = std::nullopt, py::arg("method") = "enhanced", py::arg("seed") = integer(0),
+             py::arg("misalignment") = std::map<std::string, Misalignment>{}, py::arg("environment") = std::nullopt,
+             py::arg("assumed_environment") = std::nullopt, py::arg("repeats") = integer(1),
+             py::arg("backward") = false, py::arg("seconds_per_reading") = std::nullopt,
+             py::arg("verified_share") = SimulationOptions{}.verified_share,
+             py::arg("uncertainty") = ReadingUncertainty{}, py::arg("setup") = Priors{},
+             py::arg("setup_by_line") = std::map<std::string, Priors>{}, py::arg("one_setup_per_line") = false,
+             py::arg("reversal") = true, py::arg("rotations") = true, py::arg("smoothness") = std::nullopt,
+             py::arg("derived") = std::vector<Derived>{},
+             "machine to seconds_per_reading as of simulate(); calibration_heads: what the evaluation knows the heads "
+             "as (none: the heads). method: \"conventional\", \"enhanced\", \"adjustment\" or \"one_step\", whose "
+             "options are uncertainty to smoothness, as of evaluate() and adjust(). verified_share: of the samples, in "
+             "each of which one reading of every line is traced again. derived: (name, unit, coefficients of the "
+             "values of the tables). Raises InvalidArgument.")
+        .def_property_readonly("nominal", &VirtualCalibrations::nominal,
+                               "The run with every input at its expectation, without noise.")
+        .def_property_readonly(
+            "calibration", [](const VirtualCalibrations& v) { return v.evaluator().of_pattern(); },
+            "The evaluation of `nominal`.")
+        .def(
+            "evaluate_at",
+            [](const VirtualCalibrations& v, const ArrayLike& deviations) {
+                const Eigen::MatrixXd columns = to_columns(deviations);
+                Eigen::MatrixXd outputs;
+                {
+                    py::gil_scoped_release release;
+                    outputs = v.evaluate_at(columns);
+                }
+                return to_numpy(outputs);
+            },
+            py::arg("deviations"),
+            "(outputs, n) for given deviations (inputs, n) of the inputs, without reading noise. Raises "
+            "InvalidArgument.")
+        .def(
+            "readings",
+            [](const VirtualCalibrations& v, const IntegerLike& sample) {
+                const std::uint64_t index = to_seed(sample);
+                Eigen::VectorXd readings;
+                {
+                    py::gil_scoped_release release;
+                    readings = v.readings(index);
+                }
+                const auto rows = Eigen::Index(v.nominal().size());
+                return to_numpy(Eigen::MatrixXd(
+                    Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+                        readings.data(), rows, readings.size() / rows)));
+            },
+            py::arg("sample"), "(rows, channels) of one sample, with noise; NaN where lost.");
+    m.def(
+        "drawn_inputs",
+        [](const UncertainInputs& inputs, const IntegerLike& seed, const IntegerLike& sample) {
+            return to_numpy_vector(drawn_inputs(inputs, to_seed(seed), to_seed(sample)));
+        },
+        py::arg("inputs"), py::arg("seed"), py::arg("sample"),
+        "Deviations of one sample's inputs, in their order. Raises InvalidArgument.");
+}
+
+}  // namespace stepdiag::bindings
