@@ -7,6 +7,7 @@
 
 #include "evaluation/adjustment_result.hpp"
 #include "evaluation/outlier_search.hpp"
+#include "evaluation/prepared_adjustment.hpp"
 #include "evaluation/smoothness.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/core/units.hpp"
@@ -122,37 +123,22 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     return result;
 }
 
-struct Adjuster::State {
-    AdjustmentProblem problem;
+struct Adjuster::State : PreparedAdjustment {
     Eigen::Index rows;
     std::vector<std::string> channels;
-    AdjustmentSolver solver;
-    std::vector<LinearForm> forms;
-    Eigen::VectorXd start;
+    std::vector<int> channel_of_reading;
 
     State(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
           const HeadCalibrations& heads, const AdjustmentOptions& options)
-        : problem(measurement, plan, chain, tool, heads, options),
-          rows(Eigen::Index(measurement.size())),
-          solver(problem, smoothness_at_start(options)) {
+        : PreparedAdjustment(measurement, plan, chain, tool, heads, options, stepdiag::smoothness_at_start(options)),
+          rows(Eigen::Index(measurement.size())) {
         check_options(options, plan);
-        AdjustmentTables tables(problem);
-        const Observability observability(solver, tables);
-        const CalibratedForms chosen = choose_forms(tables);
-        for (const LinearForm* form : chosen.in_order()) forms.push_back(*form);
-        solver.assume_usual(observability.determined());
-        start.setZero(problem.size());
-        solver.solve(start);
-        solver.equations().assume_usual(observability.determined(), start);
-        solver.solve(start);
-        solver.factorize(start);
         for (const Channel& channel : measurement.channels()) channels.push_back(channel.name);
         channel_of_reading.reserve(problem.readings().size());
         for (const AdjustedReading& reading : problem.readings())
             channel_of_reading.push_back(
                 int(std::find(channels.begin(), channels.end(), problem.channel_name(reading)) - channels.begin()));
     }
-    std::vector<int> channel_of_reading;
 };
 
 Adjuster::Adjuster(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,

@@ -38,6 +38,7 @@ void AdjustmentSolver::factorize(const Eigen::VectorXd& x) {
     equations_.linearise(x);
     factorize();
     factorized_at_ = x;
+    fresh_ = false;
 }
 
 void AdjustmentSolver::factorize() {

@@ -98,6 +98,13 @@ public:
     // In place. Held unknowns are 0, whatever is on the right.
     void solve(Eigen::Ref<Eigen::VectorXd> right_hand_side) const;
 
+    // L itself: the band with the reciprocals of its pivots, 0 of held ones, and below it the border's rows; the corner
+    // as far as it has rank, its rows and columns being these of the border, in this order.
+    const BorderedBand& band() const { return l_; }
+    using ConstCorner = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+    ConstCorner corner_factor() const;
+    const std::vector<int>& corner_order() const { return order_; }
+
     // The inverse of N without the held unknowns, whose rows and columns are 0, on the pattern of N; by Takahashi's
     // recurrence.
     BorderedBand selected_inverse() const;
@@ -105,9 +112,7 @@ public:
 
 private:
     using Corner = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
-    using ConstCorner = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
-    Corner schur();                     // all of it
-    ConstCorner corner_factor() const;  // as far as it has rank
+    Corner schur();  // all of it
 
     void factorize();
     void eliminate(int column, int first);

@@ -68,6 +68,10 @@ public:
     int channels() const { return kind_ == ChannelKind::multi_beam ? int(head_->beam_offsets.size()) : 3; }
     int setup_size() const { return setup_size(kind_, *head_); }
     static int setup_size(ChannelKind kind, const HeadCalibration& head);
+    ChannelKind kind() const { return kind_; }
+    const HeadCalibration& head() const { return *head_; }
+    const Eigen::Matrix3d& machine_R_line() const { return line_; }
+    const Eigen::Vector3d& origin() const { return origin_; }
 
     // The set-up of the readings that follow; `setup` has setup_size() entries.
     void set_up(const Eigen::Ref<const Eigen::VectorXd>& setup);

@@ -42,6 +42,11 @@ public:
     // or to this part of it.
     void assume_usual(const std::vector<bool>& determined, const Eigen::VectorXd& centre, double part = 1.0);
 
+    // By unknown: 1/u^2 of its prior, 1/u^2 of what is usual, and where that is.
+    const Eigen::VectorXd& prior_weight() const { return prior_weight_; }
+    const Eigen::VectorXd& usual_weight() const { return usual_weight_; }
+    const Eigen::VectorXd& centre() const { return centre_; }
+
     // Residuals and, if asked for, derivatives at x. Values that are not finite come out as such.
     void linearise(const Eigen::VectorXd& x, bool derivatives = true);
     // Takes derivatives that are roundings of 0 for 0, so that a column of nothing but them does not count.
