@@ -59,6 +59,9 @@ def result_rows(result: UncertaintyResult) -> Iterator[str]:
     if result.entries < len(result.outputs):
         yield ""
         yield from _derived_table(result)
+    if result.volume is not None:
+        yield ""
+        yield from _volume_table(result)
 
 
 def _propagation_table(result: UncertaintyResult) -> Iterator[str]:
@@ -97,8 +100,7 @@ def _budgets(result: UncertaintyResult) -> Iterator[str]:
     u = np.asarray(found.standard_uncertainty)
     yield "where the largest ones come from, in shares of the variance:"
     for family, _, worst in _worst(result, u):
-        parts = np.asarray(found.budget)[worst]
-        shares = {group: float(part / u[worst]) ** 2 for group, part in zip(found.groups, parts, strict=True)}
+        shares = {group: float(part[worst] / u[worst]) ** 2 for group, part in found.budget.items()}
         shares["between groups"] = float(np.asarray(found.between_groups)[worst]) / u[worst] ** 2
         named = sorted(((s, g) for g, s in shares.items() if abs(s) >= SMALL_SHARE), reverse=True)
         rest = sum(shares.values()) - sum(share for share, _ in named)
@@ -147,6 +149,27 @@ def _derived_table(result: UncertaintyResult) -> Iterator[str]:
             cells = [show(other.value[k]), show(other.standard_uncertainty[k]), show(expanded[k])]
         rows.append([label(output), *cells])
     yield from _table(heading, rows)
+
+
+def volume_units(name: str) -> str:
+    """The native unit of one of the ranges over the volume."""
+    return "rad" if name in ("V_A", "V_B", "V_C") else "mm"
+
+
+def _volume_table(result: UncertaintyResult) -> Iterator[str]:
+    found = result.volume
+    assert found is not None
+    rows = []
+    for k, name in enumerate(found.names):
+        if name in found.missing:
+            rows.append([name, "-", "-", f"not determined: {', '.join(found.missing[name])}"])
+            continue
+        numbers = (found.value[k], found.standard_uncertainty[k], *found.interval[k])
+        value, u, low, high = (in_report_units(volume_units(name), float(x))[0] for x in numbers)
+        unit = in_report_units(volume_units(name), 0.0)[1]
+        rows.append([name, f"{value:.4g} {unit}", f"{u:.3g} {unit}", f"{low:.4g} .. {high:.4g} {unit}"])
+    yield "ranges over the volume (V_XYZ of ISO 230-1, errors of body diagonals), by the propagated covariance:"
+    yield from _table(["range", "value", "u", f"{_percent(result)} interval"], rows)
 
 
 def _percent(result: UncertaintyResult) -> str:

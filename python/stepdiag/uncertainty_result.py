@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -34,7 +34,7 @@ class UncertaintyResult:
     propagation: Any | None = None
     monte_carlo: Any | None = None
     comparison: Any | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
+    volume: Any | None = None  # a VolumetricAccuracy
 
     @property
     def positions(self) -> FloatArray:

@@ -2,21 +2,17 @@
 
 import math
 import string
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import xarray as xr
 
-from stepdiag._core import InvalidArgument
-from stepdiag.data_files import date_of_today, is_netcdf
-from stepdiag.files import write_whole
-from stepdiag.netcdf import write_dataset
-from stepdiag.uncertainty_result import FloatArray, UncertaintyResult, in_report_units, label
+from stepdiag.uncertainty_report import volume_units
+from stepdiag.uncertainty_result import FloatArray, UncertaintyResult, label
 
 UNCERTAINTY_FORMAT: Final = "stepdiag uncertainty 1"
 
-_ABOUT: Final = {
+ABOUT: Final = {
     "format": UNCERTAINTY_FORMAT,
     "title": "uncertainty of a calibration, by virtual calibrations",
     "comment": "Geometric errors of the tool relative to the workpiece, named as in ISO 230-1, as calibrations of one "
@@ -32,7 +28,7 @@ _ABOUT: Final = {
 
 # Of a function or a squareness: the ending of its variable, what it is called, its unit where that is another, and all
 # outputs' values.
-_Column = tuple[str, str, str | None, FloatArray]
+Column = tuple[str, str, str | None, FloatArray]
 
 
 def uncertainty_table(result: UncertaintyResult) -> xr.Dataset:
@@ -40,7 +36,7 @@ def uncertainty_table(result: UncertaintyResult) -> xr.Dataset:
     `output` for what has a row for each: budget, covariance, kept samples."""
     coordinates: dict[str, Any] = {}
     variables: dict[str, Any] = {}
-    columns = _columns(result)
+    columns = columns_of(result)
     for name, rows in _functions(result).items():
         first = result.outputs[rows[0]]
         dimensions: tuple[str, ...] = ()
@@ -50,8 +46,15 @@ def uncertainty_table(result: UncertaintyResult) -> xr.Dataset:
             value = values[rows] if dimensions else values[rows[0]]
             attributes = {"units": unit or first.unit, "long_name": f"{meaning} of {name}"}
             variables[f"{name}{ending}"] = (dimensions, value, attributes)
-    variables |= _derived(result, columns) | _outputs(result) | _budget(result) | _monte_carlo(result) | _joint(result)
-    return xr.Dataset(variables, coordinates, _attributes(result))
+    variables |= (
+        _derived(result, columns)
+        | _outputs(result)
+        | _budget(result)
+        | _monte_carlo(result)
+        | _joint(result)
+        | _volume(result)
+    )
+    return xr.Dataset(variables, coordinates, attributes_of(result))
 
 
 def _dimension(coordinates: dict[str, Any], name: str, position: FloatArray) -> str:
@@ -70,8 +73,8 @@ def _functions(result: UncertaintyResult) -> dict[str, list[int]]:
     return rows
 
 
-def _columns(result: UncertaintyResult) -> list[_Column]:
-    columns: list[_Column] = []
+def columns_of(result: UncertaintyResult) -> list[Column]:
+    columns: list[Column] = []
     found, other = result.monte_carlo, result.propagation
     if found is not None:
         symmetric, shortest = np.asarray(found.symmetric), np.asarray(found.shortest)
@@ -98,7 +101,7 @@ def _columns(result: UncertaintyResult) -> list[_Column]:
     return columns
 
 
-def _derived(result: UncertaintyResult, columns: list[_Column]) -> dict[str, Any]:
+def _derived(result: UncertaintyResult, columns: list[Column]) -> dict[str, Any]:
     rows = slice(result.entries, len(result.outputs))
     derived = result.outputs[rows]
     if not derived:
@@ -131,8 +134,9 @@ def _outputs(result: UncertaintyResult) -> dict[str, Any]:
 def _budget(result: UncertaintyResult) -> dict[str, Any]:
     if result.propagation is None:
         return {}
-    groups = np.array(list(result.propagation.groups), dtype=str)
-    parts = np.asarray(result.propagation.budget).T  # a row each group
+    budget = result.propagation.budget
+    groups = np.array(list(budget), dtype=str)
+    parts = np.array(list(budget.values())).reshape(len(budget), len(result.outputs))
     meaning = "standard uncertainty of each output that a group of inputs alone makes"
     return {
         "group": ("group", groups, {"long_name": "group of uncertain inputs"}),
@@ -151,14 +155,11 @@ def _monte_carlo(result: UncertaintyResult) -> dict[str, Any]:
             np.asarray(found.covariance),
             {"long_name": "covariance of all outputs", "comment": "of two values in their output_units"},
         )
-    kept = dict(found.kept)
+    kept = found.kept
     if kept:
-        values = np.array([np.asarray(samples) for samples in kept.values()])
-        variables["kept_name"] = (
-            "kept",
-            np.array(list(kept), dtype=str),
-            {"long_name": "output whose samples are kept"},
-        )
+        values = np.array(list(kept.values()))
+        names = np.array([label(result.outputs[k]) for k in kept])
+        variables["kept_name"] = ("kept", names, {"long_name": "output whose samples are kept"})
         comment = "in the units of the output, in the order of the samples; missing where a sample gave no result"
         variables["kept_samples"] = (("kept", "sample"), values, {"long_name": "samples", "comment": comment})
     return variables
@@ -173,7 +174,7 @@ def _joint(result: UncertaintyResult) -> dict[str, Any]:
         members = [result.outputs[k] for k in region.outputs]
         text = " and ".join(map(label, members))
         units = np.array([output.unit for output in members])
-        cells = np.asarray(region.smallest).reshape(tuple(region.cells))
+        cells = np.asarray(region.smallest)
         place = {"comment": f"in {name}_units"}
         variables |= {
             f"{name}_name": (name, np.array([label(o) for o in members]), {"long_name": "outputs of a joint region"}),
@@ -217,7 +218,28 @@ def _joint(result: UncertaintyResult) -> dict[str, Any]:
     return variables
 
 
-def _attributes(result: UncertaintyResult) -> dict[str, Any]:
+def _volume(result: UncertaintyResult) -> dict[str, Any]:
+    found = result.volume
+    if found is None:
+        return {}
+    units = np.array([volume_units(name) for name in found.names])
+    columns = {
+        "value": ("range over the volume of the deviations without noise", found.value),
+        "u": ("standard uncertainty of the range", found.standard_uncertainty),
+        "low": ("lower end of the coverage interval of the range", found.interval[:, 0]),
+        "high": ("upper end of the coverage interval of the range", found.interval[:, 1]),
+        "bound": ("by how much the range may be wrong at most, with the coverage probability", found.bound),
+    }
+    variables: dict[str, Any] = {
+        "range_name": ("range", np.array(found.names), {"long_name": "V_XYZ of ISO 230-1 and body diagonals"}),
+        "range_units": ("range", units, {"long_name": "units of a range"}),
+    }
+    for ending, (meaning, values) in columns.items():
+        variables[f"range_{ending}"] = ("range", values, {"long_name": meaning, "comment": "in range_units"})
+    return variables
+
+
+def attributes_of(result: UncertaintyResult) -> dict[str, Any]:
     scenario, found = result.scenario, result.monte_carlo
     attributes: dict[str, Any] = {
         "method": result.method,
@@ -235,39 +257,3 @@ def _attributes(result: UncertaintyResult) -> dict[str, Any]:
             "instruction_set": found.target,
         }
     return attributes
-
-
-def write_uncertainty(result: UncertaintyResult, path: Path) -> None:
-    """Writes a result, CSV or netCDF (.nc). Raises InvalidArgument where it cannot be written."""
-    if is_netcdf(path):
-        write_dataset(uncertainty_table(result), path, _ABOUT | {"date": date_of_today()})
-    elif path.suffix.lower() == ".csv":
-        write_whole(path, uncertainty_csv(result))
-    else:
-        raise InvalidArgument(f"{path}: expected a name that ends in .nc or .csv")
-
-
-def uncertainty_csv(result: UncertaintyResult) -> str:
-    """A row an output, µm and µrad, what the table has in words above it as `# key=value`."""
-    columns = _columns(result)
-    facts = {"format": UNCERTAINTY_FORMAT, "date": date_of_today()} | _attributes(result)
-    lines = [f"# {name}={_fact(value)}" for name, value in facts.items()]
-    named = [(ending or "_mean").removeprefix("_").replace("_u", "_standard_uncertainty") for ending, *_ in columns]
-    named = ["standard_uncertainty" if name == "u" else name for name in named]
-    lines.append(",".join(["output", "position_mm", "unit", *named]))
-    for k, output in enumerate(result.outputs):
-        unit = {"µm": "um", "µrad": "urad"}.get(in_report_units(output.unit, 0.0)[1], output.unit)
-        cells = [_quoted(output.name), "" if math.isnan(output.position) else repr(float(output.position)), unit]
-        for ending, _, _, values in columns:
-            value = float(values[k]) if ending == "_freedom" else in_report_units(output.unit, float(values[k]))[0]
-            cells.append("" if math.isnan(value) else repr(value))
-        lines.append(",".join(cells))
-    return "\n".join(lines) + "\n"
-
-
-def _fact(value: Any) -> str:
-    return " ".join(f"{x:.17g}" for x in value) if isinstance(value, np.ndarray) else str(value)
-
-
-def _quoted(name: str) -> str:
-    return '"' + name.replace('"', '""') + '"' if "," in name or '"' in name else name

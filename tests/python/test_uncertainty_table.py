@@ -18,7 +18,8 @@ from stepdiag.netcdf import open_dataset
 from stepdiag.scenario import parse_scenario
 from stepdiag.uncertainty_report import result_rows
 from stepdiag.uncertainty_result import UncertaintyResult, find_output, label
-from stepdiag.uncertainty_table import uncertainty_table, write_uncertainty
+from stepdiag.uncertainty_table import uncertainty_table
+from stepdiag.uncertainty_write import write_uncertainty
 
 NODES = (0.0, 40.0, 80.0)
 
@@ -40,8 +41,7 @@ def made_up(**changes: Any) -> UncertaintyResult:
         standard_uncertainty=u,
         degrees_of_freedom=np.where(np.arange(count) == 2, 7.5, np.inf),
         expanded=lambda coverage: 2.0 * u,
-        groups=["noise of distance", "laser"],
-        budget=np.stack([0.8 * u, 0.6 * u], axis=1),
+        budget={"noise of distance": 0.8 * u, "laser": 0.6 * u},
         between_groups=np.zeros(count),
     )
     region = SimpleNamespace(
@@ -52,8 +52,7 @@ def made_up(**changes: Any) -> UncertaintyResult:
         rectangle_factor=2.2,
         grid_from=np.zeros(2),
         grid_width=np.ones(2),
-        cells=[2, 3],
-        smallest=[True, False, True, True, False, False],
+        smallest=np.array([[1.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
     )
     drawn = SimpleNamespace(
         mean=mean,
