@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "evaluation/linear_evaluation.hpp"
+#include "evaluation/linear_maps.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -27,20 +28,20 @@ public:
     }
     const AxisSystem& lengths(Axis axis) const { return systems_[index(axis)]; }
 
-    template <int Width>
-    std::vector<Row<Width>> apply(const ReadingRows<Width>& readings) const {
-        std::vector<Row<Width>> lengths(readings.values.size() / values_per_reading);
+    template <class Number>
+    std::vector<Number> apply(const ReadingRows<Number>& readings) const {
+        std::vector<Number> lengths(readings.values.size() / values_per_reading);
         for (std::size_t i = 0; i < lengths.size(); ++i) lengths[i] = readings.values[values_per_reading * i];
-        std::vector<Row<Width>> out(layout_.size(), Row<Width>::Zero());
-        Row<Width> slope[3][3];  // of component c over axis a
+        std::vector<Number> out(layout_.size(), Number::Zero());
+        Number slope[3][3];  // of component c over axis a
         for (const Axis axis : all_axes) {
             const int a = index(axis);
-            const auto functions = functions_of<Width>(out, layout_, axis, Component::X);
-            add_up_steps<Width>(systems_[a], lengths, visits_, readings.only_visit, functions);
+            const auto functions = functions_of<Number>(out, layout_, axis, Component::X);
+            add_up_steps<Number>(systems_[a], lengths, visits_, readings.only_visit, functions);
             for (int c = 0; c < 3; ++c) {
-                const Row<Width> end = functions[c][layout_.nodes - 1];
+                const Number end = functions[c][layout_.nodes - 1];
                 slope[a][c] = end / volume_[a];
-                if (c != a) take_off_trend<Width>(functions[c], layout_.nodes, end);  // positioning keeps its slope
+                if (c != a) take_off_trend<Number>(functions[c], layout_.nodes, end);  // positioning keeps its slope
             }
         }
         // A squareness is the angle between two axes: what their two straightness slopes have together.
@@ -58,15 +59,24 @@ private:
     AxisSystems systems_;
 };
 
+std::vector<bool> body_diagonals(const std::vector<Visit>& visits) {
+    std::vector<bool> are;
+    for (const Visit& visit : visits) are.push_back(visit.line.is_body_diagonal());
+    return are;
+}
+
 }  // namespace
+
+LinearProgram conventional_program(const std::vector<Visit>& visits, const Plan& plan) {
+    return write_down(ConventionalMap(visits, plan, body_diagonals(visits)), visits, {plan.steps() + 1});
+}
 
 Calibration evaluate_conventional(const Measurement& measurement, const Plan& plan, const Chain& chain,
                                   const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                                   const EvaluationOptions& options) {
     if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
     const auto visits = collect_visits(measurement, plan, heads, options.uncertainty, LengthKind::distance);
-    std::vector<bool> usable;
-    for (const Visit& visit : visits) usable.push_back(visit.line.is_body_diagonal());
+    const std::vector<bool> usable = body_diagonals(visits);
     const auto diagonals = std::count(usable.begin(), usable.end(), true);
     if (diagonals < 3)
         throw InvalidArgument("conventional evaluation: expected three or four body diagonals, the measurement has " +

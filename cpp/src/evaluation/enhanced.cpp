@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "evaluation/linear_evaluation.hpp"
+#include "evaluation/linear_maps.hpp"
 #include "evaluation/slope_system.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/machine/machine.hpp"
@@ -40,13 +41,13 @@ public:
         return !id.is_rotation() && bent_[index(id.axis)][static_cast<int>(id.component)];
     }
 
-    template <int Width>
-    std::vector<Row<Width>> apply(const ReadingRows<Width>& readings) const {
-        std::vector<Row<Width>> out(layout_.size(), Row<Width>::Zero());
+    template <class Number>
+    std::vector<Number> apply(const ReadingRows<Number>& readings) const {
+        std::vector<Number> out(layout_.size(), Number::Zero());
         if (readings.has_tilts) solve_angles(readings, out);
-        std::vector<Row<Width>> lengths = corrected_lengths(readings, out);
-        const std::vector<Row<Width>> slopes = slopes_.solve<Width>(lengths);
-        slopes_.correct_for_laser_angles<Width>(slopes, visits_, lengths);
+        std::vector<Number> lengths = corrected_lengths(readings, out);
+        const std::vector<Number> slopes = slopes_.solve<Number>(lengths);
+        slopes_.correct_for_laser_angles<Number>(slopes, visits_, lengths);
         solve_lengths(lengths, slopes, out);
         return out;
     }
@@ -89,13 +90,13 @@ private:
         for (Eigen::Index j = 0; j < slopes_.null_space().cols(); ++j) {
             std::vector<Row<1>> slopes, lengths(contributions_.size(), Row<1>::Zero());
             for (const double unknown : slopes_.null_space().col(j)) slopes.push_back(Row<1>(unknown));
-            slopes_.correct_for_laser_angles<1>(slopes, visits_, lengths);
+            slopes_.correct_for_laser_angles<Row<1>>(slopes, visits_, lengths);
             std::vector<Row<1>> out(layout_.size(), Row<1>::Zero());
             for (const Axis axis : all_axes) {
-                const auto functions = functions_of<1>(out, layout_, axis, Component::X);
-                add_up_steps<1>(lengths_[index(axis)], lengths, visits_, -1, functions);
+                const auto functions = functions_of<Row<1>>(out, layout_, axis, Component::X);
+                add_up_steps<Row<1>>(lengths_[index(axis)], lengths, visits_, -1, functions);
                 for (int c = 0; c < 3; ++c) {
-                    take_off_trend<1>(functions[c], layout_.nodes, functions[c][layout_.nodes - 1]);
+                    take_off_trend<Row<1>>(functions[c], layout_.nodes, functions[c][layout_.nodes - 1]);
                     for (int k = 0; k < layout_.nodes; ++k)
                         if (std::abs(functions[c][k][0]) > negligible) bent_[index(axis)][c] = true;
                 }
@@ -103,10 +104,10 @@ private:
         }
     }
 
-    template <int Width>
-    void solve_angles(const ReadingRows<Width>& readings, std::vector<Row<Width>>& out) const {
+    template <class Number>
+    void solve_angles(const ReadingRows<Number>& readings, std::vector<Number>& out) const {
         for (const Axis axis : all_axes) {
-            const auto theta = functions_of<Width>(out, layout_, axis, Component::A);
+            const auto theta = functions_of<Number>(out, layout_, axis, Component::A);
             const auto& intervals = angles_[index(axis)].intervals;
             for (std::size_t i = 0; i < intervals.size(); ++i) {
                 for (int c = 0; c < 3; ++c) {
@@ -117,43 +118,45 @@ private:
                 for (std::size_t s = 0; !intervals[i].is_bridged && s < intervals[i].steps.size(); ++s) {
                     const Step& step = intervals[i].steps[s];
                     if (readings.only_visit >= 0 && readings.only_visit != step.visit) continue;
-                    const Row<Width>* from =
+                    const Number* from =
                         &readings.values[values_per_reading * (visits_[step.visit].first_reading + step.point)];
-                    const Row<Width>* to = from + values_per_reading;
-                    const Row<Width> alpha = step.sign * (to[1] - from[1]), beta = step.sign * (to[2] - from[2]);
+                    const Number* to = from + values_per_reading;
+                    const Number alpha = step.sign * (to[1] - from[1]), beta = step.sign * (to[2] - from[2]);
                     const auto& inverse = intervals[i].solution->pseudoinverse;
                     for (int c = 0; c < 3; ++c)
                         theta[c][i + 1] +=
                             inverse(c, Eigen::Index(2 * s)) * alpha + inverse(c, Eigen::Index(2 * s + 1)) * beta;
                 }
+                for (int c = 0; c < 3; ++c) settle(theta[c][i + 1]);
             }
         }
     }
 
-    template <int Width>
-    std::vector<Row<Width>> corrected_lengths(const ReadingRows<Width>& readings,
-                                              const std::vector<Row<Width>>& theta) const {
-        std::vector<Row<Width>> lengths(contributions_.size());
+    template <class Number>
+    std::vector<Number> corrected_lengths(const ReadingRows<Number>& readings, const std::vector<Number>& theta) const {
+        std::vector<Number> lengths(contributions_.size());
         for (std::size_t i = 0; i < lengths.size(); ++i) {
-            Row<Width> length = readings.values[values_per_reading * i];
+            Number length = readings.values[values_per_reading * i];
             if (readings.has_tilts)
                 for (const auto& [row, coefficient] : contributions_[i]) length -= coefficient * theta[row];
+            settle(length);
             lengths[i] = length;
         }
         return lengths;
     }
 
     // Shapes from the steps, slopes from the slope system; straightness ends at 0 by the choice of frame.
-    template <int Width>
-    void solve_lengths(const std::vector<Row<Width>>& lengths, const std::vector<Row<Width>>& slopes,
-                       std::vector<Row<Width>>& out) const {
+    template <class Number>
+    void solve_lengths(const std::vector<Number>& lengths, const std::vector<Number>& slopes,
+                       std::vector<Number>& out) const {
         for (const Axis axis : all_axes) {
-            const auto functions = functions_of<Width>(out, layout_, axis, Component::X);
-            add_up_steps<Width>(lengths_[index(axis)], lengths, visits_, -1, functions);
+            const auto functions = functions_of<Number>(out, layout_, axis, Component::X);
+            add_up_steps<Number>(lengths_[index(axis)], lengths, visits_, -1, functions);
             for (int c = 0; c < 3; ++c) {
-                Row<Width> trend = functions[c][layout_.nodes - 1];
+                Number trend = functions[c][layout_.nodes - 1];
                 if (c == index(axis) && slopes_.determines_scale(axis)) trend -= slopes[SlopeSystem::scale(axis)];
-                take_off_trend<Width>(functions[c], layout_.nodes, trend);
+                settle(trend);
+                take_off_trend<Number>(functions[c], layout_.nodes, trend);
             }
         }
         for (const Squareness s : all_squarenesses) out[layout_.row(s)] = slopes[SlopeSystem::squareness(s)];
@@ -221,6 +224,11 @@ std::vector<std::string> explain(const EnhancedMap& map, const Plan& plan) {
 }
 
 }  // namespace
+
+LinearProgram enhanced_program(const std::vector<Visit>& visits, const Plan& plan, const Chain& chain,
+                               const Eigen::Vector3d& tool) {
+    return write_down(EnhancedMap(visits, plan, chain, tool), visits, {plan.steps() + 1});
+}
 
 Calibration evaluate_enhanced(const Measurement& measurement, const Plan& plan, const Chain& chain,
                               const Eigen::Vector3d& tool, const HeadCalibrations& heads,

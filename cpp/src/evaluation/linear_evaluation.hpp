@@ -3,12 +3,13 @@
 // A map applies itself to "rows": each reading's length, alpha and beta is a row of numbers, one for each of several
 // sets of readings evaluated at once. One set gives the values. A set that holds the effect of one raw channel alone
 // gives that channel's share of every parameter, and the shares make eq. 6: Cov(x) = sum over raw channels of share
-// share^T.
+// share^T. Rows that are Traced write the map down as a program for many sets.
 #pragma once
 
 #include <Eigen/Core>
 #include <vector>
 
+#include "evaluation/linear_program.hpp"
 #include "evaluation/step_systems.hpp"
 #include "stepdiag/core/error.hpp"
 
@@ -20,12 +21,12 @@ using Row = Eigen::Array<double, Width, 1>;
 constexpr std::size_t largest_covariance = 10'000;  // values: 800 MB
 constexpr int values_per_reading = 3;               // length, alpha, beta
 
-// What a map is applied to: `width` sets of readings. Where only one visit's readings differ from zero, or no tilt
-// does, a map may skip the rest.
-template <int Width>
+// What a map is applied to: sets of readings, a Row<Width> each value. Where only one visit's readings differ from
+// zero, or no tilt does, a map may skip the rest.
+template <class Number>
 struct ReadingRows {
-    std::vector<Row<Width>> values;  // values_per_reading a reading
-    int only_visit = -1;             // -1: all
+    std::vector<Number> values;  // values_per_reading a reading
+    int only_visit = -1;         // -1: all
     bool has_tilts = true;
 };
 
@@ -38,9 +39,9 @@ struct ParameterLayout {
 };
 
 // Where the three translations / rotations of an axis begin in the parameters.
-template <int Width>
-std::array<Row<Width>*, 3> functions_of(std::vector<Row<Width>>& parameters, const ParameterLayout& layout, Axis axis,
-                                        Component first) {
+template <class Number>
+std::array<Number*, 3> functions_of(std::vector<Number>& parameters, const ParameterLayout& layout, Axis axis,
+                                    Component first) {
     const auto begin = [&](int c) {
         return &parameters[layout.row(FunctionId{axis, Component(static_cast<int>(first) + c)}.index(), 0)];
     };
@@ -48,9 +49,12 @@ std::array<Row<Width>*, 3> functions_of(std::vector<Row<Width>>& parameters, con
 }
 
 // Takes a straight line off a function: 0 at home, `end` at the last node.
-template <int Width>
-void take_off_trend(Row<Width>* function, int nodes, const Row<Width>& end) {
-    for (int k = 1; k < nodes; ++k) function[k] -= double(k) / (nodes - 1) * end;
+template <class Number>
+void take_off_trend(Number* function, int nodes, const Number& end) {
+    for (int k = 1; k < nodes; ++k) {
+        function[k] -= double(k) / (nodes - 1) * end;
+        settle(function[k]);
+    }
 }
 
 inline std::vector<Row<1>> readings_of(const std::vector<Visit>& visits) {
@@ -84,7 +88,7 @@ inline std::vector<ChannelShare> channel_shares(const std::vector<Visit>& visits
 template <int Width, class Map, class Take>
 void for_each_share(const Map& map, const std::vector<Visit>& visits, Take&& take) {
     const auto shares = channel_shares(visits);
-    ReadingRows<Width> readings;
+    ReadingRows<Row<Width>> readings;
     readings.values.assign(readings_of(visits).size(), Row<Width>::Zero());
     for (std::size_t begin = 0; begin < shares.size();) {
         std::size_t end = begin;
@@ -96,12 +100,38 @@ void for_each_share(const Map& map, const std::vector<Visit>& visits, Take&& tak
             readings.has_tilts =
                 readings.has_tilts || shares[end].effect.template tail<2>().cwiseAbs().maxCoeff() > 0.0;
         }
-        take(map.template apply<Width>(readings), int(end - begin));
+        take(map.template apply<Row<Width>>(readings), int(end - begin));
         for (std::size_t s = begin; s < end; ++s)
             for (int c = 0; c < values_per_reading; ++c)
                 readings.values[values_per_reading * shares[s].reading + c].setZero();
         begin = end;
     }
+}
+
+// Of the parameters, in the order of the tables.
+template <class Map>
+std::vector<int> determined_rows(const Map& map, const ParameterLayout& layout) {
+    std::vector<int> rows;
+    for (int i = 0; i < function_count; ++i)
+        for (int k = 0; map.is_determined(FunctionId::at(i)) && k < layout.nodes; ++k) rows.push_back(layout.row(i, k));
+    for (const Squareness s : all_squarenesses)
+        if (map.is_determined(s)) rows.push_back(layout.row(s));
+    return rows;
+}
+
+// The map from the readings' lengths and tilts (values_per_reading each) to the parameters that are determined.
+template <class Map>
+LinearProgram write_down(const Map& map, const std::vector<Visit>& visits, const ParameterLayout& layout) {
+    ProgramBuilder builder(readings_of(visits).size());
+    ReadingRows<Traced> readings;
+    for (std::size_t i = 0; i < builder.inputs(); ++i) readings.values.emplace_back(builder, int(i));
+    std::vector<Traced> parameters = map.template apply<Traced>(readings);
+    std::vector<int> outputs;
+    for (const int row : determined_rows(map, layout)) {
+        parameters[row].settle();
+        outputs.push_back(parameters[row].place());
+    }
+    return builder.build(outputs);
 }
 
 // Fills functions, squarenesses and covariance of the calibration with what `map.is_determined` names.
@@ -110,16 +140,11 @@ void evaluate_linear(const Map& map, const std::vector<Visit>& visits, const Pla
                      Calibration& calibration) {
     constexpr int width = 8;  // the rows of a step's sum stay in registers
     const ParameterLayout layout{plan.steps() + 1};
-    std::vector<int> rows;  // of the parameters that are determined
-    for (int i = 0; i < function_count; ++i)
-        for (int k = 0; map.is_determined(FunctionId::at(i)) && k < layout.nodes; ++k) rows.push_back(layout.row(i, k));
-    for (const Squareness s : all_squarenesses)
-        if (map.is_determined(s)) rows.push_back(layout.row(s));
-
+    const std::vector<int> rows = determined_rows(map, layout);
     if (full_covariance && rows.size() > largest_covariance)
         throw InvalidArgument("full_covariance: expected at most " + std::to_string(largest_covariance) +
                               " values, the calibration has " + std::to_string(rows.size()));
-    const auto values = map.template apply<1>({readings_of(visits), -1, true});
+    const auto values = map.template apply<Row<1>>({readings_of(visits), -1, true});
     std::vector<Row<width>> variance(layout.size(), Row<width>::Zero());
     Eigen::MatrixXd covariance;
     if (full_covariance) covariance = Eigen::MatrixXd::Zero(Eigen::Index(rows.size()), Eigen::Index(rows.size()));
@@ -151,10 +176,10 @@ void evaluate_linear(const Map& map, const std::vector<Visit>& visits, const Pla
 
 // Sums the solved steps of one axis from home: component c goes to out[c][0] = 0 ... out[c][intervals]. With
 // `only_visit` the lengths of all other visits are known to be 0.
-template <int Width>
-void add_up_steps(const AxisSystem& system, const std::vector<Row<Width>>& lengths, const std::vector<Visit>& visits,
-                  int only_visit, const std::array<Row<Width>*, 3>& out) {
-    Row<Width> x = Row<Width>::Zero(), y = x, z = x;
+template <class Number>
+void add_up_steps(const AxisSystem& system, const std::vector<Number>& lengths, const std::vector<Visit>& visits,
+                  int only_visit, const std::array<Number*, 3>& out) {
+    Number x = Number::Zero(), y = x, z = x;
     out[0][0] = out[1][0] = out[2][0] = x;
     for (std::size_t i = 0; i < system.intervals.size(); ++i) {
         const StepSystem& interval = system.intervals[i];
@@ -166,13 +191,14 @@ void add_up_steps(const AxisSystem& system, const std::vector<Row<Width>>& lengt
         for (std::size_t r = 0; !interval.is_bridged && r < interval.steps.size(); ++r) {
             const Step& step = interval.steps[r];
             if (only_visit >= 0 && only_visit != step.visit) continue;
-            const Row<Width>* reading = &lengths[visits[step.visit].first_reading + step.point];
-            const Row<Width> increment = step.sign * (reading[1] - reading[0]);
+            const Number* reading = &lengths[visits[step.visit].first_reading + step.point];
+            const Number increment = step.sign * (reading[1] - reading[0]);
             const auto share = interval.solution->pseudoinverse.col(Eigen::Index(r));
             x += share[0] * increment;
             y += share[1] * increment;
             z += share[2] * increment;
         }
+        settle(x), settle(y), settle(z);
         out[0][i + 1] = x;
         out[1][i + 1] = y;
         out[2][i + 1] = z;

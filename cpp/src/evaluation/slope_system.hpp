@@ -25,28 +25,31 @@ public:
     // Unknowns that the equations leave free: each column solves them with 0 on the right.
     const Eigen::MatrixXd& null_space() const { return null_space_; }
 
-    template <int Width>
-    std::vector<Row<Width>> solve(const std::vector<Row<Width>>& lengths) const {
-        std::vector<Row<Width>> sums;
+    template <class Number>
+    std::vector<Number> solve(const std::vector<Number>& lengths) const {
+        std::vector<Number> sums;
         for (const auto& terms : sums_) {
-            Row<Width> sum = Row<Width>::Zero();
+            Number sum = Number::Zero();
             for (const auto& [reading, coefficient] : terms) sum += coefficient * lengths[reading];
+            settle(sum);
             sums.push_back(sum);
         }
-        std::vector<Row<Width>> slopes(inverse_.rows(), Row<Width>::Zero());
+        std::vector<Number> slopes(inverse_.rows(), Number::Zero());
         for (Eigen::Index j = 0; j < inverse_.rows(); ++j)
             for (Eigen::Index i = 0; i < inverse_.cols(); ++i) slopes[j] += inverse_(j, i) * sums[i];
+        for (Number& slope : slopes) settle(slope);
         return slopes;
     }
 
-    template <int Width>
-    void correct_for_laser_angles(const std::vector<Row<Width>>& slopes, const std::vector<Visit>& visits,
-                                  std::vector<Row<Width>>& lengths) const {
+    template <class Number>
+    void correct_for_laser_angles(const std::vector<Number>& slopes, const std::vector<Visit>& visits,
+                                  std::vector<Number>& lengths) const {
         for (std::size_t v = 0; v < visits.size(); ++v)
             for (std::size_t k = 0; k < visits[v].points.size(); ++k) {
                 const Eigen::Vector2d lateral = visits[v].points[k].lateral;
-                lengths[visits[v].first_reading + k] +=
-                    lateral.y() * slopes[laser_angle(int(v), 0)] - lateral.x() * slopes[laser_angle(int(v), 1)];
+                Number& length = lengths[visits[v].first_reading + k];
+                length += lateral.y() * slopes[laser_angle(int(v), 0)] - lateral.x() * slopes[laser_angle(int(v), 1)];
+                settle(length);
             }
     }
 

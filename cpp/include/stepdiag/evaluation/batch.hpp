@@ -31,7 +31,9 @@ struct CalibrationEntry {
 class BatchEvaluator {
 public:
     // `pattern`: a run of this plan whose readings are there; rows and channels of all sets are like its own. For the
-    // adjustment it is also where each set's solution starts. Throws InvalidArgument like the evaluation itself.
+    // adjustment it is also where each set's solution starts. Readings that it lost are lost in all sets. The linear
+    // methods weigh all sets as the pattern: what moves a value by less than a thousandth of its uncertainty beside an
+    // evaluation of the set by itself. Throws InvalidArgument like the evaluation itself.
     BatchEvaluator(const Measurement& pattern, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
                    const HeadCalibrations& heads, const BatchOptions& options);
     ~BatchEvaluator();
@@ -48,7 +50,7 @@ public:
         Worker(Worker&&) noexcept;
         // `readings`: [(row * channels + channel) * lanes + lane], rows and channels of the pattern's signals (without
         // time and temperature), `lanes` a multiple of lane_group; results: values[entry * stride + lane]. A lane with
-        // a reading that is NaN, or without a solution, gives NaN.
+        // a reading that counts and is NaN, or without a solution, gives NaN.
         void evaluate(const double* readings, std::size_t lanes, double* values, std::size_t stride);
 
     private:
