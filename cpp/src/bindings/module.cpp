@@ -171,4 +171,5 @@ PYBIND11_MODULE(_core, m) {
     bind_uncertain_inputs(m);
     bind_sample_model(m);
     bind_virtual_calibration(m);
+    bind_monte_carlo(m);
 }

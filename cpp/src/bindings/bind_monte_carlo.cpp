@@ -1,0 +1,264 @@
+#include <pybind11/typing.h>
+
+#include <limits>
+
+#include "bindings.hpp"
+#include "stepdiag/uncertainty/function_model.hpp"
+#include "stepdiag/uncertainty/monte_carlo.hpp"
+
+namespace stepdiag::bindings {
+namespace {
+
+using Progress = std::optional<py::typing::Callable<py::object(std::uint64_t)>>;
+using ModelFunction = py::typing::Callable<py::object(DoubleArray)>;
+using Correlation = std::pair<std::vector<int>, ArrayLike>;
+
+// Asked by the thread that called, without the interpreter lock. Ctrl-C ends a run also where nobody asks for progress.
+RunControl to_control(const IntegerLike& threads, const Progress& progress) {
+    return {to_int(threads, "threads"), [&progress](std::uint64_t leaves_done) {
+                const py::gil_scoped_acquire lock;
+                if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+                if (!progress) return true;
+                const py::object answer = (*progress)(leaves_done);
+                return answer.is_none() || answer.cast<bool>();
+            }};
+}
+
+std::uint64_t to_leaf(const IntegerLike& number, const char* name) {
+    return std::uint64_t(to_integer(number, name, 0, std::int64_t(largest_leaf_count)));
+}
+
+// Worker threads call a Python function in turn, each with the interpreter lock.
+FunctionModel::Function to_function(const ModelFunction& function) {
+    // The last one to let go of the function may be a thread without the lock.
+    const std::shared_ptr<py::function> shared(new py::function(function), [](py::function* held) {
+        const py::gil_scoped_acquire lock;
+        delete held;
+    });
+    return [shared](Eigen::Ref<const FunctionModel::Values> inputs, Eigen::Ref<FunctionModel::Values> outputs) {
+        const py::gil_scoped_acquire lock;
+        DoubleArray arguments({inputs.rows(), inputs.cols()});
+        Eigen::Map<FunctionModel::Values>(arguments.mutable_data(), inputs.rows(), inputs.cols()) = inputs;
+        const py::object result = (*shared)(arguments);
+        const DoubleArray values = DoubleArray::ensure(result);
+        if (!values) PyErr_Clear();
+        const bool row = values && values.ndim() == 1 && outputs.rows() == 1 && values.shape(0) == outputs.cols();
+        if (!row &&
+            !(values && values.ndim() == 2 && values.shape(0) == outputs.rows() && values.shape(1) == outputs.cols()))
+            throw InvalidArgument("function: expected an array of shape (" + std::to_string(outputs.rows()) + ", " +
+                                  std::to_string(outputs.cols()) + ") back, got " +
+                                  (values ? "shape " + std::string(py::str(py::object(values.attr("shape"))))
+                                          : std::string(py::str(py::type::handle_of(result)))));
+        outputs = Eigen::Map<const FunctionModel::Values>(values.data(), outputs.rows(), outputs.cols());
+    };
+}
+
+std::vector<SampleModel::Output> to_outputs(const std::vector<std::string>& names) {
+    std::vector<SampleModel::Output> outputs;
+    for (const std::string& name : names) outputs.push_back({name, std::numeric_limits<double>::quiet_NaN(), "1"});
+    return outputs;
+}
+
+DoubleArray to_flags(const JointRegion& region) {
+    std::vector<py::ssize_t> shape(region.cells.begin(), region.cells.end());
+    DoubleArray flags(shape);
+    std::copy(region.smallest.begin(), region.smallest.end(), flags.mutable_data());
+    return flags;
+}
+
+const char* figure_name(AdaptiveProcedure::Figure figure) {
+    constexpr const char* names[] = {"mean", "standard uncertainty", "lower end", "upper end"};
+    return names[int(figure)];
+}
+
+void bind_options(py::module_& m) {
+    using Sets = std::vector<std::vector<std::size_t>>;
+    m.attr("leaf_samples") = leaf_samples;
+    m.attr("pilot_samples") = pilot_samples;
+    py::class_<StatisticsOptions>(m, "StatisticsOptions", "What a Monte Carlo run is to find out of its samples.")
+        .def(py::init([](double coverage, int digits, bool covariance, std::vector<std::size_t> kept, Sets joint) {
+                 return StatisticsOptions{coverage, digits, covariance, std::move(kept), std::move(joint)};
+             }),
+             py::kw_only(), py::arg("coverage") = StatisticsOptions{}.coverage,
+             py::arg("digits") = StatisticsOptions{}.digits, py::arg("covariance") = StatisticsOptions{}.covariance,
+             py::arg("kept") = std::vector<std::size_t>{}, py::arg("joint") = Sets{},
+             "coverage: of intervals; digits: of standard uncertainties that matter, 1 to 3 (bins are a fifth of "
+             "delta wide, JCGM 101, 7.9.2); covariance: of all outputs; kept: outputs of which every value is kept, 8 "
+             "bytes each; joint: sets of one to three outputs that get joint coverage regions (JCGM 102, 6.5). "
+             "make_bins checks them.")
+        .def_readonly("coverage", &StatisticsOptions::coverage)
+        .def_readonly("digits", &StatisticsOptions::digits)
+        .def_readonly("covariance", &StatisticsOptions::covariance)
+        .def_readonly("kept", &StatisticsOptions::kept)
+        .def_readonly("joint", &StatisticsOptions::joint);
+    m.def("numerical_tolerance", &numerical_tolerance, py::arg("standard_uncertainty"), py::arg("digits"),
+          "delta = 10^r / 2 for u = c 10^r, c a whole number of so many digits (JCGM 101, 7.9.2).");
+
+    py::class_<Bins>(m, "Bins", "What all parts of one Monte Carlo run share, fixed by its pilot run.")
+        .def_property_readonly("outputs", &Bins::outputs)
+        .def_property_readonly("options", &Bins::options)
+        .def_property_readonly("seed", &Bins::seed)
+        .def_property_readonly("target", &Bins::target)
+        .def_property_readonly("counts", &Bins::counts, "Bins of all outputs: 4 bytes each, for every thread.")
+        .def("to_bytes", [](const Bins& bins) { return py::bytes(bins.to_bytes()); })
+        .def_static(
+            "from_bytes", [](const py::bytes& bytes) { return Bins::from_bytes(std::string_view(bytes)); },
+            py::arg("bytes"), "Raises InvalidArgument for damaged bytes.");
+}
+
+void bind_result(py::module_& m) {
+    py::class_<JointRegion>(
+        m, "JointRegion",
+        "A region of up to three outputs that holds the coverage (JCGM 102, 6.5): an ellipsoid and a rectangle about "
+        "the pilot run's mean, of its covariance's shape, and the smallest region made of cells of a grid.")
+        .def_readonly("outputs", &JointRegion::outputs)
+        .def_property_readonly("centre", [](const JointRegion& region) { return to_numpy_vector(region.centre); })
+        .def_property_readonly("covariance", [](const JointRegion& region) { return to_numpy(region.covariance); })
+        .def_readonly("ellipsoid_factor", &JointRegion::ellipsoid_factor,
+                      "k_p: (y - centre) covariance^-1 (y - centre) <= k_p^2; nan for a singular covariance")
+        .def_readonly("rectangle_factor", &JointRegion::rectangle_factor, "k_q: |y_j - centre_j| <= k_q u_j")
+        .def_readonly("ellipsoid_volume", &JointRegion::ellipsoid_volume)
+        .def_readonly("rectangle_volume", &JointRegion::rectangle_volume)
+        .def_property_readonly("grid_from", [](const JointRegion& region) { return to_numpy_vector(region.grid_from); })
+        .def_property_readonly("grid_width",
+                               [](const JointRegion& region) { return to_numpy_vector(region.grid_width); })
+        .def_property_readonly("smallest", &to_flags, "1 for each cell of the grid that is in the smallest region")
+        .def_readonly("smallest_volume", &JointRegion::smallest_volume)
+        .def_readonly("smallest_share", &JointRegion::smallest_share, "of all samples");
+
+    py::class_<MonteCarloResult>(m, "MonteCarloResult", "Figures of every output. Native units.")
+        .def_readonly("outputs", &MonteCarloResult::outputs)
+        .def_readonly("options", &MonteCarloResult::options)
+        .def_readonly("seed", &MonteCarloResult::seed)
+        .def_readonly("target", &MonteCarloResult::target, "The instruction set: the same bits for the same one.")
+        .def_readonly("samples", &MonteCarloResult::samples, "Samples that gave a result.")
+        .def_readonly("lost", &MonteCarloResult::lost, "Samples that gave none: left out.")
+        .def_property_readonly("mean", [](const MonteCarloResult& r) { return to_numpy_vector(r.mean); })
+        .def_property_readonly("standard_uncertainty",
+                               [](const MonteCarloResult& r) { return to_numpy_vector(r.standard_uncertainty); })
+        .def_property_readonly(
+            "symmetric", [](const MonteCarloResult& r) { return to_numpy(r.symmetric); },
+            "(outputs, 2): ends of the probabilistically symmetric coverage intervals")
+        .def_property_readonly(
+            "shortest", [](const MonteCarloResult& r) { return to_numpy(r.shortest); },
+            "(outputs, 2): ends of the shortest coverage intervals")
+        .def_property_readonly("lowest", [](const MonteCarloResult& r) { return to_numpy_vector(r.lowest); })
+        .def_property_readonly("highest", [](const MonteCarloResult& r) { return to_numpy_vector(r.highest); })
+        .def_readonly("outside", &MonteCarloResult::outside,
+                      "Values beyond the bins, by output: an interval's end among them is known roughly.")
+        .def_property_readonly("covariance",
+                               [](const MonteCarloResult& r) {
+                                   return r.covariance ? std::optional(to_numpy(*r.covariance)) : std::nullopt;
+                               })
+        .def_property_readonly(
+            "kept",
+            [](const MonteCarloResult& r) {
+                std::map<std::size_t, DoubleArray> kept;
+                for (const auto& [output, values] : r.kept) kept.emplace(output, to_numpy(values));
+                return kept;
+            },
+            "Values by output, in the order of samples; nan for a lost one.")
+        .def_readonly("joint", &MonteCarloResult::joint);
+}
+
+void bind_parts(py::module_& m) {
+    py::class_<PartialStatistics>(m, "PartialStatistics", "Statistics of a set of leaves of 2,000 samples.")
+        .def(py::init<const Bins&>(), py::arg("bins"), "Of no leaves.")
+        .def_property_readonly("bins", &PartialStatistics::bins)
+        .def_property_readonly("leaves", &PartialStatistics::leaves, "Half-open ranges, ascending.")
+        .def_property_readonly("samples", &PartialStatistics::samples)
+        .def_property_readonly("lost", &PartialStatistics::lost)
+        .def("merge", &PartialStatistics::merge, py::arg("other"), py::call_guard<py::gil_scoped_release>(),
+             "Raises InvalidArgument for statistics of another run, saying in what, and for leaves that are in both.")
+        .def("result", &PartialStatistics::result, py::call_guard<py::gil_scoped_release>())
+        .def("to_bytes", [](const PartialStatistics& part) { return py::bytes(part.to_bytes()); })
+        .def_static(
+            "from_bytes", [](const py::bytes& bytes) { return PartialStatistics::from_bytes(std::string_view(bytes)); },
+            py::arg("bytes"), "Raises InvalidArgument for damaged bytes.");
+
+    py::class_<AdaptiveProcedure::Stability>(m, "Stability", "How far an adaptive procedure is from its end.")
+        .def_readonly("ratio", &AdaptiveProcedure::Stability::ratio,
+                      "Twice the standard deviation of the average over blocks by delta, the largest of all.")
+        .def_readonly("output", &AdaptiveProcedure::Stability::output)
+        .def_property_readonly("figure", [](const AdaptiveProcedure::Stability& s) { return figure_name(s.figure); })
+        .def_readonly("unstable", &AdaptiveProcedure::Stability::unstable, "Outputs with a ratio above 1.")
+        .def_property_readonly("stable", &AdaptiveProcedure::Stability::stable);
+    py::class_<AdaptiveProcedure>(
+        m, "AdaptiveProcedure",
+        "JCGM 101, 7.9.4: blocks of M samples until mean, standard uncertainty and both ends of the symmetric interval "
+        "of every output are stable to delta.")
+        .def(py::init<const Bins&>(), py::arg("bins"))
+        .def_static("leaves_per_block", &AdaptiveProcedure::leaves_per_block, py::arg("coverage"))
+        .def_property_readonly("next_block", &AdaptiveProcedure::next_block, "Its leaves, half-open.")
+        .def_property_readonly("blocks", &AdaptiveProcedure::blocks)
+        .def("add", &AdaptiveProcedure::add, py::arg("block"), "Raises InvalidArgument for what is not the next block.")
+        .def("stability", &AdaptiveProcedure::stability, py::arg("all"), "all: the statistics of all blocks so far.")
+        .def("to_bytes", [](const AdaptiveProcedure& procedure) { return py::bytes(procedure.to_bytes()); })
+        .def_static(
+            "from_bytes", [](const py::bytes& bytes) { return AdaptiveProcedure::from_bytes(std::string_view(bytes)); },
+            py::arg("bytes"), "Raises InvalidArgument for damaged bytes.");
+}
+
+void bind_runs(py::module_& m) {
+    m.def(
+        "make_bins",
+        [](const SampleModel& model, const StatisticsOptions& options, const IntegerLike& threads) {
+            const Progress none;
+            const RunControl control = to_control(threads, none);
+            const py::gil_scoped_release release;
+            return make_bins(model, options, control);
+        },
+        py::arg("model"), py::arg("options") = StatisticsOptions{}, py::arg("threads") = integer(0),
+        "The pilot run over the first 10,000 samples. threads: 0 takes all processors. Raises InvalidArgument.");
+    m.def(
+        "run_leaves",
+        [](const SampleModel& model, const Bins& bins, const IntegerLike& first_leaf, const IntegerLike& leaves,
+           const IntegerLike& threads, const Progress& progress) {
+            const RunControl control = to_control(threads, progress);
+            const std::uint64_t first = to_leaf(first_leaf, "first_leaf"), count = to_leaf(leaves, "leaves");
+            const py::gil_scoped_release release;
+            return run_leaves(model, bins, first, count, control);
+        },
+        py::arg("model"), py::arg("bins"), py::arg("first_leaf"), py::arg("leaves"), py::kw_only(),
+        py::arg("threads") = integer(0), py::arg("progress") = std::nullopt,
+        "Statistics of these leaves; the bits depend on nothing else. progress(leaves_done) is called some times a "
+        "second; False ends the run with the leaves that are done, an exception ends it and comes through. Raises "
+        "InvalidArgument for a model that is not that of the bins.");
+    m.def(
+        "run_ranges",
+        [](const SampleModel& model, const Bins& bins, const std::vector<LeafRange>& ranges, const IntegerLike& threads,
+           const Progress& progress) {
+            const RunControl control = to_control(threads, progress);
+            const py::gil_scoped_release release;
+            return run_ranges(model, bins, ranges, control);
+        },
+        py::arg("model"), py::arg("bins"), py::arg("ranges"), py::kw_only(), py::arg("threads") = integer(0),
+        py::arg("progress") = std::nullopt,
+        "The same for half-open ranges of leaves, each computed by one thread; those that are whole.");
+}
+
+}  // namespace
+
+void bind_monte_carlo(py::module_& m) {
+    py::class_<FunctionModel, SampleModel>(m, "FunctionModel", "A model given as a function of its inputs.")
+        .def(py::init([](const ModelFunction& function, std::vector<Distribution> distributions,
+                         const std::vector<std::string>& outputs, const IntegerLike& seed,
+                         const std::vector<Correlation>& correlations) {
+                 std::vector<CorrelatedInputs> correlated;
+                 for (const auto& [members, matrix] : correlations)
+                     correlated.push_back({members, to_matrix(matrix, "correlation")});
+                 return FunctionModel(to_function(function), std::move(distributions), to_outputs(outputs),
+                                      to_seed(seed), std::move(correlated));
+             }),
+             py::arg("function"), py::arg("distributions"), py::arg("outputs"), py::kw_only(),
+             py::arg("seed") = integer(0), py::arg("correlations") = std::vector<Correlation>{},
+             "function: takes an (inputs, n) array, gives an (outputs, n) array; a sample with a value that is not "
+             "finite is lost. correlations: pairs of indices of normal inputs and their correlation matrix. Raises "
+             "InvalidArgument.");
+    bind_options(m);
+    bind_result(m);
+    bind_parts(m);
+    bind_runs(m);
+}
+
+}  // namespace stepdiag::bindings

@@ -1,0 +1,24 @@
+// Items of work taken one after the other by several threads. Internal.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+
+#include "stepdiag/uncertainty/monte_carlo.hpp"
+
+namespace stepdiag {
+
+int thread_count(const RunControl& control, std::uint64_t items);
+
+// Does one item; says early by `done` how many leaves are done. Ends soon once `stop` is set.
+struct Progress {
+    std::atomic<bool> stop{false};
+    std::atomic<std::uint64_t> done{0};
+};
+using Work = std::function<void(std::uint64_t item, Progress& progress)>;
+
+// `make_work(thread)` is called once by each thread. Exceptions of any of them, and of go_on, come through.
+void work_through(std::uint64_t items, const RunControl& control, const std::function<Work(int thread)>& make_work);
+
+}  // namespace stepdiag
