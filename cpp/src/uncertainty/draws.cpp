@@ -113,13 +113,18 @@ void Draws::inputs(std::uint64_t first_sample, std::size_t lanes, double* out) c
     }
 }
 
+void Draws::standard_noise(std::size_t entry, std::uint64_t first_sample, std::size_t lanes, std::size_t first_row,
+                           std::size_t rows, double* out) const {
+    fill_normal({seed_, stream, first_sample, lanes, item_of(1 + entry, first_row / 2), 0}, (rows + 1) / 2, out);
+}
+
 void Draws::noise(std::size_t entry, std::uint64_t first_sample, std::size_t lanes, std::size_t first_row,
                   std::size_t rows, double* out) const {
-    const Distribution& distribution = inputs_.noise[entry].distribution;
-    fill_normal({seed_, stream, first_sample, lanes, item_of(1 + entry, first_row / 2), 0}, (rows + 1) / 2, out);
+    standard_noise(entry, first_sample, lanes, first_row, rows, out);
     std::vector<double> uniform;
     for (std::size_t r = 0; r < rows; ++r)
-        scale(distribution, seed_, first_sample, lanes, item_of(1 + entry, first_row + r), out + r * lanes, uniform);
+        scale(inputs_.noise[entry].distribution, seed_, first_sample, lanes, item_of(1 + entry, first_row + r),
+              out + r * lanes, uniform);
 }
 
 }  // namespace stepdiag

@@ -40,6 +40,9 @@ public:
     void inputs(std::uint64_t first_sample, std::size_t lanes, double* out) const;
     void noise(std::size_t entry, std::uint64_t first_sample, std::size_t lanes, std::size_t first_row,
                std::size_t rows, double* out) const;
+    // The standard normal numbers that noise is made of.
+    void standard_noise(std::size_t entry, std::uint64_t first_sample, std::size_t lanes, std::size_t first_row,
+                        std::size_t rows, double* out) const;
 
 private:
     UncertainInputs inputs_;

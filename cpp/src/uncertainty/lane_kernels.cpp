@@ -306,7 +306,7 @@ void correct(const LaneVisit& visit, const LaneCorrection& c) {
             for (std::size_t i = 0; i < visit.channels; ++i) {
                 double* const reading = visit.readings + (row * visit.channels + i) * run_lanes + lane;
                 const Pair value = load(reading), constant = at(c.constant[i], lane);
-                if ((*c.is_distance)[i]) store(mul_add(value + (constant + added), w, scaled), reading);
+                if (c.is_distance[i]) store(mul_add(value + (constant + added), w, scaled), reading);
                 else store(mul_add(value, gain, constant), reading);
             }
         }

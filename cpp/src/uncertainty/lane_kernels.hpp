@@ -46,7 +46,7 @@ struct LaneFace {
     const LaneRow* plane_rows = nullptr;  // by lane: all of these
     const LaneRow* before_row = nullptr;
     const LaneRow* after_row = nullptr;
-    // of the common indices, made by prepare()
+    // of the common indices
     double inverse_index = 0.0, index_ratio = 0.0, one_less_ratio2 = 0.0;
 };
 
@@ -107,7 +107,7 @@ struct LaneCorrection {
     const LaneRow* wavelength;  // w
     const LaneRow* factor;
     const LaneRow* length;
-    const std::vector<std::uint8_t>* is_distance;
+    const std::uint8_t* is_distance;  // one a channel
 };
 void correct_lanes(const LaneVisit& visit, const LaneCorrection& correction);
 

@@ -177,7 +177,8 @@ Placement MovedComponent::at(const std::vector<double>& deviations) const {
 std::optional<HeadWays> record_ways(const RunModel& model, const Head& head) {
     const auto visit =
         std::find_if(model.visits.begin(), model.visits.end(), [&](const RunVisit& v) { return v.head == &head; });
-    HeadWays ways{&head, mirror_outline(model, visit->mirror), 1e-3, {}, {}, {}};
+    const Outline reference{{}, true, Eigen::Vector2d::Constant(head.aperture / 2.0), {}};
+    HeadWays ways{&head, reference, mirror_outline(model, visit->mirror), 1e-3, {}, {}, {}};
     if (!head.design) return ways;
     if (!reads_axes_alone(*head.design) || head.design->beams.size() > most_lane_beams) return std::nullopt;
 

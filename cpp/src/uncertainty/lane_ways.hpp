@@ -40,7 +40,8 @@ struct BeamWay {
 
 struct HeadWays {
     const Head* head;
-    Outline mirror;  // as small as a mirror that turns with the tool is at least
+    Outline reference;  // of a head without a design: the square that takes the beam back
+    Outline mirror;     // as small as a mirror that turns with the tool is at least
     double gap;
     std::vector<BeamWay> beams;  // of a design
     NominalHead nominal;

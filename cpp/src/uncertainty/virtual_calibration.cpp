@@ -1,12 +1,17 @@
 #include "stepdiag/uncertainty/virtual_calibration.hpp"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/core/random.hpp"
 #include "stepdiag/core/random_lanes.hpp"
 #include "uncertainty/general_way.hpp"
+#include "uncertainty/lane_run.hpp"
 #include "uncertainty/run_model.hpp"
 
 namespace stepdiag {
@@ -50,6 +55,7 @@ struct VirtualCalibrations::State {
     State(const VirtualRun& run, const BatchOptions& evaluation, std::uint64_t seed, std::vector<DerivedOutput> given)
         : model(run, seed),
           general(model),
+          in_lanes(LaneRun::make(model)),
           nominal(measurement_of(model, general.readings(model.draws.expectations(), std::nullopt))),
           evaluator(nominal, run.plan, run.machine.chain(), run.machine.tool(), run.calibration, evaluation),
           derived(std::move(given)) {
@@ -65,15 +71,22 @@ struct VirtualCalibrations::State {
 
     const RunModel model;
     const GeneralWay general;
+    const std::unique_ptr<const LaneRun> in_lanes;  // none: all samples go the general way
     const Measurement nominal;
     const BatchEvaluator evaluator;
     const std::vector<DerivedOutput> derived;
     std::vector<Output> outputs;
+    mutable std::atomic<std::uint64_t> replayed{0}, traced{0}, verified{0};
 };
 
 namespace {
 
-constexpr std::size_t lanes = lane_group;  // at a time: readings of all rows stay in the cache
+constexpr std::size_t lanes = run_lanes;  // at a time: readings of all rows stay in the cache
+
+// Far above rounding, far below what another way would do: 1e-9 mm and 1e-13 of the path (as traced_head), 1e-12 rad.
+double rounding(const std::string& channel, double value) {
+    return channel == "alpha" || channel == "beta" ? 1e-12 : 1e-9 + 2e-13 * std::abs(value);
+}
 
 }  // namespace
 
@@ -83,31 +96,57 @@ public:
     explicit Lanes(const State& state)
         : state_(state),
           worker_(state.evaluator),
-          readings_(state.model.rows.size() * state.model.channels.size() * lanes) {}
+          readings_(state.model.rows.size() * state.model.channels.size() * lanes),
+          deviations_(state.model.run.inputs.inputs.size() * lanes) {
+        if (state.in_lanes) scratch_.emplace(*state.in_lanes);
+    }
 
     void evaluate(const SampleBlock& block) override {
         for (std::size_t first = 0; first < block.samples; first += lanes) {
-            for (std::size_t lane = 0; lane < lanes; ++lane) {
-                const std::uint64_t sample = block.first_sample + first + lane;
-                put(lane, readings_of(sample));
-            }
+            const std::uint64_t sample = block.first_sample + first;
+            state_.model.draws.inputs(sample, lanes, deviations_.data());
+            read(sample);
             finish(block.outputs + first, block.samples);
         }
     }
-    // A column of deviations each lane, the last of them repeated where there are fewer.
+    // A column of deviations each lane, the last of them repeated where there are fewer; without noise.
     void evaluate(const Eigen::Ref<const Eigen::MatrixXd>& deviations, double* outputs, std::size_t stride) {
-        for (std::size_t lane = 0; lane < lanes; ++lane)
-            put(lane,
-                state_.general.readings(
-                    deviations.col(std::min<Eigen::Index>(Eigen::Index(lane), deviations.cols() - 1)), std::nullopt));
+        for (Eigen::Index i = 0; i < deviations.rows(); ++i)
+            for (std::size_t lane = 0; lane < lanes; ++lane)
+                deviations_[std::size_t(i) * lanes + lane] =
+                    deviations(i, std::min<Eigen::Index>(Eigen::Index(lane), deviations.cols() - 1));
+        read(std::nullopt);
         finish(outputs, stride);
     }
 
 private:
+    void read(std::optional<std::uint64_t> first_sample) {
+        std::array<std::uint8_t, lanes> followed{};
+        if (state_.in_lanes) {
+            state_.in_lanes->trace(deviations_.data(), first_sample, *scratch_, readings_.data(), followed.data());
+            if (first_sample) {
+                for (std::size_t lane = 0; lane < lanes; ++lane)
+                    if (followed[lane]) verify(*first_sample, lane);
+                state_.in_lanes->add_noise(*first_sample, *scratch_, readings_.data());
+            }
+        }
+        std::uint64_t replayed = 0;
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+            replayed += followed[lane];
+            if (!followed[lane])
+                put(lane, the_general_way(lane, first_sample ? std::optional(*first_sample + lane) : std::nullopt));
+        }
+        if (first_sample) state_.replayed += replayed, state_.traced += lanes - replayed;
+    }
+
+    Eigen::VectorXd deviations(std::size_t lane) const {
+        return Eigen::Map<const Eigen::VectorXd, 0, Eigen::InnerStride<>>(
+            deviations_.data() + lane, Eigen::Index(deviations_.size() / lanes), Eigen::InnerStride<>(lanes));
+    }
     // A sample that cannot be (air out of its equation's range) has lost all readings.
-    Eigen::VectorXd readings_of(std::uint64_t sample) const {
+    Eigen::VectorXd the_general_way(std::size_t lane, std::optional<std::uint64_t> sample) const {
         try {
-            return state_.general.readings(state_.model.draws.inputs(sample), sample);
+            return state_.general.readings(deviations(lane), sample);
         } catch (const InvalidArgument&) {
             return Eigen::VectorXd::Constant(Eigen::Index(readings_.size() / lanes),
                                              std::numeric_limits<double>::quiet_NaN());
@@ -116,6 +155,37 @@ private:
     void put(std::size_t lane, const Eigen::VectorXd& readings) {
         for (Eigen::Index i = 0; i < readings.size(); ++i) readings_[std::size_t(i) * lanes + lane] = readings[i];
     }
+
+    // Of a share of the samples one reading of each visit is traced again.
+    void verify(std::uint64_t first_sample, std::size_t lane) const {
+        const RunModel& model = state_.model;
+        const std::uint64_t sample = first_sample + lane;
+        const auto uniform = [&](std::uint32_t item) {
+            return uniform_pair(model.draws.seed(), RandomStream::verification, RandomBlock{sample, item})[0];
+        };
+        if (!(uniform(0) < model.run.simulation.verified_share)) return;
+        ++state_.verified;
+        const std::size_t channels = model.channels.size();
+        for (std::size_t v = 0; v < model.visits.size(); ++v) {
+            const RunVisit& visit = model.visits[v];
+            const std::size_t row =
+                std::size_t(visit.visit.first_row) + std::size_t(uniform(std::uint32_t(v + 1)) * double(visit.rows));
+            const Eigen::MatrixXd traced = state_.general.trace(deviations(lane), sample, visit, {row});
+            for (std::size_t c = 0; c < channels; ++c) {
+                const double found = readings_[(row * channels + c) * lanes + lane];
+                const double expected = traced(0, Eigen::Index(c));
+                if (std::abs(found - expected) <= rounding(model.channels[c], expected)) continue;
+                std::ostringstream text;
+                text.precision(17);
+                text << "virtual calibration: sample " << sample << ", line " << visit.visit.line.name() << ", row "
+                     << row << ": " << model.channels[c] << " is " << found << " by replay and " << expected
+                     << " when traced: another face came into its way; with a verified share of 1 every pose is traced "
+                        "instead";
+                throw ReplayMismatch(text.str());
+            }
+        }
+    }
+
     void finish(double* outputs, std::size_t stride) {
         worker_.evaluate(readings_.data(), lanes, outputs, stride);
         const std::size_t entries = state_.evaluator.entries().size();
@@ -132,7 +202,9 @@ private:
 
     const State& state_;
     BatchEvaluator::Worker worker_;
+    std::optional<LaneRun::Scratch> scratch_;
     std::vector<double> readings_;
+    std::vector<double> deviations_;
 };
 
 VirtualCalibrations::VirtualCalibrations(const VirtualRun& run, const BatchOptions& evaluation, std::uint64_t seed,
@@ -146,6 +218,10 @@ std::string VirtualCalibrations::target() const { return replay_target(); }
 std::unique_ptr<SampleModel::Worker> VirtualCalibrations::worker() const { return std::make_unique<Lanes>(*state_); }
 const BatchEvaluator& VirtualCalibrations::evaluator() const { return state_->evaluator; }
 const Measurement& VirtualCalibrations::nominal() const { return state_->nominal; }
+bool VirtualCalibrations::is_in_lanes() const { return state_->in_lanes != nullptr; }
+SampleCount VirtualCalibrations::count() const {
+    return {state_->replayed.load(), state_->traced.load(), state_->verified.load()};
+}
 
 Eigen::MatrixXd VirtualCalibrations::evaluate_at(const Eigen::MatrixXd& deviations) const {
     const auto inputs = Eigen::Index(state_->model.run.inputs.inputs.size());

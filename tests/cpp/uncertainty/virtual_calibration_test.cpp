@@ -57,6 +57,59 @@ std::vector<UncertainInput> setup_inputs(Kind kind) {
     return inputs;
 }
 
+// Every quantity that this kind of head has, in an air that may be uncertain.
+UncertainInputs everything(Kind kind) {
+    UncertainInputs all{setup_inputs(kind)};
+    const auto add_all = [&](InputQuantity quantity, double spread, int components, const std::string& part = "") {
+        for (int k = 0; k < components; ++k) all.inputs.push_back(normal(quantity, spread, "", part, k));
+    };
+    for (const char* line : {"p00", "0p0"}) {
+        all.inputs.push_back(normal(InputQuantity::scale_length, 1e-3, line));
+        all.inputs.push_back(normal(InputQuantity::scale_factor, 1e-6, line));
+    }
+    add_all(InputQuantity::reading_model, 1.5, 1);
+    add_all(InputQuantity::temperature, 0.5, 1);
+    add_all(InputQuantity::pressure, 100.0, 1);
+    add_all(InputQuantity::humidity, 0.05, 1);
+    add_all(InputQuantity::refractive_index, 1e-7, 1);
+    add_all(InputQuantity::wavelength, 1e-7, 1);
+    add_all(InputQuantity::machine_drift, 1e-6, 3);
+    if (kind == Kind::psd) add_all(InputQuantity::psd_distance, 0.5, 1);
+    if (kind == Kind::multi_beam) add_all(InputQuantity::beam_offset, 0.05, 6);
+    const HeadDesign design = kind == Kind::psd_traced ? beam_and_psd() : three_beams();
+    if (kind == Kind::psd_traced || kind == Kind::multi_beam_traced) {
+        for (const auto& body : design.bodies) {
+            add_all(InputQuantity::part_shift, 0.05, 3, body.name);
+            add_all(InputQuantity::part_rotation, 1e-4, 3, body.name);
+        }
+        add_all(InputQuantity::part_shift, 0.05, 3, design.beams.back().name);
+        add_all(InputQuantity::part_rotation, 1e-4, 3, design.beams.back().name);
+        if (kind == Kind::psd_traced) add_all(InputQuantity::part_shift, 0.05, 3, "psd");
+        if (kind == Kind::psd_traced) add_all(InputQuantity::part_rotation, 1e-3, 3, "psd");
+    }
+    for (const std::string& channel : signal_names(head_of(kind))) {
+        const bool tilt = channel == "alpha" || channel == "beta";
+        all.noise.push_back({NoiseQuantity::channel, {DistributionKind::normal, 0.0, tilt ? 1e-6 : 1e-4}, channel});
+    }
+    all.noise[0].distribution.kind = DistributionKind::rectangular;
+    all.noise.push_back({NoiseQuantity::common, {DistributionKind::normal, 1e-5, 1e-4}});
+    all.noise.push_back({NoiseQuantity::head_walk, {DistributionKind::normal, 0.0, 1e-5}});
+    for (int k = 0; k < 3; ++k) {
+        all.noise.push_back({NoiseQuantity::machine_walk, {DistributionKind::normal, 0.0, 1e-5}, "", k});
+        all.noise.push_back({NoiseQuantity::position, {DistributionKind::triangular, 0.0, 1e-4}, "", k});
+        all.noise.push_back({NoiseQuantity::orientation, {DistributionKind::normal, 0.0, 1e-6}, "", k});
+    }
+    return all;
+}
+
+Measurement with_readings(const Measurement& pattern, const Eigen::VectorXd& readings) {
+    std::vector<Channel> channels = pattern.channels();
+    for (std::size_t c = 0; c < channels.size(); ++c)
+        for (std::size_t r = 0; r < pattern.size(); ++r)
+            channels[c].value[r] = readings[Eigen::Index(r * channels.size() + c)];
+    return Measurement(pattern.stations(), channels);
+}
+
 Eigen::VectorXd readings_of(const Measurement& run) {
     std::vector<const Channel*> channels;
     for (const Channel& channel : run.channels())
@@ -120,4 +173,157 @@ TEST_P(OfEveryHead, SampleIsASimulationWithTheDrawnSetUpsEvaluated) {
         expect_same(model.readings(sample), readings_of(measurement), rounding, "readings");
         expect_same(outputs.col(Eigen::Index(sample)), evaluated(run, measurement), rounding, "outputs");
     }
+    EXPECT_TRUE(model.is_in_lanes());
+    EXPECT_EQ(model.count().replayed, 16u);
+    EXPECT_EQ(model.count().traced, 0u);
+}
+
+TEST_P(OfEveryHead, EveryQuantityInLanesIsThatOfTheGeneralWay) {
+    const Kind kind = GetParam();
+    VirtualRun run = run_of(kind);
+    run.inputs = everything(kind);
+    run.simulation.environment = Environment{Air{}};
+    run.simulation.verified_share = 0.5;
+    const VirtualCalibrations model(run, {}, seed);
+    ASSERT_TRUE(model.is_in_lanes());
+    const Eigen::MatrixXd outputs = outputs_of(model);
+    EXPECT_EQ(model.count().replayed, 16u);
+    EXPECT_GT(model.count().verified, 0u);
+    for (std::uint64_t sample = 0; sample < 16; ++sample) {
+        const Measurement measurement = with_readings(model.nominal(), model.readings(sample));
+        expect_same(outputs.col(Eigen::Index(sample)), evaluated(run, measurement), rounding, "outputs");
+    }
+}
+
+TEST_P(OfEveryHead, EachQuantityAloneChangesWhatIsReadAndIsTheSameInLanes) {
+    const Kind kind = GetParam();
+    const UncertainInputs all = everything(kind);
+    VirtualRun run = run_of(kind);
+    run.simulation.environment = Environment{Air{}};
+    const Eigen::VectorXd nominal = VirtualCalibrations(run, {}, seed).readings(0);
+    const auto compare = [&](const UncertainInputs& inputs, const std::string& what) {
+        run.inputs = inputs;
+        const VirtualCalibrations model(run, {}, seed);
+        const Eigen::VectorXd readings = model.readings(3);
+        // Plane-parallel glass may stand where it likes, and turn about the beam.
+        const bool is_part = !inputs.inputs.empty() && !inputs.inputs[0].part.empty();
+        if (!is_part) {
+            EXPECT_GT((readings - nominal).cwiseAbs().maxCoeff(), 1e-10) << what;
+        }
+        expect_same(outputs_of(model).col(3), evaluated(run, with_readings(model.nominal(), readings)), rounding,
+                    what.c_str());
+    };
+    for (const UncertainInput& input : all.inputs)
+        if (input.part.empty() || input.component == 0) compare({{input}}, name(input));
+    for (const ReadingNoise& noise : all.noise) compare({{}, {noise}}, name(noise));
+}
+
+TEST_P(OfEveryHead, SamplesAreTheSameBitsWhateverTheBlocks) {
+    VirtualRun run = run_of(GetParam());
+    run.inputs = everything(GetParam());
+    run.simulation.environment = Environment{Air{}};
+    const VirtualCalibrations model(run, {}, seed);
+    const Eigen::MatrixXd together = outputs_of(model, 48);
+    const auto worker = model.worker();
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> one(model.outputs().size(), 16);
+    for (const std::uint64_t first : {32, 0, 16}) {
+        worker->evaluate({first, 16, one.data()});
+        EXPECT_EQ(one, together.middleCols(Eigen::Index(first), 16)) << first;
+    }
+}
+
+TEST_P(OfEveryHead, DeviationsOfNoneGiveTheNominalCalibration) {
+    VirtualRun run = run_of(GetParam());
+    run.inputs.inputs = setup_inputs(GetParam());
+    run.inputs.noise = {{NoiseQuantity::common, {DistributionKind::normal, 0.0, 1e-3}}};
+    const VirtualCalibrations model(run, {}, seed);
+    Eigen::MatrixXd deviations = Eigen::MatrixXd::Zero(Eigen::Index(run.inputs.inputs.size()), 18);
+    deviations(0, 17) = 1e-4;
+    const Eigen::MatrixXd outputs = model.evaluate_at(deviations);
+    expect_same(outputs.col(0), values_of(model.evaluator().of_pattern()), rounding, "nominal");
+    EXPECT_EQ(outputs.col(0), outputs.col(16));
+    EXPECT_NE(outputs.col(0), outputs.col(17));
+    EXPECT_EQ(model.evaluate_at(deviations.rightCols(1)), outputs.col(17));
+}
+
+TEST(VirtualCalibration, SampleWithALostReadingHasNoResultAndIsTracedWhole) {
+    VirtualRun run = run_of(Kind::psd_traced);
+    // The spot goes by up to 2.5 m times the angle: at 0.4 mrad it is off a sensor of 2 mm.
+    HeadDesign design = beam_and_psd();
+    design.sensors[0].device = LateralEffect{{2.0, 2.0}};
+    run.heads = make_head(design, 100.0);
+    run.inputs.inputs = {normal(InputQuantity::laser, 0.2e-3, "ppp")};
+    const VirtualCalibrations model(run, {}, seed);
+    const Eigen::MatrixXd outputs = outputs_of(model, 64);
+    int lost = 0;
+    for (std::uint64_t sample = 0; sample < 64; ++sample) {
+        const bool is_lost = !model.readings(sample).allFinite();
+        lost += is_lost;
+        EXPECT_EQ(outputs.col(Eigen::Index(sample)).hasNaN(), is_lost) << sample;
+        if (is_lost) {
+            EXPECT_TRUE(outputs.col(Eigen::Index(sample)).array().isNaN().all()) << sample;
+        }
+    }
+    EXPECT_GT(lost, 0);
+    EXPECT_LT(lost, 64);
+    EXPECT_EQ(model.count().traced, std::uint64_t(lost));
+}
+
+TEST(VirtualCalibration, AirOutOfRangeIsASampleWithoutResult) {
+    VirtualRun run = run_of(Kind::psd);
+    run.simulation.environment = Environment{Air{}};
+    run.inputs.inputs = {normal(InputQuantity::humidity, 0.5)};  // of 0.5: below 0 or above 1 in a third of the cases
+    const VirtualCalibrations model(run, {}, seed);
+    const Eigen::MatrixXd outputs = outputs_of(model, 64);
+    for (std::uint64_t sample = 0; sample < 64; ++sample) {
+        const double humidity = 0.5 + drawn_inputs(run.inputs, seed, sample)[0];
+        EXPECT_EQ(outputs.col(Eigen::Index(sample)).hasNaN(), humidity < 0.0 || humidity > 1.0) << humidity;
+    }
+}
+
+TEST(VirtualCalibration, HeadThatCannotBeReplayedIsTracedWhole) {
+    VirtualRun run = run_of(Kind::psd_traced);
+    run.heads = make_head(beam_and_psd(), 100.0, std::nullopt, {}, ReadingModel::coupled_mode);
+    run.inputs.inputs = {normal(InputQuantity::reflector, 1e-4, "ppp")};
+    const VirtualCalibrations model(run, {}, seed);
+    EXPECT_FALSE(model.is_in_lanes());
+    const Eigen::MatrixXd outputs = outputs_of(model);
+    SimulationOptions options;
+    options.misalignment["ppp"].reflector[0] = drawn_inputs(run.inputs, seed, 2)[0];
+    expect_same(outputs.col(2), evaluated(run, simulate(run.machine, run.plan, run.heads, options)), rounding,
+                "coupled");
+    EXPECT_EQ(model.count().traced, 16u);
+}
+
+TEST(VirtualCalibration, DerivedOutputsAreCombinationsOfTheValues) {
+    VirtualRun run = run_of(Kind::ideal);
+    run.inputs.inputs = {normal(InputQuantity::reflector, 1e-4, "ppp")};
+    const std::size_t entries = VirtualCalibrations(run, {}, seed).evaluator().entries().size();
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(Eigen::Index(entries));
+    row[1] = 2.0, row[Eigen::Index(entries) - 1] = -3.0;
+    const VirtualCalibrations model(run, {}, seed, {{"sum", "mm", row}});
+    ASSERT_EQ(model.outputs().size(), entries + 1);
+    EXPECT_EQ(model.outputs().back().name, "sum");
+    const Eigen::MatrixXd outputs = outputs_of(model);
+    // Two products and their sum: roundings of numbers below 1e-2.
+    EXPECT_LE((outputs.bottomRows(1) - row.transpose() * outputs.topRows(Eigen::Index(entries))).norm(), 1e-15);
+    expect_refused([&] { VirtualCalibrations(run, {}, seed, {{"short", "mm", row.head(3)}}); }, "short");
+}
+
+TEST(VirtualCalibration, RefusesWhatTheRunDoesNotHave) {
+    const auto refused = [](Kind kind, const UncertainInput& input, const char* what) {
+        VirtualRun run = run_of(kind);
+        run.inputs.inputs = {input};
+        expect_refused([&] { VirtualCalibrations(run, {}, seed); }, what);
+    };
+    refused(Kind::ideal, normal(InputQuantity::reflector, 1e-4, "pp0"), "pp0");
+    refused(Kind::ideal, normal(InputQuantity::psd_zero, 1e-4, "ppp"), "psd");
+    refused(Kind::psd_traced, normal(InputQuantity::psd_distance, 1.0), "design");
+    refused(Kind::psd_traced, normal(InputQuantity::part_shift, 1.0, "", "prism"), "prism");
+    refused(Kind::psd, normal(InputQuantity::temperature, 1.0), "state of the air");
+    refused(Kind::multi_beam_traced, normal(InputQuantity::gain, 0.01, "ppp"), "gain");
+    refused(Kind::multi_beam, normal(InputQuantity::beam_constant, 0.01, "ppp", "", 3), "0 to 2");
+    VirtualRun run = run_of(Kind::ideal);
+    run.inputs.noise = {{NoiseQuantity::channel, {DistributionKind::normal, 0.0, 1.0}, "spot_x"}};
+    expect_refused([&] { VirtualCalibrations(run, {}, seed); }, "spot_x");
 }

@@ -48,6 +48,13 @@ struct DerivedOutput {
     Eigen::VectorXd row;  // coefficients by entry
 };
 
+// Samples so far.
+struct SampleCount {
+    std::uint64_t replayed;  // in lanes
+    std::uint64_t traced;    // whole, because a replay did not fit, or no head of this kind can be replayed
+    std::uint64_t verified;  // of those replayed: one reading of each visit traced again
+};
+
 // Deviations of one sample's inputs (order of UncertainInputs::inputs).
 Eigen::VectorXd drawn_inputs(const UncertainInputs& inputs, std::uint64_t seed, std::uint64_t sample);
 
@@ -66,6 +73,9 @@ public:
 
     const BatchEvaluator& evaluator() const;
     const Measurement& nominal() const;  // the run with every input at its expectation, without noise
+
+    bool is_in_lanes() const;  // whether samples are replayed at all
+    SampleCount count() const;
 
     // The outputs for given deviations of the inputs (a column a case), without reading noise: for propagation.
     Eigen::MatrixXd evaluate_at(const Eigen::MatrixXd& deviations) const;
