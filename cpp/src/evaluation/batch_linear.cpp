@@ -1,3 +1,5 @@
+#include <hwy/aligned_allocator.h>
+
 #include <algorithm>
 #include <limits>
 
@@ -51,20 +53,17 @@ public:
     Eigen::MatrixXd gain() const override {
         const auto raws = Eigen::Index(effects_.size());
         Eigen::MatrixXd gain(program_.outputs(), raws);
-        std::vector<double> registers(program_.registers() * program_lanes, 0.0);
+        std::vector<double> registers(program_.registers() * program_lanes);
         std::vector<double> values(program_.outputs() * program_lanes);
         for (Eigen::Index begin = 0; begin < raws; begin += program_lanes) {
             const Eigen::Index lanes = std::min<Eigen::Index>(program_lanes, raws - begin);
-            const auto put = [&](double factor) {
-                for (Eigen::Index lane = 0; lane < lanes; ++lane)
-                    for (int c = 0; c < values_per_reading; ++c) {
-                        const RawEffect& effect = effects_[begin + lane];
-                        registers[(effect.place + c) * program_lanes + lane] = factor * effect.by_channel[c];
-                    }
-            };
-            put(1.0);
+            std::fill(registers.begin(), registers.end(), 0.0);
+            for (Eigen::Index lane = 0; lane < lanes; ++lane)
+                for (int c = 0; c < values_per_reading; ++c) {
+                    const RawEffect& effect = effects_[begin + lane];
+                    registers[(effect.place + c) * program_lanes + lane] = effect.by_channel[c];
+                }
             program_.run(registers.data(), values.data(), program_lanes);
-            put(0.0);
             gain.middleCols(begin, lanes) = Eigen::Map<const Eigen::Matrix<double, program_lanes, Eigen::Dynamic>>(
                                                 values.data(), program_lanes, Eigen::Index(program_.outputs()))
                                                 .topRows(lanes)
@@ -83,12 +82,14 @@ private:
     class LinearWorker : public Worker {
     public:
         explicit LinearWorker(const LinearBatch& batch)
-            : batch_(batch), registers_(batch.program_.registers() * program_lanes, 0.0) {}
+            : batch_(batch), registers_(hwy::AllocateAligned<double>(batch.program_.registers() * program_lanes)) {
+            std::fill_n(registers_.get(), batch.program_.registers() * program_lanes, 0.0);
+        }
 
         void evaluate(const double* readings, std::size_t lanes, double* values, std::size_t stride) override {
             for (std::size_t lane = 0; lane < lanes; lane += program_lanes) {
-                const LaneReduction::Lost lost = batch_.reduction_.reduce(readings + lane, lanes, registers_.data());
-                batch_.program_.run(registers_.data(), values + lane, stride);
+                const LaneReduction::Lost lost = batch_.reduction_.reduce(readings + lane, lanes, registers_.get());
+                batch_.program_.run(registers_.get(), values + lane, stride);
                 for (std::size_t k = 0; k < program_lanes; ++k)
                     for (std::size_t output = 0; lost[k] && output < batch_.program_.outputs(); ++output)
                         values[output * stride + lane + k] = std::numeric_limits<double>::quiet_NaN();
@@ -97,7 +98,7 @@ private:
 
     private:
         const LinearBatch& batch_;
-        std::vector<double> registers_;
+        hwy::AlignedFreeUniquePtr<double[]> registers_;
     };
 
     std::vector<RawEffect> effects_of_raw_channels(const BatchPattern& pattern) const {

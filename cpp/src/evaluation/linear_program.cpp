@@ -31,32 +31,50 @@ struct Place {
     const double* coefficient;
 };
 
-// One block for the lanes of `Vectors` vectors: its sums stay in registers.
-template <std::size_t Rows, std::size_t Vectors>
-HWY_INLINE void run_block(std::uint32_t terms, const Place& at, double* registers, double* values, std::size_t stride) {
+// Blocks of one shape for the lanes of `Vectors` vectors: sums stay in registers.
+template <std::size_t Rows, bool OfDifferences, std::size_t Vectors>
+HWY_INLINE void run_blocks(const LinearProgram::Blocks& blocks, Place& at, double* registers, double* values,
+                           std::size_t stride) {
     const Tag tag;
     const std::size_t width = hn::Lanes(tag);
-    Vector sum[Rows][Vectors];
-    for (std::size_t r = 0; r < Rows; ++r)
-        for (std::size_t v = 0; v < Vectors; ++v)
-            sum[r][v] = hn::LoadU(tag, registers + at.row[r].base * program_lanes + v * width);
-    for (std::uint32_t t = 0; t < terms; ++t) {
-        const double* from = registers + at.source[t] * program_lanes;
-        Vector value[Vectors];
-        for (std::size_t v = 0; v < Vectors; ++v) value[v] = hn::LoadU(tag, from + v * width);
-        for (std::size_t r = 0; r < Rows; ++r) {
-            const Vector coefficient = hn::Set(tag, at.coefficient[t * Rows + r]);
-            for (std::size_t v = 0; v < Vectors; ++v) sum[r][v] = hn::MulAdd(value[v], coefficient, sum[r][v]);
+    const auto load = [&](std::size_t place, std::size_t v)
+                          HWY_ATTR { return hn::LoadU(tag, registers + place * program_lanes + v * width); };
+    const std::uint32_t terms = blocks.shape.terms;
+    for (std::uint32_t block = 0; block < blocks.count; ++block) {
+        Vector sum[Rows][Vectors];
+        for (std::size_t r = 0; r < Rows; ++r)
+            for (std::size_t v = 0; v < Vectors; ++v) sum[r][v] = hn::Zero(tag);
+        for (std::uint32_t t = 0; t < terms; ++t) {
+            Vector value[Vectors];
+            for (std::size_t v = 0; v < Vectors; ++v)
+                value[v] =
+                    OfDifferences ? hn::Sub(load(at.source[0], v), load(at.source[1], v)) : load(at.source[0], v);
+            for (std::size_t r = 0; r < Rows; ++r) {
+                const Vector coefficient = hn::Set(tag, at.coefficient[r]);
+                for (std::size_t v = 0; v < Vectors; ++v) sum[r][v] = hn::MulAdd(value[v], coefficient, sum[r][v]);
+            }
+            at.source += OfDifferences ? 2 : 1;
+            at.coefficient += Rows;
+        }
+        for (std::size_t r = 0; r < Rows; ++r, ++at.row) {
+            // The base comes last: of a running sum it is what has to be waited for.
+            for (std::size_t v = 0; v < Vectors; ++v) sum[r][v] = hn::Add(sum[r][v], load(at.row->base, v));
+            if (at.row->to >= 0)
+                for (std::size_t v = 0; v < Vectors; ++v)
+                    hn::StoreU(sum[r][v], tag, registers + at.row->to * program_lanes + v * width);
+            if (at.row->output >= 0)
+                for (std::size_t v = 0; v < Vectors; ++v)
+                    hn::StoreU(sum[r][v], tag, values + at.row->output * stride + v * width);
         }
     }
-    for (std::size_t r = 0; r < Rows; ++r) {
-        if (at.row[r].to >= 0)
-            for (std::size_t v = 0; v < Vectors; ++v)
-                hn::StoreU(sum[r][v], tag, registers + at.row[r].to * program_lanes + v * width);
-        if (at.row[r].output >= 0)
-            for (std::size_t v = 0; v < Vectors; ++v)
-                hn::StoreU(sum[r][v], tag, values + at.row[r].output * stride + v * width);
-    }
+}
+
+template <bool OfDifferences, std::size_t Vectors>
+HWY_INLINE void run_blocks_of(const LinearProgram::Blocks& blocks, Place& at, double* registers, double* values,
+                              std::size_t stride) {
+    if (blocks.shape.rows == 3) run_blocks<3, OfDifferences, Vectors>(blocks, at, registers, values, stride);
+    else if (blocks.shape.rows == 2) run_blocks<2, OfDifferences, Vectors>(blocks, at, registers, values, stride);
+    else run_blocks<1, OfDifferences, Vectors>(blocks, at, registers, values, stride);
 }
 
 void run_program(const LinearProgram& program, double* registers, double* values, std::size_t stride) {
@@ -65,13 +83,10 @@ void run_program(const LinearProgram& program, double* registers, double* values
     std::fill_n(registers + program.zero() * program_lanes, program_lanes, 0.0);
     for (std::size_t lane = 0; lane < program_lanes; lane += width) {
         Place at{program.rows(), program.places(), program.coefficients()};
-        for (const LinearProgram::Block& block : program.blocks()) {
-            if (block.rows == 3) run_block<3, vectors>(block.terms, at, registers + lane, values + lane, stride);
-            else if (block.rows == 2) run_block<2, vectors>(block.terms, at, registers + lane, values + lane, stride);
-            else run_block<1, vectors>(block.terms, at, registers + lane, values + lane, stride);
-            at.row += block.rows;
-            at.source += block.terms;
-            at.coefficient += block.rows * block.terms;
+        for (const LinearProgram::Blocks& blocks : program.blocks()) {
+            if (blocks.shape.of_differences)
+                run_blocks_of<true, vectors>(blocks, at, registers + lane, values + lane, stride);
+            else run_blocks_of<false, vectors>(blocks, at, registers + lane, values + lane, stride);
         }
     }
 }

@@ -23,15 +23,25 @@ public:
     std::size_t registers() const { return registers_; }
     std::size_t multiplications() const { return coefficients_.size(); }
 
-    // Inputs stand in the first places of `registers`; the others are written to. Results go to
+    // Inputs stand in the first places of `registers`, all of which are written to. Results go to
     // values[output * stride + lane].
     void run(double* registers, double* values, std::size_t stride) const;
 
     // --- for the code that runs it
-    // Up to three rows that are sums over the same places, `base` + sum over terms.
-    struct Block {
+    // Up to three rows that are sums over the same places, sum over terms + `base`. Of differences, a term is
+    // coefficient (place - other place).
+    struct Shape {
         std::uint32_t rows;
         std::uint32_t terms;
+        bool of_differences;
+
+        bool operator==(const Shape& o) const {
+            return rows == o.rows && terms == o.terms && of_differences == o.of_differences;
+        }
+    };
+    struct Blocks {  // one after the other
+        Shape shape;
+        std::uint32_t count;
     };
     struct Row {
         std::int32_t base;    // a place; that of the zero, where there is none
@@ -40,16 +50,16 @@ public:
     };
     static constexpr std::uint32_t most_rows = 3;
 
-    const std::vector<Block>& blocks() const { return blocks_; }
+    const std::vector<Blocks>& blocks() const { return blocks_; }
     const Row* rows() const { return rows_.data(); }
-    const std::uint32_t* places() const { return places_.data(); }       // by term
+    const std::uint32_t* places() const { return places_.data(); }       // by term, of differences two
     const double* coefficients() const { return coefficients_.data(); }  // by term, then by row
     std::size_t zero() const { return inputs_; }
 
 private:
-    friend class ProgramBuilder;
+    friend class ProgramBuilder;  // and its Emitter
     std::size_t inputs_ = 0, outputs_ = 0, registers_ = 0;
-    std::vector<Block> blocks_;
+    std::vector<Blocks> blocks_;
     std::vector<Row> rows_;
     std::vector<std::uint32_t> places_;
     std::vector<double> coefficients_;
@@ -70,7 +80,11 @@ private:
         int base;  // place with coefficient 1, taken out of the terms; -1: none
         std::vector<LinearProgram::Term> terms;
     };
-    std::vector<bool> needed_rows(const std::vector<int>& outputs) const;
+    struct Block;
+    class Emitter;
+    std::vector<bool> needed_places(const std::vector<int>& outputs) const;
+    std::vector<Block> make_blocks(const std::vector<bool>& needed) const;
+    void order_by_shape(std::vector<Block>& blocks) const;
 
     std::size_t inputs_;
     std::vector<Sum> sums_;

@@ -50,7 +50,8 @@ public:
         Worker(Worker&&) noexcept;
         // `readings`: [(row * channels + channel) * lanes + lane], rows and channels of the pattern's signals (without
         // time and temperature), `lanes` a multiple of lane_group; results: values[entry * stride + lane]. A lane with
-        // a reading that counts and is NaN, or without a solution, gives NaN.
+        // a reading that counts and is NaN, or without a solution, gives NaN. Fastest where both begin at cache lines
+        // and all lanes' readings fit into a core's own cache.
         void evaluate(const double* readings, std::size_t lanes, double* values, std::size_t stride);
 
     private:
