@@ -12,7 +12,7 @@
 namespace stepdiag {
 namespace {
 
-constexpr std::uint64_t pilot_samples = 32;
+constexpr std::uint64_t route_samples = 32;
 
 bool reads_axes_alone(const HeadDesign& design) {
     for (const HeadBeam& beam : design.beams)
@@ -150,7 +150,7 @@ bool is_clear(const RunModel& model, const Head& head, const Eigen::Vector2d& mi
     };
     add(traced, model.draws.expectations());
     const bool same_head = model.moved_parts.empty() && !model.has_uncertain_air();
-    for (std::uint64_t sample = 0; sample < pilot_samples; ++sample) {
+    for (std::uint64_t sample = 0; sample < route_samples; ++sample) {
         const Eigen::VectorXd deviations = model.draws.inputs(sample);
         try {
             if (same_head) add(traced, deviations);
