@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "expect.hpp"
@@ -232,8 +233,9 @@ void part_evaluation(benchmark::State& state, Layout layout) {
 
 const bool registered = [] {
     const auto add = [](const std::string& name, void (*run)(benchmark::State&, Layout)) {
-        benchmark::RegisterBenchmark((name + "/one_beam").c_str(), run, Layout::one_beam);
-        benchmark::RegisterBenchmark((name + "/layout_b").c_str(), run, Layout::b);
+        for (const auto& [layout, value] :
+             {std::pair("/one_beam", Layout::one_beam), std::pair("/layout_b", Layout::b)})
+            benchmark::RegisterBenchmark((name + layout).c_str(), run, value)->MeasureProcessCPUTime();
     };
     add("virtual_calibrations", virtual_calibrations);
     add("with_statistics", with_statistics);
