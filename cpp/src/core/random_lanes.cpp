@@ -25,12 +25,16 @@ HWY_INLINE void fill(const RandomLanes& lanes, std::size_t items, double* out, N
     const RoundKeys keys(lanes.seed);
     const Words ramp = hn::Iota(words, 0);
     for (std::size_t item = 0; item < items; ++item, out += 2 * lanes.lanes)
-        for (std::size_t lane = 0; lane < lanes.lanes; lane += width) {
-            const Words sample = hn::Add(hn::Set(words, lanes.first_sample + lane), ramp);
-            const TwoVectors pair =
-                numbers(keys, lanes.stream, sample, std::uint32_t(lanes.first_item + item), lanes.draw);
-            hn::StoreU(pair.first, Tag(), out + lane);
-            hn::StoreU(pair.second, Tag(), out + lanes.lanes + lane);
+        for (std::size_t lane = 0; lane < lanes.lanes; lane += 2 * width) {
+            const auto samples = [&](std::size_t first)
+                                     HWY_ATTR { return hn::Add(hn::Set(words, lanes.first_sample + first), ramp); };
+            const TwoTwins pair = numbers(keys, lanes.stream, WordTwin{samples(lane), samples(lane + width)},
+                                          std::uint32_t(lanes.first_item + item), lanes.draw);
+            double* const to = out + lane;
+            hn::StoreU(pair.first.a, Tag(), to);
+            hn::StoreU(pair.first.b, Tag(), to + width);
+            hn::StoreU(pair.second.a, Tag(), to + lanes.lanes);
+            hn::StoreU(pair.second.b, Tag(), to + lanes.lanes + width);
         }
 }
 

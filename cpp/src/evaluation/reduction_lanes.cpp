@@ -12,134 +12,155 @@
 #define HWY_TARGET_INCLUDE "evaluation/reduction_lanes.cpp"
 #include <hwy/foreach_target.h>  // compiles this file once for every instruction set
 //
-#include <hwy/highway.h>
+#include "optics/lanes-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace stepdiag {
 namespace HWY_NAMESPACE {
+namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using Tag = hn::ScalableTag<double>;
-using Vector = hn::Vec<Tag>;
-using Mask = hn::Mask<Tag>;
-
-HWY_INLINE Vector all(double value) { return hn::Set(Tag(), value); }
+STEPDIAG_INLINE Pair all(double value) { return broadcast(Type<Pair>(), value); }
+STEPDIAG_INLINE Pair square_sum(Pair x, Pair y) { return mul_add(x, x, y * y); }
+STEPDIAG_INLINE Pair select(MaskPair which, Pair yes, Pair no) {
+    return {hn::IfThenElse(which.a, yes.a, no.a), hn::IfThenElse(which.b, yes.b, no.b)};
+}
+STEPDIAG_INLINE MaskPair either(MaskPair x, MaskPair y) { return {hn::Or(x.a, y.a), hn::Or(x.b, y.b)}; }
+STEPDIAG_INLINE MaskPair no(MaskPair x) { return {hn::Not(x.a), hn::Not(x.b)}; }
+STEPDIAG_INLINE bool is_everywhere(MaskPair x) { return hn::AllTrue(Tag(), hn::And(x.a, x.b)); }
+STEPDIAG_INLINE Pair none() { return {hn::NaN(Tag()), hn::NaN(Tag())}; }
 
 struct Tilts {
-    Vector alpha, beta;
+    Pair alpha, beta;
 };
 
-HWY_INLINE Vector square_sum(Vector x, Vector y) { return hn::MulAdd(x, x, hn::Mul(y, y)); }
+// (-beta, alpha) = k spot, because the spot lies where the light goes: of reduce_spot's g(x) x = spot there is left
+//   f(k) = h k - w = 0,  h = 2 (distance w + psd_distance + k spot . spot_beam),  w = 1 - k^2 |spot|^2.
+struct SpotEquation {
+    Pair twice_distance, twice_psd, spot2, twice_beam;
 
-// Newton's method for g(x) x = spot, x = (-beta, alpha), as reduce_spot; multiplied by w = 1 - |x|^2 it is
-//   f(x) = h x - w spot/2 = 0,  h = distance w + psd_distance + x . spot_beam,
-// and needs no quotient but that by the determinant of f' = h I + x (spot_beam - 2 distance x)^T + spot x^T. Each lane
-// stops by itself. NaN where no mirror gives that spot.
-HWY_INLINE Tilts tilts_of_spot(const ReducedRow& row, Vector distance, Vector spot_x, Vector spot_y) {
-    const Vector one = all(1.0), psd = all(row.psd_distance), u = all(row.spot_beam_x), v = all(row.spot_beam_y);
-    const Vector half_x = hn::Mul(spot_x, all(0.5)), half_y = hn::Mul(spot_y, all(0.5));
-    const Vector start = hn::Div(one, hn::Add(distance, psd));
-    Vector x = hn::Mul(half_x, start), y = hn::Mul(half_y, start);
-    Mask possible = hn::And(hn::Gt(distance, hn::Zero(Tag())), hn::Gt(start, hn::Zero(Tag())));
-    Mask done = hn::Not(possible);
-    for (int iteration = 0; iteration < 20 && !hn::AllTrue(Tag(), done); ++iteration) {
-        const Vector w = hn::Sub(one, square_sum(x, y));
-        const Vector h = hn::MulAdd(distance, w, hn::MulAdd(x, u, hn::MulAdd(y, v, psd)));
-        const Vector f_x = hn::MulSub(h, x, hn::Mul(w, half_x)), f_y = hn::MulSub(h, y, hn::Mul(w, half_y));
-        const Vector twice = hn::Add(distance, distance);
-        const Vector h_x = hn::NegMulAdd(twice, x, u), h_y = hn::NegMulAdd(twice, y, v);
-        const Vector a = hn::MulAdd(x, h_x, hn::MulAdd(spot_x, x, h)), b = hn::MulAdd(x, h_y, hn::Mul(spot_x, y));
-        const Vector c = hn::MulAdd(y, h_x, hn::Mul(spot_y, x)), d = hn::MulAdd(y, h_y, hn::MulAdd(spot_y, y, h));
-        const Vector determinant = hn::MulSub(a, d, hn::Mul(b, c)), inverse = hn::Div(one, determinant);
-        const Vector by_x = hn::Mul(inverse, hn::MulSub(d, f_x, hn::Mul(b, f_y)));
-        const Vector by_y = hn::Mul(inverse, hn::MulSub(a, f_y, hn::Mul(c, f_x)));
-        x = hn::IfThenElse(done, x, hn::Sub(x, by_x));
-        y = hn::IfThenElse(done, y, hn::Sub(y, by_y));
-        const Mask regular = hn::And(hn::Gt(h, hn::Zero(Tag())), hn::Gt(determinant, hn::Zero(Tag())));
-        possible = hn::And(possible, hn::Or(done, hn::And(regular, hn::Lt(square_sum(x, y), one))));
-        // A relative change of e leaves an error of e^2 times the relative bend of g over x, below 1e-3.
-        const Mask small = hn::Le(square_sum(by_x, by_y), hn::Mul(all(1e-12), square_sum(x, y)));
-        done = hn::Or(done, hn::Or(small, hn::Not(possible)));
+    STEPDIAG_INLINE Pair w(Pair k) const { return sub_mul(k * k, spot2, all(1.0)); }
+    STEPDIAG_INLINE Pair h(Pair w, Pair k) const {
+        return mul_add(twice_distance, w, mul_add(twice_beam, k, twice_psd));
     }
-    possible = hn::And(possible, done);
-    const Vector none = hn::NaN(Tag());
-    return {hn::IfThenElse(possible, y, none), hn::IfThenElse(possible, hn::Neg(x), none)};
+    STEPDIAG_INLINE Pair f(Pair k) const {
+        const Pair own_w = w(k);
+        return mul_add(h(own_w, k), k, negative(own_w));
+    }
+};
+
+// Newton's method. Lanes stop by themselves: `done`. Those that no mirror gives end with NaN.
+HWY_NOINLINE Pair solve_by_newton(const SpotEquation& spot, MaskPair done, Pair k) {
+    const Pair zero = all(0.0);
+    MaskPair possible = zero <= zero;
+    for (int iteration = 0; iteration < 20 && !is_everywhere(done); ++iteration) {
+        const Pair w = spot.w(k), h = spot.h(w, k), w_by_k = all(-2.0) * k * spot.spot2;
+        const Pair slope = mul_add(mul_add(spot.twice_distance, w_by_k, spot.twice_beam), k, h) - w_by_k;
+        const Pair change = spot.f(k) / slope;
+        k = select(done, k, k - change);
+        possible = both(possible, either(done, both(both(h > zero, slope > zero), spot.w(k) > zero)));
+        // Newton's next error is below the square of a change of 1e-8.
+        done = either(done, either(magnitude(change) <= all(1e-8) * magnitude(k), no(possible)));
+    }
+    return select(both(possible, done), k, none());
 }
 
-// Tilts and distance of beams, as reduce_beams.
-HWY_INLINE Tilts tilts_of_beams(Vector a, Vector b) {
-    const Vector root = hn::Sqrt(hn::MulAdd(all(4.0), square_sum(a, b), all(1.0)));
-    const Vector w = hn::Div(all(2.0), hn::Add(all(1.0), root));
-    return {hn::Mul(w, a), hn::Mul(w, b)};
+// Small tilts take two or three steps with 2 (distance + psd_distance) for f'.
+STEPDIAG_INLINE Tilts tilts_of_spot(const ReducedRow& row, Pair distance, Pair spot_x, Pair spot_y) {
+    SpotEquation spot{distance + distance, all(2.0 * row.psd_distance), square_sum(spot_x, spot_y), all(0.0)};
+    if (row.is_beside)
+        spot.twice_beam = mul_add(spot_x, all(2.0 * row.spot_beam_x), spot_y * all(2.0 * row.spot_beam_y));
+    const Pair inverse = all(1.0) / (spot.twice_distance + spot.twice_psd);
+    Pair k = inverse;
+    for (int step = 0; step < 2; ++step) k = sub_mul(spot.f(k), inverse, k);
+    Pair tilt2 = k * k * spot.spot2;
+    const MaskPair away = both(distance > all(0.0), inverse > all(0.0));
+    const MaskPair done = both(away, tilt2 <= all(row.tilt2_of_two_steps));
+    if (!is_everywhere(done)) {
+        const Pair further = sub_mul(spot.f(k), inverse, k);
+        tilt2 = further * further * spot.spot2;
+        k = select(away, select(done, k, further), none());
+        const MaskPair now_done = either(done, tilt2 <= all(row.tilt2_of_three_steps));
+        if (!is_everywhere(both(away, now_done))) k = solve_by_newton(spot, now_done, k);
+    }
+    return {k * spot_y, negative(k * spot_x)};
 }
 
-// One vector of lanes.
+// As reduce_beams: w = 2/(1 + sqrt(1 + 4 m)); of small tilts its series, the first term left out of which is 42 m^5.
+STEPDIAG_INLINE Tilts tilts_of_beams(Pair a, Pair b) {
+    const Pair m = square_sum(a, b), one = all(1.0);
+    Pair w = mul_add(m, mul_add(m, mul_add(m, mul_add(m, all(14.0), all(-5.0)), all(2.0)), all(-1.0)), one);
+    const MaskPair small = m <= all(1e-5);
+    if (!is_everywhere(small)) w = select(small, w, all(2.0) / (one + root(mul_add(all(4.0), m, one))));
+    return {w * a, w * b};
+}
+
+// One pair of vectors of lanes.
 class Reducer {
 public:
     Reducer(const double* readings, std::size_t stride, double* inputs)
         : readings_(readings), stride_(stride), inputs_(inputs) {}
 
-    HWY_INLINE void reduce(const ReducedRow& row, const std::uint32_t* raws, const double* solution) {
+    STEPDIAG_INLINE void reduce(const ReducedRow& row, const std::uint32_t* raws, const double* solution) {
         if (row.kind == ReducedRow::distance) return put_length(row, raw(raws[0]));
-        if (row.kind == ReducedRow::tilts) return put_tilts(row, {raw(raws[0]), raw(raws[1])});
-        Vector distance = raw(raws[0]);
-        Tilts tilts;
-        if (row.kind == ReducedRow::distance_and_tilts) {
-            tilts = {raw(raws[1]), raw(raws[2])};
-        } else if (row.kind == ReducedRow::spot) {
-            tilts = tilts_of_spot(row, distance, raw(raws[1]), raw(raws[2]));
-        } else {
-            Vector sum[3] = {hn::Zero(Tag()), hn::Zero(Tag()), hn::Zero(Tag())};
-            for (std::uint32_t i = 0; i < row.raws; ++i) {
-                const Vector beam = raw(raws[i]);
-                for (int k = 0; k < 3; ++k) sum[k] = hn::MulAdd(beam, all(solution[3 * i + k]), sum[k]);
-            }
-            distance = sum[0];
-            tilts = tilts_of_beams(sum[1], sum[2]);
-        }
-        if (row.by_distance_alone) return put_length(row, distance);
-        put_tilts(row, tilts);
-        // The beam's length, less the lever arm's part by the tilts.
-        const Vector w = hn::Sub(all(1.0), square_sum(tilts.alpha, tilts.beta));
-        const Vector lever = hn::MulSub(all(row.lateral_y), tilts.alpha, hn::Mul(all(row.lateral_x), tilts.beta));
-        put_length(row, hn::MulAdd(distance, w, lever));
+        if (row.kind == ReducedRow::tilts) return put_tilts(row, raw(raws[0]), raw(raws[1]));
+        if (row.kind == ReducedRow::beams) return put_beams(row, raws, solution);
+        const Pair distance = raw(raws[0]), first = raw(raws[1]), second = raw(raws[2]);
+        put_tilts_and_length(
+            row, row.kind == ReducedRow::spot ? tilts_of_spot(row, distance, first, second) : Tilts{first, second},
+            distance);
     }
 
-    HWY_INLINE void report(bool* lost) const {
-        const Vector nothing = hn::Mul(hn::Add(lengths_, tilts_), hn::Zero(Tag()));  // NaN, or 0
+    STEPDIAG_INLINE void report(bool* lost) const {
         double number[program_lanes];
-        hn::StoreU(nothing, Tag(), number);
-        for (std::size_t lane = 0; lane < hn::Lanes(Tag()); ++lane) lost[lane] = !(number[lane] == 0.0);
+        store((lengths_ + tilts_) * all(0.0), number);  // NaN, or 0
+        for (std::size_t lane = 0; lane < 2 * hn::Lanes(Tag()); ++lane) lost[lane] = !(number[lane] == 0.0);
     }
 
 private:
-    HWY_INLINE Vector raw(std::uint32_t place) const { return hn::LoadU(Tag(), readings_ + place * stride_); }
-    HWY_INLINE void put(std::uint32_t place, Vector value) const {
-        hn::StoreU(value, Tag(), inputs_ + place * program_lanes);
+    STEPDIAG_INLINE Pair raw(std::uint32_t place) const { return load(readings_ + place * stride_); }
+    STEPDIAG_INLINE void put_beams(const ReducedRow& row, const std::uint32_t* raws, const double* solution) {
+        Pair sum[3] = {all(0.0), all(0.0), all(0.0)};
+        for (std::uint32_t i = 0; i < row.raws; ++i) {
+            const Pair beam = raw(raws[i]);
+            for (int k = 0; k < 3; ++k) sum[k] = mul_add(beam, all(solution[3 * i + k]), sum[k]);
+        }
+        if (row.by_distance_alone) put_length(row, sum[0]);
+        else put_tilts_and_length(row, tilts_of_beams(sum[1], sum[2]), sum[0]);
     }
-    HWY_INLINE void put_length(const ReducedRow& row, Vector length) {
-        lengths_ = hn::Add(lengths_, length);
-        put(row.place, hn::Sub(length, all(row.travel)));
+    // The length is the beam's, less the lever arm's part by the tilts.
+    STEPDIAG_INLINE void put_tilts_and_length(const ReducedRow& row, Tilts tilts, Pair distance) {
+        const Pair t = square_sum(tilts.alpha, tilts.beta);
+        const Pair lever = sub_mul(all(row.lateral_x), tilts.beta, all(row.lateral_y) * tilts.alpha);
+        put_tilts(row, tilts, t);
+        put_length(row, mul_add(distance, all(1.0) - t, lever));
+    }
+    STEPDIAG_INLINE void put_length(const ReducedRow& row, Pair length) {
+        lengths_ = lengths_ + length;
+        store(length - all(row.travel), inputs_ + row.place * program_lanes);
+    }
+    STEPDIAG_INLINE void put_tilts(const ReducedRow& row, Pair alpha, Pair beta) {
+        put_tilts(row, {alpha, beta}, square_sum(alpha, beta));
     }
     // Tilts of 45 degrees and more send no beam back.
-    HWY_INLINE void put_tilts(const ReducedRow& row, Tilts tilts) {
-        const Vector t = square_sum(tilts.alpha, tilts.beta);
-        tilts_ = hn::Add(tilts_, hn::IfThenElse(hn::Lt(t, all(1.0)), t, hn::NaN(Tag())));
-        put(row.place + 1, tilts.alpha);
-        put(row.place + 2, tilts.beta);
+    STEPDIAG_INLINE void put_tilts(const ReducedRow& row, Tilts tilts, Pair t) {
+        tilts_ = tilts_ + select(all(1.0) > t, t, none());
+        store(tilts.alpha, inputs_ + (row.place + 1) * program_lanes);
+        store(tilts.beta, inputs_ + (row.place + 2) * program_lanes);
     }
 
     const double* readings_;
     std::size_t stride_;
     double* inputs_;
     // Sums, in which what is not finite stays.
-    Vector lengths_ = hn::Zero(Tag()), tilts_ = hn::Zero(Tag());
+    Pair lengths_ = all(0.0), tilts_ = all(0.0);
 };
+
+}  // namespace
 
 LaneReduction::Lost reduce_lanes(const LaneReduction& reduction, const double* readings, std::size_t stride,
                                  double* inputs) {
     LaneReduction::Lost lost;
-    for (std::size_t lane = 0; lane < program_lanes; lane += hn::Lanes(Tag())) {
+    for (std::size_t lane = 0; lane < program_lanes; lane += 2 * hn::Lanes(Tag())) {
         Reducer reducer(readings + lane, stride, inputs + lane);
         const std::uint32_t* raws = reduction.raws();
         const double* solution = reduction.solutions();
