@@ -122,8 +122,9 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 def setup_of(case: Case, rng: np.random.Generator, line: str) -> sd.Misalignment:
     if line in SCALE_LINES:
         laser = case.scale_laser * rng.normal(size=2)
-        # The mirror square to the beam: Exp(a, b, 0) of both.
-        return sd.Misalignment(laser, laser, distance_constant=case.distance_constant * rng.normal())
+        # The mirror square to the beam: Exp(a, b, 0) of both. Their lateral offset is known as that of measured lines.
+        constant, lateral = case.distance_constant * rng.normal(), case.lateral * rng.normal(size=2)
+        return sd.Misalignment(laser, laser, distance_constant=constant, lateral=lateral)
     constants = case.beam_constants * rng.normal(size=len(BEAMS)) if case.layout == "multi_beam" else []
     return sd.Misalignment(
         case.reflector * rng.normal(size=2),

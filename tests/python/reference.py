@@ -216,14 +216,16 @@ def readings(
     a: Arithmetic = DOUBLE,
     backward: bool = False,
     elapsed: Number = 0.0,
+    mirror: tuple[Vector, Vector] | None = None,
 ) -> dict[str, Number]:
     """What the head reads on a line with the machine at a commanded position; by the conventions' words.
 
-    `elapsed`: seconds since the first reading of the set-up, by which the distances have drifted."""
+    `elapsed`: seconds since the first reading of the set-up, by which the distances have drifted.
+    `mirror`: point and normal, where they are not those of `mirror_of`."""
     setup = scenario.misalignment.get(line, {})
     gain = 1 + a.number(setup.get("gain", 0.0))
     origin, sensor = head_of(scenario, line, a)
-    point, normal = mirror_of(scenario, table, line, commanded, a, backward)
+    point, normal = mirror or mirror_of(scenario, table, line, commanded, a, backward)
     beam = sensor[:, 2]
 
     def length_from(start_of_beam: Vector) -> Number:
