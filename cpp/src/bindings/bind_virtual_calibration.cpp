@@ -1,5 +1,4 @@
 #include <memory>
-#include <tuple>
 
 #include "bindings.hpp"
 #include "stepdiag/uncertainty/virtual_calibration.hpp"
@@ -16,8 +15,6 @@ EvaluationMethod to_method(const std::string& text) {
                           text + "\"");
 }
 
-using Derived = std::tuple<std::string, std::string, ArrayLike>;  // name, unit, row
-
 std::unique_ptr<VirtualCalibrations> make(
     const Machine& machine, const Plan& plan, const HeadLike& heads, const UncertainInputs& inputs,
     const std::optional<HeadLike>& calibration_heads, const std::string& method, const IntegerLike& seed,
@@ -25,7 +22,7 @@ std::unique_ptr<VirtualCalibrations> make(
     const std::optional<Environment>& assumed, const IntegerLike& repeats, bool backward,
     const std::optional<double>& seconds_per_reading, double verified_share, const ReadingUncertainty& uncertainty,
     const Priors& setup, const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
-    bool rotations, const std::optional<Smoothness>& smoothness, const std::vector<Derived>& derived) {
+    bool rotations, const std::optional<Smoothness>& smoothness, const std::vector<DerivedOutput>& derived) {
     const Heads actual = to_heads(heads, plan);
     SimulationOptions simulation;
     simulation.misalignment = misalignment;
@@ -48,11 +45,9 @@ std::unique_ptr<VirtualCalibrations> make(
     evaluation.adjustment.reversal = reversal;
     evaluation.adjustment.rotations = rotations;
     evaluation.adjustment.smoothness = smoothness;
-    std::vector<DerivedOutput> outputs;
-    for (const auto& [name, unit, row] : derived) outputs.push_back({name, unit, to_vector(row, "derived")});
     const std::uint64_t number = to_seed(seed);
     py::gil_scoped_release release;
-    return std::make_unique<VirtualCalibrations>(run, evaluation, number, std::move(outputs));
+    return std::make_unique<VirtualCalibrations>(run, evaluation, number, derived);
 }
 
 Eigen::MatrixXd to_columns(const ArrayLike& object) {
@@ -81,11 +76,11 @@ void bind_virtual_calibration(py::module_& m) {
              py::arg("uncertainty") = ReadingUncertainty{}, py::arg("setup") = Priors{},
              py::arg("setup_by_line") = std::map<std::string, Priors>{}, py::arg("one_setup_per_line") = false,
              py::arg("reversal") = true, py::arg("rotations") = true, py::arg("smoothness") = std::nullopt,
-             py::arg("derived") = std::vector<Derived>{},
+             py::arg("derived") = std::vector<DerivedOutput>{},
              "machine to seconds_per_reading as of simulate(); calibration_heads: what the evaluation knows the heads "
              "as (none: the heads). method: \"conventional\", \"enhanced\", \"adjustment\" or \"one_step\", whose "
              "options are uncertainty to smoothness, as of evaluate() and adjust(). verified_share: of the samples, in "
-             "each of which one reading of every line is traced again. derived: (name, unit, coefficients of the "
+             "each of which one reading of every line is traced again. derived: as derived_at_point gives them, or (name, unit, coefficients of the "
              "values of the tables). Raises InvalidArgument.")
         .def_property_readonly("nominal", &VirtualCalibrations::nominal,
                                "The run with every input at its expectation, without noise.")

@@ -5,6 +5,11 @@
 #include "stepdiag/version.hpp"
 
 namespace stepdiag::bindings {
+
+void bind_derived(py::module_& m);      // before bind_virtual_calibration
+void bind_propagation(py::module_& m);  // after bind_virtual_calibration
+void bind_validation(py::module_& m);   // after bind_propagation, bind_monte_carlo
+
 namespace {
 
 DoubleArray to_array(const py::handle& object, const char* name) {
@@ -170,6 +175,9 @@ PYBIND11_MODULE(_core, m) {
     bind_calibration(m);
     bind_uncertain_inputs(m);
     bind_sample_model(m);
+    bind_derived(m);
     bind_virtual_calibration(m);
+    bind_propagation(m);
     bind_monte_carlo(m);
+    bind_validation(m);
 }

@@ -243,4 +243,7 @@ Eigen::VectorXd VirtualCalibrations::readings(std::uint64_t sample) const {
     return state_->general.readings(state_->model.draws.inputs(sample), sample);
 }
 
+const VirtualRun& VirtualCalibrations::run() const { return state_->model.run; }
+const std::vector<DerivedOutput>& VirtualCalibrations::derived() const { return state_->derived; }
+
 }  // namespace stepdiag

@@ -71,6 +71,8 @@ public:
     std::string target() const override;
     std::unique_ptr<Worker> worker() const override;
 
+    const VirtualRun& run() const;
+    const std::vector<DerivedOutput>& derived() const;
     const BatchEvaluator& evaluator() const;
     const Measurement& nominal() const;  // the run with every input at its expectation, without noise
 

@@ -1,0 +1,182 @@
+#include "uncertainty/noise_effects.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "simulation/visit_readings.hpp"
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double shift_step = 1e-3;    // mm
+constexpr double rotation_step = 1e-5;  // rad; spots answer with 2 L = 2 m: what is left over is of third order, 1e-10
+
+// The machine with a function of an axis that reads `step` more everywhere.
+Machine displaced(const Machine& machine, FunctionId id, double step) {
+    ParameterTable table = machine.errors().table();
+    auto& function = table.functions[std::size_t(id.index())];
+    if (!function) function = FunctionTable{{0.0}, {0.0}, {std::nullopt}};
+    for (double& value : function->value) value += step;
+    if (auto& negative = table.negative_functions[std::size_t(id.index())])
+        for (double& value : negative->value) value += step;
+    return Machine(machine.chain(), ErrorMap(std::move(table)), machine.tool());
+}
+
+std::vector<std::string> signals_of(const Measurement& measurement) {
+    std::vector<std::string> names;
+    for (const Channel& channel : measurement.channels())
+        if (channel.name != "time" && channel.name != "temperature") names.push_back(channel.name);
+    return names;
+}
+
+VectorXd readings_of(const VirtualRun& run, const Machine& machine) {
+    SimulationOptions options = run.simulation;
+    options.noise = {};
+    if (!options.seconds_per_reading) options.seconds_per_reading = run.seconds_per_reading;
+    const Measurement measurement = simulate(machine, run.plan, run.heads, options);
+    const auto channels = signals_of(measurement);
+    VectorXd readings(Index(measurement.size() * channels.size()));
+    for (std::size_t r = 0; r < measurement.size(); ++r)
+        for (std::size_t c = 0; c < channels.size(); ++c) {
+            const auto& value = measurement.find(channels[c])->value[r];
+            if (!value) throw InvalidArgument("virtual run: expected readings at all poses, row " + std::to_string(r) +
+                                              " is lost");
+            readings[Index(r * channels.size() + c)] = *value;
+        }
+    return readings;
+}
+
+}  // namespace
+
+Eigen::Matrix<double, Eigen::Dynamic, 6> pose_sensitivity(const VirtualRun& run,
+                                                           const Measurement& nominal) {
+    const Chain& chain = run.machine.chain();
+    const Axis first = chain.order().front(), last = chain.order().back();
+    const auto difference = [&](FunctionId id, double step) -> VectorXd {
+        return (readings_of(run, displaced(run.machine, id, step)) -
+                readings_of(run, displaced(run.machine, id, -step))) /
+               (2.0 * step);
+    };
+    Eigen::Matrix<double, Eigen::Dynamic, 6> sensitivity;
+    for (int k = 0; k < 6; ++k) {
+        const VectorXd column = k < 3 ? difference({first, Component(k)}, shift_step)
+                                      : difference({last, Component(k)}, rotation_step);
+        if (k == 0) sensitivity.resize(column.size(), 6);
+        sensitivity.col(k) = column;
+    }
+    // A rotation of the last axis moves the functional point, too; that is taken off again.
+    const Index channels = sensitivity.rows() / Index(nominal.size());
+    Index row = 0;
+    for (const Station& station : nominal.stations()) {
+        const Eigen::Vector3d lever = angular_lever(chain, run.machine.tool(), last, station.commanded);
+        for (int k = 0; k < 3; ++k) {
+            const Eigen::Vector3d moved = Eigen::Vector3d::Unit(k).cross(lever);
+            sensitivity.block(row, 3 + k, channels, 1) -= sensitivity.block(row, 0, channels, 3) * moved;
+        }
+        row += channels;
+    }
+    return sensitivity;
+}
+
+NoiseEffects::NoiseEffects(const VirtualCalibrations& calibrations, MatrixXd gain)
+    : run_(calibrations.run()),
+      nominal_(calibrations.nominal()),
+      channels_(signals_of(calibrations.nominal())),
+      gain_(std::move(gain)) {
+    const auto moves = [](const ReadingNoise& noise) {
+        return noise.quantity == NoiseQuantity::machine_walk || noise.quantity == NoiseQuantity::position ||
+               noise.quantity == NoiseQuantity::orientation;
+    };
+    const auto& noise = run_.inputs.noise;
+    if (std::any_of(noise.begin(), noise.end(), moves)) poses_ = pose_sensitivity(run_, nominal_);
+}
+
+MatrixXd NoiseEffects::of_distances() const {
+    const Index rows = Index(nominal_.size()), channels = Index(channels_.size());
+    MatrixXd effect = MatrixXd::Zero(gain_.rows(), rows);
+    for (Index c = 0; c < channels; ++c)
+        if (is_distance(channels_[std::size_t(c)]))
+            for (Index r = 0; r < rows; ++r) effect.col(r) += gain_.col(r * channels + c);
+    return effect;
+}
+
+MatrixXd NoiseEffects::of_poses(int column) const {
+    const Index rows = Index(nominal_.size()), channels = Index(channels_.size());
+    MatrixXd effect(gain_.rows(), rows);
+    for (Index r = 0; r < rows; ++r)
+        effect.col(r) =
+            gain_.middleCols(r * channels, channels) * poses_.block(r * channels, column, channels, 1);
+    return effect;
+}
+
+void NoiseEffects::sum_walks(MatrixXd& by_row, bool by_setup) const {
+    const auto& stations = nominal_.stations();
+    const auto starts = [&](Index r) {  // a backward run goes on with the set-up of the forward one
+        if (r == 0) return true;
+        const Station &before = stations[std::size_t(r) - 1], &here = stations[std::size_t(r)];
+        const bool same_visit = before.run == here.run && before.line == here.line;
+        return by_setup && !same_visit && here.direction == Direction::forward;
+    };
+    // The step to a row acts on it and all that follow, up to where the walk begins anew.
+    for (Index r = by_row.cols() - 2; r >= 0; --r)
+        if (!starts(r + 1)) by_row.col(r) += by_row.col(r + 1);
+    for (Index r = 0; r < by_row.cols(); ++r)
+        if (starts(r)) by_row.col(r).setZero();
+    by_row *= std::sqrt(run_.simulation.seconds_per_reading.value_or(run_.seconds_per_reading));
+}
+
+MatrixXd NoiseEffects::of(const ReadingNoise& noise) const {
+    MatrixXd effect;
+    switch (noise.quantity) {
+        case NoiseQuantity::channel: {
+            const auto found = std::find(channels_.begin(), channels_.end(), noise.channel);
+            const Index channels = Index(channels_.size());
+            return gain_(Eigen::all, Eigen::seqN(Index(found - channels_.begin()), Index(nominal_.size()), channels));
+        }
+        case NoiseQuantity::common: return of_distances();
+        case NoiseQuantity::head_walk:
+            effect = of_distances();
+            sum_walks(effect, true);
+            return effect;
+        case NoiseQuantity::machine_walk:
+            effect = of_poses(noise.component);
+            sum_walks(effect, false);
+            return effect;
+        case NoiseQuantity::position: return of_poses(noise.component);
+        case NoiseQuantity::orientation: return of_poses(3 + noise.component);
+    }
+    return effect;
+}
+
+std::string budget_group(const UncertainInput& input) {
+    switch (input.quantity) {
+        case InputQuantity::part_shift:
+        case InputQuantity::part_rotation: return "head part " + input.part;
+        case InputQuantity::temperature:
+        case InputQuantity::pressure:
+        case InputQuantity::humidity:
+        case InputQuantity::refractive_index: return "air";
+        case InputQuantity::scale_length:
+        case InputQuantity::scale_factor: return "scale lines";
+        default: return name(input.quantity);
+    }
+}
+
+std::string budget_group(const ReadingNoise& noise) {
+    switch (noise.quantity) {
+        case NoiseQuantity::channel: return "noise of " + noise.channel;
+        case NoiseQuantity::common: return "common noise";
+        case NoiseQuantity::head_walk: return "walk of the head";
+        case NoiseQuantity::machine_walk: return "walk of the machine";
+        case NoiseQuantity::position: return "repeatability of position";
+        default: return "repeatability of orientation";
+    }
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,142 @@
+// Propagation through virtual calibrations.
+#include <cmath>
+
+#include "stepdiag/core/error.hpp"
+#include "stepdiag/uncertainty/derived.hpp"
+#include "uncertainty/contributions.hpp"
+#include "uncertainty/noise_effects.hpp"
+
+namespace stepdiag {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index largest_gain = 400'000'000;  // numbers: 3.2 GB
+
+// GUM 4.2.3: s/sqrt(n) of n repeated readings, with n - 1 degrees of freedom, where JCGM 101 has a t distribution.
+double gum_uncertainty(const Distribution& d) {
+    return d.kind == DistributionKind::student_t ? d.spread : d.standard_uncertainty();
+}
+
+// Derived outputs below the entries.
+MatrixXd with_derived(const MatrixXd& of_entries, const std::vector<DerivedOutput>& derived) {
+    MatrixXd all(of_entries.rows() + Index(derived.size()), of_entries.cols());
+    all.topRows(of_entries.rows()) = of_entries;
+    for (std::size_t d = 0; d < derived.size(); ++d)
+        all.row(of_entries.rows() + Index(d)) = derived[d].row.transpose() * of_entries;
+    return all;
+}
+
+MatrixXd correlation_of(const UncertainInputs& inputs) {
+    if (inputs.correlations.empty()) return {};
+    const Index count = Index(inputs.inputs.size());
+    MatrixXd correlation = MatrixXd::Identity(count, count);
+    for (const CorrelatedInputs& together : inputs.correlations)
+        for (std::size_t i = 0; i < together.members.size(); ++i)
+            for (std::size_t j = 0; j < together.members.size(); ++j)
+                correlation(together.members[i], together.members[j]) = together.correlation(Index(i), Index(j));
+    return correlation;
+}
+
+// Each input at its expectation and a standard uncertainty to both sides.
+struct InputEffects {
+    std::vector<PropagatedInput> inputs;
+    VectorXd value;  // at the expectations
+    MatrixXd first_order, second_order;
+};
+
+InputEffects input_effects(const VirtualCalibrations& calibrations) {
+    const auto& uncertain = calibrations.run().inputs.inputs;
+    const Index count = Index(uncertain.size());
+    MatrixXd deviations(count, 2 * count + 1);
+    for (Index i = 0; i < count; ++i) deviations.row(i).setConstant(uncertain[std::size_t(i)].distribution.expectation);
+    InputEffects effects;
+    for (Index i = 0; i < count; ++i) {
+        const UncertainInput& input = uncertain[std::size_t(i)];
+        const Distribution& d = input.distribution;
+        const double u = gum_uncertainty(d);
+        deviations(i, 1 + 2 * i) += u;
+        deviations(i, 2 + 2 * i) -= u;
+        effects.inputs.push_back({name(input), budget_group(input), u, d.degrees_of_freedom, -1, d.kind});
+    }
+    const MatrixXd outputs = calibrations.evaluate_at(deviations);
+    effects.value = outputs.col(0);
+    effects.first_order.resize(outputs.rows(), count);
+    effects.second_order.resize(outputs.rows(), count);
+    if (!effects.value.allFinite())
+        throw InvalidArgument("virtual calibrations: without deviations there is no result");
+    for (Index i = 0; i < count; ++i) {
+        const auto up = outputs.col(1 + 2 * i), down = outputs.col(2 + 2 * i);
+        if (!up.allFinite() || !down.allFinite())
+            throw InvalidArgument(effects.inputs[std::size_t(i)].name +
+                                  ": with a deviation of its standard uncertainty there is no result");
+        effects.first_order.col(i) = (up - down) / 2.0;
+        effects.second_order.col(i) = (up - effects.value + (down - effects.value)) / 2.0;
+    }
+    return effects;
+}
+
+MatrixXd gain_of(const VirtualCalibrations& calibrations) {
+    const Index entries = Index(calibrations.evaluator().entries().size());
+    Index channels = 0;
+    for (const Channel& channel : calibrations.nominal().channels())
+        if (channel.name != "time" && channel.name != "temperature") ++channels;
+    if (entries * channels > largest_gain / std::max<Index>(Index(calibrations.nominal().size()), 1))
+        throw InvalidArgument("propagation: expected at most " + std::to_string(largest_gain) +
+                              " sensitivities to readings, got more by far too many steps; the Monte Carlo method "
+                              "does without them");
+    return with_derived(calibrations.evaluator().gain(), calibrations.derived());
+}
+
+}  // namespace
+
+Propagation propagate(const VirtualCalibrations& calibrations, bool full_covariance) {
+    const UncertainInputs& uncertain = calibrations.run().inputs;
+    InputEffects effects = input_effects(calibrations);
+    struct Part {
+        std::string group;
+        MatrixXd effect;
+        double degrees_of_freedom;
+    };
+    VectorXd value = effects.value;
+    std::vector<Part> parts;
+    if (!uncertain.noise.empty()) {
+        const NoiseEffects noises(calibrations, gain_of(calibrations));
+        for (const ReadingNoise& noise : uncertain.noise) {
+            MatrixXd effect = noises.of(noise);
+            value += effect.rowwise().sum() * noise.distribution.expectation;
+            effect *= gum_uncertainty(noise.distribution);
+            parts.push_back({budget_group(noise), std::move(effect), noise.distribution.degrees_of_freedom});
+        }
+    }
+    Contributions sum(calibrations.outputs(), value, full_covariance);
+    for (const Part& part : parts) sum.add(part.group, part.effect, part.degrees_of_freedom);
+    sum.add_inputs(effects.inputs, effects.first_order, effects.second_order, correlation_of(uncertain));
+    return sum.result();
+}
+
+Propagation propagate(const Calibration& calibration, const VirtualCalibrations& calibrations, bool full_covariance) {
+    const auto entries = calibration_entries(calibration);
+    const auto& expected = calibrations.evaluator().entries();
+    const auto same = [](const CalibrationEntry& a, const CalibrationEntry& b) {
+        return a.parameter == b.parameter && (std::isnan(a.position) || std::abs(a.position - b.position) <= 1e-6);
+    };
+    if (entries.size() != expected.size() || !std::equal(entries.begin(), entries.end(), expected.begin(), same))
+        throw InvalidArgument("calibration: expected the parameters and nodes of the virtual calibrations (" +
+                              std::to_string(expected.size()) + " values), got others (" +
+                              std::to_string(entries.size()) + ")");
+    if (calibration.covariance.size() == 0)
+        throw InvalidArgument("calibration: expected one evaluated with full covariance");
+    const MatrixXd rows =
+        with_derived(MatrixXd::Identity(Index(entries.size()), Index(entries.size())), calibrations.derived());
+    const InputEffects effects = input_effects(calibrations);
+    Contributions sum(calibrations.outputs(), rows * calibration_values(calibration), full_covariance);
+    sum.add_covariance("readings", rows * calibration.covariance * rows.transpose());
+    sum.add_inputs(effects.inputs, effects.first_order, effects.second_order,
+                   correlation_of(calibrations.run().inputs));
+    return sum.result();
+}
+
+}  // namespace stepdiag

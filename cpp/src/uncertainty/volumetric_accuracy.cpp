@@ -1,0 +1,155 @@
+// Draws of the ranges from the joint normal distribution of a calibration's values.
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "stepdiag/core/error.hpp"
+#include "stepdiag/core/random.hpp"
+#include "uncertainty/derived_parts.hpp"
+
+namespace stepdiag {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// L with L L^T = covariance, which may be singular: what is certain (0 at home) has none.
+MatrixXd root_of(const MatrixXd& covariance) {
+    // In units of the standard uncertainties: mm beside rad would make the pivots' order one of units.
+    const VectorXd u = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+    const VectorXd scale = (u.array() > 0.0).select(u.array().inverse(), 0.0);
+    const Eigen::LDLT<MatrixXd> factor(scale.asDiagonal() * covariance * scale.asDiagonal());
+    MatrixXd root = factor.matrixL();
+    root = root * factor.vectorD().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+    root = factor.transpositionsP().transpose() * root;
+    return u.asDiagonal() * root;
+}
+
+const Calibration& with_covariance(const Calibration& calibration) {
+    if (calibration.covariance.size() == 0)
+        throw InvalidArgument("calibration: expected one evaluated with full covariance");
+    return calibration;
+}
+
+// Columns: the standard normal numbers of samples.
+MatrixXd normal_numbers(std::uint64_t seed, std::uint64_t first_sample, Index count, Index samples) {
+    MatrixXd numbers(count, samples);
+    for (Index s = 0; s < samples; ++s)
+        for (Index i = 0; i < count; i += 2) {
+            const auto pair = normal_pair(seed, RandomStream::monte_carlo,
+                                          {first_sample + std::uint64_t(s), std::uint32_t(i / 2)});
+            numbers(i, s) = pair[0];
+            if (i + 1 < count) numbers(i + 1, s) = pair[1];
+        }
+    return numbers;
+}
+
+}  // namespace
+
+struct RangeModel::State {
+    VolumeRanges ranges;
+    VectorXd values;
+    MatrixXd root;
+    std::uint64_t seed;
+    std::vector<Output> outputs;
+    std::vector<int> indices;  // of the outputs among the ranges
+};
+
+RangeModel::RangeModel(const Calibration& calibration, const std::optional<Eigen::Vector3d>& tool, std::uint64_t seed) {
+    with_covariance(calibration);
+    auto state = std::make_shared<State>(State{VolumeRanges(calibration, tool_of(calibration, tool)),
+                                               calibration_values(calibration),
+                                               root_of(calibration.covariance),
+                                               seed,
+                                               {},
+                                               {}});
+    for (int i = 0; i < range_count; ++i) {
+        if (!state->ranges.missing()[std::size_t(i)].empty()) continue;
+        const bool is_angle = i >= 3 && i < deviation_count;
+        state->outputs.push_back({range_names[std::size_t(i)], std::nan(""), is_angle ? "rad" : "mm"});
+        state->indices.push_back(i);
+    }
+    state_ = std::move(state);
+}
+
+RangeModel::~RangeModel() = default;
+const std::vector<SampleModel::Output>& RangeModel::outputs() const { return state_->outputs; }
+std::uint64_t RangeModel::seed() const { return state_->seed; }
+std::string RangeModel::target() const { return "scalar"; }
+
+std::unique_ptr<SampleModel::Worker> RangeModel::worker() const {
+    struct RangeWorker : Worker {
+        explicit RangeWorker(const State& state) : state(state) {}
+        void evaluate(const SampleBlock& block) override {
+            constexpr std::size_t together = 16;  // columns of a product; a block's size is a multiple of it
+            for (std::size_t begin = 0; begin < block.samples; begin += together) {
+                const MatrixXd values =
+                    (state.root * normal_numbers(state.seed, block.first_sample + begin, state.root.cols(), together))
+                        .colwise() +
+                    state.values;
+                for (std::size_t s = 0; s < together; ++s) {
+                    const Ranges ranges = state.ranges.evaluate(values.col(Index(s)));
+                    for (std::size_t k = 0; k < state.indices.size(); ++k)
+                        block.output(k)[begin + s] = ranges[state.indices[k]];
+                }
+            }
+        }
+        const State& state;
+    };
+    return std::make_unique<RangeWorker>(*state_);
+}
+
+VolumetricAccuracy volumetric_accuracy(const Calibration& calibration, const std::optional<Eigen::Vector3d>& tool,
+                                       const RangeOptions& options) {
+    if (!(options.coverage > 0.0 && options.coverage < 1.0))
+        throw InvalidArgument("coverage: expected a probability between 0 and 1");
+    if (double(options.samples) * (1.0 - options.coverage) < 100.0)
+        throw InvalidArgument("samples: expected at least 100/(1 - coverage)");
+    with_covariance(calibration);
+    const VolumeRanges ranges(calibration, tool_of(calibration, tool));
+    const VectorXd values = calibration_values(calibration);
+    const MatrixXd root = root_of(calibration.covariance);
+
+    const Index count = Index(options.samples), together = 16;
+    MatrixXd drawn(count, range_count), of_noise(count, range_count);
+    for (Index begin = 0; begin < count; begin += together) {
+        const Index here = std::min(together, count - begin);
+        const MatrixXd noise =
+            root * normal_numbers(options.seed, std::uint64_t(begin), root.cols(), here);
+        for (Index s = 0; s < here; ++s) {
+            drawn.row(begin + s) = ranges.evaluate(values + noise.col(s)).transpose();
+            of_noise.row(begin + s) = ranges.evaluate(noise.col(s)).transpose();
+        }
+    }
+    VolumetricAccuracy result;
+    result.value = ranges.evaluate(values);
+    result.mean = drawn.colwise().mean();
+    result.standard_uncertainty =
+        ((drawn.rowwise() - result.mean.transpose()).colwise().squaredNorm() / double(count - 1)).cwiseSqrt();
+    const auto quantile = [&](MatrixXd& sorted, int column, double probability) {
+        return sorted(std::clamp(Index(probability * double(count)), Index(0), count - 1), column);
+    };
+    for (int i = 0; i < range_count; ++i) {
+        if (!ranges.missing()[std::size_t(i)].empty()) {
+            result.drawn_interval.row(i).setConstant(std::nan(""));
+            result.interval.row(i) = result.drawn_interval.row(i);
+            result.bound[i] = std::nan("");
+            continue;
+        }
+        std::sort(drawn.col(i).begin(), drawn.col(i).end());
+        std::sort(of_noise.col(i).begin(), of_noise.col(i).end());
+        const double low = quantile(drawn, i, (1.0 - options.coverage) / 2.0);
+        const double high = quantile(drawn, i, (1.0 + options.coverage) / 2.0);
+        result.drawn_interval.row(i) << low, high;
+        result.interval.row(i) << std::max(2.0 * result.value[i] - high, 0.0),
+            std::max(2.0 * result.value[i] - low, 0.0);
+        result.bound[i] = quantile(of_noise, i, options.coverage);
+    }
+    result.resolution = ranges.resolution(values);
+    result.missing = ranges.missing();
+    result.samples = options.samples;
+    return result;
+}
+
+}  // namespace stepdiag
