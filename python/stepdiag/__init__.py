@@ -15,9 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 from stepdiag._core import (
     Adjustment,
+    BatchEvaluator,
     BeamSegment,
     BeamSpot,
     Calibration,
+    CalibrationEntry,
     Camera,
     Chain,
     Environment,
@@ -80,9 +82,11 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Adjustment",
+    "BatchEvaluator",
     "BeamSegment",
     "BeamSpot",
     "Calibration",
+    "CalibrationEntry",
     "Camera",
     "Chain",
     "Comparison",

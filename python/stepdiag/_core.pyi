@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['Adjustment', 'BeamSegment', 'BeamSpot', 'Calibration', 'Camera', 'Chain', 'Distribution', 'Environment', 'ErrorMap', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'Noise', 'Outlier', 'Plan', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'UncertainInput', 'UncertainInputs', 'adjust', 'beam_radius', 'couple', 'cramer_rao_bound', 'evaluate', 'expose', 'head_sensitivities', 'largest_repeat_count', 'locate', 'normal_quantile', 'power_inside', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Distribution', 'Environment', 'ErrorMap', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'VirtualCalibrations', 'adjust', 'beam_radius', 'couple', 'cramer_rao_bound', 'drawn_inputs', 'evaluate', 'expose', 'head_sensitivities', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -955,6 +955,53 @@ class Adjustment:
     @property
     def weighted_square_sum(self) -> float:
         ...
+class CalibrationEntry:
+    """
+    A value of a calibration's tables.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def parameter(self) -> str:
+        """
+        "EXX", ..., "C0Y"
+        """
+    @property
+    def position(self) -> float:
+        """
+        mm; NaN for a squareness
+        """
+class BatchEvaluator:
+    """
+    One evaluation of many sets of readings of the same plan, heads and pattern of readings; what is known of the pattern serves all of them.
+    """
+    def __init__(self, pattern: Measurement, plan: Plan, heads: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'enhanced', uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None) -> None:
+        """
+        pattern: a run whose readings are there; lost ones are not used in any set. method: "conventional", "enhanced", "adjustment" (each set converged to 1e-4 of its values' standard uncertainties, without a search for outliers) or "one_step" (the pattern's values plus gain times what differs: off by terms of second order). setup to smoothness as of adjust(). Raises InvalidArgument.
+        """
+    def evaluate(self, readings: numpy.typing.ArrayLike, threads: typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n, entries), mm and rad, from readings (n, rows of the pattern, channels); NaN for a set with a lost reading or without a solution. A set gives the same bits whatever stands beside it. threads: 0 for all cores. Raises InvalidArgument.
+        """
+    def gain(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (entries, rows, channels): d value / d reading at the pattern.
+        """
+    @property
+    def calibration(self) -> Calibration:
+        """
+        The evaluation of the pattern, with standard uncertainties.
+        """
+    @property
+    def channels(self) -> list[str]:
+        """
+        Of a set of readings.
+        """
+    @property
+    def entries(self) -> list[CalibrationEntry]:
+        """
+        The values that a set of readings gives: functions EXX ... ECZ, nodes ascending, then squarenesses.
+        """
 class Distribution:
     """
     A distribution that JCGM 101 (6.4) assigns to an input quantity: "normal" (spread: standard deviation), "rectangular", "triangular", "arcsine" (half width), "t" (scale; degrees_of_freedom), "curvilinear_trapezoid" (half width, known to plus and minus edge only).
@@ -1047,6 +1094,333 @@ class UncertainInputs:
     @property
     def noise(self) -> list[ReadingNoise]:
         ...
+class Output:
+    """
+    An output of a sample model. Native units.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def position(self) -> float:
+        """
+        mm; NaN where it has none.
+        """
+    @property
+    def unit(self) -> str:
+        """
+        "mm", "rad", "1"
+        """
+class SampleModel:
+    """
+    A measurement model as the Monte Carlo method sees it (JCGM 101, 5.9): outputs of sample after sample, each a pure function of the seed and the sample's index.
+    """
+    def evaluate(self, first_sample: typing.SupportsIndex, samples: typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Array (outputs, samples); NaN in all outputs of a sample that gave no result. Raises InvalidArgument.
+        """
+    @property
+    def outputs(self) -> list[Output]:
+        ...
+    @property
+    def seed(self) -> int:
+        ...
+    @property
+    def target(self) -> str:
+        """
+        The instruction set, for which the bits of a sample are the same.
+        """
+class VirtualCalibrations(SampleModel):
+    """
+    Whole virtual calibrations: a run with drawn inputs and reading noise, traced by replay and evaluated with the unperturbed calibration. Outputs are the values of the calibration's tables, then those derived.
+    """
+    def __init__(self, machine: Machine, plan: Plan, heads: Head | collections.abc.Mapping[str, Head], inputs: UncertainInputs, *, calibration_heads: Head | collections.abc.Mapping[str, Head] | None = None, method: str = 'enhanced', seed: typing.SupportsIndex = 0, misalignment: collections.abc.Mapping[str, Misalignment] = {}, environment: Environment | None = None, assumed_environment: Environment | None = None, repeats: typing.SupportsIndex = 1, backward: bool = False, seconds_per_reading: typing.SupportsFloat | typing.SupportsIndex | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, derived: collections.abc.Sequence[tuple[str, str, numpy.typing.ArrayLike]] = []) -> None:
+        """
+        machine to seconds_per_reading as of simulate(); calibration_heads: what the evaluation knows the heads as (none: the heads). method: "conventional", "enhanced", "adjustment" or "one_step", whose options are uncertainty to smoothness, as of evaluate() and adjust(). verified_share: of the samples, in each of which one reading of every line is traced again. derived: (name, unit, coefficients of the values of the tables). Raises InvalidArgument.
+        """
+    def evaluate_at(self, deviations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (outputs, n) for given deviations (inputs, n) of the inputs, without reading noise. Raises InvalidArgument.
+        """
+    def readings(self, sample: typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (rows, channels) of one sample, with noise; NaN where lost.
+        """
+    @property
+    def calibration(self) -> Calibration:
+        """
+        The evaluation of `nominal`.
+        """
+    @property
+    def nominal(self) -> Measurement:
+        """
+        The run with every input at its expectation, without noise.
+        """
+class FunctionModel(SampleModel):
+    """
+    A model given as a function of its inputs.
+    """
+    def __init__(self, function: collections.abc.Callable[[numpy.typing.NDArray[numpy.float64]], typing.Any], distributions: collections.abc.Sequence[Distribution], outputs: collections.abc.Sequence[str], *, seed: typing.SupportsIndex = 0, correlations: collections.abc.Sequence[tuple[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], numpy.typing.ArrayLike]] = []) -> None:
+        """
+        function: takes an (inputs, n) array, gives an (outputs, n) array; a sample with a value that is not finite is lost. correlations: pairs of indices of normal inputs and their correlation matrix. Raises InvalidArgument.
+        """
+class StatisticsOptions:
+    """
+    What a Monte Carlo run is to find out of its samples.
+    """
+    def __init__(self, *, coverage: typing.SupportsFloat | typing.SupportsIndex = 0.95, digits: typing.SupportsInt | typing.SupportsIndex = 2, covariance: bool = False, kept: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], joint: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]] = []) -> None:
+        """
+        coverage: of intervals; digits: of standard uncertainties that matter, 1 to 3 (bins are a fifth of delta wide, JCGM 101, 7.9.2); covariance: of all outputs; kept: outputs of which every value is kept, 8 bytes each; joint: sets of one to three outputs that get joint coverage regions (JCGM 102, 6.5). make_bins checks them.
+        """
+    @property
+    def covariance(self) -> bool:
+        ...
+    @property
+    def coverage(self) -> float:
+        ...
+    @property
+    def digits(self) -> int:
+        ...
+    @property
+    def joint(self) -> list[list[int]]:
+        ...
+    @property
+    def kept(self) -> list[int]:
+        ...
+class Bins:
+    """
+    What all parts of one Monte Carlo run share, fixed by its pilot run.
+    """
+    @staticmethod
+    def from_bytes(bytes: bytes) -> Bins:
+        """
+        Raises InvalidArgument for damaged bytes.
+        """
+    def to_bytes(self) -> bytes:
+        ...
+    @property
+    def counts(self) -> int:
+        """
+        Bins of all outputs: 4 bytes each, for every thread.
+        """
+    @property
+    def options(self) -> StatisticsOptions:
+        ...
+    @property
+    def outputs(self) -> list[Output]:
+        ...
+    @property
+    def seed(self) -> int:
+        ...
+    @property
+    def target(self) -> str:
+        ...
+class JointRegion:
+    """
+    A region of up to three outputs that holds the coverage (JCGM 102, 6.5): an ellipsoid and a rectangle about the pilot run's mean, of its covariance's shape, and the smallest region made of cells of a grid.
+    """
+    @property
+    def centre(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def covariance(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def ellipsoid_factor(self) -> float:
+        """
+        k_p: (y - centre) covariance^-1 (y - centre) <= k_p^2; nan for a singular covariance
+        """
+    @property
+    def ellipsoid_volume(self) -> float:
+        ...
+    @property
+    def grid_from(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def grid_width(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def outputs(self) -> list[int]:
+        ...
+    @property
+    def rectangle_factor(self) -> float:
+        """
+        k_q: |y_j - centre_j| <= k_q u_j
+        """
+    @property
+    def rectangle_volume(self) -> float:
+        ...
+    @property
+    def smallest(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        1 for each cell of the grid that is in the smallest region
+        """
+    @property
+    def smallest_share(self) -> float:
+        """
+        of all samples
+        """
+    @property
+    def smallest_volume(self) -> float:
+        ...
+class MonteCarloResult:
+    """
+    Figures of every output. Native units.
+    """
+    @property
+    def covariance(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        ...
+    @property
+    def highest(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def joint(self) -> list[JointRegion]:
+        ...
+    @property
+    def kept(self) -> dict[int, numpy.typing.NDArray[numpy.float64]]:
+        """
+        Values by output, in the order of samples; nan for a lost one.
+        """
+    @property
+    def lost(self) -> int:
+        """
+        Samples that gave none: left out.
+        """
+    @property
+    def lowest(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def mean(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def options(self) -> StatisticsOptions:
+        ...
+    @property
+    def outputs(self) -> list[Output]:
+        ...
+    @property
+    def outside(self) -> list[int]:
+        """
+        Values beyond the bins, by output: an interval's end among them is known roughly.
+        """
+    @property
+    def samples(self) -> int:
+        """
+        Samples that gave a result.
+        """
+    @property
+    def seed(self) -> int:
+        ...
+    @property
+    def shortest(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (outputs, 2): ends of the shortest coverage intervals
+        """
+    @property
+    def standard_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def symmetric(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (outputs, 2): ends of the probabilistically symmetric coverage intervals
+        """
+    @property
+    def target(self) -> str:
+        """
+        The instruction set: the same bits for the same one.
+        """
+class PartialStatistics:
+    """
+    Statistics of a set of leaves of 2,000 samples.
+    """
+    @staticmethod
+    def from_bytes(bytes: bytes) -> PartialStatistics:
+        """
+        Raises InvalidArgument for damaged bytes.
+        """
+    def __init__(self, bins: Bins) -> None:
+        """
+        Of no leaves.
+        """
+    def merge(self, other: PartialStatistics) -> None:
+        """
+        Raises InvalidArgument for statistics of another run, saying in what, and for leaves that are in both.
+        """
+    def result(self) -> MonteCarloResult:
+        ...
+    def to_bytes(self) -> bytes:
+        ...
+    @property
+    def bins(self) -> Bins:
+        ...
+    @property
+    def leaves(self) -> list[tuple[int, int]]:
+        """
+        Half-open ranges, ascending.
+        """
+    @property
+    def lost(self) -> int:
+        ...
+    @property
+    def samples(self) -> int:
+        ...
+class Stability:
+    """
+    How far an adaptive procedure is from its end.
+    """
+    @property
+    def figure(self) -> str:
+        ...
+    @property
+    def output(self) -> int:
+        ...
+    @property
+    def ratio(self) -> float:
+        """
+        Twice the standard deviation of the average over blocks by delta, the largest of all.
+        """
+    @property
+    def stable(self) -> bool:
+        ...
+    @property
+    def unstable(self) -> int:
+        """
+        Outputs with a ratio above 1.
+        """
+class AdaptiveProcedure:
+    """
+    JCGM 101, 7.9.4: blocks of M samples until mean, standard uncertainty and both ends of the symmetric interval of every output are stable to delta.
+    """
+    @staticmethod
+    def from_bytes(bytes: bytes) -> AdaptiveProcedure:
+        """
+        Raises InvalidArgument for damaged bytes.
+        """
+    @staticmethod
+    def leaves_per_block(coverage: typing.SupportsFloat | typing.SupportsIndex) -> int:
+        ...
+    def __init__(self, bins: Bins) -> None:
+        ...
+    def add(self, block: PartialStatistics) -> None:
+        """
+        Raises InvalidArgument for what is not the next block.
+        """
+    def stability(self, all: PartialStatistics) -> Stability:
+        """
+        all: the statistics of all blocks so far.
+        """
+    def to_bytes(self) -> bytes:
+        ...
+    @property
+    def blocks(self) -> int:
+        ...
+    @property
+    def next_block(self) -> tuple[int, int]:
+        """
+        Its leaves, half-open.
+        """
 def adjust(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.01, full_covariance: bool = False) -> Adjustment:
     """
     The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. setup_by_line replaces the quantities that it names. Raises InvalidArgument.
@@ -1062,6 +1436,10 @@ def couple(mode: GaussianMode, beam: ReturnedBeam, index: typing.SupportsFloat |
 def cramer_rao_bound(camera: Camera, spot: BeamSpot) -> float:
     """
     Smallest standard deviation (mm) of the spot's x that an unbiased estimate can have with position, radius, brightness and background unknown (Winick, J. Opt. Soc. Am. A 3 (1986) 1809); 0 without noise, inf where x is not observable.
+    """
+def drawn_inputs(inputs: UncertainInputs, seed: typing.SupportsIndex, sample: typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Deviations of one sample's inputs, in their order. Raises InvalidArgument.
     """
 def evaluate(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'adjustment', uncertainty: ReadingUncertainty = ..., full_covariance: bool = False) -> Calibration:
     """
@@ -1085,9 +1463,17 @@ def locate(device: LateralEffect, spots: collections.abc.Sequence[BeamSpot], *, 
     """
     Position (2,) that the device gives for these spots, mm from its centre; None below its least power.
     """
+def make_bins(model: SampleModel, options: StatisticsOptions = ..., threads: typing.SupportsIndex = 0) -> Bins:
+    """
+    The pilot run over the first 10,000 samples. threads: 0 takes all processors. Raises InvalidArgument.
+    """
 def normal_quantile(probability: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     The number that a standard normal number is below with this probability. Raises InvalidArgument.
+    """
+def numerical_tolerance(standard_uncertainty: typing.SupportsFloat | typing.SupportsIndex, digits: typing.SupportsInt | typing.SupportsIndex) -> float:
+    """
+    delta = 10^r / 2 for u = c 10^r, c a whole number of so many digits (JCGM 101, 7.9.2).
     """
 def power_inside(spot: BeamSpot, low: numpy.typing.ArrayLike, high: numpy.typing.ArrayLike) -> float:
     """
@@ -1117,6 +1503,14 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
     """
     Reads a measurement CSV. Raises InvalidArgument naming file and line.
     """
+def run_leaves(model: SampleModel, bins: Bins, first_leaf: typing.SupportsIndex, leaves: typing.SupportsIndex, *, threads: typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> PartialStatistics:
+    """
+    Statistics of these leaves; the bits depend on nothing else. progress(leaves_done) is called some times a second; False ends the run with the leaves that are done, an exception ends it and comes through. Raises InvalidArgument for a model that is not that of the bins.
+    """
+def run_ranges(model: SampleModel, bins: Bins, ranges: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]], *, threads: typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> list[PartialStatistics]:
+    """
+    The same for half-open ranges of leaves, each computed by one thread; those that are whole.
+    """
 def simulate(machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[str, Head], *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment | None = None, assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001, repeats: typing.SupportsIndex = 1, backward: bool = False, seconds_per_reading: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Measurement:
     """
     A run on the virtual machine: lines of the plan, then its scale lines. head: one, or a dict with one for each line. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace (none: of 20 degrees Celsius for a head with a design, an index of 1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's replayed poses, traced again and compared. repeats: how often each line is measured, runs 0, 1, 2, ...; backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; seconds_per_reading: makes the channel time. Points of a visit are approached in the direction of its own travel. Readings whose beam misses the mirror or does not come back are lost (NaN). Raises InvalidArgument; RuntimeError where a replay and its trace differ.
@@ -1135,3 +1529,5 @@ def trace_beams(head: Head, *, distance: typing.SupportsFloat | typing.SupportsI
     """
 __version__: str = '0.1.0'
 largest_repeat_count: int = 1000
+leaf_samples: int = 2000
+pilot_samples: int = 10000

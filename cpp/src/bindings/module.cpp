@@ -1,6 +1,7 @@
 // stepdiag._core: the C++ library as Python sees it. Each part checks shapes, releases the interpreter lock and calls.
 #include <limits>
 
+#include "batch_arguments.hpp"
 #include "bindings.hpp"
 #include "stepdiag/version.hpp"
 
@@ -173,6 +174,7 @@ PYBIND11_MODULE(_core, m) {
     bind_evaluation(m);
     bind_adjustment(m);
     bind_calibration(m);
+    bind_batch(m);
     bind_uncertain_inputs(m);
     bind_sample_model(m);
     bind_derived(m);
