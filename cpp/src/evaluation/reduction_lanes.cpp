@@ -33,55 +33,50 @@ struct Tilts {
     Pair alpha, beta;
 };
 
-// (-beta, alpha) = k spot, because the spot lies where the light goes: of reduce_spot's g(x) x = spot there is left
-//   f(k) = h k - w = 0,  h = 2 (distance w + psd_distance + k spot . spot_beam),  w = 1 - k^2 |spot|^2.
+// (-beta, alpha) is k spot, because a spot lies where the light goes: of reduce_spot's g(x) x = spot there is left
+//   h k = w,  h = 2 (distance w + psd_distance + k spot . spot_beam),  w = 1 - k^2 |spot|^2,
+// and with k = c/D, D = 2 (distance + psd_distance):
+//   f(c) = c + p c^2 - q c^3 - 1 = 0,  p = 2 spot . spot_beam/D^2 + r,  q = 2 distance r/D,  r = |spot|^2/D^2,
+// where p and q are small, r being about the square of the tilt.
 struct SpotEquation {
-    Pair twice_distance, twice_psd, spot2, twice_beam;
+    Pair p, q, r;
 
-    STEPDIAG_INLINE Pair w(Pair k) const { return sub_mul(k * k, spot2, all(1.0)); }
-    STEPDIAG_INLINE Pair h(Pair w, Pair k) const {
-        return mul_add(twice_distance, w, mul_add(twice_beam, k, twice_psd));
-    }
-    STEPDIAG_INLINE Pair f(Pair k) const {
-        const Pair own_w = w(k);
-        return mul_add(h(own_w, k), k, negative(own_w));
-    }
+    STEPDIAG_INLINE Pair f(Pair c) const { return mul_add(mul_add(sub_mul(q, c, p), c, all(1.0)), c, all(-1.0)); }
 };
 
 // Newton's method. Lanes stop by themselves: `done`. Those that no mirror gives end with NaN.
-HWY_NOINLINE Pair solve_by_newton(const SpotEquation& spot, MaskPair done, Pair k) {
-    const Pair zero = all(0.0);
+HWY_NOINLINE Pair solve_by_newton(const SpotEquation& spot, MaskPair done, Pair c) {
+    const Pair zero = all(0.0), one = all(1.0);
     MaskPair possible = zero <= zero;
     for (int iteration = 0; iteration < 20 && !is_everywhere(done); ++iteration) {
-        const Pair w = spot.w(k), h = spot.h(w, k), w_by_k = all(-2.0) * k * spot.spot2;
-        const Pair slope = mul_add(mul_add(spot.twice_distance, w_by_k, spot.twice_beam), k, h) - w_by_k;
-        const Pair change = spot.f(k) / slope;
-        k = select(done, k, k - change);
-        possible = both(possible, either(done, both(both(h > zero, slope > zero), spot.w(k) > zero)));
-        // Newton's next error is below the square of a change of 1e-8.
-        done = either(done, either(magnitude(change) <= all(1e-8) * magnitude(k), no(possible)));
+        const Pair slope = mul_add(sub_mul(all(3.0) * spot.q, c, spot.p + spot.p), c, one);
+        const Pair change = spot.f(c) / slope;
+        c = select(done, c, c - change);
+        const Pair h_by_d = mul_add(sub_mul(spot.q, c, spot.p - spot.r), c, one), w = sub_mul(spot.r * c, c, one);
+        possible = both(possible, either(done, both(both(h_by_d > zero, slope > zero), w > zero)));
+        // The next error is below the square of a change of 1e-8.
+        done = either(done, either(magnitude(change) <= all(1e-8) * magnitude(c), no(possible)));
     }
-    return select(both(possible, done), k, none());
+    return select(both(possible, done), c, none());
 }
 
-// Small tilts take two or three steps with 2 (distance + psd_distance) for f'.
 STEPDIAG_INLINE Tilts tilts_of_spot(const ReducedRow& row, Pair distance, Pair spot_x, Pair spot_y) {
-    SpotEquation spot{distance + distance, all(2.0 * row.psd_distance), square_sum(spot_x, spot_y), all(0.0)};
-    if (row.is_beside)
-        spot.twice_beam = mul_add(spot_x, all(2.0 * row.spot_beam_x), spot_y * all(2.0 * row.spot_beam_y));
-    const Pair inverse = all(1.0) / (spot.twice_distance + spot.twice_psd);
-    Pair k = inverse;
-    for (int step = 0; step < 2; ++step) k = sub_mul(spot.f(k), inverse, k);
-    Pair tilt2 = k * k * spot.spot2;
-    const MaskPair away = both(distance > all(0.0), inverse > all(0.0));
-    const MaskPair done = both(away, tilt2 <= all(row.tilt2_of_two_steps));
-    if (!is_everywhere(done)) {
-        const Pair further = sub_mul(spot.f(k), inverse, k);
-        tilt2 = further * further * spot.spot2;
-        k = select(away, select(done, k, further), none());
-        const MaskPair now_done = either(done, tilt2 <= all(row.tilt2_of_three_steps));
-        if (!is_everywhere(both(away, now_done))) k = solve_by_newton(spot, now_done, k);
+    const Pair one = all(1.0), twice = distance + distance, inverse = one / (twice + all(2.0 * row.psd_distance));
+    const Pair inverse2 = inverse * inverse, r = square_sum(spot_x, spot_y) * inverse2;
+    SpotEquation spot{r, twice * inverse * r, r};
+    if (row.is_beside) {
+        const Pair beam = mul_add(spot_x, all(2.0 * row.spot_beam_x), spot_y * all(2.0 * row.spot_beam_y));
+        spot.p = mul_add(beam, inverse2, r);
     }
+    // The root to second order, 1 - (p - q)(1 - 2 p + 3 q), and a step of Newton's method with 1/f' to first order, the
+    // same factor: that leaves some 30 p^5.
+    const Pair slope = mul_add(all(3.0), spot.q, mul_add(all(-2.0), spot.p, one));
+    const Pair start = sub_mul(spot.p - spot.q, slope, one);
+    Pair c = sub_mul(spot.f(start), slope, start);
+    const MaskPair away = both(distance > all(0.0), inverse > all(0.0));
+    const MaskPair done = magnitude(spot.p) + spot.q <= all(3e-4);
+    if (!is_everywhere(both(away, done))) c = solve_by_newton(spot, both(away, done), select(away, c, none()));
+    const Pair k = c * inverse;
     return {k * spot_y, negative(k * spot_x)};
 }
 

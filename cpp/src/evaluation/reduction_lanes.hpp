@@ -21,8 +21,6 @@ struct ReducedRow {
     double lateral_x, lateral_y, travel;
     double psd_distance, spot_beam_x, spot_beam_y;
     bool is_beside;  // the beam that makes the spot, beside the axis
-    // Largest tan^2 of a tilt that two or three steps of the solution for a spot bring to rounding.
-    double tilt2_of_two_steps, tilt2_of_three_steps;
 };
 
 class LaneReduction {

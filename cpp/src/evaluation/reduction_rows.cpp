@@ -1,4 +1,3 @@
-#include <cmath>
 
 #include "evaluation/batch_map.hpp"
 #include "evaluation/linear_evaluation.hpp"
@@ -64,15 +63,6 @@ TakenRow take_row(const Measurement& pattern, const RawPlaces& places, std::size
     return {};
 }
 
-// A step with the slope of no tilt multiplies the error by 2 t + 2 sqrt(t) |spot_beam|/psd_distance at most, t = tan^2
-// of the tilt, and the start's error is half of that: the largest t where that factor is below `contraction`.
-double steady_tilt2(const HeadCalibration& head, double contraction) {
-    if (!(head.psd_distance.value_or(0.0) > 0.0)) return 0.0;
-    const double beside = head.spot_beam.norm() / *head.psd_distance;
-    const double tilt = (std::sqrt(beside * beside + 2.0 * contraction) - beside) / 2.0;
-    return tilt * tilt;
-}
-
 }  // namespace
 
 LaneReduction::LaneReduction(const Measurement& pattern, const HeadCalibrations& heads,
@@ -97,8 +87,6 @@ LaneReduction::LaneReduction(const Measurement& pattern, const HeadCalibrations&
             reduced.psd_distance = head.psd_distance.value_or(0.0);
             reduced.spot_beam_x = head.spot_beam.x(), reduced.spot_beam_y = head.spot_beam.y();
             reduced.is_beside = !head.spot_beam.isZero(0.0);
-            reduced.tilt2_of_two_steps = steady_tilt2(head, 4e-6);
-            reduced.tilt2_of_three_steps = steady_tilt2(head, 1e-4);
             rows_.push_back(reduced);
             raws_.insert(raws_.end(), taken.raws.begin(), taken.raws.end());
             solutions_.insert(solutions_.end(), taken.solution.begin(), taken.solution.end());
