@@ -96,7 +96,7 @@ public:
     explicit Lanes(const State& state)
         : state_(state),
           worker_(state.evaluator),
-          readings_(state.model.rows.size() * state.model.channels.size() * lanes),
+          readings_(state.model.rows.size() * state.model.channels.size()),
           deviations_(state.model.run.inputs.inputs.size() * lanes) {
         if (state.in_lanes) scratch_.emplace(*state.in_lanes);
     }
@@ -123,11 +123,12 @@ private:
     void read(std::optional<std::uint64_t> first_sample) {
         std::array<std::uint8_t, lanes> followed{};
         if (state_.in_lanes) {
-            state_.in_lanes->trace(deviations_.data(), first_sample, *scratch_, readings_.data(), followed.data());
+            state_.in_lanes->trace(deviations_.data(), first_sample, *scratch_, readings_.front().value,
+                                   followed.data());
             if (first_sample) {
                 for (std::size_t lane = 0; lane < lanes; ++lane)
                     if (followed[lane]) verify(*first_sample, lane);
-                state_.in_lanes->add_noise(*first_sample, *scratch_, readings_.data());
+                state_.in_lanes->add_noise(*first_sample, *scratch_, readings_.front().value);
             }
         }
         std::uint64_t replayed = 0;
@@ -148,12 +149,11 @@ private:
         try {
             return state_.general.readings(deviations(lane), sample);
         } catch (const InvalidArgument&) {
-            return Eigen::VectorXd::Constant(Eigen::Index(readings_.size() / lanes),
-                                             std::numeric_limits<double>::quiet_NaN());
+            return Eigen::VectorXd::Constant(Eigen::Index(readings_.size()), std::numeric_limits<double>::quiet_NaN());
         }
     }
     void put(std::size_t lane, const Eigen::VectorXd& readings) {
-        for (Eigen::Index i = 0; i < readings.size(); ++i) readings_[std::size_t(i) * lanes + lane] = readings[i];
+        for (Eigen::Index i = 0; i < readings.size(); ++i) readings_[std::size_t(i)].value[lane] = readings[i];
     }
 
     // Of a share of the samples one reading of each visit is traced again.
@@ -172,7 +172,7 @@ private:
                 std::size_t(visit.visit.first_row) + std::size_t(uniform(std::uint32_t(v + 1)) * double(visit.rows));
             const Eigen::MatrixXd traced = state_.general.trace(deviations(lane), sample, visit, {row});
             for (std::size_t c = 0; c < channels; ++c) {
-                const double found = readings_[(row * channels + c) * lanes + lane];
+                const double found = readings_[row * channels + c].value[lane];
                 const double expected = traced(0, Eigen::Index(c));
                 if (std::abs(found - expected) <= rounding(model.channels[c], expected)) continue;
                 std::ostringstream text;
@@ -187,7 +187,7 @@ private:
     }
 
     void finish(double* outputs, std::size_t stride) {
-        worker_.evaluate(readings_.data(), lanes, outputs, stride);
+        worker_.evaluate(readings_.front().value, lanes, outputs, stride);
         const std::size_t entries = state_.evaluator.entries().size();
         for (std::size_t d = 0; d < state_.derived.size(); ++d) {
             double* const sum = outputs + (entries + d) * stride;
@@ -203,7 +203,7 @@ private:
     const State& state_;
     BatchEvaluator::Worker worker_;
     std::optional<LaneRun::Scratch> scratch_;
-    std::vector<double> readings_;
+    std::vector<LaneRow> readings_;  // by row and channel
     std::vector<double> deviations_;
 };
 
