@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Distribution', 'Environment', 'ErrorMap', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'VirtualCalibrations', 'adjust', 'beam_radius', 'couple', 'cramer_rao_bound', 'drawn_inputs', 'evaluate', 'expose', 'head_sensitivities', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'Validation', 'VirtualCalibrations', 'VolumetricAccuracy', 'adjust', 'beam_radius', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'volumetric_accuracy']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -1132,13 +1132,171 @@ class SampleModel:
         """
         The instruction set, for which the bits of a sample are the same.
         """
+class DerivedOutput:
+    """
+    A linear combination of a calibration's entries, as an output of virtual calibrations.
+    """
+    @typing.overload
+    def __init__(self, name: str, unit: str, row: numpy.typing.ArrayLike) -> None:
+        """
+        row: coefficients by entry, in the order of Calibration.covariance_labels. A tuple of the three does as well where one is expected.
+        """
+    @typing.overload
+    def __init__(self, arg0: tuple) -> None:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def row(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def unit(self) -> str:
+        ...
+class ErrorAtPoint:
+    """
+    The deviations X, Y, Z (mm) of the functional point and A, B, C (rad) of the tool at a commanded point, to first order, with covariance from the calibration's. NaN where the calibration lacks something that acts there.
+    """
+    @property
+    def covariance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (6, 6) mm^2, mm rad, rad^2; NaN where the calibration has none.
+        """
+    @property
+    def missing(self) -> dict[str, list[str]]:
+        """
+        "X" ... "C" -> parameters that act in it and are not determined: "EAX", "slope of EXX".
+        """
+    @property
+    def point(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) mm
+        """
+    @property
+    def standard_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (6,) mm, rad; NaN where the calibration has no covariance.
+        """
+    @property
+    def tool(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) mm
+        """
+    @property
+    def value(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (6,) mm, rad
+        """
+class DiagonalErrors:
+    """
+    Along a body diagonal (ISO 230-6): how much further than commanded the functional point is from where the diagonal begins.
+    """
+    @property
+    def covariance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n, n) mm^2
+        """
+    @property
+    def line(self) -> str:
+        ...
+    @property
+    def missing(self) -> list[str]:
+        """
+        Parameters that are not determined.
+        """
+    @property
+    def point(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n, 3) mm, commanded
+        """
+    @property
+    def range(self) -> float:
+        """
+        Largest less smallest value, mm; its uncertainty: volumetric_accuracy.
+        """
+    @property
+    def standard_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) mm; NaN where the calibration has no covariance.
+        """
+    @property
+    def travel(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) mm, commanded, from the first point
+        """
+    @property
+    def value(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) mm; NaN where the calibration lacks something.
+        """
+class VolumetricAccuracy:
+    """
+    ISO 230-1's V_XYZ: the ranges over the volume of the deviations X, Y, Z (mm) of the functional point and A, B, C (rad) of the tool, and the ranges of the four body diagonals' errors (mm); in the order of `names`. A range is not linear in the parameters and noise makes it larger: `bias` says about how much larger `value` is than the true range; `interval` takes that off.
+    """
+    names: typing.ClassVar[list] = ['V_X', 'V_Y', 'V_Z', 'V_A', 'V_B', 'V_C', 'E_D ppp', 'E_D npp', 'E_D pnp', 'E_D nnp']
+    @property
+    def bias(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (10,) mean - value
+        """
+    @property
+    def bound(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (10,) the true range is within value -+ bound with at least the coverage probability: the quantile of the range of noise alone.
+        """
+    @property
+    def drawn_interval(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (10, 2) probabilistically symmetric coverage interval of the draws: too large by twice the bias.
+        """
+    @property
+    def interval(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (10, 2) the drawn interval mirrored about the value, 2 value - drawn_interval: takes the bias off to first order; not below 0.
+        """
+    @property
+    def mean(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (10,) of the draws.
+        """
+    @property
+    def missing(self) -> dict[str, list[str]]:
+        """
+        Name -> parameters that act in it and are not determined; its numbers are NaN.
+        """
+    @property
+    def resolution(self) -> float:
+        """
+        By how much V_X, V_Y, V_Z may be too small on either side for want of points between the nodes of axes that carry the workpiece, mm; 0 with one such axis.
+        """
+    @property
+    def samples(self) -> int:
+        ...
+    @property
+    def standard_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (10,) standard deviation of the draws.
+        """
+    @property
+    def value(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (10,) of the calibration's values.
+        """
+class RangeModel(SampleModel):
+    """
+    The ranges of VolumetricAccuracy as a model for the Monte Carlo method; those that something is missing for are no outputs.
+    """
+    def __init__(self, calibration: Calibration, *, tool: numpy.typing.ArrayLike | None = None, seed: typing.SupportsIndex = 0) -> None:
+        """
+        Raises InvalidArgument for a calibration without covariance.
+        """
 class VirtualCalibrations(SampleModel):
     """
     Whole virtual calibrations: a run with drawn inputs and reading noise, traced by replay and evaluated with the unperturbed calibration. Outputs are the values of the calibration's tables, then those derived.
     """
-    def __init__(self, machine: Machine, plan: Plan, heads: Head | collections.abc.Mapping[str, Head], inputs: UncertainInputs, *, calibration_heads: Head | collections.abc.Mapping[str, Head] | None = None, method: str = 'enhanced', seed: typing.SupportsIndex = 0, misalignment: collections.abc.Mapping[str, Misalignment] = {}, environment: Environment | None = None, assumed_environment: Environment | None = None, repeats: typing.SupportsIndex = 1, backward: bool = False, seconds_per_reading: typing.SupportsFloat | typing.SupportsIndex | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, derived: collections.abc.Sequence[tuple[str, str, numpy.typing.ArrayLike]] = []) -> None:
+    def __init__(self, machine: Machine, plan: Plan, heads: Head | collections.abc.Mapping[str, Head], inputs: UncertainInputs, *, calibration_heads: Head | collections.abc.Mapping[str, Head] | None = None, method: str = 'enhanced', seed: typing.SupportsIndex = 0, misalignment: collections.abc.Mapping[str, Misalignment] = {}, environment: Environment | None = None, assumed_environment: Environment | None = None, repeats: typing.SupportsIndex = 1, backward: bool = False, seconds_per_reading: typing.SupportsFloat | typing.SupportsIndex | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, derived: collections.abc.Sequence[DerivedOutput] = []) -> None:
         """
-        machine to seconds_per_reading as of simulate(); calibration_heads: what the evaluation knows the heads as (none: the heads). method: "conventional", "enhanced", "adjustment" or "one_step", whose options are uncertainty to smoothness, as of evaluate() and adjust(). verified_share: of the samples, in each of which one reading of every line is traced again. derived: (name, unit, coefficients of the values of the tables). Raises InvalidArgument.
+        machine to seconds_per_reading as of simulate(); calibration_heads: what the evaluation knows the heads as (none: the heads). method: "conventional", "enhanced", "adjustment" or "one_step", whose options are uncertainty to smoothness, as of evaluate() and adjust(). verified_share: of the samples, in each of which one reading of every line is traced again. derived: as derived_at_point gives them, or (name, unit, coefficients of the values of the tables). Raises InvalidArgument.
         """
     def evaluate_at(self, deviations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -1157,6 +1315,72 @@ class VirtualCalibrations(SampleModel):
     def nominal(self) -> Measurement:
         """
         The run with every input at its expectation, without noise.
+        """
+class Propagation:
+    """
+    Uncertainty of outputs by the law of propagation (GUM, JCGM 100), native units; arrays in the order of `outputs`.
+    """
+    def expanded(self, coverage: typing.SupportsFloat | typing.SupportsIndex = 0.95) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,) U = t_p u, of degrees of freedom truncated to whole ones (GUM G.4.1, G.6.4). Raises InvalidArgument for a probability outside 0 .. 1.
+        """
+    @property
+    def between_groups(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,) part of the variance by correlation between inputs of two groups.
+        """
+    @property
+    def budget(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        group of inputs -> (m,) standard uncertainty of each output by that group alone; with between_groups, the squares sum to the square of standard_uncertainty.
+        """
+    @property
+    def covariance(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        (m, m); None unless asked for.
+        """
+    @property
+    def degrees_of_freedom(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,) effective ones by Welch and Satterthwaite (GUM G.4.1); NaN where that does not apply: correlated inputs with finite degrees of freedom contribute.
+        """
+    @property
+    def first_order(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m, inputs) sensitivity x standard uncertainty.
+        """
+    @property
+    def inputs(self) -> list[str]:
+        """
+        Names of the inputs that are drawn once: columns of first_order and second_order.
+        """
+    @property
+    def outputs(self) -> list[Output]:
+        ...
+    @property
+    def second_order(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m, inputs) what the square of a deviation by the standard uncertainty does, (f(+u) + f(-u) - 2 f(0))/2; linear propagation leaves it out. 0 where not known.
+        """
+    @property
+    def second_order_shift(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,) by how much squares of deviations shift the mean.
+        """
+    @property
+    def second_order_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,) standard uncertainty with the squares of normal, independent inputs.
+        """
+    @property
+    def standard_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,)
+        """
+    @property
+    def value(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,)
         """
 class FunctionModel(SampleModel):
     """
@@ -1203,7 +1427,7 @@ class Bins:
     @property
     def counts(self) -> int:
         """
-        Bins of all outputs: 4 bytes each, for every thread.
+        Bins of all outputs: 6 bytes each, for every thread.
         """
     @property
     def options(self) -> StatisticsOptions:
@@ -1265,6 +1489,32 @@ class JointRegion:
     @property
     def smallest_volume(self) -> float:
         ...
+class Stability:
+    """
+    How far an adaptive procedure is from its end.
+    """
+    @property
+    def blocks(self) -> int:
+        ...
+    @property
+    def figure(self) -> str:
+        ...
+    @property
+    def output(self) -> int:
+        ...
+    @property
+    def ratio(self) -> float:
+        """
+        Twice the standard deviation of the average over blocks by delta, the largest of all.
+        """
+    @property
+    def stable(self) -> bool:
+        ...
+    @property
+    def unstable(self) -> int:
+        """
+        Outputs with a ratio above 1.
+        """
 class MonteCarloResult:
     """
     Figures of every output. Native units.
@@ -1319,6 +1569,11 @@ class MonteCarloResult:
         (outputs, 2): ends of the shortest coverage intervals
         """
     @property
+    def stability(self) -> Stability | None:
+        """
+        Of an adaptive run; else None.
+        """
+    @property
     def standard_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
     @property
@@ -1350,6 +1605,10 @@ class PartialStatistics:
         """
     def result(self) -> MonteCarloResult:
         ...
+    def run(self, model: SampleModel, first_leaf: typing.SupportsIndex, leaves: typing.SupportsIndex, *, threads: typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> None:
+        """
+        Adds these leaves, as run_leaves computes them. Those that are done stay also where progress ends the run, by False or by an exception. progress may not use these statistics.
+        """
     def to_bytes(self) -> bytes:
         ...
     @property
@@ -1366,29 +1625,6 @@ class PartialStatistics:
     @property
     def samples(self) -> int:
         ...
-class Stability:
-    """
-    How far an adaptive procedure is from its end.
-    """
-    @property
-    def figure(self) -> str:
-        ...
-    @property
-    def output(self) -> int:
-        ...
-    @property
-    def ratio(self) -> float:
-        """
-        Twice the standard deviation of the average over blocks by delta, the largest of all.
-        """
-    @property
-    def stable(self) -> bool:
-        ...
-    @property
-    def unstable(self) -> int:
-        """
-        Outputs with a ratio above 1.
-        """
 class AdaptiveProcedure:
     """
     JCGM 101, 7.9.4: blocks of M samples until mean, standard uncertainty and both ends of the symmetric interval of every output are stable to delta.
@@ -1403,9 +1639,13 @@ class AdaptiveProcedure:
         ...
     def __init__(self, bins: Bins) -> None:
         ...
-    def add(self, block: PartialStatistics) -> None:
+    def add(self, block: PartialStatistics, all: PartialStatistics) -> None:
         """
-        Raises InvalidArgument for what is not the next block.
+        The next block, which is also merged into `all`. Raises InvalidArgument for what is not the next block.
+        """
+    def result(self, all: PartialStatistics) -> MonteCarloResult:
+        """
+        That of `all`, with its stability.
         """
     def stability(self, all: PartialStatistics) -> Stability:
         """
@@ -1421,6 +1661,62 @@ class AdaptiveProcedure:
         """
         Its leaves, half-open.
         """
+class Validation:
+    """
+    Propagation beside the Monte Carlo method (JCGM 101, 8), arrays in the order of `outputs`, native units: validated where neither end of y -+ U is further than delta from that of the symmetric coverage interval.
+    """
+    @property
+    def coverage(self) -> float:
+        ...
+    @property
+    def d_high(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,) |y + U - y_high|
+        """
+    @property
+    def d_low(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,) |y - U - y_low|
+        """
+    @property
+    def delta(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,) half a unit of the last significant digit of u.
+        """
+    @property
+    def digits(self) -> int:
+        ...
+    @property
+    def failures(self) -> int:
+        """
+        How many outputs are not validated.
+        """
+    @property
+    def high(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,) y + U
+        """
+    @property
+    def low(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,) y - U
+        """
+    @property
+    def outputs(self) -> list[Output]:
+        ...
+    @property
+    def reason(self) -> list[str]:
+        """
+        Where it is not validated, why: which square or distribution, with figures; empty elsewhere.
+        """
+    @property
+    def sampling(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,) standard uncertainty of the Monte Carlo interval's ends by the number of samples; should be small beside delta.
+        """
+    @property
+    def validated(self) -> list[bool]:
+        ...
 def adjust(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.01, full_covariance: bool = False) -> Adjustment:
     """
     The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. setup_by_line replaces the quantities that it names. Raises InvalidArgument.
@@ -1428,6 +1724,10 @@ def adjust(measurement: Measurement, plan: Plan, head: Head | collections.abc.Ma
 def beam_radius(mode: GaussianMode, reduced_length: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     Radius (1/e^2 of power, mm) of a beam after a reduced length (sum of t/n, mm) from the collimator's plane.
+    """
+def compare(propagation: Propagation, monte_carlo: MonteCarloResult, *, digits: typing.SupportsIndex | None = None) -> Validation:
+    """
+    Validates propagation by the Monte Carlo method at the coverage probability of the latter; digits of u that matter, 1 to 3 (none: those of the Monte Carlo result). Raises InvalidArgument for results of other outputs.
     """
 def couple(mode: GaussianMode, beam: ReturnedBeam, index: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> tuple[float, float]:
     """
@@ -1437,9 +1737,25 @@ def cramer_rao_bound(camera: Camera, spot: BeamSpot) -> float:
     """
     Smallest standard deviation (mm) of the spot's x that an unbiased estimate can have with position, radius, brightness and background unknown (Winick, J. Opt. Soc. Am. A 3 (1986) 1809); 0 without noise, inf where x is not observable.
     """
+def derived_at_point(calibration: Calibration, point: numpy.typing.ArrayLike, *, tool: numpy.typing.ArrayLike | None = None) -> list[DerivedOutput]:
+    """
+    The deviations of error_at_point as outputs of virtual calibrations with entries like this calibration's: up to six, those that nothing is missing for.
+    """
+def derived_on_diagonals(calibration: Calibration, *, tool: numpy.typing.ArrayLike | None = None) -> list[DerivedOutput]:
+    """
+    The values of diagonal_errors as outputs of virtual calibrations, those that nothing is missing for.
+    """
+def diagonal_errors(calibration: Calibration, *, tool: numpy.typing.ArrayLike | None = None) -> dict[str, DiagonalErrors]:
+    """
+    Of the body diagonals "ppp", "npp", "pnp", "nnp". tool: offset (mm); none: the calibration's. Raises InvalidArgument for an offset that is not finite.
+    """
 def drawn_inputs(inputs: UncertainInputs, seed: typing.SupportsIndex, sample: typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
     """
     Deviations of one sample's inputs, in their order. Raises InvalidArgument.
+    """
+def error_at_point(calibration: Calibration, point: numpy.typing.ArrayLike, *, tool: numpy.typing.ArrayLike | None = None) -> ErrorAtPoint:
+    """
+    The error at a commanded point (mm) with a tool offset (mm; none: the calibration's), of axes that came in + direction: e = sum over axes of delta + theta x lever. Raises InvalidArgument for lengths that are not finite.
     """
 def evaluate(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'adjustment', uncertainty: ReadingUncertainty = ..., full_covariance: bool = False) -> Calibration:
     """
@@ -1479,6 +1795,14 @@ def power_inside(spot: BeamSpot, low: numpy.typing.ArrayLike, high: numpy.typing
     """
     Share of the source's power that a spot has in the rectangle between two corners (2,), mm.
     """
+def propagate(virtual_calibrations: VirtualCalibrations, calibration: Calibration | None = None, *, covariance: bool = False) -> Propagation:
+    """
+    Uncertainty of all outputs of virtual calibrations: every input by central differences of whole calibrations at its expectation plus and minus its standard uncertainty; reading noise by the evaluation's gain, with its real covariance. A t distribution counts with its scale and degrees of freedom (GUM 4.2.3). calibration: one from a measurement, evaluated with full_covariance; values are then its own, the group "readings" is its own covariance (noise, and set-ups that were solved for), and what the inputs of the virtual calibrations (same plan, head and evaluation) contribute is added; their reading noise is not. Raises InvalidArgument for a calibration of other parameters or nodes, and where a deviation leaves the evaluation without a result.
+    """
+def propagate_linear(value: numpy.typing.ArrayLike, sensitivity: numpy.typing.ArrayLike, standard_uncertainty: numpy.typing.ArrayLike, *, degrees_of_freedom: numpy.typing.ArrayLike | None = None, estimates: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, names: collections.abc.Sequence[str] | None = None, groups: collections.abc.Sequence[str] | None = None, outputs: collections.abc.Sequence[str] | None = None, correlation: numpy.typing.ArrayLike | None = None, covariance: bool = False) -> Propagation:
+    """
+    Cov(y) = C Cov(x) C^T with C = sensitivity (m, n), x of these standard uncertainties (n,), degrees of freedom (n,; none: infinite) and correlation (n, n; none: independent). estimates: a number for each input; those with the same number, 0 or more, have their standard uncertainty from one estimate, so that its degrees of freedom count once; -1: its own. groups: of the budget; none: each input by itself. Least squares is the case C = A+. Raises InvalidArgument for what makes no sense.
+    """
 def random_error_map(volume: numpy.typing.ArrayLike, *, seed: typing.SupportsIndex, translation: typing.SupportsFloat | typing.SupportsIndex = 0.02, rotation: typing.SupportsFloat | typing.SupportsIndex = 6e-05, squareness: typing.SupportsFloat | typing.SupportsIndex = 6e-05, intervals: typing.SupportsIndex = 50, screw_pitch: typing.SupportsFloat | typing.SupportsIndex = 0.0, screw_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> ErrorMap:
     """
     A random machine with peaks of `translation` mm and `rotation` rad at equidistant nodes, squarenesses uniform within +-`squareness` rad, in the frame choice of the conventions. Same arguments, same bits.
@@ -1505,7 +1829,7 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
     """
 def run_leaves(model: SampleModel, bins: Bins, first_leaf: typing.SupportsIndex, leaves: typing.SupportsIndex, *, threads: typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> PartialStatistics:
     """
-    Statistics of these leaves; the bits depend on nothing else. progress(leaves_done) is called some times a second; False ends the run with the leaves that are done, an exception ends it and comes through. Raises InvalidArgument for a model that is not that of the bins.
+    Statistics of these leaves; the bits depend on nothing else. progress(leaves_done) is called some times a second; False ends the run with the leaves that are done, an exception ends it at once and comes through. Raises InvalidArgument for a model that is not that of the bins.
     """
 def run_ranges(model: SampleModel, bins: Bins, ranges: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]], *, threads: typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> list[PartialStatistics]:
     """
@@ -1526,6 +1850,10 @@ def t_quantile(probability: typing.SupportsFloat | typing.SupportsIndex, degrees
 def trace_beams(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment | None = None) -> list[BeamSegment]:
     """
     All light of a traced head, as segments: the mirror's centre at (lateral, distance) in the sensor frame, mm, its tilts (alpha, beta) in rad. A parent stands before its children. Raises InvalidArgument.
+    """
+def volumetric_accuracy(calibration: Calibration, *, tool: numpy.typing.ArrayLike | None = None, coverage: typing.SupportsFloat | typing.SupportsIndex = 0.95, samples: typing.SupportsIndex = 10000, seed: typing.SupportsIndex = 0) -> VolumetricAccuracy:
+    """
+    By draws from the joint normal distribution of a calibration evaluated with full_covariance. tool: offset (mm); none: the calibration's. Raises InvalidArgument without a covariance and for fewer samples than 100/(1 - coverage).
     """
 __version__: str = '0.1.0'
 largest_repeat_count: int = 1000

@@ -66,7 +66,7 @@ DoubleArray to_flags(const JointRegion& region) {
     return flags;
 }
 
-const char* figure_name(AdaptiveProcedure::Figure figure) {
+const char* figure_name(Stability::Figure figure) {
     constexpr const char* names[] = {"mean", "standard uncertainty", "lower end", "upper end"};
     return names[int(figure)];
 }
@@ -99,7 +99,7 @@ void bind_options(py::module_& m) {
         .def_property_readonly("options", &Bins::options)
         .def_property_readonly("seed", &Bins::seed)
         .def_property_readonly("target", &Bins::target)
-        .def_property_readonly("counts", &Bins::counts, "Bins of all outputs: 4 bytes each, for every thread.")
+        .def_property_readonly("counts", &Bins::counts, "Bins of all outputs: 6 bytes each, for every thread.")
         .def("to_bytes", [](const Bins& bins) { return py::bytes(bins.to_bytes()); })
         .def_static(
             "from_bytes", [](const py::bytes& bytes) { return Bins::from_bytes(std::string_view(bytes)); },
@@ -126,6 +126,14 @@ void bind_result(py::module_& m) {
         .def_readonly("smallest_volume", &JointRegion::smallest_volume)
         .def_readonly("smallest_share", &JointRegion::smallest_share, "of all samples");
 
+    py::class_<Stability>(m, "Stability", "How far an adaptive procedure is from its end.")
+        .def_readonly("blocks", &Stability::blocks)
+        .def_readonly("ratio", &Stability::ratio,
+                      "Twice the standard deviation of the average over blocks by delta, the largest of all.")
+        .def_readonly("output", &Stability::output)
+        .def_property_readonly("figure", [](const Stability& s) { return figure_name(s.figure); })
+        .def_readonly("unstable", &Stability::unstable, "Outputs with a ratio above 1.")
+        .def_property_readonly("stable", &Stability::stable);
     py::class_<MonteCarloResult>(m, "MonteCarloResult", "Figures of every output. Native units.")
         .def_readonly("outputs", &MonteCarloResult::outputs)
         .def_readonly("options", &MonteCarloResult::options)
@@ -158,7 +166,8 @@ void bind_result(py::module_& m) {
                 return kept;
             },
             "Values by output, in the order of samples; nan for a lost one.")
-        .def_readonly("joint", &MonteCarloResult::joint);
+        .def_readonly("joint", &MonteCarloResult::joint)
+        .def_readonly("stability", &MonteCarloResult::stability, "Of an adaptive run; else None.");
 }
 
 void bind_parts(py::module_& m) {
@@ -170,19 +179,25 @@ void bind_parts(py::module_& m) {
         .def_property_readonly("lost", &PartialStatistics::lost)
         .def("merge", &PartialStatistics::merge, py::arg("other"), py::call_guard<py::gil_scoped_release>(),
              "Raises InvalidArgument for statistics of another run, saying in what, and for leaves that are in both.")
+        .def(
+            "run",
+            [](PartialStatistics& all, const SampleModel& model, const IntegerLike& first_leaf,
+               const IntegerLike& leaves, const IntegerLike& threads, const Progress& progress) {
+                const RunControl control = to_control(threads, progress);
+                const std::uint64_t first = to_leaf(first_leaf, "first_leaf"), count = to_leaf(leaves, "leaves");
+                const py::gil_scoped_release release;
+                add_leaves(all, model, first, count, control);
+            },
+            py::arg("model"), py::arg("first_leaf"), py::arg("leaves"), py::kw_only(), py::arg("threads") = integer(0),
+            py::arg("progress") = std::nullopt,
+            "Adds these leaves, as run_leaves computes them. Those that are done stay also where progress ends the "
+            "run, by False or by an exception. progress may not use these statistics.")
         .def("result", &PartialStatistics::result, py::call_guard<py::gil_scoped_release>())
         .def("to_bytes", [](const PartialStatistics& part) { return py::bytes(part.to_bytes()); })
         .def_static(
             "from_bytes", [](const py::bytes& bytes) { return PartialStatistics::from_bytes(std::string_view(bytes)); },
             py::arg("bytes"), "Raises InvalidArgument for damaged bytes.");
 
-    py::class_<AdaptiveProcedure::Stability>(m, "Stability", "How far an adaptive procedure is from its end.")
-        .def_readonly("ratio", &AdaptiveProcedure::Stability::ratio,
-                      "Twice the standard deviation of the average over blocks by delta, the largest of all.")
-        .def_readonly("output", &AdaptiveProcedure::Stability::output)
-        .def_property_readonly("figure", [](const AdaptiveProcedure::Stability& s) { return figure_name(s.figure); })
-        .def_readonly("unstable", &AdaptiveProcedure::Stability::unstable, "Outputs with a ratio above 1.")
-        .def_property_readonly("stable", &AdaptiveProcedure::Stability::stable);
     py::class_<AdaptiveProcedure>(
         m, "AdaptiveProcedure",
         "JCGM 101, 7.9.4: blocks of M samples until mean, standard uncertainty and both ends of the symmetric interval "
@@ -191,8 +206,10 @@ void bind_parts(py::module_& m) {
         .def_static("leaves_per_block", &AdaptiveProcedure::leaves_per_block, py::arg("coverage"))
         .def_property_readonly("next_block", &AdaptiveProcedure::next_block, "Its leaves, half-open.")
         .def_property_readonly("blocks", &AdaptiveProcedure::blocks)
-        .def("add", &AdaptiveProcedure::add, py::arg("block"), "Raises InvalidArgument for what is not the next block.")
+        .def("add", &AdaptiveProcedure::add, py::arg("block"), py::arg("all"),
+             "The next block, which is also merged into `all`. Raises InvalidArgument for what is not the next block.")
         .def("stability", &AdaptiveProcedure::stability, py::arg("all"), "all: the statistics of all blocks so far.")
+        .def("result", &AdaptiveProcedure::result, py::arg("all"), "That of `all`, with its stability.")
         .def("to_bytes", [](const AdaptiveProcedure& procedure) { return py::bytes(procedure.to_bytes()); })
         .def_static(
             "from_bytes", [](const py::bytes& bytes) { return AdaptiveProcedure::from_bytes(std::string_view(bytes)); },
@@ -222,7 +239,8 @@ void bind_runs(py::module_& m) {
         py::arg("model"), py::arg("bins"), py::arg("first_leaf"), py::arg("leaves"), py::kw_only(),
         py::arg("threads") = integer(0), py::arg("progress") = std::nullopt,
         "Statistics of these leaves; the bits depend on nothing else. progress(leaves_done) is called some times a "
-        "second; False ends the run with the leaves that are done, an exception ends it and comes through. Raises "
+        "second; False ends the run with the leaves that are done, an exception ends it at once and comes through. "
+        "Raises "
         "InvalidArgument for a model that is not that of the bins.");
     m.def(
         "run_ranges",

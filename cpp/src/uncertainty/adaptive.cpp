@@ -23,24 +23,24 @@ LeafRange AdaptiveProcedure::next_block() const {
     return {blocks_ * size, (blocks_ + 1) * size};
 }
 
-void AdaptiveProcedure::add(const PartialStatistics& block) {
+void AdaptiveProcedure::add(const PartialStatistics& block, PartialStatistics& all) {
     check_same_run(bins_, block.bins());
     if (block.leaves() != std::vector<LeafRange>{next_block()})
         throw InvalidArgument("adaptive procedure: expected the leaves " + std::to_string(next_block().first) + " to " +
                               std::to_string(next_block().second));
-    const MonteCarloResult result = block.result();
-    if (result.samples < 2)
+    if (block.samples() < 2)
         throw InvalidArgument("adaptive procedure: block " + std::to_string(blocks_) + " has no samples with a result");
-    Eigen::ArrayX4d figures(average_.rows(), 4);
-    figures << result.mean, result.standard_uncertainty, result.symmetric;
+    const Eigen::ArrayX4d figures = main_figures(block.state());
+    all.merge(block);
     const Eigen::ArrayX4d from_old = figures - average_;
     average_ += from_old / double(++blocks_);
     squares_ += from_old * (figures - average_);
 }
 
-AdaptiveProcedure::Stability AdaptiveProcedure::stability(const PartialStatistics& all) const {
-    Stability stability{blocks_ < 2 ? std::numeric_limits<double>::infinity() : 0.0, 0, Figure::mean, 0};
-    if (blocks_ < 2) return {stability.ratio, 0, Figure::mean, bins_.outputs().size()};
+Stability AdaptiveProcedure::stability(const PartialStatistics& all) const {
+    if (blocks_ < 2)
+        return {blocks_, std::numeric_limits<double>::infinity(), 0, Stability::Figure::mean, bins_.outputs().size()};
+    Stability stability{blocks_, 0.0, 0, Stability::Figure::mean, 0};
     const double h = double(blocks_);
     const Eigen::VectorXd u = standard_uncertainties(all.state());
     for (Eigen::Index i = 0; i < u.size(); ++i) {
@@ -55,12 +55,18 @@ AdaptiveProcedure::Stability AdaptiveProcedure::stability(const PartialStatistic
             if (ratio > stability.ratio) {
                 stability.ratio = ratio;
                 stability.output = std::size_t(i);
-                stability.figure = Figure(figure);
+                stability.figure = Stability::Figure(figure);
             }
         }
         stability.unstable += unstable;
     }
     return stability;
+}
+
+MonteCarloResult AdaptiveProcedure::result(const PartialStatistics& all) const {
+    MonteCarloResult result = all.result();
+    result.stability = stability(all);
+    return result;
 }
 
 }  // namespace stepdiag

@@ -150,6 +150,20 @@ Counts::Counts(const Bins::Content& bins)
     }
 }
 
+std::vector<std::uint16_t>& Counts::begin_leaf() {
+    if (recent_leaves == std::numeric_limits<std::uint16_t>::max() / int(leaf_samples)) settle();
+    recent.resize(by_bin.size());
+    ++recent_leaves;
+    return recent;
+}
+
+void Counts::settle() {
+    if (recent_leaves == 0) return;
+    for (std::size_t i = 0; i < by_bin.size(); ++i) by_bin[i] += recent[i];
+    std::fill(recent.begin(), recent.end(), std::uint16_t(0));
+    recent_leaves = 0;
+}
+
 void Counts::operator+=(const Counts& other) {
     const auto add = [](std::vector<std::uint32_t>& to, const std::vector<std::uint32_t>& from) {
         for (std::size_t i = 0; i < to.size(); ++i) to[i] += from[i];

@@ -62,7 +62,13 @@ struct JointCounts {
 // All that is counted: whole numbers, lowest and highest, kept values. Adding is exact in any order.
 struct Counts {
     explicit Counts(const Bins::Content& bins);
-    void operator+=(const Counts& other);
+    void operator+=(const Counts& other);  // both settled
+
+    // Where leaves are counted: half the memory to go through. Settled after 32 leaves at the latest, and at the end.
+    std::vector<std::uint16_t> recent = {};
+    int recent_leaves = 0;
+    std::vector<std::uint16_t>& begin_leaf();
+    void settle();
 
     std::vector<std::uint32_t> by_bin;
     Eigen::VectorXd lowest, highest;

@@ -8,6 +8,8 @@ namespace stepdiag {
 CountedValues::CountedValues(const OutputBins& bins, const std::uint32_t* counts, double lowest, double highest) {
     const std::uint32_t last = bins.bins + 1;
     const std::uint64_t total = std::accumulate(counts, counts + last + 1, std::uint64_t(0));
+    edges_.reserve(last + 2);
+    below_.reserve(last + 2);
     edges_.push_back(lowest);
     below_.push_back(0.0);
     std::uint64_t below = 0;
@@ -29,8 +31,10 @@ double CountedValues::at_rank(double rank, std::size_t& above) const {
 }
 
 double CountedValues::quantile(double probability) const {
-    std::size_t above = 1;
-    return at_rank(probability * below_.back(), above);
+    const double rank = probability * below_.back();
+    const auto found = std::lower_bound(below_.begin() + 1, below_.end(), rank);
+    std::size_t above = std::size_t(found - below_.begin());
+    return at_rank(rank, above);
 }
 
 Eigen::RowVector2d CountedValues::symmetric_interval(double coverage) const {

@@ -114,8 +114,9 @@ std::size_t LeafWorker::leave_out_lost(std::uint64_t first_sample, std::size_t s
 
 // An output at a time: its bins then stay in the first cache.
 void LeafWorker::count(std::uint64_t leaf, Counts& counts) const {
+    std::vector<std::uint16_t>& recent = counts.begin_leaf();
     for (std::size_t i = 0; i < sums_.size(); ++i) {
-        std::uint32_t* bins = counts.by_bin.data() + bins_.by_output[i].offset;
+        std::uint16_t* bins = recent.data() + bins_.by_output[i].offset;
         const std::uint16_t* indices = indices_.data() + i * leaf_samples;
         for (std::size_t s = 0; s < samples_; ++s) ++bins[indices[s]];
         // + 0.0: one zero, whichever sign comes first

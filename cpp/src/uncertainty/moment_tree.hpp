@@ -29,7 +29,8 @@ public:
         std::uint64_t leaves() const { return std::uint64_t(1) << level; }
     };
 
-    // Throws InvalidArgument for a leaf that is there.
+    // All throw InvalidArgument for a leaf that is there.
+    void check_free(std::uint64_t first_leaf, std::uint64_t leaves) const;
     void add(std::uint64_t first_leaf, Node node);
     void add(const MomentTree& other);  // all or nothing
 
@@ -38,7 +39,6 @@ public:
     std::vector<LeafRange> leaves() const;
 
 private:
-    void check_free(std::uint64_t first_leaf, std::uint64_t leaves) const;
     std::map<std::uint64_t, Node> nodes_;
 };
 

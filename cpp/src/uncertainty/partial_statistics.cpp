@@ -43,6 +43,23 @@ Eigen::VectorXd standard_uncertainties(const PartialStatistics::State& state) {
     return standard_uncertainties(state.tree.total(Eigen::Index(state.bins.outputs().size())));
 }
 
+Eigen::ArrayX4d main_figures(const PartialStatistics::State& state) {
+    const Bins::Content& bins = state.bins.content();
+    const Moments total = state.tree.total(Eigen::Index(bins.outputs.size()));
+    Eigen::ArrayX4d figures(total.first.size(), 4);
+    figures.setConstant(std::numeric_limits<double>::quiet_NaN());
+    if (total.samples < 2) return figures;
+    figures.col(0) = bins.means() + total.first / double(total.samples);
+    figures.col(1) = standard_uncertainties(total);
+    for (Eigen::Index i = 0; i < figures.rows(); ++i) {
+        const OutputBins& of_output = bins.by_output[std::size_t(i)];
+        const CountedValues values(of_output, state.counts.by_bin.data() + of_output.offset, state.counts.lowest[i],
+                                   state.counts.highest[i]);
+        figures.row(i).tail(2) = values.symmetric_interval(bins.options.coverage).array();
+    }
+    return figures;
+}
+
 PartialStatistics::PartialStatistics(const Bins& bins)
     : state_(std::make_unique<State>(State{bins, {}, Counts(bins.content())})) {}
 PartialStatistics::PartialStatistics(PartialStatistics&&) noexcept = default;

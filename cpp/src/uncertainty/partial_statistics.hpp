@@ -13,5 +13,7 @@ struct PartialStatistics::State {
 };
 
 Eigen::VectorXd standard_uncertainties(const PartialStatistics::State& state);
+// Mean, standard uncertainty and both ends of the symmetric interval of each output; NaN for too few samples.
+Eigen::ArrayX4d main_figures(const PartialStatistics::State& state);
 
 }  // namespace stepdiag

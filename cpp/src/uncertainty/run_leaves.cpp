@@ -36,26 +36,44 @@ void check_range(std::uint64_t first, std::uint64_t end) {
 
 }  // namespace
 
-PartialStatistics run_leaves(const SampleModel& model, const Bins& bins, std::uint64_t first_leaf, std::uint64_t leaves,
-                             const RunControl& control) {
+void add_leaves(PartialStatistics& all, const SampleModel& model, std::uint64_t first_leaf, std::uint64_t leaves,
+                const RunControl& control) {
+    const Bins bins = all.bins();
     check_run(model, bins);
     check_range(first_leaf, std::min(leaves, largest_leaf_count + 1) + first_leaf);
-    PartialStatistics all(bins);
+    if (leaves == 0) return;
+    all.state().tree.check_free(first_leaf, leaves);
     std::mutex mutex;
     // Counts by thread, since adding them is exact in any order; moments at once, so that few of them wait.
-    std::vector<Counts> counts(std::size_t(thread_count(control, leaves)), all.state().counts);
-    work_through(leaves, control, [&](int thread) -> Work {
-        const auto worker = std::make_shared<LeafWorker>(model, bins.content());
-        return [&, worker, thread](std::uint64_t item, Progress& progress) {
-            auto moments = worker->run(first_leaf + item, counts[std::size_t(thread)], progress.stop);
-            if (!moments) return;
-            const std::lock_guard lock(mutex);
-            all.state().tree.add(first_leaf + item, {0, std::move(*moments)});
-            ++progress.done;
-        };
-    });
-    all.state().counts = std::move(counts[0]);
-    for (std::size_t thread = 1; thread < counts.size(); ++thread) all.state().counts += counts[thread];
+    std::vector<Counts> counts(std::size_t(thread_count(control, leaves)), Counts(bins.content()));
+    const auto add_counts = [&] {
+        for (Counts& each : counts) {
+            each.settle();
+            all.state().counts += each;
+        }
+    };
+    try {
+        work_through(leaves, control, [&](int thread) -> Work {
+            const auto worker = std::make_shared<LeafWorker>(model, bins.content());
+            return [&, worker, thread](std::uint64_t item, Progress& progress) {
+                auto moments = worker->run(first_leaf + item, counts[std::size_t(thread)], progress.abandon);
+                if (!moments) return;
+                const std::lock_guard lock(mutex);
+                all.state().tree.add(first_leaf + item, {0, std::move(*moments)});
+                ++progress.done;
+            };
+        });
+    } catch (...) {
+        add_counts();
+        throw;
+    }
+    add_counts();
+}
+
+PartialStatistics run_leaves(const SampleModel& model, const Bins& bins, std::uint64_t first_leaf, std::uint64_t leaves,
+                             const RunControl& control) {
+    PartialStatistics all(bins);
+    add_leaves(all, model, first_leaf, leaves, control);
     return all;
 }
 
@@ -71,11 +89,13 @@ std::vector<PartialStatistics> run_ranges(const SampleModel& model, const Bins& 
         return [&, worker](std::uint64_t item, Progress& progress) {
             PartialStatistics::State& part = parts[item].state();
             for (std::uint64_t leaf = ranges[item].first; leaf < ranges[item].second; ++leaf) {
-                auto moments = worker->run(leaf, part.counts, progress.stop);
-                if (!moments) return;
+                auto moments = worker->run(leaf, part.counts, progress.abandon);
+                if (!moments || progress.stop) return;
                 part.tree.add(leaf, {0, std::move(*moments)});
                 ++progress.done;
             }
+            part.counts.settle();
+            part.counts.recent = {};
             whole[item] = 1;
         };
     });

@@ -36,7 +36,7 @@ void work_through(std::uint64_t items, const RunControl& control, const std::fun
             for (std::uint64_t item; !progress.stop && (item = next++) < items;) work(item, progress);
         } catch (...) {
             own = std::current_exception();
-            progress.stop = true;
+            progress.stop = progress.abandon = true;
         }
         const std::lock_guard lock(mutex);
         if (own && !failure) failure = own;
@@ -51,13 +51,13 @@ void work_through(std::uint64_t items, const RunControl& control, const std::fun
         for (int thread = 0, count = running; thread < count; ++thread) threads.emplace_back(of_thread, thread);
         std::unique_lock lock(mutex);
         while (!ended.wait_for(lock, pause, [&] { return running == 0; })) {
-            if (!control.go_on || progress.stop) continue;
+            if (!control.go_on || progress.abandon) continue;
             lock.unlock();
             if (!control.go_on(progress.done)) progress.stop = true;
             lock.lock();
         }
     } catch (...) {
-        progress.stop = true;
+        progress.stop = progress.abandon = true;
         join();
         throw;
     }

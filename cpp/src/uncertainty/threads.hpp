@@ -11,11 +11,13 @@ namespace stepdiag {
 
 int thread_count(const RunControl& control, std::uint64_t items);
 
-// Does one item; says early by `done` how many leaves are done. Ends soon once `stop` is set.
+// What threads and the one that waits for them tell each other.
 struct Progress {
-    std::atomic<bool> stop{false};
+    std::atomic<bool> stop{false};     // take no further item
+    std::atomic<bool> abandon{false};  // leave the one in hand
     std::atomic<std::uint64_t> done{0};
 };
+// Does one item; counts the leaves that are done.
 using Work = std::function<void(std::uint64_t item, Progress& progress)>;
 
 // `make_work(thread)` is called once by each thread. Exceptions of any of them, and of go_on, come through.

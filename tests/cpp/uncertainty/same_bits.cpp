@@ -139,7 +139,18 @@ TEST(RunLeaves, ExceptionsOfTheModelAndOfTheQuestionComeThrough) {
         {{"sum", 1.0, "mm"}, {"square", 2.0, "mm"}}, 1);
     EXPECT_THROW(run_leaves(failing, bins, 0, 5, {2}), std::runtime_error);
     const auto stop = [](std::uint64_t) -> bool { throw std::logic_error("enough"); };
-    EXPECT_THROW(run_leaves(model, bins, 0, 100'000, {2, stop}), std::logic_error);
+    PartialStatistics part(bins);
+    EXPECT_THROW(add_leaves(part, model, 0, 100'000, {2, stop}), std::logic_error);
+    // What was done by then stays, and is whole.
+    ASSERT_EQ(part.leaves().front().first, 0u);
+    const std::uint64_t end = part.leaves().front().second;
+    if (part.leaves().size() == 1u) EXPECT_TRUE(bytes_of(part) == bytes_of(run_leaves(model, bins, 0, end)));
+    EXPECT_EQ(part.samples() + part.lost(), [&] {
+        std::uint64_t leaves_done = 0;
+        for (const LeafRange& range : part.leaves()) leaves_done += range.second - range.first;
+        return leaves_done * leaf_samples;
+    }());
+    expect_refused([&] { add_leaves(part, model, 0, 1); }, "leaf 0 of the samples is counted twice");
 }
 
 TEST(Adaptive, BlocksHaveTheSizeOfJcgm101) {
@@ -161,8 +172,7 @@ TEST(Adaptive, StopsWhereTwiceTheDeviationOfBlockAveragesIsBelowTheTolerance) {
     for (int h = 1; h <= 6; ++h) {
         const LeafRange block = procedure.next_block();
         const PartialStatistics part = run_leaves(model, bins, block.first, block.second - block.first);
-        procedure.add(part);
-        all.merge(part);
+        procedure.add(part, all);
         const MonteCarloResult result = part.result();
         figures.conservativeResize(h, 4);
         figures.row(h - 1) << result.mean[0], result.standard_uncertainty[0], result.symmetric.row(0);
@@ -173,5 +183,5 @@ TEST(Adaptive, StopsWhereTwiceTheDeviationOfBlockAveragesIsBelowTheTolerance) {
     }
     EXPECT_TRUE(procedure.stability(all).stable());
     EXPECT_EQ(AdaptiveProcedure::from_bytes(procedure.to_bytes()).to_bytes(), procedure.to_bytes());
-    expect_refused([&] { procedure.add(all); }, "adaptive procedure: expected the leaves 30 to 35");
+    expect_refused([&] { procedure.add(all, all); }, "adaptive procedure: expected the leaves 30 to 35");
 }

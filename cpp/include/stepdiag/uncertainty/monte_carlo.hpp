@@ -52,7 +52,7 @@ public:
     const StatisticsOptions& options() const;
     std::uint64_t seed() const;
     const std::string& target() const;
-    std::size_t counts() const;  // of all bins together: 4 bytes each, for every thread
+    std::size_t counts() const;  // of all bins together: 6 bytes each, for every thread
 
     std::string to_bytes() const;
     static Bins from_bytes(std::string_view bytes);
@@ -66,7 +66,7 @@ private:
 void check_same_run(const Bins& bins, const Bins& other);
 
 // Threads: 0 takes as many as the processor has. `go_on` is called by the calling thread, several times a second, with
-// the number of leaves done; false, or an exception, ends the run soon.
+// the number of leaves done. False ends the run when the leaves in hand are done; an exception ends it at once.
 struct RunControl {
     int threads = 0;
     std::function<bool(std::uint64_t leaves_done)> go_on = {};
@@ -74,6 +74,17 @@ struct RunControl {
 
 // The pilot run. Throws InvalidArgument for options out of range, and where no pilot sample has a result.
 Bins make_bins(const SampleModel& model, const StatisticsOptions& options, const RunControl& control = {});
+
+// How far an adaptive procedure is from its end.
+struct Stability {
+    enum class Figure { mean, standard_uncertainty, low, high };
+    std::uint64_t blocks;
+    double ratio;  // 2 s / delta, the largest of all outputs and figures; infinite for fewer than two blocks
+    std::size_t output;
+    Figure figure;
+    std::size_t unstable;  // outputs with a ratio above 1
+    bool stable() const { return ratio <= 1.0; }
+};
 
 // A region of up to three outputs that holds the share `coverage` of all samples (JCGM 102, 6.5). Centre and covariance
 // are those of the pilot run; the factors are what was counted.
@@ -107,6 +118,7 @@ struct MonteCarloResult {
     std::optional<Eigen::MatrixXd> covariance;
     std::map<std::size_t, std::vector<double>> kept;  // by sample; NaN for a lost one
     std::vector<JointRegion> joint;
+    std::optional<Stability> stability = {};  // of an adaptive run
 };
 
 // Half-open: leaves first, ..., end - 1.
@@ -141,8 +153,11 @@ private:
     std::unique_ptr<State> state_;
 };
 
-// Leaves first_leaf, ..., first_leaf + leaves - 1; those done where `go_on` said no (it may be called again for the
-// others). Throws InvalidArgument where the model is of another run than the bins.
+// Adds the leaves first_leaf, ..., first_leaf + leaves - 1 to `all`. Those that are done stay there also where the run
+// ends before, by `go_on` or by an exception. Throws InvalidArgument where the model is of another run than the bins,
+// and where `all` has one of the leaves.
+void add_leaves(PartialStatistics& all, const SampleModel& model, std::uint64_t first_leaf, std::uint64_t leaves,
+                const RunControl& control = {});
 PartialStatistics run_leaves(const SampleModel& model, const Bins& bins, std::uint64_t first_leaf, std::uint64_t leaves,
                              const RunControl& control = {});
 
@@ -165,19 +180,12 @@ public:
     LeafRange next_block() const;
     std::uint64_t blocks() const { return blocks_; }
 
-    // The next block. Throws InvalidArgument for leaves other than next_block().
-    void add(const PartialStatistics& block);
+    // The next block, which is also merged into `all`. Throws InvalidArgument for leaves other than next_block().
+    void add(const PartialStatistics& block, PartialStatistics& all);
 
-    enum class Figure { mean, standard_uncertainty, low, high };
-    struct Stability {
-        double ratio;  // 2 s / delta, the largest of all; stable: 1 or less. Infinite for fewer than two blocks.
-        std::size_t output;
-        Figure figure;
-        std::size_t unstable;  // outputs with a ratio above 1
-        bool stable() const { return ratio <= 1.0; }
-    };
     // delta is that of u over `all` blocks so far.
     Stability stability(const PartialStatistics& all) const;
+    MonteCarloResult result(const PartialStatistics& all) const;  // with it
 
     std::string to_bytes() const;
     static AdaptiveProcedure from_bytes(std::string_view bytes);
