@@ -53,9 +53,9 @@ def rows_at(chain: str, labels: list[LABEL], tool: np.ndarray, point: np.ndarray
     return np.array([deviations(chain, table_of(labels, size * unit), tool, point) for unit in units]).T / size
 
 
-def grid(volume: np.ndarray, parts: int) -> np.ndarray:
-    shares = np.linspace(0.0, 1.0, parts + 1)
-    return np.array([np.multiply(volume, share) for share in product(shares, repeat=3)])
+def grid(volume: np.ndarray, parts: tuple[int, int, int]) -> np.ndarray:
+    shares = [np.linspace(0.0, 1.0, count + 1) for count in parts]
+    return np.array([np.multiply(volume, share) for share in product(*shares)])
 
 
 def diagonal(volume: np.ndarray, line: str, points: int) -> tuple[np.ndarray, np.ndarray]:

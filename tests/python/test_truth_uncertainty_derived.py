@@ -7,7 +7,7 @@ import pytest
 import reference
 from adjusted import adjust
 from dense_adjustment import Knowledge
-from derived_reference import deviations, diagonal, grid, rows_at, table_of, values_of
+from derived_reference import diagonal, grid, rows_at, values_of
 from virtual_runs import measured, random_scenario, random_table
 
 import stepdiag as sd
@@ -88,18 +88,18 @@ def test_volumetric_accuracy_is_the_range_over_the_volume(chain: str) -> None:
     volume, tool = np.array(scenario.volume), np.array(scenario.tool)
     values, covariance = values_of(calibration), calibration.covariance
     assert covariance is not None
-    points = grid(volume, 2)
+    # Between nodes deviations are linear in each position, but for that of an axis that carries the workpiece.
+    quadratic = "'" in chain
+    points = grid(volume, (4 if quadratic else 2, 2, 2))
     rows = np.array([rows_at(chain, calibration.covariance_labels, tool, p) for p in points])
     own = np.ptp(rows @ values, axis=0)
     found = _core.volumetric_accuracy(calibration, samples=20_000, seed=3)
     assert list(found.names[:6]) == ["V_X", "V_Y", "V_Z", "V_A", "V_B", "V_C"]
     value = np.asarray(found.value)
-    # Between nodes only an axis before the bed has extremes of its own; a range over fewer points is never larger.
-    table = table_of(calibration.covariance_labels, values)
-    finer = np.ptp([deviations(chain, table, tool, p) for p in grid(volume, 6)], axis=0)
-    assert np.all(value[:6] >= own - 2e-9)
-    assert np.all(value[:3] >= finer[:3] - 2 * found.resolution - 2e-9)
-    if "'" not in chain:
+    if quadratic:  # an extreme that neither grid meets is missed by less than a hundredth of the range
+        assert np.allclose(value[:6], own, rtol=0.01)
+        assert np.all(value[:3] >= own[:3] - 2 * found.resolution - 2e-9)
+    else:
         assert np.allclose(value[:6], own, rtol=0, atol=2e-9)
     diagonals = _core.diagonal_errors(calibration)
     assert np.allclose(value[6:], [diagonals[line].range for line in ("ppp", "npp", "pnp", "nnp")], atol=1e-12)
@@ -107,15 +107,14 @@ def test_volumetric_accuracy_is_the_range_over_the_volume(chain: str) -> None:
     rng = np.random.default_rng(10)
     draws = rng.multivariate_normal(values, covariance, size=20_000, method="svd")
     ranges = np.ptp(np.einsum("pdv,sv->spd", rows, draws), axis=1)
-    # Standard deviations of 20,000 draws each are good to 0.5 %; five of their difference. What is between the nodes
-    # of an axis before the bed makes a range larger, and changes its uncertainty by less than a tenth.
+    # Standard deviations of 20,000 draws each are good to 0.5 %, means to 0.007 u: five of their difference, and what
+    # two grids do not see alike.
     u = np.std(ranges, axis=0)
-    assert np.allclose(found.standard_uncertainty[:6], u, rtol=0.04 if "'" not in chain else 0.1)
-    assert np.all(np.abs(found.mean[:6] - ranges.mean(axis=0)) <= 0.05 * u + 1.5 * (finer - own))
-    if "'" in chain:
-        return
+    assert np.allclose(found.standard_uncertainty[:6], u, rtol=0.04)
+    assert np.all(np.abs(found.mean[:6] - ranges.mean(axis=0)) <= 0.05 * u + quadratic * 0.01 * own)
     ends = np.quantile(ranges, [0.025, 0.975], axis=0)
     # An end of a 95 % interval from 20,000 draws is good to 0.019 u.
-    assert np.max(np.abs(np.asarray(found.drawn_interval)[:6].T - ends) / u) <= 0.15
+    near = 0.15 * u + quadratic * 0.01 * own
+    assert np.all(np.abs(np.asarray(found.drawn_interval)[:6].T - ends) <= near)
     mirrored = 2 * value[:6, None] - np.asarray(found.drawn_interval)[:6][:, ::-1]
     assert np.allclose(np.asarray(found.interval)[:6], np.maximum(mirrored, 0.0), rtol=0, atol=1e-15)
