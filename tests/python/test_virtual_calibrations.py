@@ -1,4 +1,4 @@
-"""Virtual calibrations: what is drawn acts on the readings as its definition says, and samples are evaluated as runs."""
+"""Virtual calibrations: what is drawn acts on readings by its definition, and samples are evaluated as runs."""
 
 from __future__ import annotations
 

@@ -80,13 +80,25 @@ void bind_virtual_calibration(py::module_& m) {
              "machine to seconds_per_reading as of simulate(); calibration_heads: what the evaluation knows the heads "
              "as (none: the heads). method: \"conventional\", \"enhanced\", \"adjustment\" or \"one_step\", whose "
              "options are uncertainty to smoothness, as of evaluate() and adjust(). verified_share: of the samples, in "
-             "each of which one reading of every line is traced again. derived: as derived_at_point gives them, or (name, unit, coefficients of the "
+             "each of which one reading of every line is traced again. derived: as derived_at_point gives them, or "
+             "(name, unit, coefficients of the "
              "values of the tables). Raises InvalidArgument.")
         .def_property_readonly("nominal", &VirtualCalibrations::nominal,
                                "The run with every input at its expectation, without noise.")
         .def_property_readonly(
             "calibration", [](const VirtualCalibrations& v) { return v.evaluator().of_pattern(); },
             "The evaluation of `nominal`.")
+        .def_property_readonly("in_lanes", &VirtualCalibrations::is_in_lanes,
+                               "Whether samples are replayed, many at once; else each pose of each is traced: cameras, "
+                               "coupled modes, sensors with noise or resolution of their own, faces near a beam's way.")
+        .def_property_readonly(
+            "count",
+            [](const VirtualCalibrations& v) {
+                const SampleCount count = v.count();
+                return std::map<std::string, std::uint64_t>{
+                    {"replayed", count.replayed}, {"traced", count.traced}, {"verified", count.verified}};
+            },
+            "Samples so far: replayed, traced as a whole, and of the replayed ones verified.")
         .def(
             "evaluate_at",
             [](const VirtualCalibrations& v, const ArrayLike& deviations) {

@@ -55,7 +55,7 @@ double sideways(const Segment& from, const Segment& to) {
 }  // namespace
 
 bool pass_clear(const std::vector<std::vector<Segment>>& paths, const Scene& fixed, const std::vector<int>& component,
-                int source) {
+                int source, double times) {
     const std::vector<Face>& faces = fixed.faces();
     std::vector<Eigen::AlignedBox3d> boxes(faces.size());
     for (std::size_t f = 0; f < faces.size(); ++f)
@@ -69,7 +69,7 @@ bool pass_clear(const std::vector<std::vector<Segment>>& paths, const Scene& fix
         const int from = k > 0 ? component_of(paths.front()[k - 1].hit->face) : source;
         double moved = 0.0;
         for (const auto& path : paths) moved = std::max(moved, sideways(paths[0][k], path[k]));
-        const double clearance = 1.0 + 2.0 * moved;
+        const double clearance = 1.0 + times * moved;
         for (const auto& path : paths) {
             const Eigen::Vector3d &start = path[k].ray.origin, &end = path[k].hit->point;
             Eigen::AlignedBox3d around(start.cwiseMin(end), start.cwiseMax(end));

@@ -15,11 +15,11 @@ bool same_faces(const std::vector<RecordedRoute>& a, const std::vector<RecordedR
 // A path as its segments, source first.
 std::vector<Segment> path_segments(const RayTree& tree, int segment);
 // Whether nothing else comes near any of these paths of one beam (all with the same faces, at several poses), which a
-// replay could not see: no face is nearer to a segment than twice what the segment moves from pose to pose, and a
+// replay could not see: no face is nearer to a segment than `times` what the segment moves from pose to pose, and a
 // millimetre. `component`: of each face; `source`: the beam's. The components that a segment starts from and ends at do
 // not count: a body is convex, so that light which leaves it does not meet it again.
 bool pass_clear(const std::vector<std::vector<Segment>>& paths, const Scene& fixed, const std::vector<int>& component,
-                int source);
+                int source, double times = 2.0);
 
 // A column for each coordinate, a row for each pose.
 struct RouteReplay {

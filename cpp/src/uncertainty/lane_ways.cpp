@@ -12,7 +12,9 @@
 namespace stepdiag {
 namespace {
 
+// Their ways go about 2.5 standard deviations to each side of the nominal ones, and must have as much room again.
 constexpr std::uint64_t route_samples = 32;
+constexpr double beyond_the_pilot = 1.0;
 
 bool reads_axes_alone(const HeadDesign& design) {
     for (const HeadBeam& beam : design.beams)
@@ -159,8 +161,8 @@ bool is_clear(const RunModel& model, const Head& head, const Eigen::Vector2d& mi
         }
     }
     for (std::size_t w = 0; w < ways.size(); ++w)
-        if (!paths[w].empty() &&
-            !pass_clear(paths[w], traced.optics(ways[w].beam).fixed, ways[w].component, ways[w].source_component))
+        if (!paths[w].empty() && !pass_clear(paths[w], traced.optics(ways[w].beam).fixed, ways[w].component,
+                                             ways[w].source_component, beyond_the_pilot))
             return false;
     return true;
 }
