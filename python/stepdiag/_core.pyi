@@ -1312,6 +1312,16 @@ class VirtualCalibrations(SampleModel):
         The evaluation of `nominal`.
         """
     @property
+    def count(self) -> dict[str, int]:
+        """
+        Samples so far: replayed, traced as a whole, and of the replayed ones verified.
+        """
+    @property
+    def in_lanes(self) -> bool:
+        """
+        Whether samples are replayed, many at once; else each pose of each is traced: cameras, coupled modes, sensors with noise or resolution of their own, faces near a beam's way.
+        """
+    @property
     def nominal(self) -> Measurement:
         """
         The run with every input at its expectation, without noise.
