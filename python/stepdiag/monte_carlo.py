@@ -94,14 +94,14 @@ def _missing(leaves: int, done: Sequence[LeafRange]) -> Iterator[LeafRange]:
         first = max(first, end)
 
 
-def _threads_of(model: SampleModel, threads: int) -> Executor:
-    """Ranges computed here, as many at a time as there are threads."""
+def _threads_of(model: SampleModel, threads: int, report: Callable[[int], None]) -> Executor:
+    """Ranges computed here, as many at a time as there are threads. `report` is told the leaves done of those."""
     at_a_time = threads or os.cpu_count() or 1
 
     def compute(bins: Bins, ranges: Iterable[LeafRange]) -> Iterator[PartialStatistics]:
         remaining = iter(ranges)
         while batch := list(islice(remaining, at_a_time)):
-            yield from run_ranges(model, bins, batch, threads=threads)
+            yield from run_ranges(model, bins, batch, threads=threads, progress=report)
 
     return compute
 
@@ -130,7 +130,7 @@ class _Run(ABC):
     def go(self, executor: Executor) -> None: ...
 
     def go_here(self, model: SampleModel, threads: int) -> None:
-        self.go(_threads_of(model, threads))
+        self.go(_threads_of(model, threads, self.report))
 
     @abstractmethod
     def result(self) -> MonteCarloResult: ...

@@ -15,14 +15,26 @@ from stepdiag._core import (
     Bins,
     Distribution,
     FunctionModel,
+    Head,
     InvalidArgument,
+    Machine,
     MonteCarloResult,
     PartialStatistics,
+    Plan,
+    ReadingNoise,
+    SampleModel,
     StatisticsOptions,
+    UncertainInput,
+    UncertainInputs,
+    VirtualCalibrations,
     make_bins,
+    numerical_tolerance,
+    random_error_map,
     run_leaves,
 )
 from stepdiag.monte_carlo import LeafRange, plan_ranges, run_monte_carlo
+
+UNIFORM_TILT = Distribution("rectangular", spread=1e-4)
 
 # Of a published number with two decimals, and of a quantile of 400,000 samples: its standard deviation is below 0.009.
 TWO_DECIMALS = 0.05
@@ -117,7 +129,7 @@ def test_any_number_of_threads_gives_the_same_bits() -> None:
 class Shuffled:
     """An executor that computes ranges in an order of its own and sends them as bytes."""
 
-    def __init__(self, model: FunctionModel, at_a_time: int) -> None:
+    def __init__(self, model: SampleModel, at_a_time: int) -> None:
         self.model, self.at_a_time, self.computed = model, at_a_time, 0
 
     def __call__(self, bins: Bins, ranges: Iterable[LeafRange]) -> Iterator[PartialStatistics]:
@@ -241,6 +253,47 @@ def test_checkpoints_are_written_while_a_run_goes_on(tmp_path: Path, monkeypatch
     result = run_monte_carlo(unhurried(), samples=200_000, checkpoint=checkpoint, progress=look)
     assert seen, "no checkpoint before the end"
     assert figures(result) == figures(run_monte_carlo(unhurried(), samples=200_000))
+
+
+def virtual(seed: int = 3) -> VirtualCalibrations:
+    """A small machine whose distances, tilts and mirrors are uncertain."""
+    volume, diagonals = (400.0, 300.0, 250.0), ["ppp", "npp", "pnp", "nnp"]
+    machine = Machine("[w X' b Y Z t]", random_error_map(volume, seed=7, intervals=4))
+    plan = Plan(volume, diagonals, 4, scale_lines=["p00", "0p0", "00p"])
+    noise = [
+        ReadingNoise("channel", Distribution(spread=1e-6 if c != "distance" else 1e-4), channel=c)
+        for c in ("distance", "alpha", "beta")
+    ]
+    mirrors = [UncertainInput("reflector", UNIFORM_TILT, line=line, component=c) for line in diagonals for c in (0, 1)]
+    return VirtualCalibrations(machine, plan, Head(), UncertainInputs(mirrors, noise), seed=seed)
+
+
+def test_virtual_calibrations_have_the_same_bits_however_they_are_run(tmp_path: Path) -> None:
+    model, checkpoint = virtual(), tmp_path / "run.checkpoint"
+    options = StatisticsOptions(covariance=True, kept=[5], joint=[[4, 5]])
+
+    def run(**more: Any) -> MonteCarloResult:
+        return run_monte_carlo(model, samples=40_000, options=options, **more)
+
+    one = run(threads=1)
+    assert one.lost == 0
+    assert one.covariance is not None
+    for other in (run(threads=2), run(threads=3), run(executor=Shuffled(model, 3))):
+        assert figures(other) == figures(one)
+    with pytest.raises(KeyboardInterrupt):
+        run(checkpoint=checkpoint, executor=Shuffled(model, 3), progress=Interrupt(10_000))
+    assert figures(run(checkpoint=checkpoint, resume=True)) == figures(one)
+    # The statistics are those of the samples themselves.
+    values = model.evaluate(0, 40_000)
+    assert np.array_equal(one.kept[5], values[5])
+    assert one.standard_uncertainty == pytest.approx(values.std(axis=1, ddof=1), rel=1e-9, abs=1e-15)
+    u = one.standard_uncertainty
+    moves = u > 1e-12  # what is 0 by the choice of the frame has roundings
+    difference = (one.covariance - np.cov(values)) / np.outer(u, u)
+    assert np.abs(difference[np.ix_(moves, moves)]).max() < 1e-9
+    width = np.array([numerical_tolerance(each, 2) / 5 if each > 1e-12 else 1e-12 for each in u])
+    quantiles = np.quantile(values, [0.025, 0.975], axis=1).T  # bins are no wider
+    assert (np.abs(one.symmetric - quantiles) <= width[:, None]).all()
 
 
 # --- runs -------------------------------------------------------------------------------------------------------------
