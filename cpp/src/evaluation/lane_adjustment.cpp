@@ -64,6 +64,7 @@ Eigen::MatrixXd lane_gain(const LaneStart& start, std::size_t readings) {
 // holds.
 void LaneAdjustment::Progress::add(double largest) {
     constexpr double diverges = 1e4, shrinks = 0.25;
+    constexpr double safety = 10.0;  // the first ratios are those of second order
     const double first = change[0];
     change = {largest, change[0], change[1]};
     ++steps;
@@ -73,7 +74,7 @@ void LaneAdjustment::Progress::add(double largest) {
         state = settled;
     } else if (steps >= 3 && change[0] < shrinks * change[2]) {
         const double ratio = change[0] / change[2];
-        if ((change[0] + change[1]) * ratio / (1.0 - ratio) < lane_tolerance) state = settled;
+        if (safety * (change[0] + change[1]) * ratio / (1.0 - ratio) < lane_tolerance) state = settled;
     }
     if (state == goes_on && steps >= most_steps) state = failed;
 }
