@@ -289,11 +289,19 @@ def test_virtual_calibrations_have_the_same_bits_however_they_are_run(tmp_path: 
     assert one.standard_uncertainty == pytest.approx(values.std(axis=1, ddof=1), rel=1e-9, abs=1e-15)
     u = one.standard_uncertainty
     moves = u > 1e-12  # what is 0 by the choice of the frame has roundings
-    difference = (one.covariance - np.cov(values)) / np.outer(u, u)
-    assert np.abs(difference[np.ix_(moves, moves)]).max() < 1e-9
+    difference = (one.covariance - np.cov(values))[np.ix_(moves, moves)]
+    assert np.abs(difference / np.outer(u[moves], u[moves])).max() < 1e-9
     width = np.array([numerical_tolerance(each, 2) / 5 if each > 1e-12 else 1e-12 for each in u])
     quantiles = np.quantile(values, [0.025, 0.975], axis=1).T  # bins are no wider
     assert (np.abs(one.symmetric - quantiles) <= width[:, None]).all()
+
+
+def test_statistics_of_no_leaves_are_not_numbers() -> None:
+    result = PartialStatistics(make_bins(curved(), EVERYTHING)).result()
+    assert (result.samples, result.lost, result.covariance) == (0, 0, None)
+    for array in (result.mean, result.standard_uncertainty, result.symmetric, result.shortest, result.lowest):
+        assert np.isnan(array).all()
+    assert math.isnan(result.joint[0].ellipsoid_factor)
 
 
 # --- runs -------------------------------------------------------------------------------------------------------------
