@@ -6,35 +6,27 @@
 #define STEPDIAG_RANDOM_LANES_INL
 #endif
 
-#include <hwy/highway.h>
-
 #include <cstdint>
 
+#include "core/lanes-inl.hpp"
 #include "stepdiag/core/random.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace stepdiag {
 namespace HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using Tag = hn::ScalableTag<double>;
-using Vector = hn::Vec<Tag>;
 using WordTag = hn::ScalableTag<std::uint64_t>;
 using Words = hn::Vec<WordTag>;
 
-// Two vectors side by side, so that one goes on while the other waits for what it needs.
-struct Twin {
-    Vector a, b;
-};
-struct WordTwin {
+struct WordPair {
     Words a, b;
 };
-struct TwoTwins {
-    Twin first, second;
+struct TwoPairs {
+    Pair first, second;
 };
 
 // a * b of the low 32 bits; what stands above them is not looked at.
-HWY_INLINE Words low_product(Words a, Words b) {
+STEPDIAG_INLINE Words low_product(Words a, Words b) {
 #if HWY_TARGET == HWY_SCALAR  // has no vectors of two halves
     return hn::Set(WordTag(), std::uint64_t(std::uint32_t(hn::GetLane(a))) * std::uint32_t(hn::GetLane(b)));
 #else
@@ -44,7 +36,7 @@ HWY_INLINE Words low_product(Words a, Words b) {
 }
 
 // (word >> 11) is below 2^53, so that the conversion is exact.
-HWY_INLINE Vector to_unit(Words word) {
+STEPDIAG_INLINE Vector to_unit(Words word) {
     const hn::RebindToSigned<WordTag> integers;
     const Vector number = hn::ConvertTo(Tag(), hn::BitCast(integers, hn::ShiftRight<11>(word)));
     return hn::Mul(hn::Add(number, hn::Set(Tag(), 0.5)), hn::Set(Tag(), 0x1p-53));
@@ -65,18 +57,18 @@ struct RoundKeys {
 
 // uniform_pair for RandomBlock{sample, item, draw}, `sample` a lane: Philox4x32-10, a 32-bit word of its counter in
 // each 64-bit lane.
-HWY_INLINE TwoTwins uniform_lanes(const RoundKeys& keys, RandomStream stream, WordTwin sample, std::uint32_t item,
-                                  std::uint16_t draw) {
+STEPDIAG_INLINE TwoPairs uniform_lanes(const RoundKeys& keys, RandomStream stream, WordPair sample, std::uint32_t item,
+                                       std::uint16_t draw) {
     const WordTag tag;
     const Words m0 = hn::Set(tag, 0xD2511F53), m1 = hn::Set(tag, 0xCD9E8D57);
     // Only the low halves count; above them stands what is left of earlier products.
     const Words last = hn::Set(tag, std::uint32_t(stream) | (std::uint32_t(draw) << 16));
-    WordTwin c0 = sample, c1 = {hn::ShiftRight<32>(sample.a), hn::ShiftRight<32>(sample.b)};
-    WordTwin c2 = {hn::Set(tag, item), hn::Set(tag, item)}, c3 = {last, last};
+    WordPair c0 = sample, c1 = {hn::ShiftRight<32>(sample.a), hn::ShiftRight<32>(sample.b)};
+    WordPair c2 = {hn::Set(tag, item), hn::Set(tag, item)}, c3 = {last, last};
     for (const auto& key : keys.of_round) {
         const Words key0 = hn::Set(tag, key[0]), key1 = hn::Set(tag, key[1]);
-        const WordTwin product0 = {low_product(c0.a, m0), low_product(c0.b, m0)};
-        const WordTwin product1 = {low_product(c2.a, m1), low_product(c2.b, m1)};
+        const WordPair product0 = {low_product(c0.a, m0), low_product(c0.b, m0)};
+        const WordPair product1 = {low_product(c2.a, m1), low_product(c2.b, m1)};
         c0 = {hn::Xor3(hn::ShiftRight<32>(product1.a), c1.a, key0),
               hn::Xor3(hn::ShiftRight<32>(product1.b), c1.b, key0)};
         c2 = {hn::Xor3(hn::ShiftRight<32>(product0.a), c3.a, key1),
@@ -92,12 +84,9 @@ HWY_INLINE TwoTwins uniform_lanes(const RoundKeys& keys, RandomStream stream, Wo
 
 // sum of c_k z^k from the highest one on
 template <std::size_t Terms>
-HWY_INLINE Twin polynomial(Twin z, const double (&c)[Terms]) {
-    Twin sum = {hn::Set(Tag(), c[0]), hn::Set(Tag(), c[0])};
-    for (std::size_t k = 1; k < Terms; ++k) {
-        const Vector next = hn::Set(Tag(), c[k]);
-        sum = {hn::MulAdd(sum.a, z.a, next), hn::MulAdd(sum.b, z.b, next)};
-    }
+STEPDIAG_INLINE Pair polynomial(Pair z, const double (&c)[Terms]) {
+    Pair sum = all(c[0]);
+    for (std::size_t k = 1; k < Terms; ++k) sum = mul_add(sum, z, all(c[k]));
     return sum;
 }
 
@@ -105,7 +94,7 @@ HWY_INLINE Twin polynomial(Twin z, const double (&c)[Terms]) {
 struct Split {
     Vector k, f;
 };
-HWY_INLINE Split split(Vector u) {
+STEPDIAG_INLINE Split split(Vector u) {
     const Tag tag;
     const WordTag words;
     const Words bits = hn::BitCast(words, u);
@@ -119,74 +108,57 @@ HWY_INLINE Split split(Vector u) {
 
 // -2 ln u, relative error below 1e-15: ln(1 + f) by the series of fdlibm's e_log.c (Sun Microsystems, 1993) in
 // s = f/(2 + f).
-HWY_INLINE Twin minus_two_log(Twin u) {
-    const Tag tag;
+STEPDIAG_INLINE Pair minus_two_log(Pair u) {
     const Split a = split(u.a), b = split(u.b);
-    const Vector two = hn::Set(tag, 2.0);
-    const Twin s = {hn::Div(a.f, hn::Add(a.f, two)), hn::Div(b.f, hn::Add(b.f, two))};
-    const Twin z = {hn::Mul(s.a, s.a), hn::Mul(s.b, s.b)};
-    const Twin series = polynomial(
+    const Pair k = {a.k, b.k}, f = {a.f, b.f}, s = f / (f + all(2.0)), z = s * s;
+    const Pair series = polynomial(
         z, {1.479819860511658591e-01, 1.531383769920937332e-01, 1.818357216161805012e-01, 2.222219843214978396e-01,
             2.857142874366239149e-01, 3.999999999940941908e-01, 6.666666666666735130e-01});
-    const auto sum = [&](const Split& x, Vector own_s, Vector own_z, Vector own_series) HWY_ATTR {
-        const Vector half_square = hn::Mul(hn::Mul(x.f, x.f), hn::Set(tag, 0.5));
-        const Vector low = hn::MulAdd(own_s, hn::MulAdd(own_series, own_z, half_square),
-                                      hn::Mul(x.k, hn::Set(tag, 1.90821492927058770002e-10)));
-        const Vector log =
-            hn::MulAdd(x.k, hn::Set(tag, 6.93147180369123816490e-01), hn::Sub(x.f, hn::Sub(half_square, low)));
-        return hn::Mul(log, hn::Set(tag, -2.0));
-    };
-    return {sum(a, s.a, z.a, series.a), sum(b, s.b, z.b, series.b)};
+    const Pair half_square = f * f * all(0.5);
+    const Pair low = mul_add(s, mul_add(series, z, half_square), k * all(1.90821492927058770002e-10));
+    return mul_add(k, all(6.93147180369123816490e-01), f - (half_square - low)) * all(-2.0);
+}
+
+// x turned on by quarters of a turn, which stand in the low bits of `rounded`: that takes cos to -sin and sin to cos.
+struct CosSin {
+    Vector cosine, sine;
+};
+STEPDIAG_INLINE CosSin turn_by_quarters(Vector cosine, Vector sine, Vector rounded) {
+    const Tag tag;
+    const WordTag words;
+    const Words quarter = hn::BitCast(words, rounded), one = hn::Set(words, 1);
+    const auto is_odd = hn::MaskFromVec(hn::BitCast(tag, hn::Sub(hn::Zero(words), hn::And(quarter, one))));
+    const auto second_bit_as_sign = [&](Words n)
+                                        HWY_ATTR { return hn::BitCast(tag, hn::ShiftLeft<63>(hn::ShiftRight<1>(n))); };
+    return {hn::Xor(hn::IfThenElse(is_odd, sine, cosine), second_bit_as_sign(hn::Add(quarter, one))),
+            hn::Xor(hn::IfThenElse(is_odd, cosine, sine), second_bit_as_sign(quarter))};
 }
 
 // cos and sin of v turns, v in [0, 1], absolute error below 3e-16: of the rest of a quarter turn by the series of
 // fdlibm's k_cos.c and k_sin.c.
-HWY_INLINE TwoTwins cos_sin_of_turns(Twin v) {
-    const Tag tag;
-    const WordTag words;
-    const Vector magic = hn::Set(tag, 0x1.8p52);  // added, it rounds to integers, and the low bits are that integer
-    const auto round_quarters = [&](Vector one) HWY_ATTR { return hn::MulAdd(one, hn::Set(tag, 4.0), magic); };
-    const Twin rounded = {round_quarters(v.a), round_quarters(v.b)};
-    const auto rest = [&](Vector one, Vector quarters) HWY_ATTR {  // its difference is exact
-        return hn::Mul(hn::NegMulAdd(hn::Sub(quarters, magic), hn::Set(tag, 0.25), one),
-                       hn::Set(tag, 6.283185307179586));
-    };
-    const Twin x = {rest(v.a, rounded.a), rest(v.b, rounded.b)};
-    const Twin z = {hn::Mul(x.a, x.a), hn::Mul(x.b, x.b)};
-    const Twin odd =
+STEPDIAG_INLINE TwoPairs cos_sin_of_turns(Pair v) {
+    const Pair magic = all(0x1.8p52);  // added, it rounds to integers, and the low bits are that integer
+    const Pair rounded = mul_add(v, all(4.0), magic);
+    const Pair rest = sub_mul(rounded - magic, all(0.25), v);  // exact
+    const Pair x = rest * all(6.283185307179586), z = x * x;
+    const Pair odd =
         polynomial(z, {1.58969099521155010221e-10, -2.50507602534068634195e-08, 2.75573137070700676789e-06,
                        -1.98412698298579493134e-04, 8.33333333332248946124e-03, -1.66666666666666324348e-01});
-    const Twin cosine =
+    const Pair cosine =
         polynomial(z, {-1.13596475577881948265e-11, 2.08757232129817482790e-09, -2.75573143513906633035e-07,
                        2.48015872894767294178e-05, -1.38888888888741095749e-03, 4.16666666666666019037e-02, -0.5, 1.0});
-
-    // A quarter turn takes cos to -sin and sin to cos.
-    struct CosSin {
-        Vector cosine, sine;
-    };
-    const auto turn = [&](Vector own_x, Vector own_z, Vector own_odd, Vector cos, Vector own_rounded) HWY_ATTR {
-        const Vector sin = hn::MulAdd(hn::Mul(own_x, own_z), own_odd, own_x);
-        const Words quarter = hn::BitCast(words, own_rounded), one = hn::Set(words, 1);
-        const auto is_odd = hn::MaskFromVec(hn::BitCast(tag, hn::Sub(hn::Zero(words), hn::And(quarter, one))));
-        const auto second_bit_as_sign = [&](Words n) HWY_ATTR {
-            return hn::BitCast(tag, hn::ShiftLeft<63>(hn::ShiftRight<1>(n)));
-        };
-        return CosSin{hn::Xor(hn::IfThenElse(is_odd, sin, cos), second_bit_as_sign(hn::Add(quarter, one))),
-                      hn::Xor(hn::IfThenElse(is_odd, cos, sin), second_bit_as_sign(quarter))};
-    };
-    const CosSin a = turn(x.a, z.a, odd.a, cosine.a, rounded.a), b = turn(x.b, z.b, odd.b, cosine.b, rounded.b);
+    const Pair sine = mul_add(x * z, odd, x);
+    const CosSin a = turn_by_quarters(cosine.a, sine.a, rounded.a), b = turn_by_quarters(cosine.b, sine.b, rounded.b);
     return {{a.cosine, b.cosine}, {a.sine, b.sine}};
 }
 
 // normal_pair, by Box and Muller.
-HWY_INLINE TwoTwins normal_lanes(const RoundKeys& keys, RandomStream stream, WordTwin sample, std::uint32_t item,
-                                 std::uint16_t draw) {
-    const TwoTwins uniform = uniform_lanes(keys, stream, sample, item, draw);
-    const Twin square = minus_two_log(uniform.first);
-    const Twin radius = {hn::Sqrt(square.a), hn::Sqrt(square.b)};
-    const TwoTwins turned = cos_sin_of_turns(uniform.second);
-    return {{hn::Mul(radius.a, turned.first.a), hn::Mul(radius.b, turned.first.b)},
-            {hn::Mul(radius.a, turned.second.a), hn::Mul(radius.b, turned.second.b)}};
+STEPDIAG_INLINE TwoPairs normal_lanes(const RoundKeys& keys, RandomStream stream, WordPair sample, std::uint32_t item,
+                                      std::uint16_t draw) {
+    const TwoPairs uniform = uniform_lanes(keys, stream, sample, item, draw);
+    const Pair radius = root(minus_two_log(uniform.first));
+    const TwoPairs turned = cos_sin_of_turns(uniform.second);
+    return {radius * turned.first, radius * turned.second};
 }
 
 }  // namespace HWY_NAMESPACE

@@ -19,7 +19,7 @@ namespace stepdiag {
 namespace HWY_NAMESPACE {
 
 template <class Numbers>
-HWY_INLINE void fill(const RandomLanes& lanes, std::size_t items, double* out, Numbers numbers) {
+STEPDIAG_INLINE void fill(const RandomLanes& lanes, std::size_t items, double* out, Numbers numbers) {
     const WordTag words;
     const std::size_t width = hn::Lanes(words);
     const RoundKeys keys(lanes.seed);
@@ -28,13 +28,10 @@ HWY_INLINE void fill(const RandomLanes& lanes, std::size_t items, double* out, N
         for (std::size_t lane = 0; lane < lanes.lanes; lane += 2 * width) {
             const auto samples = [&](std::size_t first)
                                      HWY_ATTR { return hn::Add(hn::Set(words, lanes.first_sample + first), ramp); };
-            const TwoTwins pair = numbers(keys, lanes.stream, WordTwin{samples(lane), samples(lane + width)},
+            const TwoPairs pair = numbers(keys, lanes.stream, WordPair{samples(lane), samples(lane + width)},
                                           std::uint32_t(lanes.first_item + item), lanes.draw);
-            double* const to = out + lane;
-            hn::StoreU(pair.first.a, Tag(), to);
-            hn::StoreU(pair.first.b, Tag(), to + width);
-            hn::StoreU(pair.second.a, Tag(), to + lanes.lanes);
-            hn::StoreU(pair.second.b, Tag(), to + lanes.lanes + width);
+            store(pair.first, out + lane);
+            store(pair.second, out + lanes.lanes + lane);
         }
 }
 

@@ -12,14 +12,13 @@
 #define HWY_TARGET_INCLUDE "evaluation/reduction_lanes.cpp"
 #include <hwy/foreach_target.h>  // compiles this file once for every instruction set
 //
-#include "optics/lanes-inl.hpp"
+#include "core/lanes-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace stepdiag {
 namespace HWY_NAMESPACE {
 namespace {
 
-STEPDIAG_INLINE Pair all(double value) { return broadcast(Type<Pair>(), value); }
 STEPDIAG_INLINE Pair square_sum(Pair x, Pair y) { return mul_add(x, x, y * y); }
 STEPDIAG_INLINE Pair select(MaskPair which, Pair yes, Pair no) {
     return {hn::IfThenElse(which.a, yes.a, no.a), hn::IfThenElse(which.b, yes.b, no.b)};

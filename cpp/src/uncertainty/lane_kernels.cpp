@@ -13,7 +13,7 @@
 #include <hwy/foreach_target.h>  // compiles this file once for every instruction set
 
 // Vectors before the physics that is calculated with them:
-#include "optics/lanes-inl.hpp"
+#include "core/lanes-inl.hpp"
 //
 #include "optics/encounter-inl.hpp"
 #include "uncertainty/lane_rows-inl.hpp"

@@ -6,7 +6,7 @@
 #define STEPDIAG_LANE_ROWS_INL
 #endif
 
-#include "optics/lanes-inl.hpp"
+#include "core/lanes-inl.hpp"
 #include "uncertainty/lane_kernels.hpp"
 
 HWY_BEFORE_NAMESPACE();

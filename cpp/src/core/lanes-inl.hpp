@@ -1,4 +1,4 @@
-// Vectors of lanes as a number type of encounter-inl.hpp, two at a time.
+// Vectors of lanes as a number type, two at a time.
 #if defined(STEPDIAG_LANES_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef STEPDIAG_LANES_INL
 #undef STEPDIAG_LANES_INL
@@ -10,7 +10,7 @@
 
 #include <cstdint>
 
-#include "optics/number.hpp"
+#include "core/number.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace stepdiag {
@@ -58,6 +58,7 @@ STEPDIAG_INLINE Pair broadcast(Type<Pair>, double value) {
     const Vector all = hn::Set(Tag(), value);
     return {all, all};
 }
+STEPDIAG_INLINE Pair all(double value) { return broadcast(Type<Pair>(), value); }
 STEPDIAG_INLINE Pair load(const double* from) {
     return {hn::LoadU(Tag(), from), hn::LoadU(Tag(), from + hn::Lanes(Tag()))};
 }
