@@ -10,8 +10,8 @@ std::optional<Eigen::Vector3d> to_tool(const std::optional<ArrayLike>& tool) {
 
 // Name -> what is missing for it, where something is.
 template <std::size_t Size>
-std::map<std::string, std::vector<std::string>> missing_by_name(const std::array<std::vector<std::string>, Size>& missing,
-                                                                const std::array<const char*, Size>& names) {
+std::map<std::string, std::vector<std::string>> missing_by_name(
+    const std::array<std::vector<std::string>, Size>& missing, const std::array<const char*, Size>& names) {
     std::map<std::string, std::vector<std::string>> named;
     for (std::size_t i = 0; i < Size; ++i)
         if (!missing[i].empty()) named[names[i]] = missing[i];
@@ -24,9 +24,12 @@ void bind_points(py::module_& m) {
         "The deviations X, Y, Z (mm) of the functional point and A, B, C (rad) of the tool at a commanded point, to "
         "first order, with covariance from the calibration's. NaN where the calibration lacks something that acts "
         "there.")
-        .def_property_readonly("point", [](const ErrorAtPoint& e) { return to_numpy_vector(e.point); }, "(3,) mm")
-        .def_property_readonly("tool", [](const ErrorAtPoint& e) { return to_numpy_vector(e.tool); }, "(3,) mm")
-        .def_property_readonly("value", [](const ErrorAtPoint& e) { return to_numpy_vector(e.value); }, "(6,) mm, rad")
+        .def_property_readonly(
+            "point", [](const ErrorAtPoint& e) { return to_numpy_vector(e.point); }, "(3,) mm")
+        .def_property_readonly(
+            "tool", [](const ErrorAtPoint& e) { return to_numpy_vector(e.tool); }, "(3,) mm")
+        .def_property_readonly(
+            "value", [](const ErrorAtPoint& e) { return to_numpy_vector(e.value); }, "(6,) mm, rad")
         .def_property_readonly(
             "standard_uncertainty", [](const ErrorAtPoint& e) { return to_numpy_vector(e.standard_uncertainty()); },
             "(6,) mm, rad; NaN where the calibration has no covariance.")
@@ -52,17 +55,19 @@ void bind_points(py::module_& m) {
         "Along a body diagonal (ISO 230-6): how much further than commanded the functional point is from where the "
         "diagonal begins.")
         .def_property_readonly("line", [](const DiagonalErrors& d) { return d.line.name(); })
-        .def_property_readonly("point", [](const DiagonalErrors& d) { return to_numpy(Eigen::MatrixXd(d.point)); },
-                               "(n, 3) mm, commanded")
-        .def_property_readonly("travel", [](const DiagonalErrors& d) { return to_numpy_vector(d.travel); },
-                               "(n,) mm, commanded, from the first point")
-        .def_property_readonly("value", [](const DiagonalErrors& d) { return to_numpy_vector(d.value); },
-                               "(n,) mm; NaN where the calibration lacks something.")
-        .def_property_readonly("standard_uncertainty",
-                               [](const DiagonalErrors& d) { return to_numpy_vector(d.standard_uncertainty()); },
-                               "(n,) mm; NaN where the calibration has no covariance.")
-        .def_property_readonly("covariance", [](const DiagonalErrors& d) { return to_numpy(d.covariance); },
-                               "(n, n) mm^2")
+        .def_property_readonly(
+            "point", [](const DiagonalErrors& d) { return to_numpy(Eigen::MatrixXd(d.point)); }, "(n, 3) mm, commanded")
+        .def_property_readonly(
+            "travel", [](const DiagonalErrors& d) { return to_numpy_vector(d.travel); },
+            "(n,) mm, commanded, from the first point")
+        .def_property_readonly(
+            "value", [](const DiagonalErrors& d) { return to_numpy_vector(d.value); },
+            "(n,) mm; NaN where the calibration lacks something.")
+        .def_property_readonly(
+            "standard_uncertainty", [](const DiagonalErrors& d) { return to_numpy_vector(d.standard_uncertainty()); },
+            "(n,) mm; NaN where the calibration has no covariance.")
+        .def_property_readonly(
+            "covariance", [](const DiagonalErrors& d) { return to_numpy(d.covariance); }, "(n, n) mm^2")
         .def_property_readonly("range", &DiagonalErrors::range,
                                "Largest less smallest value, mm; its uncertainty: volumetric_accuracy.")
         .def_readonly("missing", &DiagonalErrors::missing, "Parameters that are not determined.");
@@ -102,7 +107,8 @@ void bind_volume(py::module_& m) {
             "(10, 2) probabilistically symmetric coverage interval of the draws: too large by twice the bias.")
         .def_property_readonly(
             "interval", [](const VolumetricAccuracy& v) { return to_numpy(Eigen::MatrixXd(v.interval)); },
-            "(10, 2) the drawn interval mirrored about the value, 2 value - drawn_interval: takes the bias off to first "
+            "(10, 2) the drawn interval mirrored about the value, 2 value - drawn_interval: takes the bias off to "
+            "first "
             "order; not below 0.")
         .def_property_readonly("bound", column(&VolumetricAccuracy::bound),
                                "(10,) the true range is within value -+ bound with at least the coverage probability: "
@@ -136,12 +142,12 @@ void bind_volume(py::module_& m) {
         m, "RangeModel",
         "The ranges of VolumetricAccuracy as a model for the Monte Carlo method; those that something is missing for "
         "are no outputs.")
-        .def(py::init([](const Calibration& calibration, const std::optional<ArrayLike>& tool,
-                         const IntegerLike& seed) {
-                 return std::make_unique<RangeModel>(calibration, to_tool(tool), to_seed(seed));
-             }),
-             py::arg("calibration"), py::kw_only(), py::arg("tool") = std::nullopt, py::arg("seed") = integer(0),
-             "Raises InvalidArgument for a calibration without covariance.");
+        .def(
+            py::init([](const Calibration& calibration, const std::optional<ArrayLike>& tool, const IntegerLike& seed) {
+                return std::make_unique<RangeModel>(calibration, to_tool(tool), to_seed(seed));
+            }),
+            py::arg("calibration"), py::kw_only(), py::arg("tool") = std::nullopt, py::arg("seed") = integer(0),
+            "Raises InvalidArgument for a calibration without covariance.");
 }
 
 }  // namespace
@@ -164,6 +170,21 @@ void bind_derived(py::module_& m) {
         .def_readonly("unit", &DerivedOutput::unit)
         .def_property_readonly("row", [](const DerivedOutput& output) { return to_numpy_vector(output.row); });
     py::implicitly_convertible<py::tuple, DerivedOutput>();
+    m.def(
+        "with_covariance",
+        [](const Calibration& calibration, const ArrayLike& covariance) {
+            const DoubleArray array = DoubleArray::ensure(covariance);
+            if (!array || array.ndim() != 2) {
+                PyErr_Clear();
+                throw InvalidArgument("covariance: expected a matrix of numbers");
+            }
+            using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+            return with_covariance(calibration,
+                                   Eigen::Map<const RowMajor>(array.data(), array.shape(0), array.shape(1)));
+        },
+        py::arg("calibration"), py::arg("covariance"),
+        "The calibration with another covariance of its values, such as Propagation.covariance of its entries, and the "
+        "standard uncertainties that go with it. Raises InvalidArgument for what is no covariance of these values.");
     m.def(
         "derived_at_point",
         [](const Calibration& calibration, const ArrayLike& point, const std::optional<ArrayLike>& tool) {

@@ -48,8 +48,7 @@ Propagation propagate_linear(const ArrayLike& value, const ArrayLike& sensitivit
                                 estimates ? (*estimates)[i] : -1});
     }
     for (Eigen::Index i = 0; i < model.value.size(); ++i)
-        model.outputs.push_back(
-            {outputs ? (*outputs)[std::size_t(i)] : "y" + std::to_string(i), std::nan(""), "1"});
+        model.outputs.push_back({outputs ? (*outputs)[std::size_t(i)] : "y" + std::to_string(i), std::nan(""), "1"});
     if (correlation) model.correlation = to_matrix(*correlation, "correlation");
     py::gil_scoped_release release;
     return propagate(model, covariance);
@@ -63,9 +62,11 @@ void bind_propagation(py::module_& m) {
         "Uncertainty of outputs by the law of propagation (GUM, JCGM 100), native units; arrays in the order of "
         "`outputs`.")
         .def_readonly("outputs", &Propagation::outputs)
-        .def_property_readonly("value", [](const Propagation& p) { return to_numpy_vector(p.value); }, "(m,)")
-        .def_property_readonly("standard_uncertainty",
-                               [](const Propagation& p) { return to_numpy_vector(p.standard_uncertainty); }, "(m,)")
+        .def_property_readonly(
+            "value", [](const Propagation& p) { return to_numpy_vector(p.value); }, "(m,)")
+        .def_property_readonly(
+            "standard_uncertainty", [](const Propagation& p) { return to_numpy_vector(p.standard_uncertainty); },
+            "(m,)")
         .def_property_readonly(
             "degrees_of_freedom", [](const Propagation& p) { return to_numpy_vector(p.degrees_of_freedom); },
             "(m,) effective ones by Welch and Satterthwaite (GUM G.4.1); NaN where that does not apply: correlated "
@@ -86,9 +87,9 @@ void bind_propagation(py::module_& m) {
             },
             "group of inputs -> (m,) standard uncertainty of each output by that group alone; with between_groups, "
             "the squares sum to the square of standard_uncertainty.")
-        .def_property_readonly("between_groups",
-                               [](const Propagation& p) { return to_numpy_vector(p.between_groups); },
-                               "(m,) part of the variance by correlation between inputs of two groups.")
+        .def_property_readonly(
+            "between_groups", [](const Propagation& p) { return to_numpy_vector(p.between_groups); },
+            "(m,) part of the variance by correlation between inputs of two groups.")
         .def_property_readonly(
             "inputs",
             [](const Propagation& p) {
@@ -97,22 +98,25 @@ void bind_propagation(py::module_& m) {
                 return names;
             },
             "Names of the inputs that are drawn once: columns of first_order and second_order.")
-        .def_property_readonly("first_order", [](const Propagation& p) { return to_numpy(p.first_order); },
-                               "(m, inputs) sensitivity x standard uncertainty.")
+        .def_property_readonly(
+            "first_order", [](const Propagation& p) { return to_numpy(p.first_order); },
+            "(m, inputs) sensitivity x standard uncertainty.")
         .def_property_readonly(
             "second_order", [](const Propagation& p) { return to_numpy(p.second_order); },
             "(m, inputs) what the square of a deviation by the standard uncertainty does, (f(+u) + f(-u) - 2 f(0))/2; "
             "linear propagation leaves it out. 0 where not known.")
-        .def("expanded", [](const Propagation& p, double coverage) { return to_numpy_vector(p.expanded(coverage)); },
-             py::arg("coverage") = 0.95,
-             "(m,) U = t_p u, of degrees of freedom truncated to whole ones (GUM G.4.1, G.6.4). Raises InvalidArgument "
-             "for a probability outside 0 .. 1.")
-        .def_property_readonly("second_order_shift",
-                               [](const Propagation& p) { return to_numpy_vector(p.second_order_shift()); },
-                               "(m,) by how much squares of deviations shift the mean.")
-        .def_property_readonly("second_order_uncertainty",
-                               [](const Propagation& p) { return to_numpy_vector(p.second_order_uncertainty()); },
-                               "(m,) standard uncertainty with the squares of normal, independent inputs.");
+        .def(
+            "expanded", [](const Propagation& p, double coverage) { return to_numpy_vector(p.expanded(coverage)); },
+            py::arg("coverage") = 0.95,
+            "(m,) U = t_p u, of degrees of freedom truncated to whole ones (GUM G.4.1, G.6.4). Raises InvalidArgument "
+            "for a probability outside 0 .. 1.")
+        .def_property_readonly(
+            "second_order_shift", [](const Propagation& p) { return to_numpy_vector(p.second_order_shift()); },
+            "(m,) by how much squares of deviations shift the mean.")
+        .def_property_readonly(
+            "second_order_uncertainty",
+            [](const Propagation& p) { return to_numpy_vector(p.second_order_uncertainty()); },
+            "(m,) standard uncertainty with the squares of normal, independent inputs.");
 
     m.def("propagate_linear", &propagate_linear, py::arg("value"), py::arg("sensitivity"),
           py::arg("standard_uncertainty"), py::kw_only(), py::arg("degrees_of_freedom") = std::nullopt,
@@ -131,8 +135,8 @@ void bind_propagation(py::module_& m) {
             return calibration ? propagate(*calibration, virtual_calibrations, covariance)
                                : propagate(virtual_calibrations, covariance);
         },
-        py::arg("virtual_calibrations"), py::arg("calibration") = std::nullopt, py::kw_only(), py::arg("covariance") = false,
-        py::call_guard<py::gil_scoped_release>(),
+        py::arg("virtual_calibrations"), py::arg("calibration") = std::nullopt, py::kw_only(),
+        py::arg("covariance") = false, py::call_guard<py::gil_scoped_release>(),
         "Uncertainty of all outputs of virtual calibrations: every input by central differences of whole calibrations "
         "at its expectation plus and minus its standard uncertainty; reading noise by the evaluation's gain, with its "
         "real covariance. A t distribution counts with its scale and degrees of freedom (GUM 4.2.3). calibration: one "

@@ -1,4 +1,5 @@
-// Sums up what inputs contribute to the outputs' uncertainty: variances, budget, covariance, Welch-Satterthwaite. Internal.
+// Sums up what inputs contribute to the outputs' uncertainty: variances, budget, covariance, Welch-Satterthwaite.
+// Internal.
 #pragma once
 
 #include <Eigen/Core>

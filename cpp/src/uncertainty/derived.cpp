@@ -62,6 +62,25 @@ VectorXd calibration_values(const Calibration& calibration) {
     return Eigen::Map<const VectorXd>(values.data(), Index(values.size()));
 }
 
+Calibration with_covariance(Calibration calibration, const MatrixXd& covariance) {
+    const EntryLayout layout(calibration);
+    if (covariance.rows() != layout.size() || covariance.cols() != layout.size())
+        throw InvalidArgument("covariance: expected a row and a column for each of " + std::to_string(layout.size()) +
+                              " values, got " + std::to_string(covariance.rows()) + " x " +
+                              std::to_string(covariance.cols()));
+    const VectorXd u = roots(covariance.diagonal());
+    for (int i = 0; i < function_count; ++i)
+        if (auto& function = calibration.functions[i])
+            for (std::size_t k = 0; k < function->standard_uncertainty.size(); ++k)
+                function->standard_uncertainty[k] = u[layout.first(i) + Index(k)];
+    for (int i = 0; i < squareness_count; ++i)
+        if (auto& squareness = calibration.squarenesses[i])
+            squareness->standard_uncertainty = u[layout.first(function_count + i)];
+    calibration.covariance = covariance;
+    check(calibration);
+    return calibration;
+}
+
 Eigen::Vector3d tool_of(const Calibration& calibration, const std::optional<Eigen::Vector3d>& tool) {
     if (tool && !tool->allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
     return tool.value_or(calibration.tool);

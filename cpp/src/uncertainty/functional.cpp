@@ -11,8 +11,7 @@
 namespace stepdiag {
 
 std::string parameter_name(int parameter) {
-    return parameter < function_count ? FunctionId::at(parameter).name()
-                                      : name(Squareness(parameter - function_count));
+    return parameter < function_count ? FunctionId::at(parameter).name() : name(Squareness(parameter - function_count));
 }
 
 std::array<Functional, 6> deviations_at(const Chain& chain, const Eigen::Vector3d& tool, const Eigen::Vector3d& point) {

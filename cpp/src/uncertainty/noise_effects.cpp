@@ -14,7 +14,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double shift_step = 1e-3;    // mm
+constexpr double shift_step = 1e-3;     // mm
 constexpr double rotation_step = 1e-5;  // rad; spots answer with 2 L = 2 m: what is left over is of third order, 1e-10
 
 // The machine with a function of an axis that reads `step` more everywhere.
@@ -45,8 +45,9 @@ VectorXd readings_of(const VirtualRun& run, const Machine& machine) {
     for (std::size_t r = 0; r < measurement.size(); ++r)
         for (std::size_t c = 0; c < channels.size(); ++c) {
             const auto& value = measurement.find(channels[c])->value[r];
-            if (!value) throw InvalidArgument("virtual run: expected readings at all poses, row " + std::to_string(r) +
-                                              " is lost");
+            if (!value)
+                throw InvalidArgument("virtual run: expected readings at all poses, row " + std::to_string(r) +
+                                      " is lost");
             readings[Index(r * channels.size() + c)] = *value;
         }
     return readings;
@@ -54,8 +55,7 @@ VectorXd readings_of(const VirtualRun& run, const Machine& machine) {
 
 }  // namespace
 
-Eigen::Matrix<double, Eigen::Dynamic, 6> pose_sensitivity(const VirtualRun& run,
-                                                           const Measurement& nominal) {
+Eigen::Matrix<double, Eigen::Dynamic, 6> pose_sensitivity(const VirtualRun& run, const Measurement& nominal) {
     const Chain& chain = run.machine.chain();
     const Axis first = chain.order().front(), last = chain.order().back();
     const auto difference = [&](FunctionId id, double step) -> VectorXd {
@@ -65,8 +65,8 @@ Eigen::Matrix<double, Eigen::Dynamic, 6> pose_sensitivity(const VirtualRun& run,
     };
     Eigen::Matrix<double, Eigen::Dynamic, 6> sensitivity;
     for (int k = 0; k < 6; ++k) {
-        const VectorXd column = k < 3 ? difference({first, Component(k)}, shift_step)
-                                      : difference({last, Component(k)}, rotation_step);
+        const VectorXd column =
+            k < 3 ? difference({first, Component(k)}, shift_step) : difference({last, Component(k)}, rotation_step);
         if (k == 0) sensitivity.resize(column.size(), 6);
         sensitivity.col(k) = column;
     }
@@ -110,8 +110,7 @@ MatrixXd NoiseEffects::of_poses(int column) const {
     const Index rows = Index(nominal_.size()), channels = Index(channels_.size());
     MatrixXd effect(gain_.rows(), rows);
     for (Index r = 0; r < rows; ++r)
-        effect.col(r) =
-            gain_.middleCols(r * channels, channels) * poses_.block(r * channels, column, channels, 1);
+        effect.col(r) = gain_.middleCols(r * channels, channels) * poses_.block(r * channels, column, channels, 1);
     return effect;
 }
 

@@ -8,9 +8,10 @@
 
 namespace stepdiag {
 
-// d reading / d pose: a row each reading (row of the run * channels + channel), columns: shift x, y, z of the functional
-// point (mm), turn about x, y, z of the tool about that point (rad), in the machine frame. By central differences of the
-// simulation of a machine with these errors added everywhere. `nominal`: a measurement with the run's rows.
+// d reading / d pose: a row each reading (row of the run * channels + channel), columns: shift x, y, z of the
+// functional point (mm), turn about x, y, z of the tool about that point (rad), in the machine frame. By central
+// differences of the simulation of a machine with these errors added everywhere. `nominal`: a measurement with the
+// run's rows.
 Eigen::Matrix<double, Eigen::Dynamic, 6> pose_sensitivity(const VirtualRun& run, const Measurement& nominal);
 
 class NoiseEffects {
@@ -22,7 +23,7 @@ public:
     Eigen::MatrixXd of(const ReadingNoise& noise) const;
 
 private:
-    Eigen::MatrixXd of_distances() const;                        // the same length in all distances of a row
+    Eigen::MatrixXd of_distances() const;  // the same length in all distances of a row
     Eigen::MatrixXd of_poses(int column) const;
     void sum_walks(Eigen::MatrixXd& by_row, bool by_setup) const;  // from steps to places
 

@@ -69,7 +69,8 @@ void Contributions::add_inputs(const std::vector<PropagatedInput>& inputs, const
             const bool together = inputs[std::size_t(i)].group == inputs[std::size_t(j)].group;
             (together ? group : sum_.between_groups) += covariance;
             variance_ += covariance;
-            // Welch and Satterthwaite suppose independent estimates; a correlation of known uncertainties does not matter.
+            // Welch and Satterthwaite suppose independent estimates; a correlation of known uncertainties does not
+            // matter.
             if (std::isfinite(inputs[std::size_t(i)].degrees_of_freedom))
                 satterthwaite_ = (covariance.array() != 0.0)
                                      .select(VectorXd::Constant(variance_.size(), std::nan("")), satterthwaite_);
@@ -97,8 +98,7 @@ Propagation Contributions::result() const {
     result.budget.resize(variance_.size(), Index(groups_.size()));
     for (std::size_t g = 0; g < groups_.size(); ++g)
         result.budget.col(Index(g)) = group_variances_[g].cwiseMax(0.0).cwiseSqrt();
-    if (full_covariance_)
-        result.covariance = MatrixXd(sum_.covariance.selfadjointView<Eigen::Lower>());
+    if (full_covariance_) result.covariance = MatrixXd(sum_.covariance.selfadjointView<Eigen::Lower>());
     return result;
 }
 
@@ -150,8 +150,7 @@ void check_model(const LinearModel& model) {
 Propagation propagate(const LinearModel& model, bool full_covariance) {
     check_model(model);
     VectorXd uncertainty(Index(model.inputs.size()));
-    for (Index i = 0; i < uncertainty.size(); ++i)
-        uncertainty[i] = model.inputs[std::size_t(i)].standard_uncertainty;
+    for (Index i = 0; i < uncertainty.size(); ++i) uncertainty[i] = model.inputs[std::size_t(i)].standard_uncertainty;
     const MatrixXd first_order = model.sensitivity * uncertainty.asDiagonal();
     Contributions sum(model.outputs, model.value, full_covariance);
     sum.add_inputs(model.inputs, first_order, MatrixXd::Zero(first_order.rows(), first_order.cols()),

@@ -98,10 +98,8 @@ private:
             text += ": a t distribution is wider than its scale, which propagation takes with its degrees of freedom";
         else if (input >= 0 && std::abs(by_squares - excess) < 0.5 * std::abs(excess))
             text += ": " + square_of(input, "spreads it");
-        else if (excess > 0.0)
-            text += ": products of two inputs, or higher orders, spread it";
-        else
-            text += ": higher orders of the inputs take some away";
+        else if (excess > 0.0) text += ": products of two inputs, or higher orders, spread it";
+        else text += ": higher orders of the inputs take some away";
         say(text);
     }
     double excess_of_t() const {
@@ -116,13 +114,15 @@ private:
 
     // A distribution that is not normal.
     void say_shape() {
-        const double below = found_.mean[i_] - found_.symmetric(i_, 0), above = found_.symmetric(i_, 1) - found_.mean[i_];
+        const double below = found_.mean[i_] - found_.symmetric(i_, 0),
+                     above = found_.symmetric(i_, 1) - found_.mean[i_];
         if (std::abs(above - below) > std::max(delta() / 2.0, 4.0 * validation_.sampling[i_]))
             say("the distribution is skew: its interval reaches " + number(below) + " below the mean and " +
                 number(above) + " above");
         const double half = (above + below) / 2.0, factor = half / drawn_u();
         const double expected = (validation_.high[i_] - validation_.low[i_]) / (2.0 * u());
-        if (!(std::abs(factor - expected) * drawn_u() > std::max(delta() / 2.0, 3.0 * validation_.sampling[i_]))) return;
+        if (!(std::abs(factor - expected) * drawn_u() > std::max(delta() / 2.0, 3.0 * validation_.sampling[i_])))
+            return;
         std::ostringstream text;
         text.precision(3);
         text << "the interval is " << factor << " u wide to each side instead of " << expected << " u";
@@ -166,8 +166,7 @@ Validation compare(const Propagation& propagation, const MonteCarloResult& monte
         throw InvalidArgument("Monte Carlo result: expected the outputs of the propagation (" +
                               std::to_string(propagation.outputs.size()) + "), got others (" +
                               std::to_string(monte_carlo.outputs.size()) + ")");
-    if (digits < 1 || digits > 3)
-        throw InvalidArgument("digits: expected 1 to 3, got " + std::to_string(digits));
+    if (digits < 1 || digits > 3) throw InvalidArgument("digits: expected 1 to 3, got " + std::to_string(digits));
     const double coverage = monte_carlo.options.coverage;
     const VectorXd expanded = propagation.expanded(coverage);
     Validation v;

@@ -1,8 +1,8 @@
 // Ranges over a volume. To first order a deviation is a sum of terms of one position and of products of two,
 //   e = F1(p1) + F2(p2) + F3(p3) + G12(p1) p2 + G13(p1) p3 + G23(p2) p3,   axes 1, 2, 3 from workpiece to tool,
 // so that for given p1 and p2 the extreme over p3 is that of F3 + slope p3: a corner of the convex hull of F3. Along an
-// axis that carries the workpiece F is quadratic between nodes. That of axis 1 is searched exactly, cell by cell where it
-// can matter; axes 2 and 3 on a finer grid, where they carry it too.
+// axis that carries the workpiece F is quadratic between nodes. That of axis 1 is searched exactly, cell by cell where
+// it can matter; axes 2 and 3 on a finer grid, where they carry it too.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -99,7 +99,8 @@ struct VolumeRanges::Grid {
 
 AxisTable VolumeRanges::Grid::table(Axis axis, const VectorXd& values) const {
     const auto& positions = position[std::size_t(index(axis))];
-    AxisTable table{positions, Matrix3Xd::Zero(3, Index(positions.size())), Matrix3Xd::Zero(3, Index(positions.size()))};
+    AxisTable table{positions, Matrix3Xd::Zero(3, Index(positions.size())),
+                    Matrix3Xd::Zero(3, Index(positions.size()))};
     for (int c = 0; c < 6; ++c) {
         const auto& of_function = nodes[std::size_t(FunctionId{axis, Component(c)}.index())];
         for (std::size_t k = 0; k < of_function.size(); ++k) {
@@ -132,8 +133,7 @@ Vector3d VolumeRanges::Grid::deviation(const std::array<AxisState, 3>& states) c
     Vector3d error = Vector3d::Zero();
     for (int r = 0; r < 3; ++r) {
         const AxisState& state = states[std::size_t(r)];
-        error += state.delta +
-                 state.theta.cross(angular_lever(chain, tool, chain.order()[std::size_t(r)], commanded));
+        error += state.delta + state.theta.cross(angular_lever(chain, tool, chain.order()[std::size_t(r)], commanded));
     }
     return error;
 }
@@ -163,8 +163,7 @@ VolumeRanges::Grid::Terms VolumeRanges::Grid::terms(const std::array<AxisTable, 
     const auto slopes = [&](std::size_t r, std::size_t after) {
         const Vector3d axis = Vector3d::Unit(index(order[after]));
         VectorXd g(terms.own[r].size());
-        for (Index k = 0; k < g.size(); ++k)
-            g[k] = sign * Vector3d(tables[r].theta.col(k)).cross(axis)[component];
+        for (Index k = 0; k < g.size(); ++k) g[k] = sign * Vector3d(tables[r].theta.col(k)).cross(axis)[component];
         return g;
     };
     terms.g12 = slopes(0, 1);
@@ -229,8 +228,7 @@ double VolumeRanges::Grid::search_cells(const std::array<AxisTable, 3>& tables, 
     return best;
 }
 
-VolumeRanges::VolumeRanges(const Calibration& calibration, const Vector3d& tool)
-    : grid_(nullptr) {
+VolumeRanges::VolumeRanges(const Calibration& calibration, const Vector3d& tool) : grid_(nullptr) {
     auto grid = std::make_unique<Grid>(
         Grid{calibration.chain, tool, EntryLayout(calibration), {}, {}, {}, diagonal_rows(calibration, tool)});
     for (const Axis axis : all_axes) {

@@ -26,10 +26,9 @@ MatrixXd root_of(const MatrixXd& covariance) {
     return u.asDiagonal() * root;
 }
 
-const Calibration& with_covariance(const Calibration& calibration) {
+void check_covariance(const Calibration& calibration) {
     if (calibration.covariance.size() == 0)
         throw InvalidArgument("calibration: expected one evaluated with full covariance");
-    return calibration;
 }
 
 // Columns: the standard normal numbers of samples.
@@ -37,8 +36,8 @@ MatrixXd normal_numbers(std::uint64_t seed, std::uint64_t first_sample, Index co
     MatrixXd numbers(count, samples);
     for (Index s = 0; s < samples; ++s)
         for (Index i = 0; i < count; i += 2) {
-            const auto pair = normal_pair(seed, RandomStream::monte_carlo,
-                                          {first_sample + std::uint64_t(s), std::uint32_t(i / 2)});
+            const auto pair =
+                normal_pair(seed, RandomStream::monte_carlo, {first_sample + std::uint64_t(s), std::uint32_t(i / 2)});
             numbers(i, s) = pair[0];
             if (i + 1 < count) numbers(i + 1, s) = pair[1];
         }
@@ -57,7 +56,7 @@ struct RangeModel::State {
 };
 
 RangeModel::RangeModel(const Calibration& calibration, const std::optional<Eigen::Vector3d>& tool, std::uint64_t seed) {
-    with_covariance(calibration);
+    check_covariance(calibration);
     auto state = std::make_shared<State>(State{VolumeRanges(calibration, tool_of(calibration, tool)),
                                                calibration_values(calibration),
                                                root_of(calibration.covariance),
@@ -106,7 +105,7 @@ VolumetricAccuracy volumetric_accuracy(const Calibration& calibration, const std
         throw InvalidArgument("coverage: expected a probability between 0 and 1");
     if (double(options.samples) * (1.0 - options.coverage) < 100.0)
         throw InvalidArgument("samples: expected at least 100/(1 - coverage)");
-    with_covariance(calibration);
+    check_covariance(calibration);
     const VolumeRanges ranges(calibration, tool_of(calibration, tool));
     const VectorXd values = calibration_values(calibration);
     const MatrixXd root = root_of(calibration.covariance);
@@ -115,8 +114,7 @@ VolumetricAccuracy volumetric_accuracy(const Calibration& calibration, const std
     MatrixXd drawn(count, range_count), of_noise(count, range_count);
     for (Index begin = 0; begin < count; begin += together) {
         const Index here = std::min(together, count - begin);
-        const MatrixXd noise =
-            root * normal_numbers(options.seed, std::uint64_t(begin), root.cols(), here);
+        const MatrixXd noise = root * normal_numbers(options.seed, std::uint64_t(begin), root.cols(), here);
         for (Index s = 0; s < here; ++s) {
             drawn.row(begin + s) = ranges.evaluate(values + noise.col(s)).transpose();
             of_noise.row(begin + s) = ranges.evaluate(noise.col(s)).transpose();

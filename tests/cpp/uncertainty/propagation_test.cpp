@@ -13,9 +13,9 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using stepdiag::LinearModel;
+using stepdiag::propagate;
 using stepdiag::PropagatedInput;
 using stepdiag::Propagation;
-using stepdiag::propagate;
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -89,8 +89,8 @@ TEST(Propagation, StraightLineOfTheGumComesOutOfThePseudoinverse) {  // JCGM 100
 }
 
 TEST(Propagation, CorrelatedResistorsAddLinearly) {  // JCGM 100, 5.2.2 example: ten resistors, one standard
-    LinearModel model = one_output(10e3, std::vector<PropagatedInput>(10, {"resistor", "standard", 0.1}),
-                                   std::vector<double>(10, 1.0));
+    LinearModel model =
+        one_output(10e3, std::vector<PropagatedInput>(10, {"resistor", "standard", 0.1}), std::vector<double>(10, 1.0));
     EXPECT_NEAR(propagate(model).standard_uncertainty[0], 0.32, 0.005);  // what the GUM calls incorrect
     model.correlation = MatrixXd::Ones(10, 10);
     EXPECT_NEAR(propagate(model).standard_uncertainty[0], 1.0, 1e-12);

@@ -91,9 +91,10 @@ TEST(Validation, DominatingRectangleIsNamed) {  // JCGM 101, 9.2.4
     expect_reason(v, {"1.68 u", "x3, rectangular, makes 97 % of the variance"});
 }
 
-TEST(Validation, SquareThatShiftsTheMeanIsNamedWithItsFigures) {  // mass calibration, JCGM 101, 9.3, in short: a product
-    const Validation v = compared(
-        [](const VectorXd& x) { return 0.1e-6 * x[0] + 0.8e-6 * x[1] * x[1]; }, {normal(0, 1), normal(0, 1)}, "rad");
+TEST(Validation,
+     SquareThatShiftsTheMeanIsNamedWithItsFigures) {  // mass calibration, JCGM 101, 9.3, in short: a product
+    const Validation v = compared([](const VectorXd& x) { return 0.1e-6 * x[0] + 0.8e-6 * x[1] * x[1]; },
+                                  {normal(0, 1), normal(0, 1)}, "rad");
     expect_reason(v, {"the mean is shifted by 0.8 urad", "the square of x1 moves it by 0.8 urad, u is 0.1 urad",
                       "u is 1.1 urad by Monte Carlo and 0.1 urad by propagation", "skew"});
 }

@@ -1,5 +1,6 @@
 // What follows from a calibration: the error of the tool at any point, of the body diagonals (ISO 230-6), and the
-// volumetric accuracy V_XYZ (ISO 230-1:2012, clause 3), with uncertainty from the covariance of the calibration's values.
+// volumetric accuracy V_XYZ (ISO 230-1:2012, clause 3), with uncertainty from the covariance of the calibration's
+// values.
 //   e = sum_a (delta_a + theta_a x L_a),  orientation = sum_a theta_a   (machine/machine.hpp, to first order)
 // is linear in the calibration's entries: functions linear between nodes, end values outside, squareness terms go on.
 // Functions are those of nodes approached in + direction. What a calibration left undetermined is not taken as 0: where
@@ -22,6 +23,10 @@ namespace stepdiag {
 std::vector<CalibrationEntry> calibration_entries(const Calibration& calibration);
 Eigen::VectorXd calibration_values(const Calibration& calibration);
 
+// The calibration with another covariance of its values, such as one that was propagated to them, and the standard
+// uncertainties that go with it. Throws InvalidArgument as check(Calibration).
+Calibration with_covariance(Calibration calibration, const Eigen::MatrixXd& covariance);
+
 // X, Y, Z: deviations of the functional point, mm; A, B, C: of the tool's orientation, rad.
 inline constexpr int deviation_count = 6;
 inline constexpr std::array<const char*, deviation_count> deviation_names = {"X", "Y", "Z", "A", "B", "C"};
@@ -36,9 +41,9 @@ struct DeviationRows {
 DeviationRows deviation_rows(const Calibration& calibration, const Eigen::Vector3d& tool, const Eigen::Vector3d& point);
 
 struct ErrorAtPoint {
-    Eigen::Vector3d point;  // commanded, mm
-    Eigen::Vector3d tool;   // offset of the functional point, mm
-    Deviations value;       // NaN where something is missing
+    Eigen::Vector3d point;                                               // commanded, mm
+    Eigen::Vector3d tool;                                                // offset of the functional point, mm
+    Deviations value;                                                    // NaN where something is missing
     Eigen::Matrix<double, deviation_count, deviation_count> covariance;  // NaN also where the calibration has none
     std::array<std::vector<std::string>, deviation_count> missing;
 
@@ -72,8 +77,8 @@ inline constexpr std::array<const char*, range_count> range_names = {"V_X", "V_Y
                                                                      "V_C", "E_D ppp", "E_D npp", "E_D pnp", "E_D nnp"};
 
 // The ranges of tables with the nodes of a calibration. Between nodes deviations are linear in each position, so that
-// their extremes are at nodes; but along an axis that carries the workpiece they are quadratic where a rotation changes,
-// and that axis is divided more finely.
+// their extremes are at nodes; but along an axis that carries the workpiece they are quadratic where a rotation
+// changes, and that axis is divided more finely.
 class VolumeRanges {
 public:
     VolumeRanges(const Calibration& calibration, const Eigen::Vector3d& tool);
@@ -132,8 +137,8 @@ struct RangeOptions {
     std::size_t samples = 10'000;
     std::uint64_t seed = 0;
 };
-// Throws InvalidArgument for a calibration without covariance, a coverage probability outside 0 .. 1, fewer samples than
-// 100/(1 - coverage).
+// Throws InvalidArgument for a calibration without covariance, a coverage probability outside 0 .. 1, fewer samples
+// than 100/(1 - coverage).
 VolumetricAccuracy volumetric_accuracy(const Calibration& calibration, const std::optional<Eigen::Vector3d>& tool = {},
                                        const RangeOptions& options = {});
 

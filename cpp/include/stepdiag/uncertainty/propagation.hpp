@@ -51,10 +51,11 @@ struct Propagation {
     // Of inputs that are drawn once (reading noise is in the budget alone): c_i u_i, and what the square of a deviation
     // by u_i does, (f(x + u_i) + f(x - u_i) - 2 f(x))/2, which linear propagation leaves out; 0 where not known.
     std::vector<PropagatedInput> inputs;
-    Eigen::MatrixXd first_order;   // a row each output, a column each input
+    Eigen::MatrixXd first_order;  // a row each output, a column each input
     Eigen::MatrixXd second_order;
 
-    // U = t_p u for this coverage probability, of degrees of freedom truncated to whole ones (G.4.1); NaN where they are.
+    // U = t_p u for this coverage probability, of degrees of freedom truncated to whole ones (G.4.1); NaN where they
+    // are.
     Eigen::VectorXd expanded(double coverage = 0.95) const;
     // The mean and standard uncertainty to second order, of independent normal inputs: sum of second_order, and
     // sqrt(u^2 + 2 sum second_order^2). What products of two inputs do is not in them.
@@ -67,16 +68,17 @@ struct Propagation {
 Propagation propagate(const LinearModel& model, bool full_covariance = false);
 
 // Of virtual calibrations: every input by central differences of whole calibrations at its expectation plus and minus
-// its standard uncertainty; reading noise by the evaluation's gain with its real covariance (channels independent, common
-// noise the same in all distances of a reading, walks summed up, repeatability of poses through what a pose does to
-// each reading). `run` is what `calibrations` was made of. A t distribution counts with its scale and degrees of
+// its standard uncertainty; reading noise by the evaluation's gain with its real covariance (channels independent,
+// common noise the same in all distances of a reading, walks summed up, repeatability of poses through what a pose does
+// to each reading). `run` is what `calibrations` was made of. A t distribution counts with its scale and degrees of
 // freedom (GUM 4.2.3, G.3), not with its standard deviation.
 // Throws InvalidArgument where a deviation leaves the evaluation without a result.
 Propagation propagate(const VirtualCalibrations& calibrations, bool full_covariance = false);
 
 // Of a calibration that was evaluated from readings with full covariance: the group "readings" is what the evaluation
-// itself says (reading noise and the set-ups it solved for); to it comes what the inputs of `calibrations`, virtual ones
-// of the same plan, head and evaluation, contribute; their reading noise does not. Values are the calibration's own.
+// itself says (reading noise and the set-ups it solved for); to it comes what the inputs of `calibrations`, virtual
+// ones of the same plan, head and evaluation, contribute; their reading noise does not. Values are the calibration's
+// own.
 Propagation propagate(const Calibration& calibration, const VirtualCalibrations& calibrations,
                       bool full_covariance = false);
 

@@ -20,7 +20,7 @@ struct Validation {
     int digits;
     // By output, native units.
     Eigen::VectorXd delta;
-    Eigen::VectorXd low, high;      // y - U, y + U
+    Eigen::VectorXd low, high;  // y - U, y + U
     Eigen::VectorXd d_low, d_high;
     // Standard uncertainty of the Monte Carlo interval's ends by the number of samples (of a normal distribution). JCGM
     // 101 (8.2) wants it small beside delta.
