@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'Validation', 'VirtualCalibrations', 'VolumetricAccuracy', 'adjust', 'beam_radius', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'volumetric_accuracy', 'with_covariance']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'Validation', 'VirtualCalibrations', 'VolumetricAccuracy', 'adjust', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'volumetric_accuracy', 'with_covariance']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -1735,6 +1735,10 @@ def beam_radius(mode: GaussianMode, reduced_length: typing.SupportsFloat | typin
     """
     Radius (1/e^2 of power, mm) of a beam after a reduced length (sum of t/n, mm) from the collimator's plane.
     """
+def choose_instruction_set(name: str) -> None:
+    """
+    For the whole process, from now on; by default the fastest is in use. Raises InvalidArgument.
+    """
 def compare(propagation: Propagation, monte_carlo: MonteCarloResult, *, digits: typing.SupportsIndex | None = None) -> Validation:
     """
     Validates propagation by the Monte Carlo method at the coverage probability of the latter; digits of u that matter, 1 to 3 (none: those of the Monte Carlo result). Raises InvalidArgument for results of other outputs.
@@ -1778,6 +1782,14 @@ def expose(camera: Camera, spots: collections.abc.Sequence[BeamSpot], *, seed: t
 def head_sensitivities(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment | None = None) -> list[Sensitivity]:
     """
     Derivatives of a traced head's readings by the six degrees of freedom of every component (along the head's axes, rotations about its own origin) and of the mirror, by indices, and by the state of the air: exact, by forward mode through the replay. Raises InvalidArgument where a beam is lost.
+    """
+def instruction_set() -> str:
+    """
+    The instruction set of this processor that is in use, such as "AVX3": traces and random numbers have the same bits for the same one.
+    """
+def instruction_sets() -> list[str]:
+    """
+    Those that this processor has, fastest first.
     """
 @typing.overload
 def locate(camera: Camera, image: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64] | None:

@@ -25,12 +25,14 @@ from stepdiag.report import (
 from stepdiag.scenario import Scenario, adjust_scenario, build_scenario, simulate_scenario
 from stepdiag.scenario_head_keys import EnvironmentSection, HeadKeys
 from stepdiag.scenario_keys import MisalignmentSection, NoiseSection, RandomSection, ScenarioKeys
+from stepdiag.sections import Section
 from stepdiag.setup_table import setup_rows
 from stepdiag.sheet import lost_readings
 from stepdiag.toml_text import located
 
 PARAMETERS: Final = 21
 AnyHead = TypeVar("AnyHead", bound=HeadKeys)
+AnySection = TypeVar("AnySection", bound=Section)
 USUAL_STEPS: Final = (5, 10, 20, 50, 100, 200)
 
 
@@ -117,16 +119,21 @@ def without_errors(scenario: Scenario, steps: int) -> Scenario:
     return dataclasses.replace(perfect, uncertainty=scenario.uncertainty)
 
 
-def with_usual_errors(scenario: Scenario, plan: Mapping[str, Any]) -> Scenario:
-    """The scenario with other keys of [plan], without noise, of a machine with errors: those of its [machine.random],
-    else those of that section's defaults. What it says of lines that are not measured is passed over."""
+def with_usual_errors(scenario: Scenario, plan: Mapping[str, Any], *, noise: bool = False) -> Scenario:
+    """The scenario with other keys of [plan], without its noise or with it, of a machine with errors: those of its
+    [machine.random], else of that section's defaults. What it says of lines that are not measured is passed over."""
     keys, usual = scenario.keys, _perfect_keys(scenario.keys, plan)
     measured = {*usual.plan.lines, *usual.plan.scale_lines}
     errors = keys.machine.random or RandomSection(seed=0)
-    by_line = {line: own for line, own in keys.misalignment.by_line.items() if line in measured}
+
+    def kept(section: AnySection, by_line: Mapping[str, Any]) -> AnySection:
+        return section.model_copy(update={"by_line": {line: by_line[line] for line in by_line if line in measured}})
+
     sections = {
         "machine": usual.machine.model_copy(update={"random": errors}),
-        "misalignment": keys.misalignment.model_copy(update={"by_line": by_line}),
+        "misalignment": kept(keys.misalignment, keys.misalignment.by_line),
+        "noise": keys.noise if noise else usual.noise,
+        "uncertainty": kept(keys.uncertainty, keys.uncertainty.by_line),
     }
     built = build_scenario(usual.model_copy(update=sections), scenario.path)
     return dataclasses.replace(built, uncertainty=scenario.uncertainty)

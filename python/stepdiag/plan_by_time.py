@@ -9,7 +9,7 @@ from typing import Final, Literal
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.comparison import Kind
+from stepdiag.comparison import KINDS, Kind, kind_of
 from stepdiag.measuring_time import MINUTE, measuring_time, times_of
 from stepdiag.observe import extents, with_usual_errors
 from stepdiag.report import largest_uncertainties
@@ -148,13 +148,38 @@ def outcome(scenario: Scenario, candidate: Candidate) -> Outcome:
             "repeats": candidate.repeats,
             "seconds_per_reading": between or None,
         }
-        usual = with_usual_errors(scenario, changes)
-        found = adjust_scenario(usual, simulate_scenario(usual))
-        largest = {kind: value for kind, (value, _) in largest_uncertainties(found.calibration).items()}
-        determined = frozenset(extents(found.calibration, plan)[0])
+        more = _says_more(scenario)
+        usual = with_usual_errors(scenario, changes, noise=more)
+        calibration, largest = _propagated(usual) if more else _adjusted(usual)
+        determined = frozenset(extents(calibration, plan)[0])
     except InvalidArgument as error:
         trouble = str(error)
     return Outcome(candidate, seconds, spacing, (float(width), float(height)), largest, determined, trouble)
+
+
+def _says_more(scenario: Scenario) -> bool:
+    """Whether its [uncertainty] names more than the noise of the readings."""
+    return bool(scenario.uncertain.inputs) or any(noise.quantity != "channel" for noise in scenario.uncertain.noise)
+
+
+def _adjusted(usual: Scenario) -> tuple[_core.Calibration, dict[Kind, float]]:
+    """By the readings' own uncertainties."""
+    calibration = adjust_scenario(usual, simulate_scenario(usual)).calibration
+    return calibration, {kind: value for kind, (value, _) in largest_uncertainties(calibration).items()}
+
+
+def _propagated(usual: Scenario) -> tuple[_core.Calibration, dict[Kind, float]]:
+    """By all that [uncertainty] names: drifts and walks take the longer, the longer measuring takes."""
+    from stepdiag.virtual import virtual_calibrations
+
+    model = virtual_calibrations(usual, method="adjustment")
+    largest: dict[Kind, float] = {}
+    with located(str(usual.path)):
+        found = _core.propagate(model)
+    for output, u in zip(model.outputs, found.standard_uncertainty, strict=True):
+        kind = kind_of(output.name)
+        largest[kind] = max(largest.get(kind, 0.0), float(u))
+    return model.calibration, {kind: largest[kind] for kind in KINDS if kind in largest}
 
 
 def complete(found: Sequence[Outcome]) -> list[Outcome]:

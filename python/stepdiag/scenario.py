@@ -152,8 +152,12 @@ def read_scenario(path: str | PathLike[str]) -> Scenario:
 
 def parse_scenario(text: str, path: str | PathLike[str] = "scenario.toml") -> Scenario:
     """A scenario from its text. `path` names it in messages; paths in it are relative to its folder."""
+    return scenario_of(parse_toml(text, str(path)), path)
+
+
+def scenario_of(content: Mapping[str, Any], path: str | PathLike[str] = "scenario.toml") -> Scenario:
+    """A scenario from the tables of its file."""
     file = str(path)
-    content = parse_toml(text, file)
     if not content:
         raise InvalidArgument(f"{file}: has no sections; expected [volume], [machine], [plan] and [head]")
     content = {name: _by_name(name, section, file) for name, section in content.items()}

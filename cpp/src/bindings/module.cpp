@@ -176,6 +176,7 @@ PYBIND11_MODULE(_core, m) {
     bind_calibration(m);
     bind_batch(m);
     bind_uncertain_inputs(m);
+    bind_instruction_set(m);
     bind_sample_model(m);
     bind_derived(m);
     bind_virtual_calibration(m);
