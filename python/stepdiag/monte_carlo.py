@@ -55,8 +55,8 @@ def run_monte_carlo(
 ) -> MonteCarloResult:
     """Draws `samples`, rounded up to whole leaves of 2,000; adaptive: whole blocks until all outputs are stable, and at
     most about that many (result.stability tells). checkpoint: a file that is written every ten seconds, where the run
-    ends, and where an exception (Ctrl-C) ends it, which goes on then; resume: goes on from there, also to more samples
-    than before. Raises InvalidArgument, also for a checkpoint of another run."""
+    ends, and where an exception (Ctrl-C) ends it, which goes on then; one that is there is replaced, but by resume, which
+    goes on from it, also to more samples than before. Raises InvalidArgument, also for a checkpoint of another run."""
     if samples < 1:
         raise InvalidArgument(f"samples: expected 1 or more, got {samples}")
     if resume and checkpoint is None:
@@ -255,4 +255,6 @@ def _parts_of(saved: bytes, name: str) -> tuple[bytes, bytes]:
         (size,) = struct.unpack("<Q", rest[:8])
         parts.append(rest[8 : 8 + size])
         rest = rest[8 + size :]
+    if rest:
+        raise InvalidArgument(f"{name}: the checkpoint is damaged: {len(rest)} bytes too many")
     return parts[0], parts[1]

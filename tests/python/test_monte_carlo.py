@@ -232,6 +232,7 @@ def test_a_checkpoint_that_is_none_is_refused(tmp_path: Path) -> None:
     for damaged, message in [
         (content[:200], "not all there|damaged"),
         (content[:200] + bytes([content[200] ^ 1]) + content[201:], "damaged"),
+        (content + b"!", "1 bytes too many"),
         (b"something else", "expected a checkpoint"),
     ]:
         checkpoint.write_bytes(damaged)
