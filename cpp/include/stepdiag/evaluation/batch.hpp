@@ -18,8 +18,8 @@ enum class EvaluationMethod { conventional, enhanced, adjustment, one_step };
 
 struct BatchOptions {
     EvaluationMethod method = EvaluationMethod::enhanced;
-    ReadingUncertainty uncertainty = {};   // conventional, enhanced
-    AdjustmentOptions adjustment = {};     // adjustment, one_step: nothing is left out as an outlier
+    ReadingUncertainty uncertainty = {};  // conventional, enhanced
+    AdjustmentOptions adjustment = {};    // adjustment, one_step: nothing is left out as an outlier
 };
 
 // A value of a calibration's tables (order of Calibration::covariance).
