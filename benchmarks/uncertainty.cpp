@@ -26,7 +26,7 @@ using namespace stepdiag;
 
 constexpr int steps = 50;
 constexpr std::uint64_t seed = 1;
-constexpr std::size_t block = leaf_samples;
+constexpr std::size_t block = 80;  // what the statistics take at a time: 0.6 MB of outputs
 
 // python/stepdiag/heads/beam_and_psd.toml
 Head layout_b() {
