@@ -64,6 +64,7 @@ Eigen::MatrixXd lane_gain(const LaneStart& start, std::size_t readings) {
 // holds.
 void LaneAdjustment::Progress::add(double largest) {
     constexpr double diverges = 1e4, shrinks = 0.25;
+    constexpr int early = 4, late = 12, most_steps_left = 16;
     constexpr double safety = 10.0;  // the first ratios are those of second order
     const double first = change[0];
     change = {largest, change[0], change[1]};
@@ -72,9 +73,15 @@ void LaneAdjustment::Progress::add(double largest) {
         state = failed;
     } else if (largest < lane_tolerance) {
         state = settled;
-    } else if (steps >= 3 && change[0] < shrinks * change[2]) {
+    } else if (steps >= 3) {
         const double ratio = change[0] / change[2];
-        if (safety * (change[0] + change[1]) * ratio / (1.0 - ratio) < lane_tolerance) state = settled;
+        const double left = (change[0] + change[1]) * ratio / (1.0 - ratio);
+        if (ratio < shrinks && safety * left < lane_tolerance) state = settled;
+        // As they went on the whole; full steps are dearer one by one.
+        if (steps == early) at_early = std::max(change[0], change[1]);
+        const double rate = std::log(at_early / change[0]) / (steps - early + 1);
+        if (state == goes_on && steps >= late && !(std::log(largest / lane_tolerance) < most_steps_left * rate))
+            state = failed;
     }
     if (state == goes_on && steps >= most_steps) state = failed;
 }
@@ -228,11 +235,18 @@ void LaneAdjustment::adjust_in_full(const double* readings, std::size_t stride, 
     for (std::size_t r = 0; r < list.size(); ++r)
         list[r].value = readings[std::size_t(start_.input[r]) * stride + lane];
     counts_[lane].in_full = true;
-    // From zero: where set-ups are aligned, no tilt is taken for the effect of a roll, a gain or a lateral offset.
     NormalEquations& equations = own.solver.equations();
     Eigen::VectorXd x = Eigen::VectorXd::Zero(own.start.size());
     equations.assume_usual(own.determined, x);
+    // If not from near by, then from zero: where set-ups are aligned, no tilt is taken for the effect of a roll, a gain
+    // or a lateral offset.
+    if (progress_[lane].is_near())
+        for (Eigen::Index j = 0; j < x.size(); ++j) x[j] = x_.at(j)[lane];
     std::optional<int> steps = own.solver.try_solve(x);
+    if (!steps || own.solver.equations().square_sum(x) > gross_scatter * double(start_.input.size())) {
+        x.setZero();
+        steps = own.solver.try_solve(x);
+    }
     if (steps && !own.solver.dependent().empty()) {
         equations.assume_usual(own.determined, x);
         steps = own.solver.try_solve(x);

@@ -74,10 +74,12 @@ private:
     struct Progress {
         enum State { goes_on, settled, lost, failed } state = goes_on;
         std::array<double, 3> change = {};
+        double at_early = 0.0;
         int steps = 0;
         bool recentred = false;
 
         void add(double largest);
+        bool is_near() const { return steps > 1 && change[0] < 1.0; }
     };
     void begin();
     void step(const double* readings, std::size_t stride);
