@@ -56,6 +56,9 @@ def result_rows(result: UncertaintyResult) -> Iterator[str]:
     if result.monte_carlo is not None:
         yield ""
         yield from _monte_carlo_table(result)
+    if result.comparison is not None:
+        yield ""
+        yield from _validation_table(result)
     if result.entries < len(result.outputs):
         yield ""
         yield from _derived_table(result)
@@ -113,6 +116,7 @@ def _monte_carlo_table(result: UncertaintyResult) -> Iterator[str]:
     assert found is not None
     lost = f", {found.lost:,} without a result" if found.lost else ""
     yield f"Monte Carlo (JCGM 101): {found.samples:,} samples, seed {result.seed}, {found.target}{lost}"
+    yield from _stability(result)
     u = np.asarray(found.standard_uncertainty)
     heading = ["family", "median u", "largest u", f"{_percent(result)} interval about the mean", "where"]
     rows = []
@@ -124,6 +128,57 @@ def _monte_carlo_table(result: UncertaintyResult) -> Iterator[str]:
         cells = [f"{median:.3g} {name}", f"{largest:.3g} {name}", f"{low:+.3g} {high:+.3g} {name}"]
         rows.append([family, *cells, label(result.outputs[worst])])
     yield from _table(heading, rows)
+
+
+def _validation_table(result: UncertaintyResult) -> Iterator[str]:
+    """By family how many outputs are validated, the worst of them, and why the worst that is not is not."""
+    found = result.comparison
+    assert found is not None
+    difference = np.maximum(np.asarray(found.d_low), np.asarray(found.d_high))
+    ratio = difference / np.asarray(found.delta)
+    rows, reasons = [], []
+    for family, members in result.families():
+        told = members[np.isfinite(ratio[members])]
+        validated = sum(bool(found.validated[k]) for k in members)
+        if not len(told):
+            rows.append([family, f"{validated} of {len(members)}", "-", "-", "-", "-"])
+            continue
+        worst = int(told[np.argmax(ratio[told])])
+        unit, sizes = result.outputs[worst].unit, (difference[worst], found.delta[worst], found.sampling[worst])
+        name = in_report_units(unit, 0.0)[1]
+        cells = [f"{in_report_units(unit, float(size))[0]:.2g} {name}".rstrip() for size in sizes]
+        rows.append([family, f"{validated} of {len(members)}", *cells, label(result.outputs[worst])])
+        if not found.validated[worst]:
+            reasons.append(f"  {family}, {label(result.outputs[worst])}: {_in_report_signs(found.reason[worst])}")
+    yield (
+        f"validation of the propagation (JCGM 101, 8): ends of y ± U beside those of the {_percent(result)} interval, "
+        f"to {found.digits} digits of u"
+    )
+    yield from _table(["family", "validated", "largest d", "tolerance", "sampling", "where"], rows)
+    if reasons:
+        yield "where propagation fails most, and why:"
+        yield from reasons
+
+
+def _in_report_signs(text: str) -> str:
+    return text.replace(" urad", " µrad").replace(" um", " µm")
+
+
+def _stability(result: UncertaintyResult) -> Iterator[str]:
+    """Of an adaptive run: whether the digits that were asked for are there."""
+    found = result.monte_carlo
+    assert found is not None
+    if found.stability is None:
+        return
+    if found.stability.stable:
+        yield f"  adaptive: every output is stable to {result.digits} digits of its u (JCGM 101, 7.9)"
+    else:
+        worst = result.outputs[found.stability.output]
+        yield (
+            f"  adaptive: {found.stability.unstable} of {len(result.outputs)} outputs are not yet stable to "
+            f"{result.digits} digits of their u; the {found.stability.figure} of {label(worst)} is the worst, "
+            f"{found.stability.ratio:.3g} times the tolerance; -n sets the largest number of samples"
+        )
 
 
 def _derived_table(result: UncertaintyResult) -> Iterator[str]:

@@ -46,14 +46,9 @@ def uncertainty_table(result: UncertaintyResult) -> xr.Dataset:
             value = values[rows] if dimensions else values[rows[0]]
             attributes = {"units": unit or first.unit, "long_name": f"{meaning} of {name}"}
             variables[f"{name}{ending}"] = (dimensions, value, attributes)
-    variables |= (
-        _derived(result, columns)
-        | _outputs(result)
-        | _budget(result)
-        | _monte_carlo(result)
-        | _joint(result)
-        | _volume(result)
-    )
+    variables |= _derived(result, columns) | _outputs(result)
+    for part in (_validation, _budget, _monte_carlo, _joint, _volume):
+        variables |= part(result)
     return xr.Dataset(variables, coordinates, attributes_of(result))
 
 
@@ -98,6 +93,13 @@ def columns_of(result: UncertaintyResult) -> list[Column]:
             ),
             ("_freedom", "effective degrees of freedom", "1", np.asarray(other.degrees_of_freedom)),
         ]
+    if result.comparison is not None:
+        both = result.comparison
+        columns += [
+            ("_tolerance", "numerical tolerance (JCGM 101, 7.9.2)", None, np.asarray(both.delta)),
+            ("_d_low", "difference of the lower ends, y - U less the interval's, without sign", None, both.d_low),
+            ("_d_high", "difference of the upper ends, y + U less the interval's, without sign", None, both.d_high),
+        ]
     return columns
 
 
@@ -128,6 +130,21 @@ def _outputs(result: UncertaintyResult) -> dict[str, Any]:
         "output_name": ("output", names, {"long_name": "parameter or derived quantity"}),
         "output_position": ("output", result.positions, where),
         "output_units": ("output", units, {"long_name": "units of an output"}),
+    }
+
+
+def _validation(result: UncertaintyResult) -> dict[str, Any]:
+    found = result.comparison
+    if found is None:
+        return {}
+    validated = "1: propagation agrees with the Monte Carlo method to the tolerance (JCGM 101, 8)"
+    return {
+        "output_validated": ("output", np.array(found.validated, dtype=np.int8), {"long_name": validated}),
+        "output_reason": (
+            "output",
+            np.array(found.reason, dtype=str),
+            {"long_name": "why it does not; empty where it does"},
+        ),
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -65,8 +66,18 @@ def made_up(**changes: Any) -> UncertaintyResult:
         covariance=np.outer(u, u),
         kept={6: np.array([1.0, np.nan, 3.0])},
         joint=[region],
+        stability=None,
     )
-    settings: dict[str, Any] = {"propagation": propagation, "monte_carlo": drawn}
+    comparison = SimpleNamespace(
+        digits=2,
+        delta=np.full(count, 5e-7),
+        d_low=np.arange(count) * 1e-7,
+        d_high=np.zeros(count),
+        sampling=np.full(count, 1e-8),
+        validated=[k < 6 for k in range(count)],
+        reason=["" if k < 6 else "the mean is shifted by 0.5 urad" for k in range(count)],
+    )
+    settings: dict[str, Any] = {"propagation": propagation, "monte_carlo": drawn, "comparison": comparison}
     return UncertaintyResult(
         parse_scenario(SCENARIO), "enhanced", 2**64 - 1, outputs, count - 1, 0.95, 2, **(settings | changes)
     )
@@ -139,6 +150,28 @@ def test_report_names_the_largest_of_each_family_and_where_it_comes_from() -> No
     assert "noise of distance 64.0%, laser 36.0%" in said
     assert "7.5" in said
     assert "X at (1, 2, 3)" in said
+
+
+def test_validation_counts_what_agrees_and_says_why_the_worst_does_not() -> None:
+    said = "\n".join(result_rows(made_up()))
+    assert re.search(r"positioning +3 of 3", said)
+    assert "squareness, C0Y: the mean is shifted by 0.5 µrad" in said
+    table = uncertainty_table(made_up())
+    assert table["output_validated"].values.tolist() == [1] * 6 + [0] * 2
+    assert table["output_reason"].values.tolist()[5:7] == ["", "the mean is shifted by 0.5 urad"]
+    assert table["EAX_d_low"].values == pytest.approx([3e-7, 4e-7, 5e-7], rel=1e-15)
+
+
+def test_adaptive_run_that_did_not_end_says_so() -> None:
+    result = made_up()
+    assert result.monte_carlo is not None
+    stability = {"ratio": 1.5, "output": 2, "figure": "upper end", "unstable": 3}
+    result.monte_carlo.stability = SimpleNamespace(stable=False, **stability)
+    said = "\n".join(result_rows(result))
+    assert "3 of 8 outputs are not yet stable to 2 digits" in said
+    assert "the upper end of EXX at 80 mm is the worst, 1.5 times" in said
+    result.monte_carlo.stability = SimpleNamespace(stable=True, **stability)
+    assert "every output is stable" in "\n".join(result_rows(result))
 
 
 @pytest.mark.parametrize(("text", "row"), [("C0Y", 6), ("EXX@40", 1), ("EXX", 2), ("X at (1, 2, 3)", 7)])

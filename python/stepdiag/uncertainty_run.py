@@ -1,0 +1,143 @@
+"""Uncertainty of a scenario's calibration: propagation, and if samples are asked for the Monte Carlo method."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from stepdiag import _core
+from stepdiag._core import InvalidArgument
+from stepdiag.monte_carlo import run_monte_carlo
+from stepdiag.scenario import Scenario
+from stepdiag.toml_text import located
+from stepdiag.uncertainty_result import UncertaintyResult, find_output
+from stepdiag.virtual import Method, virtual_calibrations
+
+Vector = tuple[float, float, float]
+Progress = Callable[[int, int], None]  # samples done, and how many there will be
+
+LARGEST_JOINT: Final = 3
+# With --adaptive and without -n: of a model that never gets stable.
+MOST_SAMPLES: Final = 10_000_000
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is asked for. `points`: commanded positions, each with a tool offset of its own or None (mm)."""
+
+    method: Method = "enhanced"
+    samples: int | None = None
+    adaptive: bool = False
+    digits: int = 2
+    coverage: float = 0.95
+    seed: int = 0
+    threads: int = 0
+    covariance: bool = False
+    keep: Sequence[str] = ()
+    joint: Sequence[Sequence[str]] = ()
+    compare: bool = False
+    points: Sequence[tuple[Vector, Vector | None]] = ()
+    volume: bool = False
+    checkpoint: Path | None = None
+    resume: bool = False
+
+    @property
+    def draws(self) -> bool:
+        """Whether the Monte Carlo method is asked for."""
+        return self.samples is not None or self.adaptive
+
+    def check(self) -> None:
+        """Raises InvalidArgument for wishes that do not go together."""
+        if not 0.0 < self.coverage < 1.0:
+            raise InvalidArgument(f"--coverage: expected a probability between 0 and 1, got {self.coverage:g}")
+        named = {
+            "--compare": self.compare,
+            "--covariance": self.covariance,
+            "--keep": bool(self.keep),
+            "--joint": bool(self.joint),
+            "--resume": self.resume,
+        }
+        for option, given in named.items():
+            if given and not self.draws:
+                raise InvalidArgument(f"{option}: goes with the Monte Carlo method: -n or --adaptive")
+        for names in self.joint:
+            if not 1 <= len(names) <= LARGEST_JOINT or len(set(names)) < len(names):
+                expected = f"one to {LARGEST_JOINT} different outputs"
+                raise InvalidArgument(f"--joint: expected {expected}, such as C0Y,B0Z, got {','.join(names)!r}")
+
+
+def evaluate_uncertainty(scenario: Scenario, request: Request, progress: Progress | None = None) -> UncertaintyResult:
+    """Propagates, and draws if samples are asked for. `progress(done, total)` is told of samples; what it raises
+    ends the run, which then leaves its checkpoint. Raises InvalidArgument for what cannot be done."""
+    model = virtual_calibrations(scenario, method=request.method, seed=request.seed)
+    entries = len(model.outputs)
+    derived = _derived(model.calibration, request)
+    if derived:
+        model = virtual_calibrations(scenario, method=request.method, seed=request.seed, derived=derived)
+    kept = [find_output(model.outputs, name, "--keep") for name in request.keep]
+    joint = [[find_output(model.outputs, name, "--joint") for name in names] for names in request.joint]
+    with located(str(scenario.path)):
+        propagation = _core.propagate(model, covariance=request.volume)
+        volume = _volume(model.calibration, propagation, entries, request) if request.volume else None
+    result = UncertaintyResult(
+        scenario=scenario,
+        method=request.method,
+        seed=request.seed,
+        outputs=model.outputs,
+        entries=entries,
+        coverage=request.coverage,
+        digits=request.digits,
+        propagation=propagation,
+        volume=volume,
+    )
+    if not request.draws:
+        return result
+    options = _core.StatisticsOptions(
+        coverage=request.coverage, digits=request.digits, covariance=request.covariance, kept=kept, joint=joint
+    )
+    found = run_monte_carlo(
+        model,
+        samples=request.samples or MOST_SAMPLES,
+        adaptive=request.adaptive,
+        options=options,
+        threads=request.threads,
+        checkpoint=request.checkpoint,
+        resume=request.resume,
+        progress=progress,
+    )
+    return replace(result, monte_carlo=found, comparison=_core.compare(propagation, found) if request.compare else None)
+
+
+def _derived(calibration: _core.Calibration, request: Request) -> list[_core.DerivedOutput]:
+    """The error vectors at the points asked for."""
+    return [
+        derived for point, tool in request.points for derived in _core.derived_at_point(calibration, point, tool=tool)
+    ]
+
+
+def _volume(
+    calibration: _core.Calibration, propagation: _core.Propagation, entries: int, request: Request
+) -> _core.VolumetricAccuracy:
+    """Of the calibration with the covariance that was propagated to it."""
+    covariance = propagation.covariance
+    assert covariance is not None
+    known = np.sqrt(np.diagonal(covariance))[:entries]
+    rows: dict[str, list[int]] = {}
+    for k, output in enumerate(propagation.outputs[:entries]):
+        rows.setdefault(output.name, []).append(k)
+    propagated = _core.Calibration(
+        calibration.method,
+        calibration.chain,
+        calibration.volume,
+        calibration.tool,
+        {name: (x, y, known[rows[name]]) for name, (x, y, _) in calibration.functions.items()},
+        {name: (y, known[rows[name][0]]) for name, (y, _) in calibration.squareness.items()},
+        undetermined_slopes=calibration.undetermined_slopes,
+        undetermined=calibration.undetermined,
+        covariance=covariance[:entries, :entries],
+        reversal=calibration.reversal,
+        undetermined_reversal_constants=calibration.undetermined_reversal_constants,
+    )
+    return _core.volumetric_accuracy(propagated, coverage=request.coverage, seed=request.seed)
