@@ -55,8 +55,8 @@ def run_monte_carlo(
 ) -> MonteCarloResult:
     """Draws `samples`, rounded up to whole leaves of 2,000; adaptive: whole blocks until all outputs are stable, and at
     most about that many (result.stability tells). checkpoint: a file that is written every ten seconds, where the run
-    ends, and where an exception (Ctrl-C) ends it, which goes on then; one that is there is replaced, but by resume, which
-    goes on from it, also to more samples than before. Raises InvalidArgument, also for a checkpoint of another run."""
+    ends, and where an exception (Ctrl-C) ends it, which goes on then (an old one is replaced); resume: goes on from
+    there, also to more samples than before. Raises InvalidArgument, also for a checkpoint of another run."""
     if samples < 1:
         raise InvalidArgument(f"samples: expected 1 or more, got {samples}")
     if resume and checkpoint is None:
