@@ -319,3 +319,29 @@ def test_small_set_up_angles_are_validated_and_large_ones_are_not() -> None:
     for i in shifted:
         found, expected = result.mean[i] - propagated.value[i], propagated.second_order_shift[i]
         assert abs(found - expected) < 0.1 * abs(expected) + 5 * result.standard_uncertainty[i] / np.sqrt(200_000)
+
+
+def test_products_of_set_up_angles_are_found_and_named() -> None:
+    setup = setup_of("ideal")
+    inputs = [of_line(q, 1e-3, "npp", c) for q in ("laser", "reflector") for c in (0, 1)]
+    model = virtual(setup, core.UncertainInputs(inputs, channel_noise(setup)), seed=2)
+    propagated = core.propagate(model)
+    assert propagated.knows_products
+    squares = np.sum(propagated.second_order**2, axis=1)
+    expected = propagated.standard_uncertainty**2 + 2 * squares + propagated.product_variance
+    assert np.allclose(propagated.second_order_uncertainty**2, expected, rtol=1e-12)
+    # A product from four whole calibrations, the cross difference.
+    signs = np.array([[1, 1, -1, -1], [0, 0, 0, 0], [1, -1, 1, -1], [0, 0, 0, 0]]) * 1e-3
+    cross = model.evaluate_at(signs) @ [1, -1, -1, 1] / 4
+    for output, (first, second, product) in enumerate(propagated.strongest_product):
+        if (first, second) == ("laser a of npp", "reflector a of npp"):
+            # Fourth orders are a millionth; rounding of readings of 1 m, summed up.
+            assert product == pytest.approx(cross[output], rel=1e-4, abs=1e-11)
+    result = monte_carlo(model, 100)
+    drawn, second_order = result.standard_uncertainty, propagated.second_order_uncertainty
+    uncertain = drawn > 1e-9
+    # 200,000 samples: 0.16 %; squares of normal numbers have heavy tails, and orders above the second a thousandth.
+    assert np.max(np.abs(drawn[uncertain] / second_order[uncertain] - 1)) < 0.02
+    assert np.max(np.abs(drawn[uncertain] / propagated.standard_uncertainty[uncertain] - 1)) > 0.05
+    compared = core.compare(propagated, result)
+    assert any("the product of laser" in reason for reason in compared.reason)

@@ -110,13 +110,36 @@ void bind_propagation(py::module_& m) {
             py::arg("coverage") = 0.95,
             "(m,) U = t_p u, of degrees of freedom truncated to whole ones (GUM G.4.1, G.6.4). Raises InvalidArgument "
             "for a probability outside 0 .. 1.")
+        .def_readonly(
+            "knows_products", &Propagation::knows_products,
+            "Whether strongest_product, product_variance and product_shift are known: of virtual calibrations "
+            "with up to 120 inputs.")
+        .def_property_readonly(
+            "strongest_product",
+            [](const Propagation& p) {
+                std::vector<std::tuple<std::string, std::string, double>> products;
+                for (const Propagation::Product& product : p.strongest_product) {
+                    const bool is_any = product.first >= 0;
+                    products.emplace_back(is_any ? p.inputs[std::size_t(product.first)].name : "",
+                                          is_any ? p.inputs[std::size_t(product.second)].name : "", product.value);
+                }
+                return products;
+            },
+            "Of each output the two inputs whose product does most when both deviate by their standard uncertainty, "
+            "and what it does; empty where not known.")
+        .def_property_readonly(
+            "product_variance", [](const Propagation& p) { return to_numpy_vector(p.product_variance); },
+            "(m,) variance by products of two independent inputs; empty where not known.")
+        .def_property_readonly(
+            "product_shift", [](const Propagation& p) { return to_numpy_vector(p.product_shift); },
+            "(m,) by how much products of correlated inputs shift the mean; empty where not known.")
         .def_property_readonly(
             "second_order_shift", [](const Propagation& p) { return to_numpy_vector(p.second_order_shift()); },
-            "(m,) by how much squares of deviations shift the mean.")
+            "(m,) by how much squares of deviations, and products of correlated ones, shift the mean.")
         .def_property_readonly(
             "second_order_uncertainty",
             [](const Propagation& p) { return to_numpy_vector(p.second_order_uncertainty()); },
-            "(m,) standard uncertainty with the squares of normal, independent inputs.");
+            "(m,) standard uncertainty with the squares and products of normal, independent inputs.");
 
     m.def("propagate_linear", &propagate_linear, py::arg("value"), py::arg("sensitivity"),
           py::arg("standard_uncertainty"), py::kw_only(), py::arg("degrees_of_freedom") = std::nullopt,

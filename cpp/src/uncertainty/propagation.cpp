@@ -171,10 +171,15 @@ VectorXd Propagation::expanded(double coverage) const {
     return expanded;
 }
 
-VectorXd Propagation::second_order_shift() const { return second_order.rowwise().sum(); }
+VectorXd Propagation::second_order_shift() const {
+    const VectorXd shift = second_order.rowwise().sum();
+    return knows_products ? VectorXd(shift + product_shift) : shift;
+}
 
 VectorXd Propagation::second_order_uncertainty() const {
-    return (standard_uncertainty.cwiseAbs2() + 2.0 * second_order.rowwise().squaredNorm()).cwiseSqrt();
+    VectorXd variance = standard_uncertainty.cwiseAbs2() + 2.0 * second_order.rowwise().squaredNorm();
+    if (knows_products) variance += product_variance;
+    return variance.cwiseSqrt();
 }
 
 }  // namespace stepdiag

@@ -1,4 +1,5 @@
 // Propagation through virtual calibrations.
+#include <algorithm>
 #include <cmath>
 
 #include "stepdiag/core/error.hpp"
@@ -78,6 +79,43 @@ InputEffects input_effects(const VirtualCalibrations& calibrations) {
     return effects;
 }
 
+// d_ij = (f(+i, +j) + f(-i, -j) - 2 f)/2 - s_i - s_j, s the second order of one input: odd orders cancel.
+void add_products(const VirtualCalibrations& calibrations, const InputEffects& effects, const MatrixXd& correlation,
+                  Propagation& result) {
+    const auto& uncertain = calibrations.run().inputs.inputs;
+    const Index count = Index(uncertain.size());
+    if (count > largest_product_inputs) return;
+    result.knows_products = true;
+    result.strongest_product.assign(std::size_t(effects.value.size()), {});
+    result.product_variance = result.product_shift = VectorXd::Zero(effects.value.size());
+    VectorXd expectation(count);
+    for (Index i = 0; i < count; ++i) expectation[i] = uncertain[std::size_t(i)].distribution.expectation;
+    for (Index i = 0; i + 1 < count; ++i) {
+        const Index others = count - 1 - i;
+        MatrixXd deviations = expectation.replicate(1, 2 * others);
+        for (Index k = 0; k < others; ++k)
+            for (const int side : {0, 1})
+                for (const Index input : {i, i + 1 + k})
+                    deviations(input, 2 * k + side) +=
+                        (side == 0 ? 1.0 : -1.0) * effects.inputs[std::size_t(input)].standard_uncertainty;
+        const MatrixXd outputs = calibrations.evaluate_at(deviations);
+        for (Index k = 0; k < others; ++k) {
+            const Index j = i + 1 + k;
+            const VectorXd product =
+                (outputs.col(2 * k) - effects.value + (outputs.col(2 * k + 1) - effects.value)) / 2.0 -
+                effects.second_order.col(i) - effects.second_order.col(j);
+            result.product_variance += product.cwiseAbs2();
+            if (correlation.size() > 0) result.product_shift += correlation(i, j) * product;
+            for (Index o = 0; o < product.size(); ++o)
+                if (auto& strongest = result.strongest_product[std::size_t(o)];
+                    std::abs(product[o]) > std::abs(strongest.value))
+                    strongest = {i, j, product[o]};
+        }
+    }
+    // A pair that leaves the evaluation without a result leaves nothing to be said.
+    result.knows_products = result.product_variance.allFinite();
+}
+
 MatrixXd gain_of(const VirtualCalibrations& calibrations) {
     const Index entries = Index(calibrations.evaluator().entries().size());
     Index channels = 0;
@@ -113,8 +151,11 @@ Propagation propagate(const VirtualCalibrations& calibrations, bool full_covaria
     }
     Contributions sum(calibrations.outputs(), value, full_covariance);
     for (const Part& part : parts) sum.add(part.group, part.effect, part.degrees_of_freedom);
-    sum.add_inputs(effects.inputs, effects.first_order, effects.second_order, correlation_of(uncertain));
-    return sum.result();
+    const MatrixXd correlation = correlation_of(uncertain);
+    sum.add_inputs(effects.inputs, effects.first_order, effects.second_order, correlation);
+    Propagation result = sum.result();
+    add_products(calibrations, effects, correlation, result);
+    return result;
 }
 
 Propagation propagate(const Calibration& calibration, const VirtualCalibrations& calibrations, bool full_covariance) {
@@ -134,9 +175,11 @@ Propagation propagate(const Calibration& calibration, const VirtualCalibrations&
     const InputEffects effects = input_effects(calibrations);
     Contributions sum(calibrations.outputs(), rows * calibration_values(calibration), full_covariance);
     sum.add_covariance("readings", rows * calibration.covariance * rows.transpose());
-    sum.add_inputs(effects.inputs, effects.first_order, effects.second_order,
-                   correlation_of(calibrations.run().inputs));
-    return sum.result();
+    const MatrixXd correlation = correlation_of(calibrations.run().inputs);
+    sum.add_inputs(effects.inputs, effects.first_order, effects.second_order, correlation);
+    Propagation result = sum.result();
+    add_products(calibrations, effects, correlation, result);
+    return result;
 }
 
 }  // namespace stepdiag

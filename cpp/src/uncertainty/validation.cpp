@@ -92,15 +92,23 @@ private:
             return;
         std::string text = "u is " + number(drawn_u()) + " by Monte Carlo and " + number(u()) + " by propagation";
         const double by_squares = 2.0 * gum_.second_order.row(i_).squaredNorm();
-        const double by_t = excess_of_t();
-        const Index input = strongest_square();
-        if (by_t > 0.5 * excess && excess > 0.0)
+        const double by_products = gum_.knows_products ? gum_.product_variance[i_] : 0.0;
+        const bool explained = std::abs(by_squares + by_products - excess) < 0.5 * std::abs(excess);
+        if (excess > 0.0 && excess_of_t() > 0.5 * excess)
             text += ": a t distribution is wider than its scale, which propagation takes with its degrees of freedom";
-        else if (input >= 0 && std::abs(by_squares - excess) < 0.5 * std::abs(excess))
-            text += ": " + square_of(input, "spreads it");
-        else if (excess > 0.0) text += ": products of two inputs, or higher orders, spread it";
+        else if (explained && by_products > by_squares)
+            text += ": " + strongest_product() + "; all products together by " + number(std::sqrt(by_products));
+        else if (explained && by_squares > 0.0) text += ": " + square_of(strongest_square(), "spreads it");
+        else if (excess > 0.0)
+            text += gum_.knows_products ? ": orders above the second spread it"
+                                        : ": products of two inputs, or higher orders, spread it";
         else text += ": higher orders of the inputs take some away";
         say(text);
+    }
+    std::string strongest_product() const {
+        const auto& product = gum_.strongest_product[std::size_t(i_)];
+        return "the product of " + gum_.inputs[std::size_t(product.first)].name + " and " +
+               gum_.inputs[std::size_t(product.second)].name + " spreads it by " + number(std::abs(product.value));
     }
     double excess_of_t() const {
         double sum = 0.0;

@@ -54,11 +54,24 @@ struct Propagation {
     Eigen::MatrixXd first_order;  // a row each output, a column each input
     Eigen::MatrixXd second_order;
 
+    // What products of two deviations by u_i and u_j do, d_ij = u_i u_j d2f/dx_i dx_j: the strongest of each output,
+    // the sum of all squares (the variance they make with independent inputs), the shift of the mean where inputs are
+    // correlated. Not known of linear models and of more than largest_product_inputs inputs.
+    struct Product {
+        Eigen::Index first = -1, second = -1;  // of `inputs`
+        double value = 0.0;
+    };
+    bool knows_products = false;
+    std::vector<Product> strongest_product;
+    Eigen::VectorXd product_variance;
+    Eigen::VectorXd product_shift;
+
     // U = t_p u for this coverage probability, of degrees of freedom truncated to whole ones (G.4.1); NaN where they
     // are.
     Eigen::VectorXd expanded(double coverage = 0.95) const;
-    // The mean and standard uncertainty to second order, of independent normal inputs: sum of second_order, and
-    // sqrt(u^2 + 2 sum second_order^2). What products of two inputs do is not in them.
+    // The mean's shift and the standard uncertainty to second order: sum of second_order, with product_shift;
+    // sqrt(u^2 + 2 sum second_order^2 + product_variance), of independent normal inputs. Without products where these
+    // are not known.
     Eigen::VectorXd second_order_shift() const;
     Eigen::VectorXd second_order_uncertainty() const;
 };
@@ -66,6 +79,8 @@ struct Propagation {
 // Throws InvalidArgument for sizes that do not fit, uncertainties that are negative or not finite, degrees of freedom
 // not above 0, a correlation that is none.
 Propagation propagate(const LinearModel& model, bool full_covariance = false);
+
+inline constexpr Eigen::Index largest_product_inputs = 120;  // 14,280 evaluations
 
 // Of virtual calibrations: every input by central differences of whole calibrations at its expectation plus and minus
 // its standard uncertainty; reading noise by the evaluation's gain with its real covariance (channels independent,
