@@ -1365,8 +1365,23 @@ class Propagation:
         Names of the inputs that are drawn once: columns of first_order and second_order.
         """
     @property
+    def knows_products(self) -> bool:
+        """
+        Whether strongest_product, product_variance and product_shift are known: of virtual calibrations with up to 120 inputs.
+        """
+    @property
     def outputs(self) -> list[Output]:
         ...
+    @property
+    def product_shift(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,) by how much products of correlated inputs shift the mean; empty where not known.
+        """
+    @property
+    def product_variance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,) variance by products of two independent inputs; empty where not known.
+        """
     @property
     def second_order(self) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -1375,17 +1390,22 @@ class Propagation:
     @property
     def second_order_shift(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (m,) by how much squares of deviations shift the mean.
+        (m,) by how much squares of deviations, and products of correlated ones, shift the mean.
         """
     @property
     def second_order_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (m,) standard uncertainty with the squares of normal, independent inputs.
+        (m,) standard uncertainty with the squares and products of normal, independent inputs.
         """
     @property
     def standard_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (m,)
+        """
+    @property
+    def strongest_product(self) -> list[tuple[str, str, float]]:
+        """
+        Of each output the two inputs whose product does most when both deviate by their standard uncertainty, and what it does; empty where not known.
         """
     @property
     def value(self) -> numpy.typing.NDArray[numpy.float64]:
