@@ -197,8 +197,8 @@ void trace_visit(const LaneVisit& visit, const Outline& outline, const std::vect
 
 void define_visit(const LaneVisit& visit, const LaneClosed& closed) {
     for (std::size_t lane = 0; lane < run_lanes; lane += 2 * hn::Lanes(Tag())) {
-        MaskPair followed = all_true();
         const Pair ratio = at(*closed.index_ratio, lane), zero = common(0.0), one = common(1.0);
+        MaskPair followed = is_finite(ratio);  // else the air is out of its equation's range
         for (std::size_t row = 0; row < visit.rows; ++row) {
             Mirror mirror{*visit.setup, lane, {}, {}, {}, {}};
             place_mirror(visit, row, lane, mirror, followed);
