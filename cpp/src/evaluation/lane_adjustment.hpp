@@ -33,7 +33,7 @@ Eigen::MatrixXd lane_gain(const LaneStart& start, std::size_t readings);
 // Unknowns or readings of lane_group lanes, [index * lane_group + lane].
 class LaneNumbers {
 public:
-    explicit LaneNumbers(Eigen::Index count) : count_(count), numbers_(count * Eigen::Index(lane_group)) {}
+    explicit LaneNumbers(Eigen::Index count) : numbers_(count * Eigen::Index(lane_group)) {}
     double* data() { return numbers_.data(); }
     const double* data() const { return numbers_.data(); }
     double* at(Eigen::Index index) { return numbers_.data() + index * Eigen::Index(lane_group); }
@@ -41,7 +41,6 @@ public:
     void fill(const Eigen::VectorXd& same);  // in all lanes
 
 private:
-    Eigen::Index count_;
     AlignedNumbers numbers_;
 };
 
