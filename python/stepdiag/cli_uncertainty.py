@@ -69,7 +69,7 @@ def _points(context: click.Context, option: click.Parameter, texts: tuple[str, .
 @click.option("--adaptive", is_flag=True, help="As many samples as the digits need (JCGM 101, 7.9).")
 @click.option(
     "--digits",
-    type=click.IntRange(1, 4),
+    type=click.IntRange(1, 3),
     default=2,
     show_default=True,
     help="Significant digits of standard uncertainties, for --adaptive and --compare.",

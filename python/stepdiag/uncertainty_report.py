@@ -13,6 +13,8 @@ from stepdiag.uncertainty_result import FloatArray, UncertaintyResult, in_report
 
 # Of a budget: groups that make less than this of a variance are added up.
 SMALL_SHARE: Final = 0.005
+# JCGM 101, 7.2.2: samples that are to lie outside of an interval.
+ENOUGH: Final = 10_000
 
 
 def input_rows(inputs: _core.UncertainInputs) -> Iterator[str]:
@@ -117,6 +119,9 @@ def _monte_carlo_table(result: UncertaintyResult) -> Iterator[str]:
     lost = f", {found.lost:,} without a result" if found.lost else ""
     yield f"Monte Carlo (JCGM 101): {found.samples:,} samples, seed {result.seed}, {found.target}{lost}"
     yield from _stability(result)
+    wanted = ENOUGH / (1.0 - result.coverage)
+    if found.samples < wanted:
+        yield f"  note: JCGM 101 (7.2.2) wants about {wanted:,.0f} samples for a {_percent(result)} interval"
     u = np.asarray(found.standard_uncertainty)
     heading = ["family", "median u", "largest u", f"{_percent(result)} interval about the mean", "where"]
     rows = []
@@ -228,7 +233,7 @@ def _volume_table(result: UncertaintyResult) -> Iterator[str]:
 
 
 def _percent(result: UncertaintyResult) -> str:
-    return f"{100.0 * result.coverage:.4g} %"
+    return f"{100.0 * result.coverage:.8g} %"
 
 
 def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:

@@ -191,6 +191,7 @@ REFUSED = [
     (["--point", "1,2,nan"], "expected X,Y,Z in mm"),
     (["-o", "u.txt"], "u.txt: expected a name that ends in .nc or .csv"),
     (["-o", "nowhere/u.nc"], "the folder nowhere does not exist"),
+    (["-n", "1e4", "--digits", "4"], "4 is not in the range 1<=x<=3"),
     (["-m", "guess"], "'guess' is not one of"),
 ]  # fmt: skip
 

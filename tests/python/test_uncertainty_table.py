@@ -162,6 +162,14 @@ def test_validation_counts_what_agrees_and_says_why_the_worst_does_not() -> None
     assert table["EAX_d_low"].values == pytest.approx([3e-7, 4e-7, 5e-7], rel=1e-15)
 
 
+def test_too_few_samples_for_the_interval_are_noted() -> None:
+    result = made_up()
+    assert "wants about 200,000 samples for a 95 % interval" in "\n".join(result_rows(result))
+    assert result.monte_carlo is not None
+    result.monte_carlo.samples = 200_000
+    assert "wants about" not in "\n".join(result_rows(result))
+
+
 def test_adaptive_run_that_did_not_end_says_so() -> None:
     result = made_up()
     assert result.monte_carlo is not None
