@@ -15,6 +15,7 @@ from stepdiag.cli_evaluate import evaluate, observe
 from stepdiag.cli_head import head
 from stepdiag.cli_options import PATH, InOrder, keep_apart, keep_map, out_file, tell
 from stepdiag.cli_plan import plan
+from stepdiag.cli_study import study
 from stepdiag.cli_uncertainty import uncertainty
 
 EPILOG = """\b
@@ -35,6 +36,7 @@ SHORT = {
     "observe": "Tell what a plan and head can determine, before measuring.",
     "plan": "Tell which plan to measure in the time that there is.",
     "uncertainty": "Tell how uncertain a calibration would be.",
+    "study": "Tell the same over a grid of scenarios.",
     "simulate": "Simulate the run of a scenario.",
     "evaluate": "Calibrate the machine from a run.",
     "report": "Tell what a calibration says.",
@@ -173,7 +175,7 @@ def init(folder: Path, scenario: Path | None, head_name: str | None) -> None:
         click.echo(f"wrote {path}")
 
 
-for command in (evaluate, observe, plan, uncertainty, report, compare, head):
+for command in (evaluate, observe, plan, uncertainty, study, report, compare, head):
     command.short_help = SHORT[str(command.name)]
     cli.add_command(command)
 cli.commands = {name: cli.commands[name] for name in SHORT}  # the order in which help lists them

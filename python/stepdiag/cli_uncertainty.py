@@ -11,8 +11,10 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli_options import PATH, keep_apart, keep_map, tell
+from stepdiag.cli_workers import chosen_workers, worker_options
 
 if TYPE_CHECKING:
+    from stepdiag.dask_workers import Workers
     from stepdiag.scenario import Scenario
     from stepdiag.uncertainty_result import UncertaintyResult
     from stepdiag.uncertainty_run import Request
@@ -110,6 +112,7 @@ def _points(context: click.Context, option: click.Parameter, texts: tuple[str, .
 @click.option("--resume", is_flag=True, help="Go on from the checkpoint, to the same bits.")
 @click.option("--inputs", "list_inputs", is_flag=True, help="Only list the uncertain inputs by name.")
 @click.option("-o", "output", type=PATH, metavar="FILE", help="Result to write, netCDF (.nc) or CSV (.csv).")
+@worker_options
 def uncertainty(
     scenario: Path,
     samples: int | None,
@@ -129,6 +132,8 @@ def uncertainty(
     resume: bool,
     list_inputs: bool,
     output: Path | None,
+    scheduler: str | None,
+    workers: int | None,
 ) -> None:
     """Tell how uncertain a calibration of SCENARIO's machine would be, by what its [uncertainty] names.
 
@@ -172,6 +177,8 @@ def uncertainty(
             raise InvalidArgument(f"{output}: expected a name that ends in .nc or .csv")
         check_output(output)
         keep_apart(output, scenario)
+    if (scheduler is not None or workers is not None) and not wanted.draws:
+        raise InvalidArgument("--scheduler and --workers: go with the Monte Carlo method: -n or --adaptive")
     if (covariance or keep) and (output is None or not is_netcdf(output)):
         raise InvalidArgument(f"{'--covariance' if covariance else '--keep'}: expected -o with a name that ends in .nc")
     described = read_scenario(scenario)
@@ -183,7 +190,8 @@ def uncertainty(
         return
     for warning in scenario_warnings(described):
         tell("warning", warning)
-    result = _evaluate(described, wanted)
+    with chosen_workers(scheduler, workers) as chosen:
+        result = _evaluate(described, wanted, chosen)
     if checkpoint is None and wanted.checkpoint is not None:  # one that was named can go on to more samples
         wanted.checkpoint.unlink(missing_ok=True)
     if output is not None:
@@ -194,13 +202,15 @@ def uncertainty(
         click.echo(line)
 
 
-def _evaluate(scenario: "Scenario", wanted: "Request") -> "UncertaintyResult":
+def _evaluate(scenario: "Scenario", wanted: "Request", workers: "Workers | None") -> "UncertaintyResult":
     """With a progress bar; an interrupted run says how to go on."""
+    from stepdiag.calibration_recipe import calibration_recipe
     from stepdiag.uncertainty_run import evaluate_uncertainty
 
+    executor = workers.executor(calibration_recipe(scenario.path, wanted)) if workers is not None else None
     try:
         with Bar() as bar:
-            return evaluate_uncertainty(scenario, wanted, bar.show)
+            return evaluate_uncertainty(scenario, wanted, bar.show, executor)
     except KeyboardInterrupt:
         if wanted.draws and wanted.checkpoint is not None and wanted.checkpoint.exists():
             tell("interrupted", f"{wanted.checkpoint} keeps what is done; the same command with --resume goes on")

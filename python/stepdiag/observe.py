@@ -25,10 +25,12 @@ from stepdiag.report import (
 from stepdiag.scenario import Scenario, adjust_scenario, build_scenario, simulate_scenario
 from stepdiag.scenario_head_keys import EnvironmentSection, HeadKeys
 from stepdiag.scenario_keys import MisalignmentSection, NoiseSection, RandomSection, ScenarioKeys
+from stepdiag.scenario_uncertainty import OF_SCALE_LINES
 from stepdiag.sections import Section
 from stepdiag.setup_table import setup_rows
 from stepdiag.sheet import lost_readings
 from stepdiag.toml_text import located
+from stepdiag.uncertainty_keys import UncertaintySection
 
 PARAMETERS: Final = 21
 AnyHead = TypeVar("AnyHead", bound=HeadKeys)
@@ -126,6 +128,11 @@ def with_usual_errors(scenario: Scenario, plan: Mapping[str, Any], *, noise: boo
     measured = {*usual.plan.lines, *usual.plan.scale_lines}
     errors = keys.machine.random or RandomSection(seed=0)
 
+    uncertainty = keys.uncertainty
+    if not usual.plan.scale_lines:  # then there is nothing that these could be about
+        stated = {name: getattr(uncertainty, name) for name in uncertainty.model_fields_set - {*OF_SCALE_LINES}}
+        uncertainty = UncertaintySection.model_construct(**stated)
+
     def kept(section: AnySection, by_line: Mapping[str, Any]) -> AnySection:
         return section.model_copy(update={"by_line": {line: by_line[line] for line in by_line if line in measured}})
 
@@ -133,7 +140,7 @@ def with_usual_errors(scenario: Scenario, plan: Mapping[str, Any], *, noise: boo
         "machine": usual.machine.model_copy(update={"random": errors}),
         "misalignment": kept(keys.misalignment, keys.misalignment.by_line),
         "noise": keys.noise if noise else usual.noise,
-        "uncertainty": kept(keys.uncertainty, keys.uncertainty.by_line),
+        "uncertainty": kept(uncertainty, uncertainty.by_line),
     }
     built = build_scenario(usual.model_copy(update=sections), scenario.path)
     return dataclasses.replace(built, uncertainty=scenario.uncertainty)

@@ -9,7 +9,7 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.monte_carlo import run_monte_carlo
+from stepdiag.monte_carlo import Executor, run_monte_carlo
 from stepdiag.scenario import Scenario
 from stepdiag.toml_text import located
 from stepdiag.uncertainty_result import UncertaintyResult, find_output
@@ -68,14 +68,23 @@ class Request:
                 raise InvalidArgument(f"--joint: expected {expected}, such as C0Y,B0Z, got {','.join(names)!r}")
 
 
-def evaluate_uncertainty(scenario: Scenario, request: Request, progress: Progress | None = None) -> UncertaintyResult:
-    """Propagates, and draws if samples are asked for. `progress(done, total)` is told of samples; what it raises
-    ends the run, which then leaves its checkpoint. Raises InvalidArgument for what cannot be done."""
+def model_for(scenario: Scenario, request: Request) -> tuple[_core.VirtualCalibrations, int]:
+    """The errors at the points asked for stand behind the calibration's own values; and how many those are."""
     model = virtual_calibrations(scenario, method=request.method, seed=request.seed)
+    derived = [d for point, tool in request.points for d in _core.derived_at_point(model.calibration, point, tool=tool)]
     entries = len(model.outputs)
-    derived = _derived(model.calibration, request)
     if derived:
         model = virtual_calibrations(scenario, method=request.method, seed=request.seed, derived=derived)
+    return model, entries
+
+
+def evaluate_uncertainty(
+    scenario: Scenario, request: Request, progress: Progress | None = None, executor: Executor | None = None
+) -> UncertaintyResult:
+    """Propagates, and draws if samples are asked for, by the executor where there is one. `progress(done, total)` is
+    told of samples; what it raises ends the run, which then leaves its checkpoint. Raises InvalidArgument for what
+    cannot be done."""
+    model, entries = model_for(scenario, request)
     kept = [find_output(model.outputs, name, "--keep") for name in request.keep]
     joint = [[find_output(model.outputs, name, "--joint") for name in names] for names in request.joint]
     with located(str(scenario.path)):
@@ -106,15 +115,9 @@ def evaluate_uncertainty(scenario: Scenario, request: Request, progress: Progres
         checkpoint=request.checkpoint,
         resume=request.resume,
         progress=progress,
+        executor=executor,
     )
     return replace(result, monte_carlo=found, comparison=_core.compare(propagation, found) if request.compare else None)
-
-
-def _derived(calibration: _core.Calibration, request: Request) -> list[_core.DerivedOutput]:
-    """The error vectors at the points asked for."""
-    return [
-        derived for point, tool in request.points for derived in _core.derived_at_point(calibration, point, tool=tool)
-    ]
 
 
 def _volume(

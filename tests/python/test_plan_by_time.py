@@ -98,6 +98,23 @@ def test_uncertainties_are_those_of_a_machine_with_errors() -> None:
     assert usual > 1.1 * none
 
 
+def test_drift_counts_by_the_time_that_measuring_takes() -> None:
+    head = "[plan_by_time]\nline_change_min = 0.0\n"
+    drift = SCENARIO.replace("steps = 5", "steps = 5\nseconds_per_reading = 2.0") + (
+        "[uncertainty]\ndistance_um = 0.1\ntilt_urad = 1.0\nmachine_drift_um_per_h = 100.0\nscale_ppm = 1.0\n"
+    )
+    lines = (("ppp", "npp", "pnp", "nnp"), ("p00", "0p0", "00p"))
+    slow, fast, without = (
+        outcome(parse_scenario(text + head + times), Candidate(*lines, 5, 1))
+        for text, times in ((drift, "measure_s = 30.0\n"), (drift, ""), (drift.replace("100.0\nsc", "1e-6\nsc"), ""))
+    )
+    assert slow.seconds > 5.0 * fast.seconds
+    assert slow.worst("length") > 3.0 * fast.worst("length")  # the drift dominates: by the time, 10 times
+    assert fast.worst("length") > 1.2 * without.worst("length")
+    # A plan without scale lines has no use for what is said of them.
+    assert "scale_ppm" not in outcome(parse_scenario(drift + head), Candidate(lines[0], (), 5, 1)).trouble
+
+
 def test_four_runs_halve_what_one_leaves() -> None:
     scenario = parse_scenario(SCENARIO)
     lines = (("ppp", "npp", "pnp", "nnp"), ("p00", "0p0", "00p"))
