@@ -6,6 +6,7 @@
 
 #include "refuses.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
+#include "stepdiag/optics/replay.hpp"
 #include "uncertainty/virtual_runs.hpp"
 
 namespace {
@@ -142,6 +143,22 @@ TEST_P(OfEveryHead, SamplesAreTheSameBitsWhateverTheBlocks) {
     for (const std::uint64_t first : {32, 0, 16}) {
         worker->evaluate({first, 16, one.data()});
         EXPECT_EQ(one, together.middleCols(Eigen::Index(first), 16)) << first;
+    }
+}
+
+TEST_P(OfEveryHead, OtherInstructionSetsAgreeToRounding) {
+    VirtualRun run = run_of(GetParam());
+    run.inputs = everything(GetParam());
+    run.simulation.environment = Environment{Air{}};
+    const VirtualCalibrations model(run, {}, seed);
+    const Eigen::MatrixXd fastest = outputs_of(model);
+    const std::string before = replay_target();
+    for (const std::string& target : replay_targets()) {
+        choose_replay_target(target);
+        EXPECT_EQ(model.target(), target);
+        const Eigen::MatrixXd found = outputs_of(model);
+        choose_replay_target(before);
+        EXPECT_LE((found - fastest).cwiseAbs().maxCoeff(), rounding) << target;
     }
 }
 
