@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "refuses.hpp"
+#include "stepdiag/core/units.hpp"
 #include "stepdiag/uncertainty/function_model.hpp"
 
 using namespace stepdiag;
@@ -200,6 +201,27 @@ TEST(MonteCarlo, JointRegionsOfNormalOutputsAreThoseOfJcgm102) {
     EXPECT_LT(pair.smallest_volume, 1.1 * pair.ellipsoid_volume);
     EXPECT_NEAR(result.joint[1].ellipsoid_factor, 1.96, 0.03);
     EXPECT_NEAR(result.joint[1].ellipsoid_factor, result.joint[1].rectangle_factor, 1e-12);
+}
+
+TEST(MonteCarlo, JointRegionsOfThreeIndependentOutputsHaveTheFactorsOfJcgm102) {
+    // Units of their own: factors do not know them.
+    const FunctionModel model(
+        [](Eigen::Ref<const Values> x, Eigen::Ref<Values> y) {
+            y.row(0) = 1e-6 * x.row(0);
+            y.row(1) = 1e3 + x.row(1);
+            y.row(2) = 1e4 * x.row(2);
+        },
+        std::vector<Distribution>(3, of_kind(DistributionKind::normal, 0.0, 1.0)), outputs({"a", "b", "c"}), 6);
+    StatisticsOptions options;
+    options.joint = {{2, 0, 1}};
+    const JointRegion region = monte_carlo(model, options, 1'000'000).joint[0];
+    EXPECT_NEAR(region.ellipsoid_factor, 2.80, 0.02);  // JCGM 102, table 1: square root of chi-square, 3 degrees
+    EXPECT_NEAR(region.rectangle_factor, 2.39, 0.02);  // normal quantile of (1 + 0.95^(1/3)) / 2
+    EXPECT_NEAR(region.ellipsoid_volume / (4.0 / 3.0 * pi * std::pow(2.80, 3) * 1e-2), 1.0, 0.05);
+    EXPECT_NEAR(region.rectangle_volume / (std::pow(2.0 * 2.39, 3) * 1e-2), 1.0, 0.05);
+    EXPECT_GT(region.smallest_volume, 0.85 * region.ellipsoid_volume);  // cells of a quarter of u
+    EXPECT_LT(region.smallest_volume, 1.1 * region.ellipsoid_volume);
+    EXPECT_NEAR(region.smallest_share, 0.95, 0.001);
 }
 
 TEST(MonteCarlo, OptionsThatMakeNoSenseAreRefused) {

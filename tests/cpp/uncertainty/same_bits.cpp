@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "refuses.hpp"
+#include "stepdiag/optics/replay.hpp"
 #include "stepdiag/uncertainty/function_model.hpp"
 #include "stepdiag/uncertainty/monte_carlo.hpp"
 
@@ -88,6 +89,32 @@ TEST(SameBits, ForRangesComputedByOneThreadEach) {
     EXPECT_TRUE(bytes_of(all) == bytes_of(run_leaves(model, bins, 0, leaves)));
 }
 
+TEST(SameBits, AreThoseOfOneInstructionSetAndOthersAreRefused) {
+    const FunctionModel model = curved();
+    const std::vector<std::string> targets = replay_targets();
+    const Bins bins = make_bins(model, options);
+    const MonteCarloResult fastest = run_leaves(model, bins, 0, leaves).result();
+    EXPECT_EQ(fastest.target, targets.front());
+    for (std::size_t i = 1; i < targets.size(); ++i) {
+        choose_replay_target(targets[i]);
+        EXPECT_THROW(run_leaves(model, bins, 0, 1), InvalidArgument);
+        const Bins its_bins = make_bins(model, options);
+        const MonteCarloResult result = run_leaves(model, its_bins, 0, leaves).result();
+        choose_replay_target(targets.front());
+        EXPECT_EQ(result.target, targets[i]);
+        expect_refused([&] { check_same_run(bins, its_bins); }, "expected instruction set " + targets.front());
+        // The same samples to rounding: a few of them may fall into the bin beside.
+        const auto near = [](const auto& a, const auto& b, double tolerance) {
+            return (a - b).cwiseAbs().maxCoeff() < tolerance;
+        };
+        EXPECT_TRUE(near(result.mean, fastest.mean, 1e-12)) << targets[i];
+        EXPECT_TRUE(near(result.standard_uncertainty, fastest.standard_uncertainty, 1e-12)) << targets[i];
+        EXPECT_TRUE(near(*result.covariance, *fastest.covariance, 1e-11)) << targets[i];
+        EXPECT_TRUE(near(result.symmetric, fastest.symmetric, 1e-3)) << targets[i];
+        EXPECT_EQ(result.samples, fastest.samples) << targets[i];
+    }
+}
+
 TEST(PartialStatistics, OfAnotherRunAreRefusedSayingInWhat) {
     const Bins bins = make_bins(curved(), options);
     PartialStatistics part(bins);
@@ -144,7 +171,9 @@ TEST(RunLeaves, ExceptionsOfTheModelAndOfTheQuestionComeThrough) {
     // What was done by then stays, and is whole.
     ASSERT_EQ(part.leaves().front().first, 0u);
     const std::uint64_t end = part.leaves().front().second;
-    if (part.leaves().size() == 1u) EXPECT_TRUE(bytes_of(part) == bytes_of(run_leaves(model, bins, 0, end)));
+    if (part.leaves().size() == 1u) {
+        EXPECT_TRUE(bytes_of(part) == bytes_of(run_leaves(model, bins, 0, end)));
+    }
     EXPECT_EQ(part.samples() + part.lost(), [&] {
         std::uint64_t leaves_done = 0;
         for (const LeafRange& range : part.leaves()) leaves_done += range.second - range.first;
