@@ -183,6 +183,7 @@ def workers_of(
             dashboard_address=None,
             memory_limit=0,  # what a run takes is known beforehand, and Dask would stop workers
             silence_logs=logging.CRITICAL,
+            preload=["stepdiag.dask_preload"],
         ) as cluster,
         distributed.Client(cluster, set_as_default=False) as client,
     ):

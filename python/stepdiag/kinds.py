@@ -63,11 +63,13 @@ def _head_of(text: str) -> tuple[list[str], str]:
 
 
 def _toml(path: Path) -> Finding:
-    """A head where nothing but a head has such sections, else a scenario."""
+    """A head or a study where nothing but such a file has its sections, else a scenario."""
     from stepdiag.files import read_text
     from stepdiag.toml_text import parse_toml
 
     content = parse_toml(read_text(path), str(path))
+    if "study" in content:
+        return _study(path)
     return _head(path) if {"beam", "body", "sensor"} & content.keys() else _scenario(path)
 
 
@@ -77,6 +79,13 @@ def _head(path: Path) -> Finding:
     design = read_head_design(path)
     counts = f"{len(design.bodies)} bodies, {len(design.beams)} beams, {len(design.sensors)} sensors"
     return Finding("head", f"{design.name}, layout {design.layout}, {counts}")
+
+
+def _study(path: Path) -> Finding:
+    from stepdiag.study_keys import read_study
+
+    study = read_study(path)
+    return Finding("study", f"{' x '.join(map(str, study.shape))} cells of {study.settings.samples} samples")
 
 
 def _scenario(path: Path) -> Finding:

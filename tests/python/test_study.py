@@ -54,6 +54,11 @@ def test_grid_is_the_product_and_groups_go_together(folder: Path) -> None:
     assert cells[3].content["volume"] == study.content["volume"]
 
 
+def test_check_knows_a_study(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "study.toml"]) == 0
+    assert capsys.readouterr().out == "study.toml: study: 2 x 2 x 1 cells of 2000 samples\n"
+
+
 def test_quoted_and_nested_keys_are_the_same(folder: Path) -> None:
     dotted = read_study("study.toml")
     Path("study.toml").write_text(SMALL.replace("plan.steps =", '"plan.steps" ='))
