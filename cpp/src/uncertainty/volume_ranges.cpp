@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "uncertainty/derived_parts.hpp"
+#include "uncertainty/extremes.hpp"
 
 namespace stepdiag {
 namespace {
@@ -38,40 +39,6 @@ AxisState between(const AxisTable& table, Index interval, double t) {
                 t * (table.position[std::size_t(interval) + 1] - table.position[std::size_t(interval)]),
             mix(table.delta.col(interval), table.delta.col(interval + 1)),
             mix(table.theta.col(interval), table.theta.col(interval + 1))};
-}
-
-// The corners of the upper convex hull of the points (x_k, y_k), x ascending.
-class UpperHull {
-public:
-    UpperHull(const std::vector<double>& x, const VectorXd& y) {
-        for (std::size_t k = 0; k < x.size(); ++k) {
-            while (x_.size() >= 2 && (y_.back() - y_[y_.size() - 2]) * (x[k] - x_.back()) <=
-                                         (y[Index(k)] - y_.back()) * (x_.back() - x_[x_.size() - 2])) {
-                x_.pop_back();
-                y_.pop_back();
-            }
-            x_.push_back(x[k]);
-            y_.push_back(y[Index(k)]);
-        }
-    }
-    // The largest y + slope x. `corner`: where it was last time, a good start for a slope that is much the same.
-    double support(double slope, std::size_t& corner) const {
-        const auto rises = [&](std::size_t k) { return y_[k + 1] - y_[k] + slope * (x_[k + 1] - x_[k]) > 0.0; };
-        while (corner + 1 < x_.size() && rises(corner)) ++corner;
-        while (corner > 0 && !rises(corner - 1)) --corner;
-        return y_[corner] + slope * x_[corner];
-    }
-
-private:
-    std::vector<double> x_;
-    std::vector<double> y_;
-};
-
-// The largest value of a parabola between its ends that rises by `sag` above the middle of their chord.
-double top_of_arc(double begin, double end, double sag) {
-    const double slope = (end - begin) / (4.0 * sag);
-    if (!(sag > 0.0 && std::abs(slope) < 1.0)) return std::max(begin, end);
-    return (begin + end) / 2.0 + sag * (1.0 + slope * slope);
 }
 
 }  // namespace
@@ -212,17 +179,29 @@ double VolumeRanges::Grid::search_cells(const std::array<AxisTable, 3>& tables, 
         const AxisState one{tables[0].position[std::size_t(i)], tables[0].delta.col(i), tables[0].theta.col(i)};
         return sign * deviation({one, two, three})[component];
     };
+    const auto highest_corner = [&](Index i, Index j, Index k) {
+        double highest = -std::numeric_limits<double>::infinity();
+        for (const Index a : {i, i + 1})
+            for (const Index b : {j, j + 1})
+                for (const Index c : {k, k + 1})
+                    highest = std::max(highest, at.own[0][a] + at.own[1][b] + at.own[2][c] +
+                                                    at.g12[a] * tables[1].position[std::size_t(b)] +
+                                                    (at.g13[a] + at.g23[b]) * tables[2].position[std::size_t(c)]);
+        return highest;
+    };
     for (Index i = 0; i < at.sag[0].size(); ++i)
         for (Index j = 0; j < at.sag[1].size(); ++j) {
             const double higher = std::max(at.sag[0][i], 0.0) + std::max(at.sag[1][j], 0.0) + sag3;
             if (!(top.block<2, 2>(i, j).maxCoeff() + higher > best)) continue;
-            for (int b = 0; b <= finer; ++b) {
-                const AxisState two = between(tables[1], j, double(b) / finer);
-                for (Index k = 0; k < at.sag[2].size(); ++k)
+            for (Index k = 0; k < at.sag[2].size(); ++k) {
+                if (!(highest_corner(i, j, k) + higher > best)) continue;
+                for (int b = 0; b <= finer; ++b) {
+                    const AxisState two = between(tables[1], j, double(b) / finer);
                     for (int c = 0; c <= parts; ++c) {
                         const AxisState three = between(tables[2], k, double(c) / parts);
                         best = std::max(best, top_of_arc(value(i, two, three), value(i + 1, two, three), at.sag[0][i]));
                     }
+                }
             }
         }
     return best;

@@ -1,7 +1,9 @@
 // Draws of the ranges from the joint normal distribution of a calibration's values.
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <thread>
 
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/core/random.hpp"
@@ -112,14 +114,23 @@ VolumetricAccuracy volumetric_accuracy(const Calibration& calibration, const std
 
     const Index count = Index(options.samples), together = 16;
     MatrixXd drawn(count, range_count), of_noise(count, range_count);
-    for (Index begin = 0; begin < count; begin += together) {
-        const Index here = std::min(together, count - begin);
-        const MatrixXd noise = root * normal_numbers(options.seed, std::uint64_t(begin), root.cols(), here);
-        for (Index s = 0; s < here; ++s) {
-            drawn.row(begin + s) = ranges.evaluate(values + noise.col(s)).transpose();
-            of_noise.row(begin + s) = ranges.evaluate(noise.col(s)).transpose();
+    std::atomic<Index> next{0};
+    // A sample's numbers depend on its index alone, so that threads make no difference.
+    const auto draw_blocks = [&] {
+        for (Index begin; (begin = together * next++) < count;) {
+            const Index here = std::min(together, count - begin);
+            const MatrixXd noise = root * normal_numbers(options.seed, std::uint64_t(begin), root.cols(), together);
+            for (Index s = 0; s < here; ++s) {
+                drawn.row(begin + s) = ranges.evaluate(values + noise.col(s)).transpose();
+                of_noise.row(begin + s) = ranges.evaluate(noise.col(s)).transpose();
+            }
         }
-    }
+    };
+    std::vector<std::thread> others(std::max(std::thread::hardware_concurrency(), 1u) - 1);
+    for (std::thread& other : others) other = std::thread(draw_blocks);
+    draw_blocks();
+    for (std::thread& other : others) other.join();
+
     VolumetricAccuracy result;
     result.value = ranges.evaluate(values);
     result.mean = drawn.colwise().mean();
