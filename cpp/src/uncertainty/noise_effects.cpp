@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <variant>
 
 #include "simulation/visit_readings.hpp"
 #include "stepdiag/core/error.hpp"
@@ -35,9 +36,20 @@ std::vector<std::string> signals_of(const Measurement& measurement) {
     return names;
 }
 
-VectorXd readings_of(const VirtualRun& run, const Machine& machine) {
+bool has_noise(const Head& head) {
+    if (!head.design) return false;
+    const auto is_noisy = [](const SpotSensor& sensor) {
+        if (const auto* camera = std::get_if<Camera>(&sensor.device))
+            return camera->shot_noise || camera->read_noise > 0.0;
+        return std::get<LateralEffect>(sensor.device).noise > 0.0;
+    };
+    return std::any_of(head.design->sensors.begin(), head.design->sensors.end(), is_noisy);
+}
+
+VectorXd readings_of(const VirtualRun& run, const Machine& machine, std::uint64_t seed = 0) {
     SimulationOptions options = run.simulation;
     options.noise = {};
+    options.noise.seed = seed;
     if (!options.seconds_per_reading) options.seconds_per_reading = run.seconds_per_reading;
     const Measurement measurement = simulate(machine, run.plan, run.heads, options);
     const auto channels = signals_of(measurement);
@@ -54,6 +66,22 @@ VectorXd readings_of(const VirtualRun& run, const Machine& machine) {
 }
 
 }  // namespace
+
+VectorXd sensor_noise(const VirtualRun& run) {
+    bool any = has_noise(run.heads.head);
+    for (const auto& [line, head] : run.heads.by_line) any = any || has_noise(head);
+    if (!any) return {};
+    // Outputs sum up hundreds of readings, so that theirs is known to about a hundredth.
+    constexpr int runs = 16;
+    MatrixXd readings;
+    for (int i = 0; i < runs; ++i) {
+        const VectorXd one = readings_of(run, run.machine, std::uint64_t(i) + 1);
+        if (i == 0) readings.resize(one.size(), runs);
+        readings.col(i) = one;
+    }
+    const VectorXd mean = readings.rowwise().mean();
+    return ((readings.colwise() - mean).rowwise().squaredNorm() / double(runs - 1)).cwiseSqrt();
+}
 
 Eigen::Matrix<double, Eigen::Dynamic, 6> pose_sensitivity(const VirtualRun& run, const Measurement& nominal) {
     const Chain& chain = run.machine.chain();

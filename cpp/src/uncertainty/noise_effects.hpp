@@ -14,6 +14,10 @@ namespace stepdiag {
 // run's rows.
 Eigen::Matrix<double, Eigen::Dynamic, 6> pose_sensitivity(const VirtualRun& run, const Measurement& nominal);
 
+// Standard deviation of each reading by the noise of the sensors of traced heads (shot and read noise of cameras, noise
+// of position devices), from a few simulated runs; empty where no sensor has any.
+Eigen::VectorXd sensor_noise(const VirtualRun& run);
+
 class NoiseEffects {
 public:
     // `gain`: d output / d reading.
@@ -21,6 +25,7 @@ public:
 
     // Columns: what each number drawn for a noise does to the outputs, for a number of 1.
     Eigen::MatrixXd of(const ReadingNoise& noise) const;
+    const Eigen::MatrixXd& gain() const { return gain_; }
 
 private:
     Eigen::MatrixXd of_distances() const;  // the same length in all distances of a row

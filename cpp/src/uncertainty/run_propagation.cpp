@@ -1,6 +1,7 @@
 // Propagation through virtual calibrations.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/uncertainty/derived.hpp"
@@ -140,7 +141,8 @@ Propagation propagate(const VirtualCalibrations& calibrations, bool full_covaria
     };
     VectorXd value = effects.value;
     std::vector<Part> parts;
-    if (!uncertain.noise.empty()) {
+    const VectorXd by_sensors = sensor_noise(calibrations.run());
+    if (!uncertain.noise.empty() || by_sensors.size() > 0) {
         const NoiseEffects noises(calibrations, gain_of(calibrations));
         for (const ReadingNoise& noise : uncertain.noise) {
             MatrixXd effect = noises.of(noise);
@@ -148,6 +150,9 @@ Propagation propagate(const VirtualCalibrations& calibrations, bool full_covaria
             effect *= gum_uncertainty(noise.distribution);
             parts.push_back({budget_group(noise), std::move(effect), noise.distribution.degrees_of_freedom});
         }
+        if (by_sensors.size() > 0)
+            parts.push_back(
+                {"noise of sensors", noises.gain() * by_sensors.asDiagonal(), std::numeric_limits<double>::infinity()});
     }
     Contributions sum(calibrations.outputs(), value, full_covariance);
     for (const Part& part : parts) sum.add(part.group, part.effect, part.degrees_of_freedom);
