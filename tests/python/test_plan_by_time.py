@@ -221,6 +221,12 @@ def test_command_says_which_plan_to_take(scenario: str, capsys: pytest.CaptureFi
     assert float(row.split()[1]) <= 20.0
 
 
+def test_page_has_the_table_of_the_example(capsys: pytest.CaptureFixture[str]) -> None:
+    root = Path(__file__).parents[2]
+    assert main(["plan", str(root / "examples" / "scenario.toml")]) == 0
+    assert capsys.readouterr().out in (root / "docs" / "study.md").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
