@@ -44,9 +44,9 @@ class StudySection(Section):
         "the path of a scenario", "The scenario to vary, relative to this file.", example="scenario.toml"
     )
     methods: Annotated[tuple[Method, ...], Field(min_length=1)] = key(
-        'a list of "enhanced", "conventional", "adjustment" and "one_step"',
+        'a list of "adjustment", "enhanced", "conventional" and "one_step"',
         "What virtual calibrations are evaluated with; several make a dimension of their own.",
-        ("enhanced",),
+        ("adjustment",),
     )
     samples: Annotated[int, Field(ge=0, le=4_000_000_000)] = key(
         "a whole number from 0 to 4e9", "Virtual calibrations in each cell; 0: propagation alone.", 10_000

@@ -27,7 +27,7 @@ MOST_SAMPLES: Final = 10_000_000
 class Request:
     """What is asked for. `points`: commanded positions, each with a tool offset of its own or None (mm)."""
 
-    method: Method = "enhanced"
+    method: Method = "adjustment"
     samples: int | None = None
     adaptive: bool = False
     digits: int = 2

@@ -11,11 +11,11 @@ from stepdiag.scenario_uncertainty import STATE_OF_AIR
 from stepdiag.toml_text import located
 
 Method = Literal["conventional", "enhanced", "adjustment", "one_step"]
-METHODS: Final = ("enhanced", "conventional", "adjustment", "one_step")
+METHODS: Final = ("adjustment", "enhanced", "conventional", "one_step")
 
 
 def virtual_calibrations(
-    scenario: Scenario, *, method: Method = "enhanced", seed: int = 0, derived: Sequence[Any] = ()
+    scenario: Scenario, *, method: Method = "adjustment", seed: int = 0, derived: Sequence[Any] = ()
 ) -> _core.VirtualCalibrations:
     """The model that draws the scenario's uncertain inputs, traces the run and evaluates it, sample after sample.
 

@@ -49,7 +49,7 @@ def test_grid_is_the_product_and_groups_go_together(folder: Path) -> None:
     assert study.shape == (2, 2, 1)
     cells = list(study.cells())
     assert [cell.index for cell in cells] == [(0, 0, 0), (0, 1, 0), (1, 0, 0), (1, 1, 0)]
-    assert cells[1].name == "plan.steps = 2, noise.distance_um = 0.2, noise.tilt_urad = 2.0, method = enhanced"
+    assert cells[1].name == "plan.steps = 2, noise.distance_um = 0.2, noise.tilt_urad = 2.0, method = adjustment"
     assert cells[3].content["noise"] == {"distance_um": 0.2, "tilt_urad": 2.0, "seed": 3}
     assert cells[3].content["volume"] == study.content["volume"]
 
