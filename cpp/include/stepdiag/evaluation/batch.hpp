@@ -32,8 +32,9 @@ class BatchEvaluator {
 public:
     // `pattern`: a run of this plan whose readings are there; rows and channels of all sets are like its own. For the
     // adjustment it is also where each set's solution starts. Readings that it lost are lost in all sets. The linear
-    // methods weigh all sets as the pattern: what moves a value by less than a thousandth of its uncertainty beside an
-    // evaluation of the set by itself. Throws InvalidArgument like the evaluation itself.
+    // methods weigh all sets as the pattern: what moves a value by a thousandth of its uncertainty or so beside an
+    // evaluation of the set by itself (most with beams that stand close together). Throws InvalidArgument like the
+    // evaluation itself.
     BatchEvaluator(const Measurement& pattern, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
                    const HeadCalibrations& heads, const BatchOptions& options);
     ~BatchEvaluator();
