@@ -5,8 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.monte_carlo import Executor, run_monte_carlo
@@ -126,21 +124,5 @@ def _volume(
     """Of the calibration with the covariance that was propagated to it."""
     covariance = propagation.covariance
     assert covariance is not None
-    known = np.sqrt(np.diagonal(covariance))[:entries]
-    rows: dict[str, list[int]] = {}
-    for k, output in enumerate(propagation.outputs[:entries]):
-        rows.setdefault(output.name, []).append(k)
-    propagated = _core.Calibration(
-        calibration.method,
-        calibration.chain,
-        calibration.volume,
-        calibration.tool,
-        {name: (x, y, known[rows[name]]) for name, (x, y, _) in calibration.functions.items()},
-        {name: (y, known[rows[name][0]]) for name, (y, _) in calibration.squareness.items()},
-        undetermined_slopes=calibration.undetermined_slopes,
-        undetermined=calibration.undetermined,
-        covariance=covariance[:entries, :entries],
-        reversal=calibration.reversal,
-        undetermined_reversal_constants=calibration.undetermined_reversal_constants,
-    )
-    return _core.volumetric_accuracy(propagated, coverage=request.coverage, seed=request.seed)
+    known = _core.with_covariance(calibration, covariance[:entries, :entries])
+    return _core.volumetric_accuracy(known, coverage=request.coverage, seed=request.seed)
