@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from coverage_cases import CASES, Case, coverages, draw, labels, outcomes
 
-MACHINES = 150
+MACHINES = 120
 HOLD = [name for name, case in CASES.items() if not case.wrong]
 
 
 def assert_rms(family: str, z: np.ndarray) -> None:
     """Mean squares of normal deviates. A machine's nodes are correlated: as if they were one (they are some more)."""
-    # The mean of chi-square/1 over n machines has a standard deviation of sqrt(2/n): 12 %; five of them.
+    # The mean of chi-square/1 over n machines has a standard deviation of sqrt(2/n): 13 %; five of them.
     assert abs(np.mean(z**2) - 1.0) <= 5.0 * np.sqrt(2.0 / len(z)), family
 
 
@@ -23,7 +23,7 @@ def test_intervals_cover_the_truth_where_the_model_holds(name: str) -> None:
     families = np.array([family for family, _, _ in labels()])
     for family, coverage in coverages(z).items():
         assert_rms(family, z[:, families == family])
-        # Four binomial standard deviations, 7 %, of the mean over nodes, which varies no more than one of them.
+        # Four binomial standard deviations, 8 %, of the mean over nodes, which varies no more than one of them.
         assert abs(coverage.pooled - 0.95) <= coverage.tolerance, (family, coverage)
         # The worst of up to 90 nodes: five and a half of them below, no node above 1.
         assert coverage.lowest >= 0.95 - 1.375 * coverage.tolerance, (family, coverage)
@@ -32,7 +32,7 @@ def test_intervals_cover_the_truth_where_the_model_holds(name: str) -> None:
 @pytest.mark.parametrize("name", list(coverage_propagated.CASES))
 def test_propagated_intervals_cover_the_truth(name: str) -> None:
     """Fewer machines: each takes some sixty derivatives of whole calibrations."""
-    z = np.array([coverage_propagated.outcome(coverage_propagated.CASES[name], seed) for seed in range(40)])
+    z = np.array([coverage_propagated.outcome(coverage_propagated.CASES[name], seed) for seed in range(30)])
     families = np.array([family for family, _, _ in labels()])
     for family, coverage in coverages(z).items():
         assert_rms(family, z[:, families == family])

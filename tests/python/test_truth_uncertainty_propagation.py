@@ -129,7 +129,7 @@ def centred(entries: list[Any]) -> list[Any]:
 
 def small(layout: str, seed: int) -> tuple[reference.Scenario, reference.ErrorTable]:
     scenario, table = scenario_of(layout, seed)
-    return replace(scenario, steps=3, lines=["ppp", "npp", "nnp", "pnp"]), table
+    return replace(scenario, steps=2, lines=["ppp", "npp", "nnp", "pnp"]), table
 
 
 def order_of(calibrations: Any, labels: list[tuple[str, float]]) -> list[int]:
