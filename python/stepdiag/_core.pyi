@@ -1142,7 +1142,7 @@ class DerivedOutput:
         row: coefficients by entry, in the order of Calibration.covariance_labels. A tuple of the three does as well where one is expected.
         """
     @typing.overload
-    def __init__(self, arg0: tuple) -> None:
+    def __init__(self, arg0: tuple[str, str, numpy.typing.ArrayLike]) -> None:
         ...
     @property
     def name(self) -> str:
@@ -1233,7 +1233,6 @@ class VolumetricAccuracy:
     """
     ISO 230-1's V_XYZ: the ranges over the volume of the deviations X, Y, Z (mm) of the functional point and A, B, C (rad) of the tool, and the ranges of the four body diagonals' errors (mm); in the order of `names`. A range is not linear in the parameters and noise makes it larger: `bias` says about how much larger `value` is than the true range; `interval` takes that off.
     """
-    names: typing.ClassVar[list] = ['V_X', 'V_Y', 'V_Z', 'V_A', 'V_B', 'V_C', 'E_D ppp', 'E_D npp', 'E_D pnp', 'E_D nnp']
     @property
     def bias(self) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -1264,6 +1263,9 @@ class VolumetricAccuracy:
         """
         Name -> parameters that act in it and are not determined; its numbers are NaN.
         """
+    @property
+    def names(self) -> typing.Annotated[list[str], "FixedSize(10)"]:
+        ...
     @property
     def resolution(self) -> float:
         """

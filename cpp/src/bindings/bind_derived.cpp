@@ -1,3 +1,5 @@
+#include <pybind11/typing.h>
+
 #include "bindings.hpp"
 #include "stepdiag/uncertainty/derived.hpp"
 
@@ -95,7 +97,7 @@ void bind_volume(py::module_& m) {
         "B, C (rad) of the tool, and the ranges of the four body diagonals' errors (mm); in the order of `names`. A "
         "range is not linear in the parameters and noise makes it larger: `bias` says about how much larger `value` is "
         "than the true range; `interval` takes that off.")
-        .def_property_readonly_static("names", [](const py::object&) { return range_names; })
+        .def_property_readonly("names", [](const VolumetricAccuracy&) { return range_names; })
         .def_property_readonly("value", column(&VolumetricAccuracy::value), "(10,) of the calibration's values.")
         .def_property_readonly("mean", column(&VolumetricAccuracy::mean), "(10,) of the draws.")
         .def_property_readonly("standard_uncertainty", column(&VolumetricAccuracy::standard_uncertainty),
@@ -161,7 +163,7 @@ void bind_derived(py::module_& m) {
              py::arg("name"), py::arg("unit"), py::arg("row"),
              "row: coefficients by entry, in the order of Calibration.covariance_labels. A tuple of the three does as "
              "well where one is expected.")
-        .def(py::init([](const py::tuple& parts) {
+        .def(py::init([](const py::typing::Tuple<py::str, py::str, ArrayLike>& parts) {
             if (parts.size() != 3) throw InvalidArgument("derived: expected (name, unit, row)");
             return DerivedOutput{parts[0].cast<std::string>(), parts[1].cast<std::string>(),
                                  to_vector(parts[2], "derived")};
