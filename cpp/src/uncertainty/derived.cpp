@@ -189,7 +189,8 @@ std::vector<DerivedOutput> derived_at_point(const Calibration& calibration, cons
     std::vector<DerivedOutput> outputs;
     for (int c = 0; c < deviation_count; ++c)
         if (deviations.missing[std::size_t(c)].empty())
-            outputs.push_back({std::string("e_") + deviation_names[std::size_t(c)] + " at " + text_of(point),
+            outputs.push_back({std::string("e_") + deviation_names[std::size_t(c)] + " at " + text_of(point) +
+                                   (tool ? " with tool " + text_of(*tool) : ""),
                                c < 3 ? "mm" : "rad", deviations.rows.row(c).transpose()});
     return outputs;
 }

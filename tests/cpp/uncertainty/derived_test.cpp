@@ -208,6 +208,8 @@ TEST(Derived, OutputsOfPointsAndDiagonalsAreRowsOnTheEntries) {
     ASSERT_EQ(at_point.size(), 6u);
     EXPECT_EQ(at_point[0].name, "e_X at (400, 300, 250)");
     EXPECT_EQ(at_point[4].unit, "rad");
+    const auto with_tool = derived_at_point(calibration, {400, 300, 250}, Vector3d(0, 0, -80));
+    EXPECT_EQ(with_tool[1].name, "e_Y at (400, 300, 250) with tool (0, 0, -80)");
     const ErrorAtPoint error = error_at_point(calibration, {400, 300, 250});
     for (int c = 0; c < 6; ++c) EXPECT_NEAR(at_point[c].row.dot(values), error.value[c], 1e-15);
     EXPECT_EQ(derived_on_diagonals(calibration).size(), 28u);
