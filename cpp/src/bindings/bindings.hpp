@@ -92,7 +92,7 @@ void bind_uncertain_inputs(py::module_& m);
 void bind_instruction_set(py::module_& m);
 void bind_sample_model(py::module_& m);
 void bind_virtual_calibration(py::module_& m);  // after bind_uncertain_inputs, bind_sample_model, bind_adjustment
-void bind_monte_carlo(py::module_& m);  // after bind_sample_model
+void bind_monte_carlo(py::module_& m);          // after bind_sample_model
 
 }  // namespace stepdiag::bindings
 
