@@ -191,3 +191,7 @@ def test_bad_input_is_refused() -> None:
         virtual([normal("laser", 1e-4, line="ppp")]).evaluate_at([[1.0], [2.0]])
     with pytest.raises(sd.InvalidArgument, match="pp0"):
         virtual([normal("laser", 1e-4, line="pp0")])
+    with pytest.raises(sd.InvalidArgument, match="first_sample"):
+        virtual([]).evaluate(-1, 16)
+    with pytest.raises(sd.InvalidArgument, match="sample"):
+        virtual([]).readings(-1)

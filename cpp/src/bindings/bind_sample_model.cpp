@@ -52,7 +52,8 @@ void bind_sample_model(py::module_& m) {
             "evaluate",
             [](const SampleModel& model, const IntegerLike& first_sample, const IntegerLike& samples) {
                 const auto count = to_integer(samples, "samples", 0, std::int64_t(1) << 32);
-                return evaluate(model, to_seed(first_sample), std::size_t(count));
+                const auto first = to_integer(first_sample, "first_sample", 0, std::int64_t(1) << 62);
+                return evaluate(model, std::uint64_t(first), std::size_t(count));
             },
             py::arg("first_sample"), py::arg("samples"),
             "Array (outputs, samples); NaN in all outputs of a sample that gave no result. Raises InvalidArgument.");

@@ -6,6 +6,10 @@
 namespace stepdiag::bindings {
 namespace {
 
+std::uint64_t to_sample(const IntegerLike& number) {
+    return std::uint64_t(to_integer(number, "sample", 0, std::int64_t(1) << 62));
+}
+
 EvaluationMethod to_method(const std::string& text) {
     for (const auto& [name, method] :
          {std::pair("conventional", EvaluationMethod::conventional), std::pair("enhanced", EvaluationMethod::enhanced),
@@ -116,7 +120,7 @@ void bind_virtual_calibration(py::module_& m) {
         .def(
             "readings",
             [](const VirtualCalibrations& v, const IntegerLike& sample) {
-                const std::uint64_t index = to_seed(sample);
+                const std::uint64_t index = to_sample(sample);
                 Eigen::VectorXd readings;
                 {
                     py::gil_scoped_release release;
@@ -131,7 +135,7 @@ void bind_virtual_calibration(py::module_& m) {
     m.def(
         "drawn_inputs",
         [](const UncertainInputs& inputs, const IntegerLike& seed, const IntegerLike& sample) {
-            return to_numpy_vector(drawn_inputs(inputs, to_seed(seed), to_seed(sample)));
+            return to_numpy_vector(drawn_inputs(inputs, to_seed(seed), to_sample(sample)));
         },
         py::arg("inputs"), py::arg("seed"), py::arg("sample"),
         "Deviations of one sample's inputs, in their order. Raises InvalidArgument.");
