@@ -120,7 +120,7 @@ def _monte_carlo_table(result: UncertaintyResult) -> Iterator[str]:
     yield f"Monte Carlo (JCGM 101): {found.samples:,} samples, seed {result.seed}, {found.target}{lost}"
     yield from _stability(result)
     wanted = ENOUGH / (1.0 - result.coverage)
-    if found.samples < wanted:
+    if found.stability is None and found.samples < wanted:
         yield f"  note: JCGM 101 (7.2.2) wants about {wanted:,.0f} samples for a {_percent(result)} interval"
     u = np.asarray(found.standard_uncertainty)
     heading = ["family", "median u", "largest u", f"{_percent(result)} interval about the mean", "where"]
@@ -157,7 +157,7 @@ def _validation_table(result: UncertaintyResult) -> Iterator[str]:
             reasons.append(f"  {family}, {label(result.outputs[worst])}: {_in_report_signs(found.reason[worst])}")
     yield (
         f"validation of the propagation (JCGM 101, 8): ends of y ± U beside those of the {_percent(result)} interval, "
-        f"to {found.digits} digits of u"
+        f"to {_digits(result)} of u"
     )
     yield from _table(["family", "validated", "largest d", "tolerance", "sampling", "where"], rows)
     if reasons:
@@ -176,12 +176,12 @@ def _stability(result: UncertaintyResult) -> Iterator[str]:
     if found.stability is None:
         return
     if found.stability.stable:
-        yield f"  adaptive: every output is stable to {result.digits} digits of its u (JCGM 101, 7.9)"
+        yield f"  adaptive: every output is stable to {_digits(result)} of its u (JCGM 101, 7.9)"
     else:
         worst = result.outputs[found.stability.output]
         yield (
             f"  adaptive: {found.stability.unstable} of {len(result.outputs)} outputs are not yet stable to "
-            f"{result.digits} digits of their u; the {found.stability.figure} of {label(worst)} is the worst, "
+            f"{_digits(result)} of their u; the {found.stability.figure} of {label(worst)} is the worst, "
             f"{found.stability.ratio:.3g} times the tolerance; -n sets the largest number of samples"
         )
 
@@ -230,6 +230,10 @@ def _volume_table(result: UncertaintyResult) -> Iterator[str]:
         rows.append([name, f"{value:.4g} {unit}", f"{u:.3g} {unit}", f"{low:.4g} .. {high:.4g} {unit}"])
     yield "ranges over the volume (V_XYZ of ISO 230-1, errors of body diagonals), by the propagated covariance:"
     yield from _table(["range", "value", "u", f"{_percent(result)} interval"], rows)
+
+
+def _digits(result: UncertaintyResult) -> str:
+    return "1 digit" if result.digits == 1 else f"{result.digits} digits"
 
 
 def _percent(result: UncertaintyResult) -> str:
