@@ -1,5 +1,6 @@
 #include <memory>
 
+#include "batch_arguments.hpp"
 #include "bindings.hpp"
 #include "stepdiag/uncertainty/virtual_calibration.hpp"
 
@@ -8,15 +9,6 @@ namespace {
 
 std::uint64_t to_sample(const IntegerLike& number) {
     return std::uint64_t(to_integer(number, "sample", 0, std::int64_t(1) << 62));
-}
-
-EvaluationMethod to_method(const std::string& text) {
-    for (const auto& [name, method] :
-         {std::pair("conventional", EvaluationMethod::conventional), std::pair("enhanced", EvaluationMethod::enhanced),
-          std::pair("adjustment", EvaluationMethod::adjustment), std::pair("one_step", EvaluationMethod::one_step)})
-        if (text == name) return method;
-    throw InvalidArgument("method: expected \"conventional\", \"enhanced\", \"adjustment\" or \"one_step\", got \"" +
-                          text + "\"");
 }
 
 std::unique_ptr<VirtualCalibrations> make(
@@ -40,15 +32,8 @@ std::unique_ptr<VirtualCalibrations> make(
         machine,    plan,
         actual,     calibration_heads ? to_heads(*calibration_heads, plan).calibration() : actual.calibration(),
         simulation, inputs};
-    BatchOptions evaluation;
-    evaluation.method = to_method(method);
-    evaluation.uncertainty = evaluation.adjustment.uncertainty = uncertainty;
-    evaluation.adjustment.setup = setup.value;
-    for (const auto& [line, priors] : setup_by_line) evaluation.adjustment.setup_by_line[line] = priors.value;
-    evaluation.adjustment.one_setup_per_line = one_setup_per_line;
-    evaluation.adjustment.reversal = reversal;
-    evaluation.adjustment.rotations = rotations;
-    evaluation.adjustment.smoothness = smoothness;
+    const BatchOptions evaluation = to_batch_options(method, uncertainty, setup, setup_by_line, one_setup_per_line,
+                                                     reversal, rotations, smoothness);
     const std::uint64_t number = to_seed(seed);
     py::gil_scoped_release release;
     return std::make_unique<VirtualCalibrations>(run, evaluation, number, derived);
