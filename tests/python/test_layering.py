@@ -19,6 +19,7 @@ BELOW: dict[str, set[str]] = {
     "simulation": {"machine", "plan", "head", "measurement"},
     "evaluation": {"machine", "plan", "measurement"},
     "uncertainty": {"simulation", "evaluation"},
+    "controller": {"machine"},
 }
 
 

@@ -1,0 +1,52 @@
+/* Volumetric compensation for a controller, for C: see compensator.hpp, which says what the functions do.
+ * Lengths in mm, angles in rad. Only load allocates; after it no function allocates, locks, throws or makes a system
+ * call, and all but free may be called from many threads at once. */
+#ifndef STEPDIAG_COMPENSATOR_H
+#define STEPDIAG_COMPENSATOR_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct stepdiag_compensator stepdiag_compensator;
+
+enum stepdiag_outside { STEPDIAG_HOLD = 0, STEPDIAG_LINEAR = 1, STEPDIAG_REFUSE = 2 };
+enum stepdiag_approach { STEPDIAG_MEAN = 0, STEPDIAG_POSITIVE = 1, STEPDIAG_NEGATIVE = 2 };
+
+/* Flags of a status; 0 is an answer inside the volume. */
+enum stepdiag_status { STEPDIAG_OUTSIDE = 1, STEPDIAG_CAPPED = 2, STEPDIAG_REFUSED = 4 };
+
+typedef struct {
+    double origin[3];
+    int outside; /* enum stepdiag_outside */
+    double margin;
+    double largest_correction;
+    int approach; /* enum stepdiag_approach */
+} stepdiag_options;
+
+stepdiag_options stepdiag_default_options(void);
+
+/* `options` may be NULL. NULL on failure: `message` then holds the reason, cut to `message_size` bytes with its 0. */
+stepdiag_compensator* stepdiag_compensator_load(const char* path, const char* chain, const stepdiag_options* options,
+                                                char* message, size_t message_size);
+void stepdiag_compensator_free(stepdiag_compensator* compensator);
+
+/* Each returns the status. `tool` may be NULL: the tool of the calibration. `orientation` may be NULL. */
+unsigned stepdiag_error(const stepdiag_compensator* compensator, const double position[3], const double tool[3],
+                        double error[3], double orientation[3]);
+unsigned stepdiag_command(const stepdiag_compensator* compensator, const double target[3], const double tool[3],
+                          double command[3]);
+unsigned stepdiag_forward(const stepdiag_compensator* compensator, const double command[3], const double tool[3],
+                          double actual[3]);
+
+uint64_t stepdiag_fingerprint(const stepdiag_compensator* compensator);
+double stepdiag_inverse_bound(const stepdiag_compensator* compensator);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,92 @@
+// Volumetric compensation for a controller: a calibration file, loaded once, tells the error of the machine wherever it
+// is sent, and where to send it instead.
+//   forward(c) = c + e(c)                  where the tool is when the axes stand at c
+//   command(t) = c with c + e(c) = t       where the axes must stand for the tool to be at t; c <- t - e(c), bounded
+// e(c): error of the functional point, the exact pose of CONVENTIONS (machine.hpp) minus its nominal position, with the
+// tool offset of the call, interpolated linearly between the nodes of the table. Positions are axis positions in the
+// controller's machine coordinates, mm; `origin` is where these have home, the corner of the calibrated volume.
+//
+// Loading allocates and throws. After that every function is noexcept, allocates nothing, locks nothing, makes no system
+// call, takes a bounded time, and may be called from many threads at once. compensator.h is the same in C.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace stepdiag {
+
+struct ParameterTable;
+
+// What holds outside the calibrated volume.
+enum class Outside {
+    hold,    // the error of the nearest point of the volume
+    linear,  // functions and squareness terms go on as in the last interval, up to `margin`; further out as `refuse`
+    refuse   // no answer: CompensationStatus::refused
+};
+
+// Of a table with two directions of approach (reversal), which the compensator corrects: it knows no motion.
+enum class CompensatedApproach { mean, positive, negative };
+
+struct CompensatorOptions {
+    std::array<double, 3> origin = {0.0, 0.0, 0.0};  // controller's coordinates of home, mm
+    Outside outside = Outside::hold;
+    double margin = 0.0;              // mm, with Outside::linear
+    double largest_correction = 1.0;  // mm: a longer error vector is shortened to this length
+    CompensatedApproach approach = CompensatedApproach::mean;
+};
+
+// Flags: 0 is an answer inside the volume.
+enum CompensationStatus : unsigned {
+    compensation_outside = 1,  // outside the volume: held or linear
+    compensation_capped = 2,   // shortened to largest_correction
+    compensation_refused = 4   // no answer: outside with Outside::refuse, beyond the margin, or a position that is not
+                               // finite; the position returned is the one asked for, and the machine must not move
+};
+
+struct MachineError {
+    std::array<double, 3> position;     // e, mm, before any cap is reached
+    std::array<double, 3> orientation;  // rotation vector of the tool, rad
+    unsigned status;
+};
+
+struct CompensatedPosition {
+    std::array<double, 3> position;  // mm, controller's coordinates
+    unsigned status;
+};
+
+class Compensator {
+public:
+    // Reads a calibration or error map. Throws InvalidArgument naming the file, line and key: what the table's reader
+    // refuses; a table without chain, volume_mm or tool_mm, or with another chain than `chain`, the controller's;
+    // errors so steep that the inverse has no bound; options that make no sense.
+    static Compensator load(const std::string& path, const std::string& chain, const CompensatorOptions& options = {});
+    // The same of a table in memory; `name` is what messages call it.
+    Compensator(const ParameterTable& table, const std::string& name, const std::string& chain,
+                const CompensatorOptions& options = {});
+    ~Compensator();
+    Compensator(Compensator&&) noexcept;
+    Compensator& operator=(Compensator&&) noexcept;
+
+    // `tool`: offset of the functional point from the tool's origin, mm.
+    MachineError error(const std::array<double, 3>& position, const std::array<double, 3>& tool) const noexcept;
+    CompensatedPosition command(const std::array<double, 3>& target, const std::array<double, 3>& tool) const noexcept;
+    CompensatedPosition forward(const std::array<double, 3>& command, const std::array<double, 3>& tool) const noexcept;
+
+    // The table in force: a hash of chain, volume, tool and every value, whatever the file's spelling and order.
+    std::uint64_t fingerprint() const noexcept;
+    // |forward(command(t)) - t| never exceeds this, mm.
+    double inverse_bound() const noexcept;
+    std::array<double, 3> volume() const noexcept;  // mm
+    std::array<double, 3> tool() const noexcept;    // of the calibration, mm
+    // What the table does not tell and is therefore not compensated: "EXX", "EYX (slope)", "C0Y".
+    const std::vector<std::string>& uncompensated() const noexcept;
+
+private:
+    struct Tables;
+    std::unique_ptr<const Tables> tables_;
+};
+
+}  // namespace stepdiag
