@@ -45,7 +45,8 @@ Eigen::Vector3d lengths(const ParameterTable& table, const std::string& name, co
     std::string rest = entry->second;
     for (int i = 0; i < 3; ++i) {
         const auto number = parse_decimal(rest.substr(0, rest.find(' ')), 0);
-        if (!number) throw InvalidArgument(name + ": " + key + ": expected three lengths in mm, got \"" + entry->second + "\"");
+        if (!number)
+            throw InvalidArgument(name + ": " + key + ": expected three lengths in mm, got \"" + entry->second + "\"");
         value[i] = *number;
         rest = rest.find(' ') == std::string::npos ? "" : rest.substr(rest.find(' ') + 1);
     }
@@ -66,9 +67,13 @@ Compensator::Compensator(const ParameterTable& table, const std::string& name, c
     const Chain own = Chain::parse(entry->second);
     if (!(own == controllers))
         throw InvalidArgument(name + ": chain: expected the controller's " + chain + ", got " + own.name());
-    tables_ = std::make_unique<const Tables>(Tables{Machine(own, ErrorMap(table)), lengths(table, name, "volume_mm"),
-                                                    lengths(table, name, "tool_mm"), vector(options.origin), options,
-                                                    0, {}});
+    tables_ = std::make_unique<const Tables>(Tables{Machine(own, ErrorMap(table)),
+                                                    lengths(table, name, "volume_mm"),
+                                                    lengths(table, name, "tool_mm"),
+                                                    vector(options.origin),
+                                                    options,
+                                                    0,
+                                                    {}});
 }
 
 Compensator::~Compensator() = default;

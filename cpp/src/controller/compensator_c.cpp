@@ -34,10 +34,10 @@ stepdiag_compensator* stepdiag_compensator_load(const char* path, const char* ch
                                                 char* message, size_t message_size) {
     const stepdiag_options given = options ? *options : stepdiag_default_options();
     try {
-        return new stepdiag_compensator{stepdiag::Compensator::load(
-            path, chain,
-            {array(given.origin), stepdiag::Outside(given.outside), given.margin, given.largest_correction,
-             stepdiag::CompensatedApproach(given.approach)})};
+        return new stepdiag_compensator{
+            stepdiag::Compensator::load(path, chain,
+                                        {array(given.origin), stepdiag::Outside(given.outside), given.margin,
+                                         given.largest_correction, stepdiag::CompensatedApproach(given.approach)})};
     } catch (const std::exception& error) {
         if (message && message_size) {
             std::strncpy(message, error.what(), message_size - 1);
@@ -51,8 +51,7 @@ void stepdiag_compensator_free(stepdiag_compensator* compensator) { delete compe
 
 unsigned stepdiag_error(const stepdiag_compensator* compensator, const double position[3], const double tool[3],
                         double error[3], double orientation[3]) {
-    const stepdiag::MachineError result =
-        compensator->compensator.error(array(position), tool_of(compensator, tool));
+    const stepdiag::MachineError result = compensator->compensator.error(array(position), tool_of(compensator, tool));
     std::memcpy(error, result.position.data(), sizeof result.position);
     if (orientation) std::memcpy(orientation, result.orientation.data(), sizeof result.orientation);
     return result.status;

@@ -6,8 +6,8 @@
 // tool offset of the call, interpolated linearly between the nodes of the table. Positions are axis positions in the
 // controller's machine coordinates, mm; `origin` is where these have home, the corner of the calibrated volume.
 //
-// Loading allocates and throws. After that every function is noexcept, allocates nothing, locks nothing, makes no system
-// call, takes a bounded time, and may be called from many threads at once. compensator.h is the same in C.
+// Loading allocates and throws. After that every function is noexcept, allocates nothing, locks nothing, makes no
+// system call, takes a bounded time, and may be called from many threads at once. compensator.h is the same in C.
 #pragma once
 
 #include <array>
