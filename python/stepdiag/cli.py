@@ -13,6 +13,7 @@ from stepdiag._core import InvalidArgument, ReplayMismatch, __version__
 from stepdiag.cli_calibrations import compare, report
 from stepdiag.cli_evaluate import evaluate, observe
 from stepdiag.cli_head import head
+from stepdiag.cli_nc import nc
 from stepdiag.cli_options import PATH, InOrder, keep_apart, keep_map, out_file, tell
 from stepdiag.cli_plan import plan
 from stepdiag.cli_study import study
@@ -37,6 +38,7 @@ SHORT = {
     "plan": "Tell which plan to measure in the time that there is.",
     "uncertainty": "Tell how uncertain a calibration would be.",
     "study": "Tell the same over a grid of scenarios.",
+    "nc": "Write the measuring program for a controller.",
     "simulate": "Simulate the run of a scenario.",
     "evaluate": "Calibrate the machine from a run.",
     "report": "Tell what a calibration says.",
@@ -175,7 +177,7 @@ def init(folder: Path, scenario: Path | None, head_name: str | None) -> None:
         click.echo(f"wrote {path}")
 
 
-for command in (evaluate, observe, plan, uncertainty, study, report, compare, head):
+for command in (evaluate, observe, plan, uncertainty, study, nc, report, compare, head):
     command.short_help = SHORT[str(command.name)]
     cli.add_command(command)
 cli.commands = {name: cli.commands[name] for name in SHORT}  # the order in which help lists them
