@@ -1,8 +1,10 @@
+#include <algorithm>
 #include <cstring>
 #include <exception>
 
 #include "stepdiag/controller/compensator.h"
 #include "stepdiag/controller/compensator.hpp"
+#include "stepdiag/core/error.hpp"
 
 struct stepdiag_compensator {
     stepdiag::Compensator compensator;
@@ -10,14 +12,55 @@ struct stepdiag_compensator {
 
 namespace {
 
+using stepdiag::Compensator;
+using stepdiag::InvalidArgument;
+
+static_assert(int(stepdiag::Outside::hold) == STEPDIAG_HOLD && int(stepdiag::Outside::linear) == STEPDIAG_LINEAR &&
+              int(stepdiag::Outside::refuse) == STEPDIAG_REFUSE);
+static_assert(int(stepdiag::CompensatedApproach::mean) == STEPDIAG_MEAN &&
+              int(stepdiag::CompensatedApproach::positive) == STEPDIAG_POSITIVE &&
+              int(stepdiag::CompensatedApproach::negative) == STEPDIAG_NEGATIVE);
+static_assert(int(stepdiag::compensation_outside) == STEPDIAG_OUTSIDE &&
+              int(stepdiag::compensation_capped) == STEPDIAG_CAPPED &&
+              int(stepdiag::compensation_refused) == STEPDIAG_REFUSED);
+
 std::array<double, 3> array(const double v[3]) { return {v[0], v[1], v[2]}; }
 
-std::array<double, 3> tool_of(const stepdiag_compensator* c, const double* tool) {
-    return tool ? array(tool) : c->compensator.tool();
+stepdiag::CompensatorOptions options_of(const stepdiag_options& given) {
+    return {array(given.origin),
+            stepdiag::Outside(given.outside),
+            given.margin,
+            given.largest_correction,
+            stepdiag::CompensatedApproach(given.approach),
+            given.largest_tool};
 }
 
-unsigned give(const stepdiag::CompensatedPosition& result, double out[3]) {
-    std::memcpy(out, result.position.data(), sizeof result.position);
+stepdiag_compensator* load(const char* path, const char* chain, const stepdiag_options* options) {
+    if (!path) throw InvalidArgument("path: expected the name of a file, got NULL");
+    if (!chain) throw InvalidArgument("chain: expected a text such as \"wX'bYZt\", got NULL");
+    return new stepdiag_compensator{
+        Compensator::load(path, chain, options_of(options ? *options : stepdiag_default_options()))};
+}
+
+void tell(const char* reason, char* message, size_t size) noexcept {
+    if (!message || size == 0) return;
+    const size_t length = std::min(std::strlen(reason), size - 1);
+    std::memcpy(message, reason, length);
+    message[length] = '\0';
+}
+
+void give(const std::array<double, 3>& result, double out[3]) noexcept {
+    if (out) std::copy(result.begin(), result.end(), out);
+}
+
+using Move = stepdiag::CompensatedPosition (Compensator::*)(const std::array<double, 3>&,
+                                                            const std::array<double, 3>&) const noexcept;
+
+unsigned move(Move move, const stepdiag_compensator* c, const double in[3], const double tool[3],
+              double out[3]) noexcept {
+    if (!c || !in) return STEPDIAG_REFUSED;
+    const auto result = (c->compensator.*move)(array(in), tool ? array(tool) : c->compensator.tool());
+    give(result.position, out);
     return result.status;
 }
 
@@ -27,51 +70,53 @@ extern "C" {
 
 stepdiag_options stepdiag_default_options(void) {
     const stepdiag::CompensatorOptions own;
-    return {{0.0, 0.0, 0.0}, int(own.outside), own.margin, own.largest_correction, int(own.approach)};
+    return {{own.origin[0], own.origin[1], own.origin[2]},
+            int(own.outside),
+            own.margin,
+            own.largest_correction,
+            int(own.approach),
+            own.largest_tool};
 }
 
 stepdiag_compensator* stepdiag_compensator_load(const char* path, const char* chain, const stepdiag_options* options,
                                                 char* message, size_t message_size) {
-    const stepdiag_options given = options ? *options : stepdiag_default_options();
     try {
-        return new stepdiag_compensator{
-            stepdiag::Compensator::load(path, chain,
-                                        {array(given.origin), stepdiag::Outside(given.outside), given.margin,
-                                         given.largest_correction, stepdiag::CompensatedApproach(given.approach)})};
+        return load(path, chain, options);
     } catch (const std::exception& error) {
-        if (message && message_size) {
-            std::strncpy(message, error.what(), message_size - 1);
-            message[message_size - 1] = '\0';
-        }
-        return nullptr;
+        tell(error.what(), message, message_size);
+    } catch (...) {
+        tell("an unknown exception", message, message_size);
     }
+    return nullptr;
 }
 
 void stepdiag_compensator_free(stepdiag_compensator* compensator) { delete compensator; }
 
 unsigned stepdiag_error(const stepdiag_compensator* compensator, const double position[3], const double tool[3],
                         double error[3], double orientation[3]) {
-    const stepdiag::MachineError result = compensator->compensator.error(array(position), tool_of(compensator, tool));
-    std::memcpy(error, result.position.data(), sizeof result.position);
-    if (orientation) std::memcpy(orientation, result.orientation.data(), sizeof result.orientation);
+    if (!compensator || !position) return STEPDIAG_REFUSED;
+    const Compensator& c = compensator->compensator;
+    const stepdiag::MachineError result = c.error(array(position), tool ? array(tool) : c.tool());
+    give(result.position, error);
+    give(result.orientation, orientation);
     return result.status;
 }
 
 unsigned stepdiag_command(const stepdiag_compensator* compensator, const double target[3], const double tool[3],
                           double command[3]) {
-    return give(compensator->compensator.command(array(target), tool_of(compensator, tool)), command);
+    return move(&Compensator::command, compensator, target, tool, command);
 }
 
 unsigned stepdiag_forward(const stepdiag_compensator* compensator, const double command[3], const double tool[3],
                           double actual[3]) {
-    return give(compensator->compensator.forward(array(command), tool_of(compensator, tool)), actual);
+    return move(&Compensator::forward, compensator, command, tool, actual);
 }
 
 uint64_t stepdiag_fingerprint(const stepdiag_compensator* compensator) {
-    return compensator->compensator.fingerprint();
+    return compensator ? compensator->compensator.fingerprint() : 0;
 }
 
 double stepdiag_inverse_bound(const stepdiag_compensator* compensator) {
-    return compensator->compensator.inverse_bound();
+    return compensator ? compensator->compensator.inverse_bound() : 0.0;
 }
 }

@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <set>
 
-#include "core/text_file.hpp"
+#include "machine/table_header.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -43,47 +42,6 @@ std::string join(const std::vector<std::string>& parts, std::string_view separat
     std::string text;
     for (const auto& part : parts) text += (text.empty() ? "" : std::string(separator)) + part;
     return text;
-}
-
-std::vector<std::string> split(std::string_view text, std::string_view separator) {
-    std::vector<std::string> parts;
-    while (!text.empty()) {
-        const auto end = text.find(separator);
-        parts.emplace_back(text.substr(0, end));
-        text.remove_prefix(end == std::string_view::npos ? text.size() : end + separator.size());
-    }
-    return parts;
-}
-
-std::string header_value(const ParameterTable& table, const std::string& key, const std::string& path) {
-    const auto entry = table.header.find(key);
-    if (entry == table.header.end())
-        throw InvalidArgument(path + ": the leading line \"# " + key +
-                              "=...\" is missing; a calibration carries its chain, volume_mm and tool_mm");
-    return entry->second;
-}
-
-Eigen::Vector3d parse_lengths(const ParameterTable& table, const std::string& key, const std::string& path) {
-    const std::string text = header_value(table, key, path);
-    const auto parts = split(text, " ");
-    Eigen::Vector3d lengths;
-    for (int i = 0; i < 3; ++i) {
-        const auto value = parts.size() == 3 ? parse_decimal(parts[i], 0) : std::nullopt;
-        if (!value)
-            throw InvalidArgument(path + ": " + key + ": expected three numbers with a space between, got \"" + text +
-                                  "\"");
-        lengths[i] = *value;
-    }
-    return lengths;
-}
-
-Chain parse_chain(const ParameterTable& table, const std::string& path) {
-    const std::string text = header_value(table, "chain", path);
-    try {
-        return Chain::parse(text);
-    } catch (const InvalidArgument& error) {
-        throw InvalidArgument(path + ": " + error.what());
-    }
 }
 
 }  // namespace
@@ -145,22 +103,6 @@ void write_calibration(const Calibration& calibration, const std::string& path) 
     write_parameter_table(to_parameter_table(calibration), path);
 }
 
-namespace {
-
-// Names of error functions in a leading line.
-std::set<std::string> listed_functions(const ParameterTable& table, const char* key, const std::string& path) {
-    std::set<std::string> names;
-    if (const auto entry = table.header.find(key); entry != table.header.end())
-        for (const std::string& name : split(entry->second, " ")) {
-            if (!FunctionId::parse(name))
-                throw InvalidArgument(path + ": " + key + ": expected names of error functions, got \"" + name + "\"");
-            names.insert(name);
-        }
-    return names;
-}
-
-}  // namespace
-
 Calibration read_calibration(const std::string& path) {
     const ParameterTable table = ErrorMap(read_parameter_table(path)).table();
     const auto optional_value = [&](const char* key) {
@@ -168,16 +110,16 @@ Calibration read_calibration(const std::string& path) {
         return entry == table.header.end() ? std::string() : entry->second;
     };
     Calibration calibration{optional_value("method"),
-                            parse_chain(table, path),
-                            parse_lengths(table, "volume_mm", path),
-                            parse_lengths(table, "tool_mm", path),
+                            chain_of(table, path),
+                            lengths_of(table, "volume_mm", path),
+                            lengths_of(table, "tool_mm", path),
                             {},
                             {},
                             split(optional_value("undetermined"), sentence_break),
                             {}};
     calibration.date = optional_value("date");
-    const auto slopes = listed_functions(table, "undetermined_slopes", path);
-    const auto constants = listed_functions(table, "undetermined_reversal_constants", path);
+    const auto slopes = functions_listed(table, "undetermined_slopes", path);
+    const auto constants = functions_listed(table, "undetermined_reversal_constants", path);
     for (int i = 0; i < function_count; ++i) {
         if (!table.functions[i]) continue;
         const std::string name = FunctionId::at(i).name();

@@ -14,16 +14,29 @@ namespace {
                           "; expected the links w, X, Y, Z, b, t in a form like \"[w X' b Y Z t]\"");
 }
 
-}  // namespace
-
-Chain Chain::parse(std::string_view text) {
+// "[w X' b Y Z t]", or "wX'bYZt" where blanks cannot be written.
+std::vector<std::string> links(std::string_view text) {
+    std::vector<std::string> names;
+    if (!text.empty() && text.find_first_of("[] \t") == std::string_view::npos) {
+        for (const char c : text) {
+            if (c == '\'' && !names.empty()) names.back() += c;
+            else names.emplace_back(1, c);
+        }
+        return names;
+    }
     const auto first = text.find_first_not_of(" \t");
     const auto last = text.find_last_not_of(" \t");
     if (first == std::string_view::npos || text[first] != '[' || text[last] != ']' || first == last)
         refuse(text, "brackets [ ] are missing");
-    std::istringstream links(std::string(text.substr(first + 1, last - first - 1)));
-    std::vector<std::string> names;
-    for (std::string name; links >> name;) names.push_back(name);
+    std::istringstream stream(std::string(text.substr(first + 1, last - first - 1)));
+    for (std::string name; stream >> name;) names.push_back(name);
+    return names;
+}
+
+}  // namespace
+
+Chain Chain::parse(std::string_view text) {
+    const std::vector<std::string> names = links(text);
     if (names.size() != 6) refuse(text, "has " + std::to_string(names.size()) + " links, not 6");
     if (names.front() != "w") refuse(text, "does not begin with w");
     if (names.back() != "t") refuse(text, "does not end with t");

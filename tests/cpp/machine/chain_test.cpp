@@ -38,6 +38,11 @@ TEST(Chain, AllTwentyFourChainsAreReadBackFromTheirNames) {
 
 TEST(Chain, BlanksDoNotMatter) { EXPECT_EQ(Chain::parse("  [ w  X' b Y   Z t ] ").name(), "[w X' b Y Z t]"); }
 
+TEST(Chain, WhereNoBlankCanStandNoneIsNeeded) {
+    EXPECT_EQ(Chain::parse("wX'bYZt"), Chain::parse("[w X' b Y Z t]"));
+    EXPECT_EQ(Chain::parse("wY'X'Z'bt"), Chain::parse("[w Y' X' Z' b t]"));
+}
+
 TEST(Chain, WhatIsNoChainIsRefusedByName) {
     for (const char* text : {"",
                              "[]",
@@ -56,6 +61,11 @@ TEST(Chain, WhatIsNoChainIsRefusedByName) {
                              "[w X'' b Y Z t]",
                              "[w x' b Y Z t]",
                              "[wX'bYZt]",
+                             "wX'bYZ",
+                             "wXbYZt",
+                             "'wX'bYZt",
+                             "wX''bYZt",
+                             "w",
                              "[w X' b Y Z t] t",
                              "[w b X Y Q t]",
                              "[w ' b Y Z t]"})

@@ -25,6 +25,7 @@ typedef struct {
     double margin;
     double largest_correction;
     int approach; /* enum stepdiag_approach */
+    double largest_tool;
 } stepdiag_options;
 
 stepdiag_options stepdiag_default_options(void);

@@ -20,7 +20,8 @@ namespace stepdiag {
 
 struct ParameterTable;
 
-// What holds outside the calibrated volume.
+// What holds outside the calibrated volume. An error is judged by its position, a command by its target, a forward by
+// its result, so that the three agree although command and target differ; 1e-6 mm beyond the edge still is inside.
 enum class Outside {
     hold,    // the error of the nearest point of the volume
     linear,  // functions and squareness terms go on as in the last interval, up to `margin`; further out as `refuse`
@@ -33,21 +34,23 @@ enum class CompensatedApproach { mean, positive, negative };
 struct CompensatorOptions {
     std::array<double, 3> origin = {0.0, 0.0, 0.0};  // controller's coordinates of home, mm
     Outside outside = Outside::hold;
-    double margin = 0.0;              // mm, with Outside::linear
-    double largest_correction = 1.0;  // mm: a longer error vector is shortened to this length
+    double margin = 0.0;              // mm, with Outside::linear; at most the volume's shortest edge
+    double largest_correction = 1.0;  // mm: command and forward shorten a longer error vector to this length
     CompensatedApproach approach = CompensatedApproach::mean;
+    double largest_tool = 1000.0;  // mm: longer tools are refused; the bound of the inverse holds for all others
 };
 
 // Flags: 0 is an answer inside the volume.
 enum CompensationStatus : unsigned {
-    compensation_outside = 1,  // outside the volume: held or linear
-    compensation_capped = 2,   // shortened to largest_correction
-    compensation_refused = 4   // no answer: outside with Outside::refuse, beyond the margin, or a position that is not
-                               // finite; the position returned is the one asked for, and the machine must not move
+    compensation_outside = 1,  // outside the volume: held, linear or refused
+    compensation_capped = 2,   // the error is longer than largest_correction, the correction is not
+    compensation_refused = 4   // no answer: outside with Outside::refuse, beyond the margin, a position that is not
+                              // finite or farther than 100 m, a tool longer than largest_tool; the position returned is
+                              // the one asked for, an error is 0, and the machine must not move
 };
 
 struct MachineError {
-    std::array<double, 3> position;     // e, mm, before any cap is reached
+    std::array<double, 3> position;     // e, mm: the whole of it, also where the correction is capped
     std::array<double, 3> orientation;  // rotation vector of the tool, rad
     unsigned status;
 };
@@ -60,8 +63,9 @@ struct CompensatedPosition {
 class Compensator {
 public:
     // Reads a calibration or error map. Throws InvalidArgument naming the file, line and key: what the table's reader
-    // refuses; a table without chain, volume_mm or tool_mm, or with another chain than `chain`, the controller's;
-    // errors so steep that the inverse has no bound; options that make no sense.
+    // refuses; a table without chain, volume_mm or tool_mm, or with another chain than `chain`, the controller's; one
+    // without parameters, or with nodes that cannot be those of its volume; errors so steep that the inverse has no
+    // bound; options that make no sense.
     static Compensator load(const std::string& path, const std::string& chain, const CompensatorOptions& options = {});
     // The same of a table in memory; `name` is what messages call it.
     Compensator(const ParameterTable& table, const std::string& name, const std::string& chain,
@@ -75,13 +79,15 @@ public:
     CompensatedPosition command(const std::array<double, 3>& target, const std::array<double, 3>& tool) const noexcept;
     CompensatedPosition forward(const std::array<double, 3>& command, const std::array<double, 3>& tool) const noexcept;
 
-    // The table in force: a hash of chain, volume, tool and every value, whatever the file's spelling and order.
+    // The table in force: a hash of chain, volume, tool, nodes and values, whatever the file's spelling and order.
+    // Options, uncertainties, method and date are not in it.
     std::uint64_t fingerprint() const noexcept;
-    // |forward(command(t)) - t| never exceeds this, mm.
+    // |forward(command(t)) - t| never exceeds this, mm, whatever the target, the tool and the options.
     double inverse_bound() const noexcept;
     std::array<double, 3> volume() const noexcept;  // mm
     std::array<double, 3> tool() const noexcept;    // of the calibration, mm
-    // What the table does not tell and is therefore not compensated: "EXX", "EYX (slope)", "C0Y".
+    // What the table does not tell and is therefore not compensated: "EXX", "EYX (slope)", "EXX (above 784.0 mm)",
+    // "C0Y".
     const std::vector<std::string>& uncompensated() const noexcept;
 
 private:

@@ -12,8 +12,8 @@ namespace stepdiag {
 
 class Chain {
 public:
-    // Parses "[w X' b Y Z t]". Throws InvalidArgument when a link is missing, doubled, or primed on the wrong side of
-    // b.
+    // Parses "[w X' b Y Z t]" or, for places where no blank can stand, "wX'bYZt". Throws InvalidArgument when a link is
+    // missing, doubled, or primed on the wrong side of b.
     static Chain parse(std::string_view text);
 
     const std::array<Axis, 3>& order() const { return order_; }  // from w to t

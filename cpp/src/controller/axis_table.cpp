@@ -1,0 +1,107 @@
+#include "controller/axis_table.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+// A function where it is linear: from `start` on with this value and slope.
+struct Piece {
+    double value, slope;
+};
+
+// What `interpolate` says from `start` to the next boundary, by the function's own nodes: the distance of two
+// boundaries may be next to nothing.
+Piece piece_of(const FunctionTable& table, double start) {
+    const auto after = std::upper_bound(table.position.begin(), table.position.end(), start);
+    if (after == table.position.begin()) return {table.value.front(), 0.0};
+    if (after == table.position.end()) return {table.value.back(), 0.0};
+    const auto j = after - table.position.begin();
+    const double slope = (table.value[j] - table.value[j - 1]) / (table.position[j] - table.position[j - 1]);
+    return {table.value[j - 1] + slope * (start - table.position[j - 1]), slope};
+}
+
+// The directions of approach that a compensator for `approach` takes the mean of.
+std::vector<const FunctionTable*> tables_of(const ErrorMap& errors, FunctionId id, CompensatedApproach approach) {
+    const auto& positive = errors.table().functions[id.index()];
+    const auto& negative = errors.table().negative_functions[id.index()];
+    if (!positive) return {};
+    if (!negative || approach == CompensatedApproach::positive) return {&*positive};
+    if (approach == CompensatedApproach::negative) return {&*negative};
+    return {&*positive, &*negative};
+}
+
+std::array<std::vector<const FunctionTable*>, 6> tables_of(const ErrorMap& errors, Axis axis,
+                                                           CompensatedApproach approach) {
+    std::array<std::vector<const FunctionTable*>, 6> tables;
+    for (int c = 0; c < 6; ++c) tables[c] = tables_of(errors, {axis, Component(c)}, approach);
+    return tables;
+}
+
+std::vector<double> boundaries(const std::array<std::vector<const FunctionTable*>, 6>& functions, double edge) {
+    std::vector<double> all = {0.0, edge};
+    for (const auto& tables : functions)
+        for (const FunctionTable* table : tables)
+            for (const double node : table->position)
+                if (0.0 < node && node < edge) all.push_back(node);
+    std::sort(all.begin(), all.end());
+    all.erase(std::unique(all.begin(), all.end()), all.end());
+    return all;
+}
+
+}  // namespace
+
+AxisTable::AxisTable(const ErrorMap& errors, Axis axis, double edge, CompensatedApproach approach) {
+    const auto functions = tables_of(errors, axis, approach);
+    const std::vector<double> bounds = boundaries(functions, edge);
+    if (bounds.size() > largest_node_count)
+        throw InvalidArgument(std::string("axis ") + letter(axis) + ": expected at most " +
+                              std::to_string(largest_node_count) + " different nodes, got " +
+                              std::to_string(bounds.size()));
+    count_ = bounds.size() - 1;
+    for (std::size_t i = 0; i < count_; ++i) {
+        AxisInterval interval;
+        interval.lower = i == 0 ? -infinity : bounds[i];
+        interval.upper = i + 1 == count_ ? infinity : bounds[i + 1];
+        interval.start = bounds[i];
+        for (int c = 0; c < 6; ++c)
+            for (const FunctionTable* table : functions[c]) {
+                const double share = 1.0 / double(functions[c].size());
+                const Piece piece = piece_of(*table, bounds[i]);
+                (c < 3 ? interval.delta : interval.theta)[c % 3] += share * piece.value;
+                (c < 3 ? interval.delta_slope : interval.theta_slope)[c % 3] += share * piece.slope;
+            }
+        for (const Squareness s : all_squarenesses) {
+            const SquarenessTerm term = squareness_term(s);
+            if (term.axis != axis) continue;
+            const double slope = term.sign * errors.squareness(s);
+            interval.delta[term.component] += slope * bounds[i];
+            interval.delta_slope[term.component] += slope;
+        }
+        intervals_.push_back(interval);
+    }
+    // One boundary in a bucket at most, where no more than this many buckets an interval bring it about.
+    constexpr std::size_t buckets_per_interval = 8;
+    std::uint32_t most = 2;
+    for (std::size_t factor = 1; factor <= buckets_per_interval && most > 1; factor *= 2)
+        most = make_buckets(factor * count_, edge);
+    for (largest_step_ = 1; 2 * largest_step_ <= most;) largest_step_ *= 2;
+    intervals_.resize(count_ + 2 * largest_step_, intervals_.back());  // halving looks ahead, and finds no end there
+}
+
+std::uint32_t AxisTable::make_buckets(std::size_t count, double edge) {
+    buckets_per_mm_ = double(count) / edge;
+    last_bucket_ = std::int32_t(count) - 1;
+    std::vector<std::uint32_t> inside(count, 0);  // boundaries in each bucket
+    for (std::size_t i = 1; i < count_; ++i) ++inside[std::size_t(bucket_of(intervals_[i].lower))];
+    first_.assign(count, 0);
+    for (std::size_t bucket = 1; bucket < count; ++bucket) first_[bucket] = first_[bucket - 1] + inside[bucket - 1];
+    return *std::max_element(inside.begin(), inside.end());
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,93 @@
+#include "controller/checks.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/text_file.hpp"
+#include "machine/table_header.hpp"
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+namespace {
+
+constexpr double shortest_edge = 1e-3;  // mm
+constexpr double node_slack = 1e-6;     // mm: rounding of positions is no missing end of a table
+
+std::string text(double number) { return format_decimal(number, 0); }
+
+void require(bool holds, const std::string& what, const std::string& expected, double got) {
+    if (!holds)
+        throw InvalidArgument(what + ": expected " + expected + ", got " +
+                              (std::isfinite(got) ? text(got) : std::to_string(got)));
+}
+
+template <class Call>
+void for_each_function(const ParameterTable& table, Call&& call) {
+    for (int i = 0; i < function_count; ++i) call(FunctionId::at(i), table.functions[i]);
+}
+
+}  // namespace
+
+void check(const CompensatorOptions& options) {
+    const auto enumerator = [](const char* what, int value) {
+        if (value < 0 || value > 2)
+            throw InvalidArgument(std::string(what) + ": expected 0, 1 or 2, got " + std::to_string(value));
+    };
+    enumerator("outside", int(options.outside));
+    enumerator("approach", int(options.approach));
+    for (const double origin : options.origin)
+        require(std::abs(origin) <= farthest_position, "origin", "three lengths within 100 m", origin);
+    require(options.margin >= 0.0 && options.margin <= farthest_position, "margin", "a length from 0 to 100 m",
+            options.margin);
+    if (options.margin > 0.0 && options.outside != Outside::linear)
+        throw InvalidArgument("margin: expected 0 unless outside is linear, got " + text(options.margin));
+    require(options.largest_correction > 0.0 && options.largest_correction <= farthest_position, "largest_correction",
+            "a positive length of at most 100 m", options.largest_correction);
+    require(options.largest_tool >= 0.0 && options.largest_tool <= farthest_position, "largest_tool",
+            "a length from 0 to 100 m", options.largest_tool);
+}
+
+void check_volume(const Eigen::Vector3d& volume, const CompensatorOptions& options, const std::string& name) {
+    for (const double edge : volume)
+        require(edge >= shortest_edge && edge <= farthest_position, name + ": volume_mm",
+                "three edges from " + text(shortest_edge) + " mm to 100 m", edge);
+    require(options.margin <= volume.minCoeff(), "margin", "at most the shortest edge of the volume", options.margin);
+}
+
+void check_tool(const Eigen::Vector3d& tool, const CompensatorOptions& options, const std::string& name) {
+    require(tool.norm() <= options.largest_tool, name + ": tool_mm",
+            "a tool no longer than the option largest_tool, " + text(options.largest_tool), tool.norm());
+}
+
+void check_nodes(const ParameterTable& table, const Eigen::Vector3d& volume, const std::string& name) {
+    const auto told = [](const auto& parameter) { return parameter.has_value(); };
+    if (std::none_of(table.functions.begin(), table.functions.end(), told) &&
+        std::none_of(table.squarenesses.begin(), table.squarenesses.end(), told))
+        throw InvalidArgument(name + ": expected at least one of the 21 parameters, got none");
+    for_each_function(table, [&](FunctionId id, const std::optional<FunctionTable>& function) {
+        if (!function || function->position.empty()) return;  // which ErrorMap refuses
+        const double edge = volume[index(id.axis)], first = function->position.front(),
+                     last = function->position.back();
+        const double inside = std::min(last, edge) - std::max(first, 0.0);
+        if (inside < 0.5 * edge || first < -edge || last > 2.0 * edge)
+            throw InvalidArgument(name + ": " + id.name() + ": expected nodes over the volume's edge, 0 to " +
+                                  text(edge) + " mm, got nodes from " + text(first) + " to " + text(last));
+    });
+}
+
+std::vector<std::string> not_told(const ParameterTable& table, const Eigen::Vector3d& volume, const std::string& name) {
+    const auto slopes = functions_listed(table, "undetermined_slopes", name);
+    std::vector<std::string> missing;
+    for_each_function(table, [&](FunctionId id, const std::optional<FunctionTable>& function) {
+        if (!function) return missing.push_back(id.name());
+        if (slopes.count(id.name())) missing.push_back(id.name() + " (slope)");
+        const double first = function->position.front(), last = function->position.back();
+        if (first > node_slack) missing.push_back(id.name() + " (below " + text(first) + " mm)");
+        if (last < volume[index(id.axis)] - node_slack) missing.push_back(id.name() + " (above " + text(last) + " mm)");
+    });
+    for (const Squareness s : all_squarenesses)
+        if (!table.squarenesses[static_cast<int>(s)]) missing.push_back(stepdiag::name(s));
+    return missing;
+}
+
+}  // namespace stepdiag
