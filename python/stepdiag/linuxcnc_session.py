@@ -1,0 +1,294 @@
+"""A simulated machine run by LinuxCNC without a display, for programs: start, move, read, stop.
+
+    with LinuxcncSession() as session:
+        session.mdi("G0 X100 Y20")
+        print(session.joints(), session.position())
+
+LinuxCNC's own modules for Python belong to Debian's /usr/bin/python3: linuxcnc_driver.py runs there, as LinuxCNC's
+display, and does what is asked for over a Unix socket. One LinuxCNC at a time runs on a computer; a lock sees to it.
+"""
+
+import contextlib
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from stepdiag.linuxcnc_configuration import Machine, write_configuration
+from stepdiag.linuxcnc_processes import LinuxcncError, end_all_of, linuxcnc_lock, refuse_a_running_one
+
+PYTHON = "/usr/bin/python3"
+PACKAGES = ("linuxcnc-uspace", "linuxcnc-uspace-dev")
+NOBODY = 65534
+
+__all__ = ["LinuxcncError", "LinuxcncSession", "linuxcnc_lock"]
+
+Setting = float | int | bool
+
+
+class LinuxcncSession:
+    """Starts LinuxCNC in a folder of its own on entry, ends it and clears up on exit.
+
+    table, chain: load the kinematics `stepdiagkins` with this calibration and chain ("wX'bYZt"); `options` are its
+    further arguments, {"outside": "refuse", "margin": 5}. Without a table: `kinematics`.
+    comp_files: {joint: file}, LinuxCNC's own screw compensation, of type `comp_type`.
+    hal, ini: further lines and keys. Everything else as in Machine.
+    """
+
+    def __init__(
+        self,
+        *,
+        table: str | os.PathLike[str] | None = None,
+        chain: str | None = None,
+        options: Mapping[str, str | float] | None = None,
+        kinematics: str | None = None,
+        comp_files: Mapping[int, str | os.PathLike[str]] | None = None,
+        comp_type: int = 0,
+        tools: Mapping[int, tuple[float, float, float]] | None = None,
+        limits: tuple[float, float] = (-10000.0, 10000.0),
+        speed: float = 20000.0,
+        acceleration: float = 2e6,
+        servo_period: int = 1000000,
+        hal: Sequence[str] = (),
+        ini: Mapping[str, Mapping[str, str | float | int]] | None = None,
+        home: bool = True,
+        start_timeout: float = 60.0,
+    ) -> None:
+        self._table, self._chain, self._options = table, chain, dict(options or {})
+        self._kinematics = kinematics
+        self._comp_files = dict(comp_files or {})
+        self._machine: dict[str, Any] = {
+            "limits": limits,
+            "speed": speed,
+            "acceleration": acceleration,
+            "servo_period": servo_period,
+            "compensation_type": comp_type,
+            "tools": dict(tools or {}),
+            "hal": tuple(hal),
+            "ini": dict(ini or {}),
+        }
+        self._home, self._start_timeout = home, start_timeout
+        self._stack = contextlib.ExitStack()
+
+    # --- start and end ---
+    def __enter__(self) -> Self:
+        missing = [name for name in ("linuxcnc", "halrun", "rtapi_app") if shutil.which(name) is None]
+        if missing or not Path(PYTHON).exists():
+            raise LinuxcncError(f"LinuxCNC is not installed ({', '.join(missing)} missing): "
+                                f"apt-get install {' '.join(PACKAGES)}")  # fmt: skip
+        try:
+            self._start()
+        except BaseException:
+            self._stack.close()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        with contextlib.suppress(OSError, LinuxcncError, AttributeError):
+            self._lines.write('{"do": "end"}\n')
+            self._lines.flush()
+            self._process.wait(15)
+        self._stack.close()
+
+    def _start(self) -> None:
+        self._stack.enter_context(linuxcnc_lock())
+        refuse_a_running_one()
+        self.folder = Path(tempfile.mkdtemp(prefix="stepdiag-linuxcnc-"))
+        self._stack.callback(shutil.rmtree, self.folder, ignore_errors=True)
+        self._log_path = self.folder / "log.txt"
+        self._stack.callback(self._keep_log)
+        self.folder.chmod(0o777 if os.geteuid() == 0 else 0o755)  # rtapi_app is somebody else's then
+        ini = write_configuration(self.folder, self._configured(), "./display")
+        self._write_display()
+
+        socket_path = self.folder / "session"
+        listener = self._stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
+        listener.bind(str(socket_path))
+        listener.listen(1)
+        self._environment = self._make_environment(socket_path)
+        with self._log_path.open("wb") as log:
+            self._process = subprocess.Popen(
+                ["linuxcnc", "-r", str(ini)],
+                cwd=self.folder,
+                env=self._environment,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+        self._stack.callback(self._end_processes)
+        connection = self._stack.enter_context(self._accept(listener))
+        self._connection = connection
+        self._lines = self._stack.enter_context(connection.makefile("rw", encoding="utf-8"))
+        self._ask("turn_on", self._start_timeout, home=self._home)
+
+    def _make_environment(self, socket_path: Path) -> dict[str, str]:
+        environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "PYTHONPATH")}
+        environment |= {
+            "STEPDIAG_SESSION_SOCKET": str(socket_path),
+            "RTAPI_FIFO_PATH": str(self.folder / "rtapi"),
+            "HOME": str(self.folder),  # LinuxCNC leaves files there
+            "LANG": "C.UTF-8",
+            "STEPDIAG_SERVO_PERIOD": repr(self._machine["servo_period"] * 1e-9),
+        }
+        if os.geteuid() == 0:  # LinuxCNC's real-time process refuses to be root
+            environment["RTAPI_UID"] = str(NOBODY)
+        return environment
+
+    def _configured(self) -> Machine:
+        comp = {}
+        for joint, path in self._comp_files.items():
+            shutil.copyfile(path, self.folder / f"joint-{joint}.comp")
+            comp[joint] = f"joint-{joint}.comp"
+        kinematics = self._kinematics or "trivkins coordinates=XYZ"
+        if self._table is not None:
+            arguments = {"table": self._own_table(), **self._options}
+            if self._chain is not None:
+                arguments["chain"] = self._chain.replace("'", "").replace(" ", "").strip("[]")
+            kinematics = " ".join(["stepdiagkins", *(f"{key}={value}" for key, value in arguments.items())])
+        return Machine(kinematics=kinematics, compensation=comp, **self._machine)
+
+    def _own_table(self) -> str:
+        """A copy that LinuxCNC's real-time process may read, whoever it runs as; a missing file stays missing."""
+        assert self._table is not None
+        own = self.folder / "table.csv"
+        if Path(self._table).is_file():
+            shutil.copyfile(self._table, own)
+            own.chmod(0o644)
+        return str(own)
+
+    def _write_display(self) -> None:
+        display = self.folder / "display"
+        driver = self.folder / "driver.py"
+        shutil.copyfile(Path(__file__).with_name("linuxcnc_driver.py"), driver)
+        display.write_text(f'#!/bin/sh\nexec {PYTHON} -P "{driver}" "$@"\n', encoding="utf-8")
+        display.chmod(0o755)
+
+    def _accept(self, listener: socket.socket) -> socket.socket:
+        """The driver's connection: there when LinuxCNC has started."""
+        end = time.monotonic() + self._start_timeout
+        listener.settimeout(0.1)
+        while time.monotonic() < end:
+            with contextlib.suppress(TimeoutError):
+                connection, _ = listener.accept()
+                return connection
+            if self._process.poll() is not None:
+                raise LinuxcncError(f"LinuxCNC did not start:\n{self.log}")
+        raise LinuxcncError(f"LinuxCNC did not start within {self._start_timeout:g} s:\n{self.log}")
+
+    def _end_processes(self) -> None:
+        """What is left after an orderly end is nothing; after a crash or a hang, everything that was started."""
+        if self._process.poll() is None:
+            for sign, patience in ((signal.SIGTERM, 8.0), (signal.SIGKILL, 5.0)):
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(self._process.pid, sign)
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    self._process.wait(patience)
+                    break
+        end_all_of(str(self.folder), self._environment)
+
+    def _keep_log(self) -> None:
+        self._kept_log = self.log
+
+    @property
+    def log(self) -> str:
+        """Everything that LinuxCNC has printed."""
+        with contextlib.suppress(OSError):
+            return self._log_path.read_text(encoding="utf-8", errors="replace")
+        return getattr(self, "_kept_log", "")
+
+    # --- requests ---
+    def _ask(self, verb: str, patience: float = 60.0, /, **arguments: Any) -> Any:
+        request = {"do": verb, **arguments}
+        self._connection.settimeout(patience + 10.0)  # the driver's own limit comes first
+        try:
+            self._lines.write(json.dumps(request) + "\n")
+            self._lines.flush()
+            line = self._lines.readline()
+        except OSError as error:
+            raise LinuxcncError(f"LinuxCNC does not answer ({verb}): {error}\n{self.log}") from error
+        if not line:
+            raise LinuxcncError(f"LinuxCNC has ended ({verb}):\n{self.log}")
+        answer = json.loads(line)
+        if "error" in answer:
+            raise LinuxcncError(answer["error"])
+        return answer["result"]
+
+    def mdi(self, code: str, timeout: float = 60.0) -> None:
+        """One line of G-code; returns when the machine stands."""
+        self._ask("mdi", timeout, code=code, timeout=timeout)
+
+    def run_program(
+        self,
+        path: str | os.PathLike[str],
+        on_pause: Callable[[Self, int, list[str]], None] | None = None,
+        timeout: float = 600.0,
+    ) -> list[str]:
+        """Runs a program to its end; returns its messages. At each stop (M0) `on_pause(session, line, messages since
+        the last stop)` is called, then the program goes on."""
+        own = self.folder / Path(path).name
+        shutil.copyfile(path, own)
+        said: list[str] = []
+        outcome = self._ask("program", timeout, path=str(own), timeout=timeout)
+        while True:
+            new = outcome["messages"][len(said) :]
+            said = outcome["messages"]
+            if not outcome["paused"]:
+                return said
+            if on_pause is not None:
+                on_pause(self, outcome["line"], new)
+            outcome = self._ask("resume", timeout, timeout=timeout)
+
+    def visit(self, points: Sequence[Sequence[float]], timeout: float = 60.0) -> list[list[float]]:
+        """The joints' commands (motor-pos-cmd, screw compensation included) at machine positions, one by one."""
+        rows = [[float(v) for v in point] for point in points]
+        joints: list[list[float]] = self._ask("visit", timeout * max(1, len(rows)), points=rows, timeout=timeout)
+        return joints
+
+    def joints(self) -> list[float]:
+        """joint.N.motor-pos-cmd, mm, once the joints stand."""
+        joints: list[float] = self._ask("at_rest")
+        return joints
+
+    def joint_commands(self) -> list[float]:
+        """joint.N.pos-cmd, mm: without LinuxCNC's screw compensation."""
+        return [float(v) for v in self.pins([f"joint.{j}.pos-cmd" for j in range(3)])]
+
+    def position(self) -> list[float]:
+        """Where LinuxCNC says that the tool is, X, Y, Z in machine coordinates, mm: from the joints' feedback."""
+        self._ask("at_rest")
+        return [float(v) for v in self.state()["actual_position"][:3]]
+
+    def state(self) -> dict[str, Any]:
+        state: dict[str, Any] = self._ask("state")
+        return state
+
+    def pin(self, name: str) -> Setting:
+        value: Setting = self._ask("pin", name=name)
+        return value
+
+    def pins(self, names: Sequence[str]) -> list[Setting]:
+        values: list[Setting] = self._ask("pins", names=list(names))
+        return values
+
+    def set_pin(self, name: str, value: Setting) -> None:
+        self._ask("set_pin", name=name, value=value)
+
+    def turn_on(self, *, home: bool = True) -> None:
+        self._ask("turn_on", home=home)
+
+    def turn_off(self) -> None:
+        self._ask("turn_off")
+
+    def abort(self) -> None:
+        self._ask("abort")
