@@ -56,6 +56,9 @@ private:
             if (key == "format" && given != error_map_format && given != calibration_format)
                 fail(comment.line, "format: expected " + quoted(error_map_format) + " or " +
                                        quoted(calibration_format) + ", got " + quoted(given));
+            const bool is_known = std::find(first_keys.begin(), first_keys.end(), key) != first_keys.end();
+            if (is_known && table_.header.count(key))
+                fail(comment.line, "the leading line " + quoted(key) + " is given twice");
             table_.header[key] = given;
         }
     }

@@ -137,6 +137,7 @@ TEST(ParameterTable, MalformedTextIsRefusedWithFileAndLine) {
         {"unit,parameter,position_mm,value,unit,standard_uncertainty\n", "line 1: the column \"unit\" is given twice"},
         {"# format=stepdiag error map 2\n" + header, "line 1: format: expected \"stepdiag error map 1\" or \"stepdiag"},
         {"# format=stepdiag error map 2\n" + header, "got \"stepdiag error map 2\""},
+        {"# chain=a\n# chain=b\n" + header, "line 2: the leading line \"chain\" is given twice"},
         {header + "EXX,0,0,um\n", "line 2"},
         {header + "EXX,0,0,um,,\n", "line 2"},
         {header + "EXQ,0,0,um,\n", "line 2: parameter"},
