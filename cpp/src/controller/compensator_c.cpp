@@ -119,4 +119,8 @@ uint64_t stepdiag_fingerprint(const stepdiag_compensator* compensator) {
 double stepdiag_inverse_bound(const stepdiag_compensator* compensator) {
     return compensator ? compensator->compensator.inverse_bound() : 0.0;
 }
+
+void stepdiag_calibration_tool(const stepdiag_compensator* compensator, double tool[3]) {
+    give(compensator ? compensator->compensator.tool() : std::array<double, 3>{}, tool);
+}
 }

@@ -45,6 +45,7 @@ unsigned stepdiag_forward(const stepdiag_compensator* compensator, const double 
 
 uint64_t stepdiag_fingerprint(const stepdiag_compensator* compensator);
 double stepdiag_inverse_bound(const stepdiag_compensator* compensator);
+void stepdiag_calibration_tool(const stepdiag_compensator* compensator, double tool[3]);
 
 #ifdef __cplusplus
 }

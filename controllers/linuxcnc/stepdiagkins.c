@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Kinematics of a three-axis machine whose errors are compensated, for LinuxCNC: trivial Cartesian kinematics plus
+// volumetric compensation by a table of stepdiag (compensator.h, BSD-3-Clause).
+//   inverse   joints = command(world)      where the axes must stand for the tool to be at world
+//   forward   world  = forward(joints)     where the tool is when the axes stand at joints
+// Both with a share s in 0..1 of the correction and a tool, the same in either direction at any time:
+//   joints = world + s (command(world) - world)
+// s and tool change only by ramps, in small steps, one a servo cycle. docs/linuxcnc.md tells the rest.
+//
+// LinuxCNC calls both directions from its servo thread only: the inverse also for targets that it merely checks, the
+// forward once a cycle with the joints' feedback (in joint mode again with their commands) as soon as all joints are
+// homed. So what "now" means to the pins, and time, are the forward's.
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "compensator.h"
+#include "hal.h"
+#include "kinematics.h"
+#include "rtapi.h"
+#include "rtapi_app.h"
+
+MODULE_LICENSE("GPL");
+
+static char* table = "";
+RTAPI_MP_STRING(table, "calibration file (CSV)");
+static char* chain = "";
+RTAPI_MP_STRING(chain, "kinematic chain from workpiece to tool: wXbYZt");
+static char* origin = "0,0,0";
+RTAPI_MP_STRING(origin, "machine coordinates of the corner of the calibrated volume, mm");
+static char* outside = "hold";
+RTAPI_MP_STRING(outside, "outside the volume: hold, linear or refuse");
+static char* margin = "0";
+RTAPI_MP_STRING(margin, "how far outside linear goes on, mm");
+static char* largest_correction = "1";
+RTAPI_MP_STRING(largest_correction, "longer corrections are cut to this length, mm");
+static char* largest_tool = "1000";
+RTAPI_MP_STRING(largest_tool, "longer tools are not taken from the pins, mm");
+static char* approach = "mean";
+RTAPI_MP_STRING(approach, "of a table with reversal: mean, positive or negative");
+static char* ramp = "1";
+RTAPI_MP_STRING(ramp, "duration of a change of enable or tool, s");
+static char* coordinates = "XYZ";
+RTAPI_MP_STRING(coordinates, "letter of the axis of each joint");
+static char* units = "mm";
+RTAPI_MP_STRING(units, "the machine's linear unit: mm or inch");
+
+enum { MAX_JOINTS = 16, TOOL_IGNORED = 8 };
+static const char LETTERS[] = "XYZABCUVW";
+
+// What the compensation is made with. The tool is that of the functional point, from the tool's origin, mm.
+typedef struct {
+    double share;
+    double tool[3];
+} setting;
+
+typedef struct {
+    hal_bit_t *enable, *use_tool, *inside;
+    hal_float_t *tool_offset[3], *error[3], *correction[3], *tool[3], *applied;
+    hal_u32_t *status, *refusals, *table_id_low, *table_id_high;
+} pins;
+
+static int component = -1;
+static stepdiag_compensator* compensator;
+static pins* pin;
+static int axis_of_joint[MAX_JOINTS], joint_count;
+static double mm_per_unit = 1.0, ramp_ns = 1e9, tool_limit = 1000.0;
+static setting before, now, wanted;  // `now` goes from `before` to `wanted` by the ramp that began at `begun`
+static double own_tool[3];           // of the calibration
+static long long begun;
+static int ramping, started;
+
+// --- the setting in force ---
+// The tool that the pins ask for; 0 if they do not say a tool. motion.tooloffset is what LinuxCNC adds to the point of
+// the tool to get its origin: the other way round.
+static int tool_of_pins(double tool[3]) {
+    double square = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        tool[i] = -*pin->tool_offset[i] * mm_per_unit;
+        square += tool[i] * tool[i];
+    }
+    return square <= tool_limit * tool_limit;  // false for a NaN too
+}
+
+static int same(const setting* a, const setting* b) { return memcmp(a, b, sizeof *a) == 0; }
+
+// One step of the ramp: a half period of 3u² - 2u³, without a jump of speed at either end. A ramp that has begun is
+// finished before the pins are looked at again. Returns flags for the status.
+static unsigned advance(void) {
+    setting asked = now;
+    unsigned flags = 0;
+    asked.share = *pin->enable ? 1.0 : 0.0;
+    if (!*pin->use_tool) memcpy(asked.tool, own_tool, sizeof asked.tool);
+    else if (!tool_of_pins(asked.tool)) {
+        memcpy(asked.tool, now.tool, sizeof asked.tool);
+        flags = TOOL_IGNORED;
+    }
+    if (!started) now = asked;  // the first cycle after homing: nothing moves by kinematics yet
+    started = 1;
+    const long long time = rtapi_get_time();
+    if (!ramping && !same(&asked, &now)) {
+        before = now;
+        wanted = asked;
+        begun = time;
+        ramping = 1;
+    }
+    if (ramping) {
+        const double u = ramp_ns > 0.0 ? (double)(time - begun) / ramp_ns : 1.0;
+        if (u >= 1.0) {
+            now = wanted;
+            ramping = 0;
+        } else {
+            const double weight = u * u * (3.0 - 2.0 * u);
+            now.share = before.share + weight * (wanted.share - before.share);
+            for (int i = 0; i < 3; ++i) now.tool[i] = before.tool[i] + weight * (wanted.tool[i] - before.tool[i]);
+        }
+    }
+    *pin->applied = now.share;
+    for (int i = 0; i < 3; ++i) *pin->tool[i] = now.tool[i] / mm_per_unit;
+    return flags;
+}
+
+// --- both directions, mm ---
+static unsigned joints_of(const double world[3], double joints[3]) {
+    const unsigned status = stepdiag_command(compensator, world, now.tool, joints);
+    if (now.share < 1.0)
+        for (int i = 0; i < 3; ++i) joints[i] = world[i] + now.share * (joints[i] - world[i]);
+    return status;
+}
+
+// With a share of the correction: the fixed point of world <- joints - s (command(world) - world), from a start that is
+// already within the change of the error over the length of the correction. The errors' slopes are below 0.1 (a table
+// with steeper ones does not load), so that each turn gains a digit.
+static unsigned world_of(const double joints[3], double world[3]) {
+    enum { TURNS = 16 };
+    const unsigned status = stepdiag_forward(compensator, joints, now.tool, world);
+    if (now.share == 1.0 || status & STEPDIAG_REFUSED) return status;
+    for (int i = 0; i < 3; ++i) world[i] = joints[i] + now.share * (world[i] - joints[i]);
+    if (now.share == 0.0) return status;
+    for (int turn = 0; turn < TURNS; ++turn) {
+        double command[3], change = 0.0;
+        if (stepdiag_command(compensator, world, now.tool, command) & STEPDIAG_REFUSED) break;  // at the very edge
+        for (int i = 0; i < 3; ++i) {
+            const double next = joints[i] - now.share * (command[i] - world[i]);
+            change = fmax(change, fabs(next - world[i]));
+            world[i] = next;
+        }
+        if (change < 1e-12) break;
+    }
+    return status;
+}
+
+static void publish(const double joints[3], const double world[3], unsigned status) {
+    double error[3];
+    stepdiag_error(compensator, joints, now.tool, error, NULL);
+    for (int i = 0; i < 3; ++i) {
+        *pin->error[i] = error[i] / mm_per_unit;
+        *pin->correction[i] = (joints[i] - world[i]) / mm_per_unit;
+    }
+    *pin->status = status;
+    *pin->inside = !(status & (STEPDIAG_OUTSIDE | STEPDIAG_REFUSED));
+}
+
+// --- what LinuxCNC calls ---
+static double* coordinate(EmcPose* pose, int axis) {
+    double* const all[] = {&pose->tran.x, &pose->tran.y, &pose->tran.z, &pose->a, &pose->b,
+                           &pose->c,      &pose->u,      &pose->v,      &pose->w};
+    return all[axis];
+}
+
+KINEMATICS_TYPE kinematicsType(void) { return KINEMATICS_BOTH; }
+
+int kinematicsForward(const double* joint, EmcPose* pose, const KINEMATICS_FORWARD_FLAGS* fflags,
+                      KINEMATICS_INVERSE_FLAGS* iflags) {
+    (void)fflags, (void)iflags;
+    double joints[3], world[3];
+    for (int j = joint_count - 1; j >= 0; --j)
+        *coordinate(pose, axis_of_joint[j]) = joint[j];  // the first of two counts
+    for (int i = 0; i < 3; ++i) joints[i] = *coordinate(pose, i) * mm_per_unit;
+    const unsigned flags = advance();
+    // Where there is no answer the world is the joints, so that a machine out there can still be seen and jogged back
+    // by its joints; moving there in world coordinates is refused by the inverse.
+    const unsigned status = world_of(joints, world) | flags;
+    if (!(status & STEPDIAG_REFUSED))
+        for (int i = 0; i < 3; ++i) *coordinate(pose, i) = world[i] / mm_per_unit;
+    publish(joints, world, status);
+    return 0;
+}
+
+int kinematicsInverse(const EmcPose* pose, double* joint, const KINEMATICS_INVERSE_FLAGS* iflags,
+                      KINEMATICS_FORWARD_FLAGS* fflags) {
+    (void)fflags, (void)iflags;
+    EmcPose target = *pose;
+    if (now.share > 0.0) {
+        const double world[3] = {pose->tran.x * mm_per_unit, pose->tran.y * mm_per_unit, pose->tran.z * mm_per_unit};
+        double joints[3];
+        if (joints_of(world, joints) & STEPDIAG_REFUSED) {
+            ++*pin->refusals;
+            return -1;
+        }
+        for (int i = 0; i < 3; ++i) *coordinate(&target, i) = joints[i] / mm_per_unit;
+    }
+    for (int j = 0; j < joint_count; ++j) joint[j] = *coordinate(&target, axis_of_joint[j]);
+    return 0;
+}
+
+KINS_NOT_SWITCHABLE
+EXPORT_SYMBOL(kinematicsType);
+EXPORT_SYMBOL(kinematicsForward);
+EXPORT_SYMBOL(kinematicsInverse);
+
+// --- loading ---
+#include "stepdiagkins_arguments.h"
+
+static int make_pins(void) {
+    static const char axis[] = "xyz";
+    pin = hal_malloc(sizeof *pin);
+    if (!pin) return -1;
+    int bad = 0;
+    bad |= hal_pin_bit_newf(HAL_IN, &pin->enable, component, "stepdiagkins.enable");
+    bad |= hal_pin_bit_newf(HAL_IN, &pin->use_tool, component, "stepdiagkins.use-tool");
+    bad |= hal_pin_bit_newf(HAL_OUT, &pin->inside, component, "stepdiagkins.inside");
+    bad |= hal_pin_float_newf(HAL_OUT, &pin->applied, component, "stepdiagkins.applied");
+    bad |= hal_pin_u32_newf(HAL_OUT, &pin->status, component, "stepdiagkins.status");
+    bad |= hal_pin_u32_newf(HAL_OUT, &pin->refusals, component, "stepdiagkins.refusals");
+    bad |= hal_pin_u32_newf(HAL_OUT, &pin->table_id_low, component, "stepdiagkins.table-id-low");
+    bad |= hal_pin_u32_newf(HAL_OUT, &pin->table_id_high, component, "stepdiagkins.table-id-high");
+    for (int i = 0; i < 3; ++i) {
+        bad |= hal_pin_float_newf(HAL_IN, &pin->tool_offset[i], component, "stepdiagkins.tooloffset-%c", axis[i]);
+        bad |= hal_pin_float_newf(HAL_OUT, &pin->tool[i], component, "stepdiagkins.tool-%c", axis[i]);
+        bad |= hal_pin_float_newf(HAL_OUT, &pin->error[i], component, "stepdiagkins.error-%c", axis[i]);
+        bad |= hal_pin_float_newf(HAL_OUT, &pin->correction[i], component, "stepdiagkins.correction-%c", axis[i]);
+    }
+    return bad ? -1 : 0;
+}
+
+void rtapi_app_exit(void) {
+    if (component >= 0) hal_exit(component);
+    stepdiag_compensator_free(compensator);
+    component = -1;
+    compensator = NULL;
+}
+
+int rtapi_app_main(void) {
+    if (read_arguments()) return -EINVAL;
+    component = hal_init("stepdiagkins");
+    if (component < 0 || make_pins()) {
+        rtapi_app_exit();
+        return -ENOMEM;
+    }
+    const uint64_t id = stepdiag_fingerprint(compensator);
+    *pin->enable = 1;
+    *pin->table_id_low = (hal_u32_t)(id & 0xffffffffu);
+    *pin->table_id_high = (hal_u32_t)(id >> 32);
+    memcpy(now.tool, own_tool, sizeof now.tool);
+    now.share = 1.0;
+    rtapi_print("stepdiagkins: table %s, id %08x%08x, forward of inverse within %.0e mm\n", table, (unsigned)(id >> 32),
+                (unsigned)(id & 0xffffffffu), stepdiag_inverse_bound(compensator));
+    hal_ready(component);
+    return 0;
+}

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The load-time arguments of stepdiagkins.c, which alone includes this: read, checked, and the table loaded. Each
+// mistake is told by LinuxCNC's error output, and the module does not load.
+#include <ctype.h>
+#include <errno.h>
+
+#define COMPLAIN(...) rtapi_print_msg(RTAPI_MSG_ERR, "stepdiagkins: " __VA_ARGS__)
+
+// "1.5", or "0,0,-200" for count = 3.
+static int read_numbers(const char* name, const char* text, double* values, int count) {
+    const char* rest = text;
+    for (int i = 0; i < count; ++i) {
+        char* end;
+        values[i] = strtod(rest, &end);
+        if (end == rest || *end != (i + 1 < count ? ',' : '\0') || !isfinite(values[i])) {
+            COMPLAIN("%s: expected %s, got \"%s\"\n", name, count == 1 ? "a number" : "three numbers x,y,z", text);
+            return -1;
+        }
+        rest = end + 1;
+    }
+    return 0;
+}
+
+static int read_choice(const char* name, const char* text, const char* const choices[3], int* value) {
+    for (*value = 0; *value < 3; ++*value)
+        if (choices[*value] && strcmp(text, choices[*value]) == 0) return 0;
+    COMPLAIN("%s: expected %s, %s%s%s, got \"%s\"\n", name, choices[0], choices[1], choices[2] ? " or " : "",
+             choices[2] ? choices[2] : "", text);
+    return -1;
+}
+
+// INI files and HAL do not pass on every quote: an axis before b has its prime whether it is written or not.
+static int read_chain(char* spelled, size_t size) {
+    const char* const bed = strchr(chain, 'b');
+    size_t n = 0;
+    for (const char* c = chain; *c && n + 3 < size; ++c) {
+        if (strchr("'\"[] \t", *c)) continue;
+        spelled[n++] = *c;
+        if (bed && c < bed && *c != 'w') spelled[n++] = '\'';
+    }
+    spelled[n] = '\0';
+    if (n) return 0;
+    COMPLAIN("chain: expected the machine's kinematic chain, as in chain=wXbYZt, got none\n");
+    return -1;
+}
+
+static int read_coordinates(void) {
+    int seen[3] = {0, 0, 0};
+    joint_count = 0;
+    for (const char* c = coordinates; *c; ++c) {
+        const char* const letter = strchr(LETTERS, toupper((unsigned char)*c));
+        if (!letter || joint_count == MAX_JOINTS) {
+            COMPLAIN("coordinates: expected up to %d letters of %s, got \"%s\"\n", MAX_JOINTS, LETTERS, coordinates);
+            return -1;
+        }
+        axis_of_joint[joint_count++] = (int)(letter - LETTERS);
+        if (letter - LETTERS < 3) seen[letter - LETTERS] = 1;
+    }
+    if (seen[0] && seen[1] && seen[2]) return 0;
+    COMPLAIN("coordinates: expected X, Y and Z among them, got \"%s\"\n", coordinates);
+    return -1;
+}
+
+static int read_arguments(void) {
+    static const char* const outsides[] = {"hold", "linear", "refuse"};
+    static const char* const approaches[] = {"mean", "positive", "negative"};
+    static const char* const lengths[] = {"mm", "inch", NULL};
+    char spelled[64], reason[900];
+    double seconds;
+    int inch;
+    stepdiag_options options = stepdiag_default_options();
+    if (read_chain(spelled, sizeof spelled) || read_coordinates() ||
+        read_numbers("origin", origin, options.origin, 3) || read_numbers("margin", margin, &options.margin, 1) ||
+        read_numbers("largest_correction", largest_correction, &options.largest_correction, 1) ||
+        read_numbers("largest_tool", largest_tool, &options.largest_tool, 1) ||
+        read_numbers("ramp", ramp, &seconds, 1) || read_choice("outside", outside, outsides, &options.outside) ||
+        read_choice("approach", approach, approaches, &options.approach) || read_choice("units", units, lengths, &inch))
+        return -1;
+    if (!(seconds >= 0.0 && seconds <= 60.0)) {
+        COMPLAIN("ramp: expected 0 to 60 s, got \"%s\"\n", ramp);
+        return -1;
+    }
+    if (!*table) {
+        COMPLAIN("table: expected the path of a calibration file, got none\n");
+        return -1;
+    }
+    compensator = stepdiag_compensator_load(table, spelled, &options, reason, sizeof reason);
+    if (!compensator) {
+        COMPLAIN("%s\n", reason);
+        return -1;
+    }
+    stepdiag_calibration_tool(compensator, own_tool);
+    mm_per_unit = inch ? 25.4 : 1.0;
+    ramp_ns = seconds * 1e9;
+    tool_limit = options.largest_tool;
+    return 0;
+}
