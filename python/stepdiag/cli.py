@@ -12,6 +12,7 @@ import click
 from stepdiag._core import InvalidArgument, ReplayMismatch, __version__
 from stepdiag.cli_calibrations import compare, report
 from stepdiag.cli_evaluate import evaluate, observe
+from stepdiag.cli_export import export
 from stepdiag.cli_head import head
 from stepdiag.cli_nc import nc
 from stepdiag.cli_options import PATH, InOrder, keep_apart, keep_map, out_file, tell
@@ -43,6 +44,7 @@ SHORT = {
     "evaluate": "Calibrate the machine from a run.",
     "report": "Tell what a calibration says.",
     "compare": "Set two calibrations side by side.",
+    "export": "Write a calibration for a controller.",
     "check": "Tell what a file is, and whether it is sound.",
     "head": "Look at the description of a laser head.",
 }
@@ -177,7 +179,7 @@ def init(folder: Path, scenario: Path | None, head_name: str | None) -> None:
         click.echo(f"wrote {path}")
 
 
-for command in (evaluate, observe, plan, uncertainty, study, nc, report, compare, head):
+for command in (evaluate, observe, plan, uncertainty, study, nc, report, compare, export, head):
     command.short_help = SHORT[str(command.name)]
     cli.add_command(command)
 cli.commands = {name: cli.commands[name] for name in SHORT}  # the order in which help lists them
