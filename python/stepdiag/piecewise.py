@@ -17,8 +17,9 @@ from stepdiag._core import InvalidArgument
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int_]
 
-RESOLUTION: Final = 1e-6
-MOST_NODES: Final = 20_000  # the search takes time in proportion to the square
+RESOLUTION: Final = 1e-4
+MOST_NODES: Final = 5_000  # the search takes ten seconds
+FIRST_WINDOW: Final = 32  # nodes looked at, as long as chords end within them
 
 
 def best_subset(x: FloatArray, functions: FloatArray, size: int) -> IntArray:
@@ -51,12 +52,14 @@ def best_subset(x: FloatArray, functions: FloatArray, size: int) -> IntArray:
 def fewest_nodes(x: FloatArray, functions: FloatArray, tolerance: float) -> IntArray:
     """The fewest nodes whose chords deviate by at most the tolerance from every function."""
     n = len(x)
+    # The slack keeps nodes on one straight line together, whatever the rounding of their values.
+    slack = tolerance + 4.0 * np.finfo(float).eps * np.max(np.abs(functions), axis=1, keepdims=True)
     edges = np.full(n, n)  # from the first node, so far
     came_from = np.zeros(n, dtype=int)
     edges[0] = 0
     for i in range(n - 1):
-        last = _as_far_as_chords_may_go(x, functions, tolerance, i)
-        ends = last[edges[last] > edges[i] + 1]
+        ends = _ends_of_chords(x, functions, slack, i)
+        ends = ends[edges[ends] > edges[i] + 1]
         edges[ends], came_from[ends] = edges[i] + 1, i
     path = [n - 1]
     while path[-1] != 0:
@@ -64,17 +67,18 @@ def fewest_nodes(x: FloatArray, functions: FloatArray, tolerance: float) -> IntA
     return np.array(path[::-1])
 
 
-def _as_far_as_chords_may_go(x: FloatArray, functions: FloatArray, tolerance: float, i: int) -> IntArray:
+def _ends_of_chords(x: FloatArray, functions: FloatArray, slack: FloatArray, i: int) -> IntArray:
     """The nodes after i to which a chord from i may go: its slope must pass all those between."""
-    step = x[i + 1 :] - x[i]
-    rise = functions[:, i + 1 :] - functions[:, i, None]
-    # The slack keeps nodes on one straight line together, whatever the rounding of their values: 4 units in the last
-    # place, a thousandth of the deviation that anybody could measure.
-    slack = tolerance + 4.0 * np.finfo(float).eps * np.max(np.abs(functions), axis=1, keepdims=True)
-    least = np.maximum.accumulate((rise - slack) / step, axis=1)
-    most = np.minimum.accumulate((rise + slack) / step, axis=1)
-    slope = rise / step
-    # A chord that is too steep for a node before its end is refused; its own end asks nothing of it.
+    width = FIRST_WINDOW
+    while True:
+        step = x[i + 1 : i + 1 + width] - x[i]
+        slope = (functions[:, i + 1 : i + 1 + width] - functions[:, i, None]) / step
+        least = np.maximum.accumulate(slope - slack / step, axis=1)
+        most = np.minimum.accumulate(slope + slack / step, axis=1)
+        # Where no slope is left that passes all nodes so far, no chord goes farther.
+        if np.any(least[:, -1] > most[:, -1]) or i + 1 + width >= len(x):
+            break
+        width *= 2
     passes = np.ones(slope.shape[1], dtype=bool)
     passes[1:] = np.all((slope[:, 1:] >= least[:, :-1]) & (slope[:, 1:] <= most[:, :-1]), axis=0)
     return i + 1 + np.flatnonzero(passes)

@@ -12,8 +12,8 @@ from refusal import refused
 
 from stepdiag.piecewise import best_subset, fewest_nodes, largest_deviation
 
-# The search stops when its interval is a millionth of the deviation.
-RESOLUTION = 2e-6
+# The search stops when its interval is a ten-thousandth of the deviation.
+RESOLUTION = 2e-4
 
 values = st.lists(st.tuples(st.integers(1, 9), st.integers(-50, 50), st.integers(-50, 50)), min_size=2, max_size=9)
 
@@ -57,7 +57,7 @@ def test_as_many_nodes_as_there_are_stay_all() -> None:
 
 
 def test_a_sine_loses_what_a_parabola_over_its_intervals_does() -> None:
-    x = np.linspace(0.0, 1.0, 2001)
+    x = np.linspace(0.0, 1.0, 801)
     kept = best_subset(x, np.sin(np.pi * x)[None, :], 11)
     # Of the best chords of sin every one deviates by the same d; the integral of sqrt(|f''| / (8 d)) is their number.
     share = np.mean(np.sqrt(np.pi**2 * np.sin(np.pi * x) / 8.0))
@@ -67,5 +67,5 @@ def test_a_sine_loses_what_a_parabola_over_its_intervals_does() -> None:
 def test_bad_sizes_are_refused() -> None:
     x = np.array([0.0, 1.0])
     refused(best_subset, x, np.zeros((1, 2)), 1, names="at least 2")
-    many = np.arange(30_000.0)
-    refused(best_subset, many, np.zeros((1, len(many))), 256, names="30000 nodes")
+    many = np.arange(6_000.0)
+    refused(best_subset, many, np.zeros((1, len(many))), 256, names="6000 nodes")
