@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from stepdiag._core import InvalidArgument, ReplayMismatch, __version__
+from stepdiag.cli_acquire import acquire, twin
 from stepdiag.cli_calibrations import compare, report
 from stepdiag.cli_evaluate import evaluate, observe
 from stepdiag.cli_export import export
@@ -40,6 +41,8 @@ SHORT = {
     "uncertainty": "Tell how uncertain a calibration would be.",
     "study": "Tell the same over a grid of scenarios.",
     "nc": "Write the measuring program for a controller.",
+    "acquire": "Take a run's readings from an IDS3010.",
+    "twin": "Simulate the instrument, behind a socket.",
     "simulate": "Simulate the run of a scenario.",
     "evaluate": "Calibrate the machine from a run.",
     "report": "Tell what a calibration says.",
@@ -179,7 +182,7 @@ def init(folder: Path, scenario: Path | None, head_name: str | None) -> None:
         click.echo(f"wrote {path}")
 
 
-for command in (evaluate, observe, plan, uncertainty, study, nc, report, compare, export, head):
+for command in (evaluate, observe, plan, uncertainty, study, nc, acquire, twin, report, compare, export, head):
     command.short_help = SHORT[str(command.name)]
     cli.add_command(command)
 cli.commands = {name: cli.commands[name] for name in SHORT}  # the order in which help lists them

@@ -30,15 +30,6 @@ std::map<std::string, std::pair<DoubleArray, DoubleArray>> to_arrays(const Funct
     return functions;
 }
 
-Approaches to_approaches(const std::string& text) {
-    const bool valid = text.size() == 3 && text.find_first_not_of("+-") == std::string::npos;
-    if (!valid) throw InvalidArgument("approach: expected + or - of X, Y, Z such as \"++-\", got \"" + text + "\"");
-    Approaches approaches = all_positive;
-    for (int a = 0; a < 3; ++a)
-        if (text[a] == '-') approaches[a] = Approach::negative;
-    return approaches;
-}
-
 ErrorMap make_error_map(const FunctionArrays& functions, const std::map<std::string, double>& squareness,
                         const FunctionArrays& negative_functions) {
     ParameterTable table;
@@ -69,6 +60,15 @@ DoubleArray map_points(const Points& commanded, Map&& map) {
 }
 
 }  // namespace
+
+Approaches to_approaches(const std::string& text) {
+    const bool valid = text.size() == 3 && text.find_first_not_of("+-") == std::string::npos;
+    if (!valid) throw InvalidArgument("approach: expected + or - of X, Y, Z such as \"++-\", got \"" + text + "\"");
+    Approaches approaches = all_positive;
+    for (int a = 0; a < 3; ++a)
+        if (text[a] == '-') approaches[a] = Approach::negative;
+    return approaches;
+}
 
 void bind_machine(py::module_& m) {
     py::class_<Chain>(m, "Chain",

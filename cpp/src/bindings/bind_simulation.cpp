@@ -1,5 +1,6 @@
 #include "bindings.hpp"
 #include "stepdiag/simulation/simulate.hpp"
+#include "stepdiag/simulation/virtual_readout.hpp"
 
 namespace stepdiag::bindings {
 namespace {
@@ -172,6 +173,42 @@ void bind_simulation(py::module_& m) {
         "the channel time. Points of a visit are approached in the direction of its own travel. Readings whose beam "
         "misses the mirror or does not come back are "
         "lost (NaN). Raises InvalidArgument; RuntimeError where a replay and its trace differ.");
+
+    py::class_<VirtualReadout>(
+        m, "VirtualReadout",
+        "The virtual head set up on one line, read with the axes at any position: the row that simulate makes there.")
+        .def(py::init([](const Machine& machine, const Plan& plan, const HeadLike& head, const std::string& line,
+                         const std::map<std::string, Misalignment>& misalignment, const Noise& noise,
+                         const std::optional<Environment>& environment, const std::optional<Environment>& assumed,
+                         double verified_share) {
+                 const SimulationOptions options{misalignment, noise, environment, assumed, verified_share};
+                 return VirtualReadout(machine, plan, to_heads(head, plan), Line::parse(line), options);
+             }),
+             py::arg("machine"), py::arg("plan"), py::arg("head"), py::arg("line"), py::kw_only(),
+             py::arg("misalignment") = std::map<std::string, Misalignment>{}, py::arg("noise") = Noise{},
+             py::arg("environment") = std::nullopt, py::arg("assumed_environment") = std::nullopt,
+             py::arg("verified_share") = SimulationOptions{}.verified_share,
+             "Arguments as those of simulate. Raises InvalidArgument as it does, and for a line that is not in the "
+             "plan.")
+        .def(
+            "read",
+            [](const VirtualReadout& readout, const ArrayLike& position, const std::string& approach,
+               const IntegerLike& row, double elapsed) {
+                const Eigen::Vector3d at = to_vector3(position, "position");
+                if (!at.allFinite()) throw InvalidArgument("position: expected three finite numbers");
+                const Approaches came = to_approaches(approach);
+                const auto number = std::uint64_t(to_integer(row, "row", 0, std::int64_t(1) << 47));
+                const SignalRow signals = [&] {
+                    py::gil_scoped_release release;
+                    return readout.read(at, came, number, elapsed);
+                }();
+                return to_numpy(signals);
+            },
+            py::arg("position"), py::arg("approach") = "+++", py::kw_only(), py::arg("row") = integer(0),
+            py::arg("elapsed") = 0.0,
+            "The head's signals (n,), mm and rad, NaN where lost, with the axes at `position` (mm). approach: the "
+            "directions that the axes came from, + or - of each. row: which draws the noise takes, as the number of a "
+            "simulated row; elapsed: seconds since the set-up's first reading.");
 }
 
 }  // namespace stepdiag::bindings

@@ -64,6 +64,7 @@ std::uint64_t to_seed(const IntegerLike& number);
 std::string to_path(const PathLike& path);
 Chain to_chain(const ChainLike& chain);  // a Chain, or its text
 Axis to_axis(const std::string& name);
+Approaches to_approaches(const std::string& text);                             // "++-"
 Placement to_placement(const ArrayLike& position, const ArrayLike& rotation);  // a rotation vector
 Heads to_heads(const HeadLike& heads, const Plan& plan);                       // a Head, or one for each line
 

@@ -4,32 +4,8 @@
 
 #include "simulation/visit_readings.hpp"
 #include "stepdiag/core/error.hpp"
-#include "stepdiag/core/random.hpp"
 
 namespace stepdiag {
-namespace {
-
-double deviation(const Noise& noise, const std::string& channel) {
-    if (channel == "alpha" || channel == "beta") return noise.tilt;
-    return channel == "spot_x" || channel == "spot_y" ? noise.spot : noise.distance;
-}
-
-// The noise of a row, by its number.
-void add_noise(SignalRow& row, const std::vector<std::string>& channels, const Noise& noise, std::uint64_t number) {
-    constexpr std::uint64_t common_draw = 0xffff;  // no channel has this number
-    const auto draw = [&](std::uint64_t c) {
-        return normal_pair(noise.seed, RandomStream::reading_noise, (number << 16) | c)[0];
-    };
-    const double common = noise.common > 0.0 ? noise.common * draw(common_draw) : 0.0;
-    for (std::size_t c = 0; c < row.size(); ++c) {
-        if (!row[c]) continue;
-        if (is_distance(channels[c])) *row[c] += common;
-        if (const double sigma = deviation(noise, channels[c]); sigma > 0.0) *row[c] += sigma * draw(c);
-    }
-}
-
-}  // namespace
-
 void check_noise(const Noise& noise) {
     for (const auto& [key, deviation] : {std::pair("distance", noise.distance), std::pair("tilt", noise.tilt),
                                          std::pair("spot", noise.spot), std::pair("common", noise.common)})

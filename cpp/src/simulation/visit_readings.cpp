@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/core/random.hpp"
 
 namespace stepdiag {
 namespace {
@@ -53,6 +54,11 @@ void check_heads(const Heads& heads, const Plan& plan) {
         if (signal_names(head) != signal_names(heads.head))
             throw InvalidArgument("head of " + line + ": expected the same signals as the other lines' heads");
     }
+}
+
+double deviation(const Noise& noise, const std::string& channel) {
+    if (channel == "alpha" || channel == "beta") return noise.tilt;
+    return channel == "spot_x" || channel == "spot_y" ? noise.spot : noise.distance;
 }
 
 }  // namespace
@@ -146,6 +152,19 @@ void add_setup(SignalRow& row, const std::vector<std::string>& channels, const M
         if (channels[c] == "spot_x" || channels[c] == "spot_y")
             constant = misalignment.psd_zero[channels[c] == "spot_y"];
         *row[c] += constant;
+    }
+}
+
+void add_noise(SignalRow& row, const std::vector<std::string>& channels, const Noise& noise, std::uint64_t number) {
+    constexpr std::uint64_t common_draw = 0xffff;  // no channel has this number
+    const auto draw = [&](std::uint64_t c) {
+        return normal_pair(noise.seed, RandomStream::reading_noise, (number << 16) | c)[0];
+    };
+    const double common = noise.common > 0.0 ? noise.common * draw(common_draw) : 0.0;
+    for (std::size_t c = 0; c < row.size(); ++c) {
+        if (!row[c]) continue;
+        if (is_distance(channels[c])) *row[c] += common;
+        if (const double sigma = deviation(noise, channels[c]); sigma > 0.0) *row[c] += sigma * draw(c);
     }
 }
 

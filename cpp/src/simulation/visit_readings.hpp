@@ -39,5 +39,7 @@ std::vector<SignalRow> read_defined(Head head, const HeadSetup& setup, const std
 // What a line's set-up makes of a row read `elapsed` seconds after its first one.
 void add_setup(SignalRow& row, const std::vector<std::string>& channels, const Misalignment& misalignment,
                double elapsed);
+// The noise of a row, by its number.
+void add_noise(SignalRow& row, const std::vector<std::string>& channels, const Noise& noise, std::uint64_t number);
 
 }  // namespace stepdiag
