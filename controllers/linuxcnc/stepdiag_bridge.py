@@ -174,7 +174,9 @@ def make_component(name: str) -> "hal.component":
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--acquire", type=address, required=True, metavar="HOST:PORT", help="`stepdiag acquire --trigger`")
+    parser.add_argument(
+        "--acquire", type=address, required=True, metavar="HOST:PORT", help="`stepdiag acquire --trigger`"
+    )
     parser.add_argument("--twin", type=address, metavar="HOST:PORT", help="`stepdiag twin`, in simulation only")
     parser.add_argument("--timeout", type=float, default=60.0, metavar="S", help="for each answer (60)")
     parser.add_argument("--rest", type=int, default=6, metavar="N", help="servo cycles at rest, with --twin (6)")
