@@ -1,7 +1,6 @@
 """What an acquisition is to read: the channels of the scenario's head, its visits, and where head and mirror stand."""
 
 import hashlib
-import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,6 +8,7 @@ import numpy as np
 
 from stepdiag._core import InvalidArgument
 from stepdiag.ids3010 import AXES
+from stepdiag.raw_records import Visited
 from stepdiag.scenario import Scenario
 from stepdiag.visits import Visit, visits_of
 
@@ -48,27 +48,28 @@ def nominal_distances(scenario: Scenario, visit: Visit) -> list[float]:
     return [float(d) for d in scenario.heads[visit.line].standoff + (visit.positions - start) @ along]
 
 
-def described_plan(scenario: Scenario) -> list[dict[str, Any]]:
+def described_plan(scenario: Scenario) -> list[Visited]:
     """The visits as a raw file keeps them."""
     return [
-        {
-            "visit": visit.number,
-            "set_up": visit.set_up,
-            "line": visit.line,
-            "run": visit.run,
-            "direction": visit.direction,
-            "scale_line": visit.is_scale_line,
-            "points": [int(point) for point in visit.points],
-            "position_mm": [[float(x) for x in position] for position in visit.positions],
-            "nominal_mm": nominal_distances(scenario, visit),
-        }
+        Visited(
+            visit=visit.number,
+            set_up=visit.set_up,
+            line=visit.line,
+            run=visit.run,
+            direction=visit.direction,
+            scale_line=visit.is_scale_line,
+            points=[int(point) for point in visit.points],
+            position_mm=[(float(x), float(y), float(z)) for x, y, z in visit.positions],
+            nominal_mm=nominal_distances(scenario, visit),
+        )
         for visit in visits_of(scenario)
     ]
 
 
-def digest_of(channels: Sequence[str], plan: Sequence[Any]) -> str:
+def digest_of(channels: Sequence[str], plan: Sequence[Visited]) -> str:
     """Of all that must be the same for an acquisition to be taken up again."""
-    return hashlib.sha256(json.dumps([list(channels), list(plan)]).encode()).hexdigest()
+    text = ",".join(channels) + "".join(visit.model_dump_json() for visit in plan)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def placement(scenario: Scenario, visit: Visit) -> str:

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,7 +11,8 @@ from stepdiag._core import InvalidArgument
 from stepdiag.cli_options import PATH, keep_apart, keep_map, out_file, tell
 
 if TYPE_CHECKING:
-    from stepdiag.acquire import AcquireOptions, Resume
+    from stepdiag.acquire import AcquireOptions
+    from stepdiag.acquire_loop import Resume
     from stepdiag.acquire_triggers import Trigger
 
 SECONDS = click.FloatRange(min=0.0, min_open=True)
@@ -126,16 +127,15 @@ def _take(scenario: Path, output: Path, given: dict[str, Any]) -> None:
 
 
 def _convert(raw: Path, output: Path, options: "AcquireOptions") -> None:
-    from stepdiag.acquire import write_run
     from stepdiag.raw_file import read_raw
+    from stepdiag.run_from_raw import write_run
 
     keep_apart(output, raw)
     content = read_raw(raw)
-    if content.torn_bytes:
-        tell("warning", f"{raw}: the last line was torn ({content.torn_bytes} bytes without an end) and is left out")
-    write_run(raw, output, options)
-    planned = sum(len(visit["points"]) for visit in content.header["plan"])
-    click.echo(f"wrote {output}: {len(content.readings())} of {planned} readings")
+    if content.torn is not None:
+        tell("warning", content.torn)
+    write_run(raw, output, zero=options.zero, uncertainties=options.uncertainties)
+    click.echo(f"wrote {output}: {len(content.readings())} of {content.planned} readings")
 
 
 def _options(given: dict[str, Any]) -> "AcquireOptions":
@@ -179,7 +179,8 @@ def _resume(given: dict[str, Any]) -> "Resume | None":
 
 
 def _trigger(text: str) -> "Trigger":
-    from stepdiag.acquire_triggers import KeyTrigger, SettleTrigger, TcpTrigger
+    from stepdiag.acquire_triggers import KeyTrigger, SettleTrigger
+    from stepdiag.tcp_trigger import TcpTrigger
 
     simple: dict[str, Callable[[], Trigger]] = {"key": KeyTrigger, "settle": SettleTrigger}
     if text in simple:
@@ -229,6 +230,7 @@ def _point(context: click.Context, option: click.Parameter, texts: tuple[str, ..
 @click.option(
     "--latch/--no-latch", default=True, show_default=True, help="Beams stay lost until the measurement starts anew."
 )
+@click.option("--interrupt", is_flag=True, help="Interrupt the beams whenever the head moves to another line.")
 def twin(
     scenario: Path,
     host: str,
@@ -237,7 +239,8 @@ def twin(
     settling_ms: float,
     sampling_noise_um: float,
     lose: frozenset[tuple[int, int]],
-    latch: Literal[True, False],
+    latch: bool,
+    interrupt: bool,
 ) -> None:
     """Simulate the instrument: an IDS3010 that reads SCENARIO's virtual machine.
 
@@ -249,7 +252,9 @@ def twin(
     from stepdiag.twin import Twin
     from stepdiag.twin_instrument import TwinBehaviour
 
-    behaviour = TwinBehaviour(settling=settling_ms * 1e-3, sampling_noise_um=sampling_noise_um, latch=latch, lost=lose)
+    behaviour = TwinBehaviour(
+        settling=settling_ms * 1e-3, sampling_noise_um=sampling_noise_um, latch=latch, lost=lose, interrupt=interrupt
+    )
     with Twin(scenario, host=host, port=port, behaviour=behaviour, play=play) as running:
         click.echo(f"listening on {running.address[0]}:{running.address[1]} (Ctrl-C ends)")
         sys.stdout.flush()

@@ -19,6 +19,7 @@ PORT: Final = 9090
 AXES: Final = 3
 RUNNING: Final = "measurement running"
 IDLE: Final = "system idle"
+STARTING: Final = ("measurement starting", "measurement restarting")
 TWIN: Final = "stepdiag twin"  # what a twin calls itself, in its device type
 # Firmware up to 1.8 names its functions by the first, that of 1.9.1 by the second.
 INTERFACES: Final = ("com.attocube.ids", "com.attocube.sen")
@@ -131,12 +132,11 @@ class Ids3010:
 
     def start(self, timeout: float) -> None:
         """Starts its measurement, stopping one that runs: so its manual clears errors after a beam was interrupted."""
-        deadline = time.monotonic() + timeout
         if self.mode() != IDLE:
             self.ask("system.stopMeasurement", attempts=1)
-            self._wait_for(IDLE, deadline)
+            self.wait_for(IDLE, timeout)
         self.ask("system.startMeasurement", attempts=1)
-        self._wait_for(RUNNING, deadline)
+        self.wait_for(RUNNING, timeout)
 
     def error_text(self, number: int) -> str:
         """What the instrument says that an error or warning number means."""
@@ -147,7 +147,9 @@ class Ids3010:
                 return f"number {number}"
         return f"number {number}: {self._texts[number]}"
 
-    def _wait_for(self, mode: str, deadline: float) -> None:
+    def wait_for(self, mode: str, timeout: float) -> None:
+        """Until it says that it does this."""
+        deadline = time.monotonic() + timeout
         while (now := self.mode()) != mode:
             if time.monotonic() > deadline:
                 error = _whole(self._request(self._full("system.getSystemError"), (), self._attempts)[0])

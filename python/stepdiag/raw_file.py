@@ -1,49 +1,54 @@
 """The raw file of an acquisition: JSON lines, only ever appended to, on the disk before the next reading begins.
 
-The first line is the header; then every value that the instrument gave ("value"), after those of a point what became of
-them ("reading"), and where an acquisition began or took up again ("session", "again").
+The first line is the header; then every value that the instrument gave, after those of a point what became of them, and
+where an acquisition began or was taken up again (raw_records.py).
 """
 
 import fcntl
-import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Self
+from typing import Self
 
 from stepdiag._core import InvalidArgument
 from stepdiag.files import check_output, read_bytes, reason
-
-FORMAT: Final = "stepdiag raw readings"
-VERSION: Final = 1
-RECORDS: Final = ("header", "session", "again", "value", "reading")
-
-Record = Mapping[str, Any]
+from stepdiag.raw_records import Again, Header, RawReading, Record, parse_record
 
 
 @dataclass(frozen=True)
 class RawContent:
-    """What a raw file holds. `sound_bytes`: its length without a last line that was torn."""
+    """What a raw file holds. `sound_bytes`: its length without a last line that was torn, of `torn_bytes`."""
 
     path: Path
-    header: Record
+    header: Header
     records: tuple[Record, ...]
     sound_bytes: int
     torn_bytes: int
 
-    def readings(self) -> dict[tuple[int, int], Record]:
-        """The readings by (visit, point), in the order in which they were taken. What an "again" repeats is gone."""
-        found: dict[tuple[int, int], Record] = {}
+    def readings(self) -> dict[tuple[int, int], RawReading]:
+        """The readings by (visit, point), in the order in which they were taken, without those that were repeated."""
+        found: dict[tuple[int, int], RawReading] = {}
         for record in self.records:
-            if record["record"] == "again":
-                found = {key: reading for key, reading in found.items() if key[0] < record["visit"]}
-            elif record["record"] == "reading":
-                key = (record["visit"], record["point"])
-                found.pop(key, None)
-                found[key] = record
+            if isinstance(record, Again):
+                found = {key: reading for key, reading in found.items() if key[0] < record.visit}
+            elif isinstance(record, RawReading):
+                found.pop((record.visit, record.point), None)
+                found[record.visit, record.point] = record
         return found
+
+    @property
+    def planned(self) -> int:
+        """How many readings the plan has."""
+        return sum(len(visit.points) for visit in self.header.plan)
+
+    @property
+    def torn(self) -> str | None:
+        """What there is to say of its end."""
+        if not self.torn_bytes:
+            return None
+        return f"{self.path}: the last line was torn ({self.torn_bytes} bytes without an end) and is left out"
 
 
 class RawFile:
@@ -54,7 +59,7 @@ class RawFile:
         self._handle = handle
 
     @classmethod
-    def create(cls, path: Path, header: Record) -> Self:
+    def create(cls, path: Path, header: Header) -> Self:
         """A new file. Raises InvalidArgument for one that exists."""
         check_output(path)
         try:
@@ -67,7 +72,7 @@ class RawFile:
             raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
         file = cls(path, handle)
         file._lock()
-        file.append([{"record": "header", "format": FORMAT, "version": VERSION, **header}])
+        file.append([header])
         folder = os.open(path.parent, os.O_RDONLY)
         try:
             os.fsync(folder)  # so that the file's name outlasts a power cut too
@@ -83,8 +88,8 @@ class RawFile:
         except OSError as error:
             raise InvalidArgument(f"{path}: cannot go on with it: {reason(error)}") from None
         file = cls(path, handle)
+        file._lock()
         try:
-            file._lock()
             content = read_raw(path)
             if content.torn_bytes:
                 os.ftruncate(handle, content.sound_bytes)
@@ -96,7 +101,7 @@ class RawFile:
 
     def append(self, records: Iterable[Record]) -> None:
         """Writes records, and returns when they are on the disk."""
-        data = b"".join(json.dumps(dict(record)).encode() + b"\n" for record in records)
+        data = b"".join(record.model_dump_json().encode() + b"\n" for record in records)
         before = os.fstat(self._handle).st_size
         try:
             while data:
@@ -130,59 +135,13 @@ def read_raw(path: Path) -> RawContent:
     any other line that is not sound."""
     data = read_bytes(path)
     sound = data.rfind(b"\n") + 1
-    lines = data[:sound].splitlines()
-    records = [_record(path, number, line) for number, line in enumerate(lines, start=1)]
-    if not records or records[0]["record"] != "header":
-        raise InvalidArgument(f"{path}: expected a raw file of stepdiag acquire, got one that does not begin as such")
-    for number, record in enumerate(records[1:], start=2):
-        if record["record"] == "header":
+    lines = data[:sound].split(b"\n")[:-1]
+    if not lines:
+        raise InvalidArgument(f"{path}: expected a raw file of stepdiag acquire, got {data[:20]!a}...")
+    header, *records = [parse_record(line, f"{path}, line {number}") for number, line in enumerate(lines, start=1)]
+    if not isinstance(header, Header):
+        raise InvalidArgument(f"{path}, line 1: expected the header of a raw file, got a {header.record}")
+    for number, record in enumerate(records, start=2):
+        if isinstance(record, Header):
             raise InvalidArgument(f"{path}, line {number}: expected one header, got another one")
-    return RawContent(path, records[0], tuple(records[1:]), sound, len(data) - sound)
-
-
-def _record(path: Path, number: int, line: bytes) -> dict[str, Any]:
-    place = f"{path}, line {number}"
-    try:
-        record = json.loads(line)
-    except (ValueError, RecursionError):
-        raise InvalidArgument(f"{place}: expected a JSON object, got {line[:40].decode(errors='replace')!a}") from None
-    if not isinstance(record, dict) or record.get("record") not in RECORDS:
-        raise InvalidArgument(f"{place}: expected a record of one of {', '.join(RECORDS)}")
-    if record["record"] == "header":
-        _check_header(place, record)
-    elif record["record"] == "reading":
-        _check_reading(place, record)
-    elif record["record"] == "again" and not _is_number(record.get("visit")):
-        raise InvalidArgument(f"{place}: visit: expected a whole number")
-    return record
-
-
-def _check_header(place: str, record: Record) -> None:
-    if record.get("format") != FORMAT:
-        raise InvalidArgument(f"{place}: format: expected {FORMAT!r}, got {record.get('format')!r}")
-    if record.get("version") != VERSION:
-        raise InvalidArgument(f"{place}: version: expected {VERSION}, got {record.get('version')!r}")
-    channels, plan = record.get("channels"), record.get("plan")
-    if not isinstance(channels, list) or not channels or not all(isinstance(name, str) for name in channels):
-        raise InvalidArgument(f"{place}: channels: expected a list of names")
-    if not isinstance(plan, list) or not all(isinstance(visit, dict) for visit in plan):
-        raise InvalidArgument(f"{place}: plan: expected a list of visits")
-    if record.get("sign") not in (1, -1):
-        raise InvalidArgument(f"{place}: sign: expected 1 or -1, got {record.get('sign')!r}")
-
-
-def _check_reading(place: str, record: Record) -> None:
-    for key in ("visit", "point"):
-        if not _is_number(record.get(key)):
-            raise InvalidArgument(f"{place}: {key}: expected a whole number, got {record.get(key)!r}")
-    pm, deviations = record.get("pm"), record.get("sd_pm")
-    if not isinstance(pm, list) or not all(value is None or _is_number(value) for value in pm):
-        raise InvalidArgument(f"{place}: pm: expected whole numbers, or null where a beam was lost")
-    if not isinstance(deviations, list) or len(deviations) != len(pm):
-        raise InvalidArgument(f"{place}: sd_pm: expected as many values as pm has")
-    if not isinstance(record.get("time"), str):
-        raise InvalidArgument(f"{place}: time: expected a time")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
+    return RawContent(path, header, tuple(records), sound, len(data) - sound)

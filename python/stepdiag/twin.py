@@ -140,7 +140,7 @@ class Answers:
             return _error(number, BAD_PARAMS, "params: expected a list")
         try:
             result = function(params)
-        except InvalidArgument as error:
+        except (InvalidArgument, OverflowError) as error:
             return _error(number, BAD_PARAMS, str(error))
         return {"jsonrpc": "2.0", "result": result, "id": number}
 

@@ -38,6 +38,7 @@ class TwinBehaviour:
     sampling_noise_um: float = 0.0  # of every value, beside the scenario's noise, which is that of a point
     latch: bool = True  # a beam that was interrupted stays lost until the measurement is started anew
     lost: frozenset[tuple[int, int]] = frozenset()  # (visit, point) where every beam is interrupted
+    interrupt: bool = False  # moving the head to another line interrupts every beam, as it does in truth
 
     def __post_init__(self) -> None:
         for name, value in (("settling", self.settling), ("sampling_noise_um", self.sampling_noise_um)):
@@ -143,8 +144,8 @@ class TwinInstrument:
             return self._visit, self._index
 
     def _place(self, set_up: int) -> None:
-        if set_up != self._set_up:
-            self._interrupted = [False] * AXES  # whoever put the head there has started the measurement anew
+        if set_up != self._set_up:  # without `interrupt`, whoever moved the head has started the measurement anew
+            self._interrupted = [self._behaviour.interrupt] * AXES
         self._set_up = set_up
 
     def _remember(self) -> None:

@@ -1,0 +1,129 @@
+"""Reading when a controller asks, over a socket."""
+
+import selectors
+import socket
+import time
+from collections.abc import Sequence
+from typing import Final
+
+from stepdiag._core import InvalidArgument
+from stepdiag.acquire_triggers import Context, Stopped, of_start, point_text
+from stepdiag.files import reason
+from stepdiag.visits import Visit
+
+
+class TcpTrigger:
+    """A controller asks, by lines of text: READ <visit> <point> is answered by DONE <visit> <point> when the reading is
+    on the disk, or by FAIL <reason>."""
+
+    LONGEST: Final = 256  # bytes of a line
+
+    def __init__(self, host: str = "127.0.0.1", port: int = 0) -> None:
+        try:
+            self._server = socket.create_server((host, port))
+        except OSError as error:
+            raise InvalidArgument(f"trigger: cannot listen on {host}:{port}: {reason(error)}") from None
+        self._server.setblocking(False)
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(self._server, selectors.EVENT_READ)
+        self._clients: dict[socket.socket, bytes] = {}
+        self._asking: socket.socket | None = None
+        self._context: Context | None = None
+        self.address: tuple[str, int] = self._server.getsockname()[:2]
+
+    def start(self, context: Context) -> None:
+        self._context = context
+
+    def begin(self, visit: Visit, index: int, text: str) -> None:
+        of_start(self._context).operator.tell(f"{text}; waiting for {point_text(visit, index)}")
+
+    def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> None:
+        context = of_start(self._context)
+        deadline = time.monotonic() + context.wait_timeout
+        while (left := deadline - time.monotonic()) > 0.0:
+            for client, line in self._lines(left):
+                wrong = _wrong(line, visit, index)
+                if wrong is None:
+                    self._asking = client
+                    return
+                context.operator.tell(f"the controller asked in vain: {wrong}")
+                self._answer(client, f"FAIL {wrong}")
+        raise Stopped(f"{point_text(visit, index)}: nobody asked for it in {context.wait_timeout:g} s")
+
+    def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
+        if self._asking is not None:
+            self._answer(self._asking, f"DONE {visit.number} {int(visit.points[index])}")
+        self._asking = None
+
+    def failed(self, why: str) -> None:
+        if self._asking is not None:
+            self._answer(self._asking, f"FAIL {' '.join(why.split())}")
+        self._asking = None
+
+    def close(self) -> None:
+        for client in list(self._clients):
+            self._drop(client)
+        self._selector.close()
+        self._server.close()
+
+    def _lines(self, timeout: float) -> list[tuple[socket.socket, bytes]]:
+        """One line of each client that has sent a whole one, waiting for some if there is none."""
+        ready = [client for client, rest in self._clients.items() if b"\n" in rest]
+        for key, _ in self._selector.select(0.0 if ready else timeout):
+            if key.fileobj is self._server:
+                self._accept()
+            elif isinstance(key.fileobj, socket.socket):
+                self._receive(key.fileobj)
+        lines = []
+        for client, rest in list(self._clients.items()):
+            line, end, rest = rest.partition(b"\n")
+            if end:
+                self._clients[client] = rest
+                lines.append((client, line))
+                break  # its answer comes before anybody else's turn
+        return lines
+
+    def _accept(self) -> None:
+        try:
+            client, _ = self._server.accept()
+        except OSError:
+            return
+        client.settimeout(1.0)  # for answers; who does not take them is dropped
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._clients[client] = b""
+        self._selector.register(client, selectors.EVENT_READ)
+
+    def _receive(self, client: socket.socket) -> None:
+        try:
+            data = client.recv(4096)
+        except OSError:
+            data = b""
+        if not data:
+            self._drop(client)
+            return
+        self._clients[client] += data
+        if b"\n" not in self._clients[client] and len(self._clients[client]) > self.LONGEST:
+            self._answer(client, "FAIL expected READ <visit> <point>, got a line without an end")
+            self._drop(client)
+
+    def _answer(self, client: socket.socket, text: str) -> None:
+        try:
+            client.sendall(text.encode() + b"\n")
+        except OSError:
+            self._drop(client)
+
+    def _drop(self, client: socket.socket) -> None:
+        if self._clients.pop(client, None) is not None:
+            self._selector.unregister(client)
+            client.close()
+
+
+def _wrong(line: bytes, visit: Visit, index: int) -> str | None:
+    words = line.decode("ascii", errors="replace").split()
+    if len(words) != 3 or words[0] != "READ" or not all(word.isdigit() and len(word) < 10 for word in words[1:]):
+        return f"expected READ <visit> <point>, got {' '.join(words)[:60]!a}"
+    got = (int(words[1]), int(words[2]))
+    expected = (visit.number, int(visit.points[index]))
+    if got != expected:
+        return f"expected visit {expected[0]} point {expected[1]}, got visit {got[0]} point {got[1]}"
+    return None
