@@ -23,6 +23,8 @@ AXES: Final = "XYZ"
 FUNCTIONS: Final = tuple(f"E{component}{axis}" for axis in AXES for component in "XYZABC")
 SQUARENESSES: Final = ("C0Y", "B0Z", "A0Z")
 
+SAME_NODE: Final = 1e-6  # mm: nearer ones are the same position, and one row of a table with nine digits
+
 
 @dataclass(frozen=True)
 class ExportOptions:
@@ -181,8 +183,10 @@ def common_nodes(errors: ErrorMap, axis: str) -> FloatArray:
 
 
 def inside(nodes: FloatArray, edge: float) -> FloatArray:
-    """The nodes within the volume, and both its ends."""
-    return np.union1d(nodes[(nodes > 0.0) & (nodes < edge)], [0.0, edge])
+    """The nodes within the volume, and both its ends; of nodes that are one but for rounding, one."""
+    between = nodes[(nodes > SAME_NODE) & (nodes < edge - SAME_NODE)]
+    apart = np.diff(between, prepend=-np.inf) > SAME_NODE
+    return np.concatenate([[0.0], between[apart], [edge]])
 
 
 def spread(values: FloatArray, most: int) -> FloatArray:

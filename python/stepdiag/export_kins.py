@@ -27,10 +27,12 @@ def linuxcnc_kins(calibration: Calibration, output: Path, options: ExportOptions
     missing = require(calibration, [*FUNCTIONS, *SQUARENESSES], options)
     tool, origin = tool_of(calibration, options), origin_of(options)
     text = _csv_text(_with_tool(calibration, tool))
-    chain = calibration.chain.name.strip("[]").replace(" ", "")
-    arguments = f"table={output} chain={chain}"
+    # INI files do not pass on quotes, and the module knows where the bed is.
+    arguments = f"table={output.absolute()} chain={''.join(c for c in calibration.chain.name if c.isalpha())}"
     if origin.any():
-        arguments += f" origin={','.join(f'{o:g}' for o in origin)}"
+        arguments += f" origin={','.join(repr(o) for o in origin.tolist())}"
+    if options.approach not in (None, "mean"):
+        arguments += f" approach={options.approach}"
     lines = [
         f"chain {calibration.chain}, volume {words(calibration.volume)} mm, tool offset {words(tool)} mm, home at "
         f"{words(origin)} mm in the controller's coordinates",

@@ -143,7 +143,7 @@ def test_the_kinematics_table_is_the_calibration_to_the_last_bit(tmp_path: Path)
     report = export(calibration, "linuxcnc-kins", tmp_path / "table.csv", incomplete=True)
     calibration.write(tmp_path / "calibration.csv")
     assert (tmp_path / "table.csv").read_bytes() == (tmp_path / "calibration.csv").read_bytes()
-    assert any("stepdiagkins" in line and "wX'bYZt" in line for line in report)
+    assert any("stepdiagkins" in line and "chain=wXbYZt" in line for line in report)
 
 
 def test_the_kinematics_table_may_be_for_another_tool(tmp_path: Path) -> None:

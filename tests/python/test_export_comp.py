@@ -127,6 +127,13 @@ def test_tables_with_many_uneven_nodes_fit_into_256_rows_with_the_loss_that_is_s
     assert np.max(np.abs(left)) * 1e3 <= float(said[1]) * 1.06 + 1e-6
 
 
+def test_nodes_that_are_one_but_for_rounding_make_one_row(tmp_path: Path) -> None:
+    errors = one_error("EXX", [0.0, 20.0, 80.0], [0.0, 0.001, 0.0])
+    functions = errors.functions | {"EBX": ([0.0, 20.0 + 4e-15, 79.99999999999999], [0.0, 1e-5, 0.0])}
+    export(calibration_of(sd.ErrorMap(functions)), "linuxcnc-comp", tmp_path)
+    assert joints(tmp_path)[0].nominal.tolist() == [0.0, 20.0, 80.0]
+
+
 def test_what_is_left_in_the_volume_is_what_the_machine_then_does(tmp_path: Path) -> None:
     calibration = random_calibration(4)
     report = "\n".join(export(calibration, "linuxcnc-comp", tmp_path))
