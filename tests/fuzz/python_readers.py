@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import faulthandler
 import random
+import re
 import resource
 import signal
 import sys
@@ -19,6 +20,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import acquisition_readers as acquisition
 
 import stepdiag as sd
 from stepdiag.head_description import read_head_design
@@ -53,6 +56,8 @@ WEIRD = [
         "1000000000",
     ),
 ]
+# What stands behind = or :, or between commas.
+VALUE = re.compile(rb"(?:[=:,\[] *)(\"[^\"]*\"|\[[^\]]*\]|[^,\]\[}]+)")
 
 
 @dataclass(frozen=True)
@@ -76,6 +81,10 @@ def heads() -> list[bytes]:
 READERS = {
     "scenario": Reader(read_scenario, scenarios, ".toml"),
     "head": Reader(read_head_design, heads, ".toml"),
+    "raw": Reader(acquisition.read_raw_file, acquisition.raw_files, ".jsonl"),
+    "requests": Reader(acquisition.answer_requests, acquisition.requests, ".json"),
+    "replies": Reader(acquisition.read_replies, acquisition.replies, ".json"),
+    "wishes": Reader(acquisition.read_wishes, acquisition.wishes, ".txt"),
 }
 
 
@@ -86,9 +95,10 @@ def spoiled(content: bytes, chance: random.Random, is_text: bool) -> bytes:
 
 
 def spoil_line(content: bytes, chance: random.Random) -> bytes:
+    """Of TOML or JSON: takes a line out, doubles it, moves it, or puts another value into it."""
     lines = content.split(b"\n")
     i, j = chance.randrange(len(lines)), chance.randrange(len(lines))
-    key, equals, _ = lines[i].partition(b"=")
+    values = list(VALUE.finditer(lines[i]))
     match chance.randrange(5):
         case 0:
             del lines[i]
@@ -96,8 +106,9 @@ def spoil_line(content: bytes, chance: random.Random) -> bytes:
             lines.insert(j, lines[i])
         case 2:
             lines[i], lines[j] = lines[j], lines[i]
-        case 3 | 4 if equals:
-            lines[i] = key + b"= " + chance.choice(WEIRD).encode()
+        case 3 | 4 if values:
+            start, end = chance.choice(values).span(1)
+            lines[i] = lines[i][:start] + chance.choice(WEIRD).encode() + lines[i][end:]
     return b"\n".join(lines)
 
 
