@@ -141,10 +141,15 @@ class Ids3010:
     def error_text(self, number: int) -> str:
         """What the instrument says that an error or warning number means."""
         if number not in self._texts:
+            method = "com.attocube.system.errorNumberToString"
             try:
-                self._texts[number] = self._word("com.attocube.system.errorNumberToString", (0, number))
+                result = self._request(method, (0, number), self._attempts)  # ask() would come back here
             except InstrumentError:
                 return f"number {number}"
+            words = [value for value in result if isinstance(value, str)]
+            if result[0] != 0 or not words:
+                return f"number {number}"
+            self._texts[number] = words[-1]
         return f"number {number}: {self._texts[number]}"
 
     def wait_for(self, mode: str, timeout: float) -> None:

@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from stepdiag.acquire import AcquireOptions, acquire, raw_path
-from stepdiag.acquire_triggers import KeyTrigger, _wrong
+from stepdiag.acquire_triggers import KeyTrigger
 from stepdiag.ids3010 import Ids3010, InstrumentError
 from stepdiag.ids3010_messages import JsonStream
 from stepdiag.raw_file import read_raw
 from stepdiag.run_from_raw import measurement_of
 from stepdiag.scenario import parse_scenario
 from stepdiag.settling import Settling
+from stepdiag.tcp_trigger import _wrong
 from stepdiag.twin import Answers, Twin
 from stepdiag.twin_instrument import TwinInstrument
 from stepdiag.visits import Visit, visits_of
@@ -153,7 +154,8 @@ def read_replies(path: Path) -> None:
         try:
             ask(Connected(data))
         except InstrumentError as error:
-            assert str(error).startswith("ids3010://"), error
+            if not str(error).startswith("ids3010://"):
+                raise AssertionError("a message names the instrument") from error
 
 
 def replies() -> list[bytes]:
