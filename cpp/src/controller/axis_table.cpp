@@ -1,6 +1,7 @@
 #include "controller/axis_table.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "stepdiag/core/error.hpp"
@@ -54,9 +55,11 @@ std::vector<double> boundaries(const std::array<std::vector<const FunctionTable*
     return all;
 }
 
+double& component(Vector3& v, int c) { return c == 0 ? v.x : c == 1 ? v.y : v.z; }
+
 }  // namespace
 
-AxisTable::AxisTable(const ErrorMap& errors, Axis axis, double edge, CompensatedApproach approach) {
+AxisTable::AxisTable(const ErrorMap& errors, Axis axis, double edge, double margin, CompensatedApproach approach) {
     const auto functions = tables_of(errors, axis, approach);
     const std::vector<double> bounds = boundaries(functions, edge);
     if (bounds.size() > largest_node_count)
@@ -73,34 +76,38 @@ AxisTable::AxisTable(const ErrorMap& errors, Axis axis, double edge, Compensated
             for (const FunctionTable* table : functions[c]) {
                 const double share = 1.0 / double(functions[c].size());
                 const Piece piece = piece_of(*table, bounds[i]);
-                (c < 3 ? interval.delta : interval.theta)[c % 3] += share * piece.value;
-                (c < 3 ? interval.delta_slope : interval.theta_slope)[c % 3] += share * piece.slope;
+                component(c < 3 ? interval.delta : interval.theta, c % 3) += share * piece.value;
+                component(c < 3 ? interval.delta_slope : interval.theta_slope, c % 3) += share * piece.slope;
             }
         for (const Squareness s : all_squarenesses) {
             const SquarenessTerm term = squareness_term(s);
             if (term.axis != axis) continue;
             const double slope = term.sign * errors.squareness(s);
-            interval.delta[term.component] += slope * bounds[i];
-            interval.delta_slope[term.component] += slope;
+            component(interval.delta, term.component) += slope * bounds[i];
+            component(interval.delta_slope, term.component) += slope;
         }
         intervals_.push_back(interval);
     }
     // One boundary in a bucket at most, where no more than this many buckets an interval bring it about.
     constexpr std::size_t buckets_per_interval = 8;
-    std::uint32_t most = 2;
+    std::size_t most = 2;
     for (std::size_t factor = 1; factor <= buckets_per_interval && most > 1; factor *= 2)
-        most = make_buckets(factor * count_, edge);
+        most = make_buckets(factor * count_, edge, margin);
     for (largest_step_ = 1; 2 * largest_step_ <= most;) largest_step_ *= 2;
     intervals_.resize(count_ + 2 * largest_step_, intervals_.back());  // halving looks ahead, and finds no end there
 }
 
-std::uint32_t AxisTable::make_buckets(std::size_t count, double edge) {
-    buckets_per_mm_ = double(count) / edge;
-    last_bucket_ = std::int32_t(count) - 1;
-    std::vector<std::uint32_t> inside(count, 0);  // boundaries in each bucket
-    for (std::size_t i = 1; i < count_; ++i) ++inside[std::size_t(bucket_of(intervals_[i].lower))];
-    first_.assign(count, 0);
-    for (std::size_t bucket = 1; bucket < count; ++bucket) first_[bucket] = first_[bucket - 1] + inside[bucket - 1];
+std::size_t AxisTable::make_buckets(std::size_t count, double edge, double margin) {
+    // A little wider than the edge's share: equidistant boundaries then all come to lie at the very end of a bucket,
+    // however they are rounded, and what `find` asks for has the same answer throughout.
+    constexpr double wider = 1.0 + 1e-12;
+    buckets_per_mm_ = double(count) / (edge * wider);
+    bucket_of_home_ = std::ceil(margin * buckets_per_mm_);
+    first_.assign(bucket_of(edge + margin) + 1, 0);
+    std::vector<std::uint32_t> inside(first_.size(), 0);  // boundaries in each bucket
+    for (std::size_t i = 1; i < count_; ++i) ++inside[bucket_of(intervals_[i].lower)];
+    for (std::size_t bucket = 1; bucket < first_.size(); ++bucket)
+        first_[bucket] = first_[bucket - 1] + inside[bucket - 1];
     return *std::max_element(inside.begin(), inside.end());
 }
 

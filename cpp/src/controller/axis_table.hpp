@@ -3,11 +3,10 @@
 // however the nodes are spread. Beyond the ends the first and last intervals go on.
 #pragma once
 
-#include <Eigen/Core>
-#include <array>
 #include <cstdint>
 #include <vector>
 
+#include "controller/vector3.hpp"
 #include "stepdiag/controller/compensator.hpp"
 #include "stepdiag/machine/error_map.hpp"
 
@@ -17,18 +16,15 @@ namespace stepdiag {
 struct alignas(64) AxisInterval {
     double lower = 0.0, upper = 0.0;  // positions in [lower, upper) belong here: -inf and +inf where the table ends
     double start = 0.0;               // mm, where the values hold
-    std::array<double, 3> delta = {}, delta_slope = {};  // mm, mm/mm
-    std::array<double, 3> theta = {}, theta_slope = {};  // rad, rad/mm
+    Vector3 delta = {}, delta_slope = {};  // mm, mm/mm
+    Vector3 theta = {}, theta_slope = {};  // rad, rad/mm
 
     bool holds(double position) const noexcept { return lower <= position && position < upper; }
-    Eigen::Vector3d delta_at(double position) const noexcept { return at(delta, delta_slope, position); }
-    Eigen::Vector3d theta_at(double position) const noexcept { return at(theta, theta_slope, position); }
-
-private:
-    Eigen::Vector3d at(const std::array<double, 3>& value, const std::array<double, 3>& slope,
-                       double position) const noexcept {
-        const double run = position - start;
-        return {value[0] + run * slope[0], value[1] + run * slope[1], value[2] + run * slope[2]};
+    STEPDIAG_INLINED Vector3 delta_at(double position) const noexcept {
+        return delta + (position - start) * delta_slope;
+    }
+    STEPDIAG_INLINED Vector3 theta_at(double position) const noexcept {
+        return theta + (position - start) * theta_slope;
     }
 };
 static_assert(sizeof(AxisInterval) == 128);
@@ -37,16 +33,16 @@ class AxisTable {
 public:
     static constexpr std::size_t largest_node_count = 100'000;  // 13 MB
 
-    // `edge`: travel of the axis, mm. Throws InvalidArgument naming the axis for more nodes than a controller should
-    // hold.
-    AxisTable(const ErrorMap& errors, Axis axis, double edge, CompensatedApproach approach);
+    // `edge`: travel of the axis; `margin`: how far beyond its ends positions may be, mm. Throws InvalidArgument naming
+    // the axis for more nodes than a controller should hold.
+    AxisTable(const ErrorMap& errors, Axis axis, double edge, double margin, CompensatedApproach approach);
 
-    // Buckets of equal width say between which intervals a position is; halving finds it. Bucketing is monotone, with
-    // all its rounding, so a boundary in a lower bucket is below the position and one in a higher bucket above it.
-    const AxisInterval& find(double position) const noexcept {
-        const std::int32_t bucket = bucket_of(position);
-        const AxisInterval* interval = &intervals_[first_[std::size_t(bucket)]];
-        for (std::uint32_t step = largest_step_; step > 0; step /= 2)
+    // The interval of a position between -margin and edge + margin. Buckets of equal width say between which intervals
+    // it is; halving finds it. Bucketing is monotone, with all its rounding, so a boundary in a lower bucket is below
+    // the position and one in a higher bucket above it.
+    STEPDIAG_INLINED const AxisInterval& find(double position) const noexcept {
+        const AxisInterval* interval = &intervals_[first_[bucket_of(position)]];
+        for (std::size_t step = largest_step_; step > 0; step /= 2)
             if (position >= interval[step - 1].upper) interval += step;
         return *interval;
     }
@@ -55,18 +51,16 @@ public:
     const AxisInterval* end() const { return intervals_.data() + count_; }
 
 private:
-    std::int32_t bucket_of(double position) const noexcept {
-        const auto bucket = std::int32_t(position * buckets_per_mm_);  // positions are those of a machine: no overflow
-        return bucket < 0 ? 0 : bucket > last_bucket_ ? last_bucket_ : bucket;
+    STEPDIAG_INLINED std::size_t bucket_of(double position) const noexcept {
+        return std::size_t(std::int64_t(position * buckets_per_mm_ + bucket_of_home_));
     }
-    std::uint32_t make_buckets(std::size_t count, double edge);  // the most boundaries in one of them
+    std::size_t make_buckets(std::size_t count, double edge, double margin);  // the most boundaries in one of them
 
     std::size_t count_ = 0;  // of intervals that hold positions; copies of the last follow
     std::vector<AxisInterval> intervals_;
     std::vector<std::uint32_t> first_;  // of each bucket: the interval that holds its lowest positions
-    double buckets_per_mm_ = 0.0;
-    std::int32_t last_bucket_ = 0;
-    std::uint32_t largest_step_ = 1;  // a power of two
+    double buckets_per_mm_ = 0.0, bucket_of_home_ = 0.0;
+    std::size_t largest_step_ = 1;  // a power of two
 };
 
 }  // namespace stepdiag

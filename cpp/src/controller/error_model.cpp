@@ -9,16 +9,21 @@
 namespace stepdiag {
 namespace {
 
-using Eigen::Vector3d;
+double norm(const Vector3& v) { return std::sqrt(dot(v, v)); }
 
-Vector3d vector(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+struct Quaternion {
+    double w;
+    Vector3 v;
+};
 
-// Exp theta as a quaternion, off by less than 1e-16 up to largest_angle.
-Eigen::Quaterniond rotation(const Vector3d& theta) noexcept {
-    const double angle2 = theta.squaredNorm();
-    const double cosine = 1.0 - angle2 * (1.0 / 8.0 - angle2 / 384.0);
-    const Vector3d sine = (0.5 - angle2 * (1.0 / 48.0 - angle2 / 3840.0)) * theta;
-    return {cosine, sine.x(), sine.y(), sine.z()};
+Quaternion operator*(const Quaternion& a, const Quaternion& b) noexcept {
+    return {a.w * b.w - dot(a.v, b.v), a.w * b.v + b.w * a.v + cross(a.v, b.v)};
+}
+
+// Exp theta, off by less than 1e-19 up to largest_angle.
+Quaternion rotation(const Vector3& theta) noexcept {
+    const double angle2 = dot(theta, theta);
+    return {1.0 - angle2 * (1.0 / 8.0 - angle2 / 384.0), (0.5 - angle2 / 48.0) * theta};
 }
 
 // What one axis does at most, over a range of positions.
@@ -31,33 +36,35 @@ Extremes extremes(const AxisTable& table, double lowest, double highest) {
     Extremes most;
     for (const AxisInterval& interval : table)
         for (const double end : {std::max(interval.lower, lowest), std::min(interval.upper, highest)}) {
-            most.delta = std::max(most.delta, interval.delta_at(end).norm());
-            most.theta = std::max(most.theta, interval.theta_at(end).norm());
-            most.delta_slope = std::max(most.delta_slope, vector(interval.delta_slope).norm());
-            most.theta_slope = std::max(most.theta_slope, vector(interval.theta_slope).norm());
+            most.delta = std::max(most.delta, norm(interval.delta_at(end)));
+            most.theta = std::max(most.theta, norm(interval.theta_at(end)));
+            most.delta_slope = std::max(most.delta_slope, norm(interval.delta_slope));
+            most.theta_slope = std::max(most.theta_slope, norm(interval.theta_slope));
         }
     return most;
 }
 
 }  // namespace
 
-ErrorModel::ErrorModel(const Chain& chain, const ErrorMap& errors, const Vector3d& volume, CompensatedApproach approach)
-    : tables_{AxisTable(errors, Axis::X, volume.x(), approach), AxisTable(errors, Axis::Y, volume.y(), approach),
-              AxisTable(errors, Axis::Z, volume.z(), approach)},
-      axes_before_bed_(0),
-      volume_(volume) {
+ErrorModel::ErrorModel(const Chain& chain, const ErrorMap& errors, const std::array<double, 3>& volume, double margin,
+                       CompensatedApproach approach)
+    : tables_{AxisTable(errors, Axis::X, volume[0], margin, approach),
+              AxisTable(errors, Axis::Y, volume[1], margin, approach),
+              AxisTable(errors, Axis::Z, volume[2], margin, approach)},
+      volume_(volume),
+      margin_(margin) {
     for (int rank = 0; rank < 3; ++rank) {
         order_[rank] = index(chain.order()[rank]);
         axes_before_bed_ += chain.carries_workpiece(chain.order()[rank]);
     }
 }
 
-Vector3d ErrorModel::orientation(const Vector3d& position, const Cell& cell) const noexcept {
-    const auto turn = [&](int axis) { return rotation(cell[axis]->theta_at(position[axis])); };
-    const Vector3d half_sine = (turn(order_[0]) * turn(order_[1]) * turn(order_[2])).vec();
-    // 2 asin(s)/s; its next term is 2e-13 of the vector where all three axes turn by largest_angle.
-    const double s2 = half_sine.squaredNorm();
-    return (2.0 + s2 * (1.0 / 3.0 + s2 * (3.0 / 20.0))) * half_sine;
+Vector3 ErrorModel::orientation(const Vector3& p, const Cell& cell) const noexcept {
+    const std::array<Quaternion, 3> turns = {rotation(cell.x->theta_at(p.x)), rotation(cell.y->theta_at(p.y)),
+                                             rotation(cell.z->theta_at(p.z))};
+    const Vector3 half_sine = (turns[order_[0]] * turns[order_[1]] * turns[order_[2]]).v;
+    // 2 asin(s)/s; the next term is 2e-11 of it where all three axes turn by largest_angle, 1e-13 rad.
+    return (2.0 + dot(half_sine, half_sine) * (1.0 / 3.0)) * half_sine;
 }
 
 // With the point's distance from the joint of axis a never more than reach_a = |tool| + sum of |p_j| + |delta_j| from a
@@ -66,20 +73,20 @@ Vector3d ErrorModel::orientation(const Vector3d& position, const Cell& cell) con
 //   |de/dp_a| <= |delta_a'| + |theta_a'| reach_a + sum of |theta| over the rotations that turn the direction of a
 // (|d Exp(theta)/dp| <= |theta'|). The root of the sum of squares of these three columns bounds the matrix de/dp, and
 // with it, because e is continuous, how far the errors at two positions can differ.
-ErrorModel::Bounds ErrorModel::bounds(double margin, double largest_tool) const {
+ErrorModel::Bounds ErrorModel::bounds(double largest_tool) const {
     std::array<Extremes, 3> most;
-    for (int axis = 0; axis < 3; ++axis) most[axis] = extremes(tables_[axis], -margin, volume_[axis] + margin);
+    for (int axis = 0; axis < 3; ++axis) most[axis] = extremes(tables_[axis], -margin_, volume_[axis] + margin_);
     double reach = largest_tool, error = 0.0, squares = 0.0;
     for (int rank = 2; rank >= 0; --rank) {
         const int axis = order_[rank];
         if (!(most[axis].theta <= largest_angle))
             throw InvalidArgument(std::string("axis ") + letter(Axis(axis)) + ": expected rotations of at most " +
                                   std::to_string(largest_angle) + " rad, got " + std::to_string(most[axis].theta));
-        const double farther = reach + volume_[axis] + margin + most[axis].delta;
-        const bool carries_workpiece = rank < axes_before_bed_;
-        double slope = most[axis].delta_slope + most[axis].theta_slope * (carries_workpiece ? farther : reach);
-        for (int before = 0; before < rank + carries_workpiece; ++before) slope += most[order_[before]].theta;
-        error += most[axis].delta + most[axis].theta * (carries_workpiece ? farther : reach);
+        const double farther = reach + volume_[axis] + margin_ + most[axis].delta;
+        const bool workpiece = carries_workpiece(rank);
+        double slope = most[axis].delta_slope + most[axis].theta_slope * (workpiece ? farther : reach);
+        for (int before = 0; before < rank + workpiece; ++before) slope += most[order_[before]].theta;
+        error += most[axis].delta + most[axis].theta * (workpiece ? farther : reach);
         squares += slope * slope;
         reach = farther;
     }
