@@ -68,13 +68,14 @@ def read_what_is_exported(path: Path) -> Calibration:
     calibration = read_calibration(path)
     if is_netcdf(path) or not read_error_map(path).header.get("format", "").startswith("stepdiag error map"):
         return calibration
-    nothing = (np.zeros(1), np.zeros(1), np.full(1, np.nan))
+    edges = dict(zip(AXES, calibration.volume, strict=True))
+    nothing = {name: (np.array([0.0, edges[name[2]]]), np.zeros(2), np.full(2, np.nan)) for name in FUNCTIONS}
     return Calibration(
         calibration.method,
         calibration.chain,
         calibration.volume,
         calibration.tool,
-        dict.fromkeys(FUNCTIONS, nothing) | calibration.functions,
+        nothing | calibration.functions,
         dict.fromkeys(SQUARENESSES, (0.0, np.nan)) | calibration.squareness,
         reversal=calibration.reversal,
         reversal_negative_uncertainty={name: table[2] for name, table in calibration.negative_functions.items()},

@@ -42,6 +42,8 @@ def linuxcnc_kins(calibration: Calibration, output: Path, options: ExportOptions
         *missing,
         f"INI file: [KINS] KINEMATICS = stepdiagkins {arguments}",
     ]
+    if " " in str(output.absolute()):
+        lines.append("note: KINEMATICS takes no space in a path: move the table to where there is none")
     return Export({output: text}, lines)
 
 
