@@ -54,7 +54,7 @@ void check_position(const Compensator& c, const CompensatorOptions& options, con
     if (!(command.status & compensation_refused)) {
         const double length = std::hypot(command.position[0] - position[0], command.position[1] - position[1],
                                          command.position[2] - position[2]);
-        expect(length <= options.largest_correction * (1 + 1e-9) + 4e-16 * largest(position),
+        expect(length <= options.largest_correction + c.inverse_bound() + 4e-16 * largest(position),
                "a correction is no longer than the largest");
     }
     expect(fuzzing::same_bits(c.command(position, tool).position, command.position), "a command is reproducible");
