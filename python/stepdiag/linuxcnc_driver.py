@@ -171,7 +171,8 @@ class Driver:
 
     def resume(self, timeout: float = 600.0) -> dict[str, Any]:
         self.command.auto(linuxcnc.AUTO_RESUME)
-        self.wait_for("resume", lambda: self.received() and not self.status.paused, timeout)
+        # Not until it is no longer paused: the next stop may have come before anybody has looked.
+        self.wait_for("resume", self.received, timeout)
         return self.until_pause(timeout)
 
     def until_pause(self, timeout: float) -> dict[str, Any]:

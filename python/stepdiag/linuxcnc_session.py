@@ -94,9 +94,12 @@ class LinuxcncSession:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        with contextlib.suppress(OSError, LinuxcncError, AttributeError):
-            self._lines.write('{"do": "end"}\n')
-            self._lines.flush()
+        with contextlib.suppress(OSError, LinuxcncError, AttributeError, subprocess.TimeoutExpired):
+            if kind is None:
+                self._lines.write('{"do": "end"}\n')
+                self._lines.flush()
+            else:  # perhaps in the middle of a request, which the driver gives up when nobody is there
+                self._connection.shutdown(socket.SHUT_RDWR)
             self._process.wait(15)
         self._stack.close()
 
