@@ -6,6 +6,8 @@ from pathlib import Path
 
 AXES = "XYZ"
 
+RECORD_DEPTH = 8000  # servo periods that may pass before they are fetched
+
 HAL = """\
 loadrt [KINS]KINEMATICS
 loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS num_dio=8 num_aio=8
@@ -32,6 +34,7 @@ class Machine:
     compensation: Mapping[int, str] = field(default_factory=dict)  # COMP_FILE of a joint
     compensation_type: int = 0
     tools: Mapping[int, tuple[float, float, float]] = field(default_factory=dict)  # offsets of tools by number
+    record: Sequence[str] = ()  # pins of numbers that are written down every servo period
     hal: Sequence[str] = ()  # lines after those of the machine
     ini: Mapping[str, Mapping[str, str | float | int]] = field(default_factory=dict)  # further keys, by section
 
@@ -48,7 +51,16 @@ def write_configuration(folder: Path, machine: Machine, display: str) -> Path:
 
 def _hal(machine: Machine) -> str:
     loops = [f"net joint-{j} joint.{j}.motor-pos-cmd => joint.{j}.motor-pos-fb" for j in range(3)]
-    return HAL + "\n".join([*loops, *machine.hal]) + "\n"
+    recorder = []
+    if machine.record:
+        recorder = [
+            f"loadrt sampler depth={RECORD_DEPTH} cfg={'f' * len(machine.record)}",
+            "addf sampler.0 servo-thread",
+        ]
+    for column, pin in enumerate(machine.record):
+        own = [f"joint-{j}" for j in range(3) if pin == f"joint.{j}.motor-pos-cmd"]  # has a signal already
+        recorder.append(f"net {own[0] if own else f'record-{column} {pin}'} => sampler.0.pin.{column}")
+    return HAL + "\n".join([*loops, *recorder, *machine.hal]) + "\n"
 
 
 def _tools(machine: Machine) -> str:

@@ -30,6 +30,7 @@ class Driver:
         self.status = linuxcnc.stat()
         self.errors = linuxcnc.error_channel()
         self.messages: list[str] = []  # of the move or program under way
+        self.code = ""  # of the MDI move under way
         # Pins can only be read by a component; this one has none of its own.
         self.component = hal.component("stepdiag-session")
         self.component.ready()
@@ -122,12 +123,38 @@ class Driver:
         self.wait_for("homing", lambda: all(self.status.homed[:joints]), timeout)
         self.switch_to(linuxcnc.MODE_MDI, timeout)
 
-    def mdi(self, code: str, timeout: float = 60.0) -> None:
+    def jog_joint(self, joint: int, distance: float, speed: float, timeout: float = 60.0) -> None:
+        """Moves one joint, in joint mode."""
         self.messages = []
+        self.switch_to(linuxcnc.MODE_MANUAL, timeout)
+        self.free(True, timeout)
+        goal = self.motors()[joint] + distance
+        self.command.jog(linuxcnc.JOG_INCREMENT, True, joint, speed, distance)
+        self.wait_for("jog", lambda: abs(self.motors()[joint] - goal) < 1e-3, timeout)
+        self.at_rest(timeout)
+        self.free(False, timeout)
+        self.switch_to(linuxcnc.MODE_MDI, timeout)
+
+    def free(self, joints: bool, timeout: float) -> None:
+        """Joint mode, or world mode."""
+        mode = linuxcnc.TRAJ_MODE_FREE if joints else linuxcnc.TRAJ_MODE_TELEOP
+        self.command.teleop_enable(not joints)
+        self.wait_for("joint or world mode", lambda: self.status.motion_mode == mode, timeout)
+
+    def mdi(self, code: str, timeout: float = 60.0) -> None:
+        self.start_mdi(code, timeout)
+        self.finish_mdi(timeout)
+
+    def start_mdi(self, code: str, timeout: float = 60.0) -> None:
+        self.messages = []
+        self.code = code
         self.switch_to(linuxcnc.MODE_MDI, timeout)
         self.command.mdi(code)
-        self.done(code, timeout)
-        self.wait_for(code, self.idle, timeout)
+        self.wait_for(code, self.received, timeout)
+
+    def finish_mdi(self, timeout: float = 60.0) -> None:
+        self.done(self.code, timeout)
+        self.wait_for(self.code, self.idle, timeout)
 
     def visit(self, points: list[list[float]], timeout: float = 60.0) -> list[list[float]]:
         """Goes to each point by G53 G0 and reads where the joints are told to stand (joint.N.motor-pos-cmd)."""
@@ -211,6 +238,9 @@ class Driver:
     def pins(self, names: list[str]) -> list[float | int | bool]:
         return [self.pin(name) for name in names]
 
+    def wait_for_pin(self, name: str, value: float | int | bool, timeout: float) -> None:
+        self.wait_for(f"{name} = {value}", lambda: bool(self.pin(name) == value), timeout)
+
     def set_pin(self, name: str, value: float | int | bool) -> None:
         hal.set_p(name, str(int(value)) if isinstance(value, bool) else repr(value))
 
@@ -223,23 +253,44 @@ class Driver:
 
 
 VERBS = {
-    *("turn_on", "turn_off", "home", "mdi", "visit", "at_rest", "motors", "program", "resume", "abort"),
-    *("state", "pin", "pins", "set_pin"),
+    *(
+        "turn_on",
+        "turn_off",
+        "home",
+        "jog_joint",
+        "mdi",
+        "start_mdi",
+        "finish_mdi",
+        "visit",
+        "at_rest",
+        "motors",
+        "program",
+        "resume",
+        "abort",
+    ),
+    *("state", "pin", "pins", "wait_for_pin", "set_pin"),
 }
+
+
+def serve(connection: socket.socket) -> None:
+    driver = Driver(connection)
+    with connection.makefile("rw", encoding="utf-8") as lines:
+        for line in lines:
+            request = json.loads(line)
+            if request["do"] == "end":
+                break
+            answer = driver.answer(request) if request["do"] in VERBS else {"error": f"unknown: {request['do']}"}
+            lines.write(json.dumps(answer) + "\n")
+            lines.flush()
 
 
 def main() -> int:
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         connection.connect(os.environ["STEPDIAG_SESSION_SOCKET"])
-        driver = Driver(connection)
-        with connection.makefile("rw", encoding="utf-8") as lines:
-            for line in lines:
-                request = json.loads(line)
-                if request["do"] == "end":
-                    break
-                answer = driver.answer(request) if request["do"] in VERBS else {"error": f"unknown: {request['do']}"}
-                lines.write(json.dumps(answer) + "\n")
-                lines.flush()
+        try:
+            serve(connection)
+        except (OSError, KeyboardInterrupt):
+            return 1  # the session is gone
     return 0
 
 

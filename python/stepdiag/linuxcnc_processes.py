@@ -10,6 +10,8 @@ import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+# Keys: messages to and from LinuxCNC's task (linuxcnc.nml), motion, then HAL, RTAPI and their clients.
+SHARED_MEMORY = {1001, 1002, 1003, 1004, 1005, 100, 0x48414C32, 0x90280A48, 0x48484C34}
 PROCESSES = ("rtapi_app", "milltask", "linuxcncsvr")  # a LinuxCNC that runs has all of these
 
 
@@ -38,13 +40,28 @@ def linuxcnc_lock(timeout: float = 1800.0) -> Iterator[None]:
         os.close(descriptor)
 
 
-def refuse_a_running_one() -> None:
-    """Another LinuxCNC, of a user or a real machine, must not be touched. A lock file without a process is stale."""
-    running = sorted({name for _, name in processes() if name in PROCESSES})
-    if running:
-        raise LinuxcncError(f"another LinuxCNC runs on this computer ({', '.join(running)}); one at a time can")
+def refuse_a_running_one(patience: float = 15.0) -> None:
+    """Another LinuxCNC, of a user or a real machine, must not be touched. One of a session that has crashed ends by
+    itself or is ended here: the lock is held, so that no other session lives."""
+    end = time.monotonic() + patience
+    while running := sorted({name for _, name in processes() if name in PROCESSES}):
+        if time.monotonic() > end:
+            raise LinuxcncError(f"another LinuxCNC runs on this computer ({', '.join(running)}); one at a time can")
+        if time.monotonic() > end - patience / 2:
+            end_processes(of_sessions("/"))
+        time.sleep(0.1)
+    remove_leavings()
+
+
+def remove_leavings() -> None:
+    """What a LinuxCNC that was killed leaves: its lock file, and shared memory that would confuse the next one."""
     with contextlib.suppress(OSError):
-        Path("/tmp/linuxcnc.lock").unlink()  # LinuxCNC's own, at this place whatever TMPDIR says
+        Path("/tmp/linuxcnc.lock").unlink()  # at this place whatever TMPDIR says
+    with contextlib.suppress(OSError, ValueError):
+        _, *segments = Path("/proc/sysvipc/shm").read_text().splitlines()
+        for key, number, _, _, _, _, users, *_ in map(str.split, segments):
+            if int(key) & 0xFFFFFFFF in SHARED_MEMORY and int(users) == 0:
+                subprocess.run(["ipcrm", "-m", number], stdin=subprocess.DEVNULL, capture_output=True, timeout=10)
 
 
 def processes() -> list[tuple[int, str]]:
@@ -59,30 +76,33 @@ def processes() -> list[tuple[int, str]]:
     return found
 
 
+def of_sessions(folder: str) -> list[int]:
+    """The processes of LinuxCNC that a session with a folder like this has started: it is in their environment."""
+    marker = f"STEPDIAG_SESSION_SOCKET={folder}".encode()
+    found = []
+    for number, _ in processes():
+        with contextlib.suppress(OSError):
+            if marker in Path(f"/proc/{number}/environ").read_bytes():
+                found.append(number)
+    return found
+
+
+def end_processes(numbers: list[int], sign: signal.Signals = signal.SIGKILL) -> None:
+    for number in numbers:
+        with contextlib.suppress(OSError):
+            os.kill(number, sign)
+
+
 def end_all_of(folder: str, environment: Mapping[str, str]) -> None:
-    """Ends the processes that were started with this session's folder in their environment. The real-time process has
-    left the process group, and hides its environment from an ordinary user: while the lock is held it is this one's."""
-    marker = f"STEPDIAG_SESSION_SOCKET={folder}/".encode()
-    for attempt in range(3):
-        left = []
-        for number, name in processes():
-            with contextlib.suppress(OSError):
-                try:
-                    ours = marker in Path(f"/proc/{number}/environ").read_bytes()
-                except PermissionError:
-                    ours = name == "rtapi_app"
-                if ours:
-                    left.append(number)
-        if not left:
-            break
-        if attempt == 0:
-            with contextlib.suppress(OSError, subprocess.TimeoutExpired):
-                subprocess.run(["halrun", "-U"], env=environment, stdin=subprocess.DEVNULL,
-                               capture_output=True, timeout=20, cwd="/")  # fmt: skip
-            continue
-        for number in left:
-            with contextlib.suppress(OSError):
-                os.kill(number, signal.SIGTERM if attempt == 1 else signal.SIGKILL)
-        time.sleep(0.3)
-    with contextlib.suppress(OSError):
-        Path("/tmp/linuxcnc.lock").unlink()
+    """Ends what a session has started. The real-time process has left the process group, and hides its environment
+    from an ordinary user: halrun asks it to end."""
+    with contextlib.suppress(OSError, subprocess.TimeoutExpired):
+        if of_sessions(folder) or any(name == "rtapi_app" for _, name in processes()):
+            subprocess.run(["halrun", "-U"], env=environment, stdin=subprocess.DEVNULL,
+                           capture_output=True, timeout=20, cwd="/")  # fmt: skip
+    for sign in (signal.SIGTERM, signal.SIGKILL):
+        left = of_sessions(folder)
+        end_processes(left, sign)
+        if left:
+            time.sleep(0.3)
+    remove_leavings()

@@ -40,6 +40,7 @@ class LinuxcncSession:
     table, chain: load the kinematics `stepdiagkins` with this calibration and chain ("wX'bYZt"); `options` are its
     further arguments, {"outside": "refuse", "margin": 5}. Without a table: `kinematics`.
     comp_files: {joint: file}, LinuxCNC's own screw compensation, of type `comp_type`.
+    record: pins whose values in every servo period `recorded` returns.
     hal, ini: further lines and keys. Everything else as in Machine.
     """
 
@@ -57,6 +58,7 @@ class LinuxcncSession:
         speed: float = 20000.0,
         acceleration: float = 2e6,
         servo_period: int = 1000000,
+        record: Sequence[str] = (),
         hal: Sequence[str] = (),
         ini: Mapping[str, Mapping[str, str | float | int]] | None = None,
         home: bool = True,
@@ -72,6 +74,7 @@ class LinuxcncSession:
             "servo_period": servo_period,
             "compensation_type": comp_type,
             "tools": dict(tools or {}),
+            "record": tuple(record),
             "hal": tuple(hal),
             "ini": dict(ini or {}),
         }
@@ -133,7 +136,20 @@ class LinuxcncSession:
         connection = self._stack.enter_context(self._accept(listener))
         self._connection = connection
         self._lines = self._stack.enter_context(connection.makefile("rw", encoding="utf-8"))
-        self._ask("turn_on", self._start_timeout, home=self._home)
+        if self._machine["record"]:
+            self._start_recording()
+        try:
+            self._ask("turn_on", self._start_timeout, home=self._home)
+        except LinuxcncError as error:
+            raise LinuxcncError(f"the machine could not be turned on: {error}\n{self.log}") from error
+
+    def _start_recording(self) -> None:
+        with (self.folder / "record.txt").open("wb") as record:
+            recorder = subprocess.Popen(
+                ["stdbuf", "-oL", "halsampler", "-t"], env=self._environment, stdout=record, cwd=self.folder
+            )
+        self._stack.callback(recorder.wait)
+        self._stack.callback(recorder.terminate)
 
     def _make_environment(self, socket_path: Path) -> dict[str, str]:
         environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "PYTHONPATH")}
@@ -231,6 +247,17 @@ class LinuxcncSession:
         """One line of G-code; returns when the machine stands."""
         self._ask("mdi", timeout, code=code, timeout=timeout)
 
+    def start_mdi(self, code: str) -> None:
+        """Begins one line of G-code; `finish_mdi` waits for its end."""
+        self._ask("start_mdi", code=code)
+
+    def finish_mdi(self, timeout: float = 60.0) -> None:
+        self._ask("finish_mdi", timeout, timeout=timeout)
+
+    def jog_joint(self, joint: int, distance: float, speed: float = 100.0) -> None:
+        """Moves one joint by itself, without kinematics, by a distance in mm."""
+        self._ask("jog_joint", joint=joint, distance=distance, speed=speed)
+
     def run_program(
         self,
         path: str | os.PathLike[str],
@@ -272,6 +299,17 @@ class LinuxcncSession:
         self._ask("at_rest")
         return [float(v) for v in self.state()["actual_position"][:3]]
 
+    def recorded(self, timeout: float = 20.0) -> list[list[float]]:
+        """What has been recorded until now: of each servo period its number and the pins' values."""
+        wanted, end = int(self.pin("sampler.0.sample-num")), time.monotonic() + timeout
+        while True:
+            *lines, _ = (self.folder / "record.txt").read_text(encoding="ascii").split("\n")
+            if lines and int(lines[-1].split()[0]) >= wanted - 1:
+                return [[float(value) for value in line.split()] for line in lines]
+            if time.monotonic() > end:
+                raise LinuxcncError(f"recording: period {wanted} not written within {timeout:g} s")
+            time.sleep(0.02)
+
     def state(self) -> dict[str, Any]:
         state: dict[str, Any] = self._ask("state")
         return state
@@ -283,6 +321,9 @@ class LinuxcncSession:
     def pins(self, names: Sequence[str]) -> list[Setting]:
         values: list[Setting] = self._ask("pins", names=list(names))
         return values
+
+    def wait_for_pin(self, name: str, value: Setting, timeout: float = 20.0) -> None:
+        self._ask("wait_for_pin", timeout, name=name, value=value, timeout=timeout)
 
     def set_pin(self, name: str, value: Setting) -> None:
         self._ask("set_pin", name=name, value=value)
