@@ -1,5 +1,7 @@
 """Acquisition: a run's readings from the instrument to the disk, and from there to a measurement file."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -11,7 +13,7 @@ from stepdiag.acquire_plan import channels_of, check_axes, described_plan, diges
 from stepdiag.acquire_triggers import Operator, Silent, Trigger
 from stepdiag.files import check_output
 from stepdiag.ids3010 import Ids3010, InstrumentError, parse_source
-from stepdiag.raw_file import RawContent, RawFile
+from stepdiag.raw_file import RawContent, RawFile, check_new
 from stepdiag.raw_records import Header
 from stepdiag.run_from_raw import Zero, write_run
 from stepdiag.scenario import Scenario
@@ -89,6 +91,8 @@ def acquire(
         host, port = parse_source(source)
         check_output(output)
         path = raw or raw_path(output)
+        if path.resolve() == output.resolve():
+            raise InvalidArgument(f"{path}: expected different names for the raw file and the output")
         plan = described_plan(scenario)
         header = Header(
             created=datetime.now(UTC),
@@ -99,8 +103,8 @@ def acquire(
             sign=options.sign,
             plan=plan,
         )
-        file, content = _open(path, header, resume)
-        with file, Ids3010(host, port, timeout=options.timeout, attempts=options.attempts) as instrument:
+        instrument = Ids3010(host, port, timeout=options.timeout, attempts=options.attempts)
+        with instrument, _opened(path, header, resume, instrument) as (file, content):
             work = Acquisition(scenario, header, file, instrument, trigger, operator or Silent(), options)
             if content is not None:
                 work.go_on(content, resume or "point")
@@ -122,12 +126,20 @@ def acquire(
     return Acquired(path, output, len(work.done), lost, sum(len(visit.points) for visit in plan))
 
 
-def _open(path: Path, header: Header, resume: Resume | None) -> tuple[RawFile, RawContent | None]:
+@contextmanager
+def _opened(
+    path: Path, header: Header, resume: Resume | None, instrument: Ids3010
+) -> Iterator[tuple[RawFile, RawContent | None]]:
+    """The raw file, begun or to go on with."""
     if resume is None:
-        return RawFile.create(path, header), None
+        check_new(path)
+        instrument.describe()  # one that cannot be reached leaves no file behind
+        with RawFile.create(path, header) as file:
+            yield file, None
+        return
     file, content = RawFile.resume(path)
-    for key, what in (("digest", "plan, head or channels"), ("axes", "axes"), ("sign", "sign")):
-        if getattr(content.header, key) != getattr(header, key):
-            file.close()
-            raise InvalidArgument(f"{path}: was begun with another {what}: a run is resumed as it was begun")
-    return file, content
+    with file:
+        for key, what in (("digest", "plan, head or channels"), ("axes", "axes"), ("sign", "sign")):
+            if getattr(content.header, key) != getattr(header, key):
+                raise InvalidArgument(f"{path}: was begun with another {what}: a run is resumed as it was begun")
+        yield file, content

@@ -112,7 +112,8 @@ def demo(folder: Path) -> None:
 def check(context: click.Context, files: tuple[Path, ...]) -> None:
     """Tell what kind each FILE is, and whether it is sound.
 
-    Knows scenarios, heads and studies (TOML), measurements and calibrations (CSV or netCDF), and error maps (CSV). A
+    Knows scenarios, heads and studies (TOML), measurements and calibrations (CSV or netCDF), error maps (CSV)
+    and raw readings (JSON lines). A
     scenario is checked together with the error map that it names. Exit code 2 if any file is not sound.
     """
     from stepdiag.kinds import examine

@@ -22,7 +22,7 @@ class JsonStream:
         objects = []
         while self._rest:
             line, end, rest = self._rest.partition(b"\n")
-            if not end and not line.endswith(b"}"):  # it may go on
+            if not end and not line.rstrip().endswith(b"}"):  # it may go on
                 if not line.startswith(b"{") or len(line) > LARGEST:
                     raise ValueError(shown(line))
                 break

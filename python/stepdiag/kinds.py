@@ -39,6 +39,8 @@ def examine(path: Path) -> Finding:
         return _error_map(path)
     if {"parameter", "value"} & columns:
         return _calibration(path) if "method" in leading else _error_map(path)
+    if header.startswith("{"):
+        return _raw(path)
     if {"line", "point"} & columns:
         return _measurement(path)
     if header.lstrip().startswith("[") or "=" in header:
@@ -113,6 +115,16 @@ def _measurement(path: Path) -> Finding:
     lost = int(np.count_nonzero(np.any([np.isnan(values) for values in channels.values()], axis=0))) if channels else 0
     summary = f"{len(measurement)} points on {len(set(measurement.line))} lines, {', '.join(channels)}"
     return Finding("measurement", summary, (f"{lost} points lack a reading",) if lost else ())
+
+
+def _raw(path: Path) -> Finding:
+    from stepdiag.raw_file import read_raw
+
+    content = read_raw(path)
+    readings = content.readings().values()
+    lost = sum(1 for reading in readings if reading.is_lost)
+    summary = f"{len(readings)} of {content.planned} readings of {', '.join(content.header.channels)}, {lost} lost"
+    return Finding("raw readings", summary, () if content.torn is None else (content.torn,))
 
 
 def _error_map(path: Path) -> Finding:

@@ -61,13 +61,9 @@ class RawFile:
     @classmethod
     def create(cls, path: Path, header: Header) -> Self:
         """A new file. Raises InvalidArgument for one that exists."""
-        check_output(path)
+        check_new(path)
         try:
             handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | os.O_CLOEXEC, 0o666)
-        except FileExistsError:
-            raise InvalidArgument(
-                f"{path}: exists already: --resume goes on with it, another -o (or --raw) begins a new one"
-            ) from None
         except OSError as error:
             raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
         file = cls(path, handle)
@@ -128,6 +124,15 @@ class RawFile:
         except OSError:
             self.close()
             raise InvalidArgument(f"{self.path}: another acquisition is writing it") from None
+
+
+def check_new(path: Path) -> None:
+    """Raises InvalidArgument where `path` cannot become a raw file: nothing is ever written over one."""
+    check_output(path)
+    if path.exists() or path.is_symlink():
+        raise InvalidArgument(
+            f"{path}: exists already: --resume goes on with it, another -o (or --raw) begins a new one"
+        )
 
 
 def read_raw(path: Path) -> RawContent:
