@@ -7,6 +7,7 @@
 
 namespace stepdiag::bindings {
 
+void bind_controller(py::module_& m);   // after bind_evaluation
 void bind_derived(py::module_& m);      // before bind_virtual_calibration
 void bind_propagation(py::module_& m);  // after bind_virtual_calibration
 void bind_validation(py::module_& m);   // after bind_propagation, bind_monte_carlo
@@ -174,6 +175,7 @@ PYBIND11_MODULE(_core, m) {
     bind_evaluation(m);
     bind_adjustment(m);
     bind_calibration(m);
+    bind_controller(m);
     bind_batch(m);
     bind_uncertain_inputs(m);
     bind_instruction_set(m);

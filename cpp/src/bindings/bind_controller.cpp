@@ -1,0 +1,172 @@
+#include <algorithm>
+#include <limits>
+
+#include "bindings.hpp"
+#include "stepdiag/controller/compensator.hpp"
+#include "stepdiag/evaluation/calibration.hpp"
+
+namespace stepdiag::bindings {
+
+// A file of a table, or what was read from one.
+class TableLike : public py::object {
+    PYBIND11_OBJECT_DEFAULT(TableLike, py::object, PyObject_Type)
+};
+
+}  // namespace stepdiag::bindings
+
+namespace pybind11::detail {
+template <>
+struct handle_type_name<stepdiag::bindings::TableLike> {
+    static constexpr auto name = const_name("str | os.PathLike[str] | Calibration | ErrorMap");
+};
+}  // namespace pybind11::detail
+
+namespace stepdiag::bindings {
+namespace {
+
+using Position = std::array<double, 3>;
+
+constexpr double no_answer = std::numeric_limits<double>::quiet_NaN();
+
+template <class Choice>
+Choice one_of(const char* argument, const std::string& name, const std::vector<std::pair<const char*, Choice>>& known) {
+    std::string names;
+    for (const auto& [text, choice] : known) {
+        if (name == text) return choice;
+        names += (names.empty() ? "\"" : ", \"") + std::string(text) + "\"";
+    }
+    throw InvalidArgument(std::string(argument) + ": expected one of " + names + ", got \"" + name + "\"");
+}
+
+Position to_position(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+Compensator make_compensator(const TableLike& table, const ChainLike& chain, const ArrayLike& origin,
+                             const std::string& outside, double margin, double largest_correction,
+                             const std::string& approach, double largest_tool) {
+    CompensatorOptions options;
+    options.origin = to_position(to_vector3(origin, "origin"));
+    options.outside = one_of<Outside>(
+        "outside", outside, {{"hold", Outside::hold}, {"linear", Outside::linear}, {"refuse", Outside::refuse}});
+    options.margin = margin;
+    options.largest_correction = largest_correction;
+    options.approach = one_of<CompensatedApproach>("approach", approach,
+                                                   {{"mean", CompensatedApproach::mean},
+                                                    {"positive", CompensatedApproach::positive},
+                                                    {"negative", CompensatedApproach::negative}});
+    options.largest_tool = largest_tool;
+    const std::string name = to_chain(chain).name();
+    if (py::isinstance<Calibration>(table))
+        return Compensator(to_parameter_table(table.cast<Calibration>()), "calibration", name, options);
+    if (py::isinstance<ErrorMap>(table)) return Compensator(table.cast<ErrorMap>().table(), "error map", name, options);
+    return Compensator::load(to_path(py::reinterpret_borrow<PathLike>(table)), name, options);
+}
+
+Position tool_of(const Compensator& compensator, const std::optional<ArrayLike>& tool) {
+    return tool ? to_position(to_vector3(*tool, "tool")) : compensator.tool();
+}
+
+// `ask` gives three numbers for one position.
+template <class Ask>
+DoubleArray for_each_position(const ArrayLike& positions, const char* name, Ask&& ask) {
+    const Points points = to_points(positions, name);
+    DoubleArray result({points.rows(), Eigen::Index(3)});
+    double* out = result.mutable_data();
+    py::gil_scoped_release release;
+    for (Eigen::Index i = 0; i < points.rows(); ++i) {
+        const Position answer = ask(Position{points(i, 0), points(i, 1), points(i, 2)});
+        std::copy(answer.begin(), answer.end(), out + 3 * i);
+    }
+    return result;
+}
+
+Position unless_refused(const Position& answer, unsigned status) {
+    return status & compensation_refused ? Position{no_answer, no_answer, no_answer} : answer;
+}
+
+py::array_t<int> status(const Compensator& compensator, const ArrayLike& positions,
+                        const std::optional<ArrayLike>& tool) {
+    const Points points = to_points(positions, "positions");
+    const Position offset = tool_of(compensator, tool);
+    py::array_t<int> result(points.rows());
+    int* out = result.mutable_data();
+    py::gil_scoped_release release;
+    for (Eigen::Index i = 0; i < points.rows(); ++i)
+        out[i] = int(compensator.error({points(i, 0), points(i, 1), points(i, 2)}, offset).status);
+    return result;
+}
+
+}  // namespace
+
+void bind_controller(py::module_& m) {
+    py::class_<Compensator>(
+        m, "Compensator",
+        "Volumetric compensation as a controller does it (the C++ library stepdiag::controller): forward(c) = c + "
+        "error(c) is where the tool is when the axes stand at c, command(t) where they must stand for it to be at t. "
+        "Positions (n, 3) are axis positions in the controller's coordinates, mm; tool: offset of the functional point "
+        "(3,), mm, by default that of the calibration. NaN where there is no answer: outside with \"refuse\", beyond "
+        "the margin, a position that is not finite, a tool longer than largest_tool.")
+        .def(py::init(&make_compensator), py::arg("table"), py::arg("chain"), py::kw_only(),
+             py::arg("origin") = zeros(3), py::arg("outside") = "hold", py::arg("margin") = CompensatorOptions{}.margin,
+             py::arg("largest_correction") = CompensatorOptions{}.largest_correction, py::arg("approach") = "mean",
+             py::arg("largest_tool") = CompensatorOptions{}.largest_tool,
+             "table: a file, a Calibration or an ErrorMap that carries chain, volume and tool. chain: the "
+             "controller's. origin: home in the controller's coordinates. outside the calibrated volume: \"hold\" the "
+             "error of its nearest point, go on \"linear\" up to `margin`, or \"refuse\". largest_correction: command "
+             "and forward shorten a longer error to this length. approach: \"mean\", \"positive\" or \"negative\", of "
+             "a table with reversal. Raises InvalidArgument for a table or options that a controller should not use.")
+        .def(
+            "error",
+            [](const Compensator& c, const ArrayLike& positions, const std::optional<ArrayLike>& tool) {
+                return for_each_position(positions, "positions", [&, offset = tool_of(c, tool)](const Position& p) {
+                    const MachineError e = c.error(p, offset);
+                    return unless_refused(e.position, e.status);
+                });
+            },
+            py::arg("positions"), py::arg("tool") = std::nullopt,
+            "Error of the functional point (n, 3), mm: exact, and the whole of it where corrections are capped.")
+        .def(
+            "orientation",
+            [](const Compensator& c, const ArrayLike& positions, const std::optional<ArrayLike>& tool) {
+                return for_each_position(positions, "positions", [&, offset = tool_of(c, tool)](const Position& p) {
+                    const MachineError e = c.error(p, offset);
+                    return unless_refused(e.orientation, e.status);
+                });
+            },
+            py::arg("positions"), py::arg("tool") = std::nullopt, "Rotation vectors of the tool (n, 3), rad.")
+        .def(
+            "command",
+            [](const Compensator& c, const ArrayLike& targets, const std::optional<ArrayLike>& tool) {
+                return for_each_position(targets, "targets", [&, offset = tool_of(c, tool)](const Position& p) {
+                    const CompensatedPosition answer = c.command(p, offset);
+                    return unless_refused(answer.position, answer.status);
+                });
+            },
+            py::arg("targets"), py::arg("tool") = std::nullopt,
+            "Where the axes must stand (n, 3), mm, for the tool to be at the targets (n, 3).")
+        .def(
+            "forward",
+            [](const Compensator& c, const ArrayLike& commands, const std::optional<ArrayLike>& tool) {
+                return for_each_position(commands, "commands", [&, offset = tool_of(c, tool)](const Position& p) {
+                    const CompensatedPosition answer = c.forward(p, offset);
+                    return unless_refused(answer.position, answer.status);
+                });
+            },
+            py::arg("commands"), py::arg("tool") = std::nullopt,
+            "Where the tool is (n, 3), mm, when the axes stand at the commands (n, 3).")
+        .def("status", &status, py::arg("positions"), py::arg("tool") = std::nullopt,
+             "Of the error at positions (n, 3): 0, or the sum of 1 outside the volume, 2 longer than "
+             "largest_correction, 4 refused; shape (n,).")
+        .def_property_readonly("fingerprint", &Compensator::fingerprint,
+                               "The table in force: a hash of chain, volume, tool, nodes and values, 64 bit.")
+        .def_property_readonly("inverse_bound", &Compensator::inverse_bound,
+                               "|forward(command(t)) - t| never exceeds this, mm.")
+        .def_property_readonly("volume",
+                               [](const Compensator& c) { return to_numpy_vector(Eigen::Vector3d(c.volume().data())); })
+        .def_property_readonly(
+            "tool", [](const Compensator& c) { return to_numpy_vector(Eigen::Vector3d(c.tool().data())); },
+            "Of the calibration, mm.")
+        .def_property_readonly("uncompensated", &Compensator::uncompensated,
+                               "What the table does not tell: \"EXX\", \"EYX (slope)\", \"EXX (above 784.0 mm)\" ...");
+}
+
+}  // namespace stepdiag::bindings

@@ -1,0 +1,44 @@
+/* The C header as a C11 compiler sees it, and its functions as a C program calls them. */
+#include <math.h>
+#include <string.h>
+
+#include "stepdiag/controller/compensator.h"
+
+const char* stepdiag_c11_failure(const char* path, const char* chain);
+
+#define EXPECT(claim) \
+    if (!(claim)) return #claim
+
+/* NULL, or the claim that does not hold. */
+const char* stepdiag_c11_failure(const char* path, const char* chain) {
+    const double position[3] = {100.0, 200.0, 300.0}, nowhere[3] = {NAN, 0.0, 0.0};
+    double error[3], orientation[3], command[3], actual[3];
+    char message[200] = "";
+    stepdiag_options options = stepdiag_default_options();
+    stepdiag_compensator* compensator = stepdiag_compensator_load(path, chain, NULL, message, sizeof message);
+    EXPECT(compensator != NULL);
+    EXPECT(stepdiag_fingerprint(compensator) != 0);
+    EXPECT(stepdiag_error(compensator, position, NULL, error, orientation) == 0);
+    EXPECT(stepdiag_command(compensator, position, NULL, command) == 0);
+    EXPECT(stepdiag_forward(compensator, command, NULL, actual) == 0);
+    for (int i = 0; i < 3; ++i) {
+        EXPECT(error[i] != 0.0 && orientation[i] != 0.0);
+        EXPECT(fabs(actual[i] - position[i]) <= stepdiag_inverse_bound(compensator));
+        EXPECT(fabs(command[i] - (position[i] - error[i])) < 1e-3);
+    }
+    EXPECT(stepdiag_command(compensator, nowhere, NULL, command) == STEPDIAG_REFUSED);
+    EXPECT(isnan(command[0]) && command[1] == 0.0);
+    stepdiag_compensator_free(compensator);
+
+    options.outside = STEPDIAG_REFUSE;
+    options.origin[0] = 1000.0;
+    compensator = stepdiag_compensator_load(path, chain, &options, NULL, 0);
+    EXPECT(compensator != NULL);
+    EXPECT(stepdiag_error(compensator, position, NULL, error, NULL) == (STEPDIAG_OUTSIDE | STEPDIAG_REFUSED));
+    stepdiag_compensator_free(compensator);
+
+    EXPECT(stepdiag_compensator_load(path, "wZbXYt", NULL, message, sizeof message) == NULL);
+    EXPECT(strstr(message, "chain: expected the controller's [w Z b X Y t]") == NULL); /* Z needs a prime there */
+    EXPECT(strstr(message, "chain") != NULL);
+    return NULL;
+}
