@@ -41,6 +41,7 @@ class Twin:
         if play is not None and not 0.0 < play < 1e6:
             raise InvalidArgument(f"play: expected seconds above 0, got {play!r}")
         self.instrument = TwinInstrument(described, behaviour)
+        self.instrument.moves_itself = play is not None
         self._visits = list(visits_of(described))
         self._play = play
         self._ended = threading.Event()
@@ -91,7 +92,6 @@ class Twin:
             if number is None:
                 continue
             visit = self._visits[number - 1]
-            self.instrument.move_to(visit.positions[index], counts=False)
             for position in visit.positions[index + 1 :]:
                 if self._ended.wait(self._play) or begun.is_set():
                     break

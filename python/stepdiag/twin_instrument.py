@@ -80,6 +80,7 @@ class TwinInstrument:
         self._interrupted = [False] * AXES
         self._reference = [0] * AXES
         self.visit_begun = threading.Event()  # for whoever moves it
+        self.moves_itself = False  # through a visit that is begun (Twin, play)
 
     # --- the machine ---
 
@@ -112,7 +113,7 @@ class TwinInstrument:
 
     def visit(self, number: int, index: int = 0, digest: str | None = None) -> None:
         """The same for a visit of the plan, which is at its point of this place: also says how the axes come there,
-        and which row of the run it is. The axes stay where they are."""
+        and which row of the run it is. The axes stay where they are, unless the twin moves them itself."""
         if digest is not None and digest != self._digest:
             raise InvalidArgument("visit: the twin has another plan or head")
         if not 1 <= number <= len(self._visits):
@@ -125,6 +126,8 @@ class TwinInstrument:
             self._visit, self._index = number, index
             self._approach = "".join("-" if sign < 0 else "+" for sign in visit.approach)
             self._place(visit.set_up)
+            if self.moves_itself:  # at once: the client reads as soon as it has its answer
+                self._position = np.array(visit.positions[index])
             repeated = self._begun[number - 1] * self._rows
             self._begun[number - 1] += 1
             self._row = repeated + self._first_rows[number - 1] + index

@@ -256,3 +256,13 @@ def test_traced_head_reads_as_in_its_simulated_run() -> None:
                 ids.ask("stepdiag.twin.moveTo", [float(p) for p in position])
             expected = tuple(round(float(run.channels[f"d{i + 1}"][row]) * 1e9) for i in range(3))
             assert ids.read((0, 1, 2)).pm == expected
+
+
+def test_twin_that_plays_stands_at_the_point_where_a_visit_is_begun() -> None:
+    """Before it answers: a client that goes on in the middle of a visit reads at once."""
+    described = scenario()
+    visit = list(visits_of(described))[1]
+    with Twin(described, play=1000.0) as twin, Ids3010(*twin.address) as client:
+        client.ask("stepdiag.twin.visit", [visit.number, 4])
+        _, state = client.ask("stepdiag.twin.state")
+    np.testing.assert_array_equal(state["position_mm"], visit.positions[4])
