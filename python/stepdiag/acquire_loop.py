@@ -40,6 +40,7 @@ class Acquisition:
         self._axes = [axis - 1 for axis in header.axes]
         self._is_twin = False
         self._set_up = 0  # for which the instrument was found ready
+        self._visit = 0  # of the last reading
         self.done: dict[tuple[int, int], RawReading] = {}
 
     def go_on(self, content: RawContent, resume: Resume) -> None:
@@ -68,13 +69,18 @@ class Acquisition:
         if self.done:
             self._operator.tell(f"going on with {point_text(visit, index)}: bring the machine there")
         options = self._options
-        self._trigger.start(Context(self._read, options.settling, options.wait_timeout, options.sign, self._operator))
+        last = next(reversed(self.done), None)
+        self._trigger.start(
+            Context(self._read, options.settling, options.wait_timeout, options.sign, self._operator, last)
+        )
         begun = 0
         for visit, index in remaining:
             if visit.number != begun:
                 self._trigger.begin(visit, index, self._instruction(visit, begun))
-            self._take(visit, index, first=visit.number != begun)
             begun = visit.number
+            while not self._trigger.wait(visit, index, self._header.plan[visit.number - 1].nominal_mm):
+                self._take(*self._last_taken())
+            self._take(visit, index)
             if index + 1 == len(visit.points):
                 write()
                 self._operator.tell(self._summary(visit))
@@ -90,10 +96,15 @@ class Acquisition:
             return f"set-up {visit.set_up} stays as it is: run {visit.run}, {visit.direction}"
         return placement(self._scenario, visit)
 
-    def _take(self, visit: Visit, index: int, *, first: bool) -> None:
-        self._trigger.wait(visit, index, self._header.plan[visit.number - 1].nominal_mm)
-        if first and self._is_twin:
+    def _last_taken(self) -> tuple[Visit, int]:
+        number, point = next(reversed(self.done))
+        visit = self._visits[number - 1]
+        return visit, visit.points.tolist().index(point)
+
+    def _take(self, visit: Visit, index: int) -> None:
+        if self._is_twin and visit.number != self._visit:
             self._instrument.ask("stepdiag.twin.visit", [visit.number, index, self._header.digest])
+        self._visit = visit.number
         if visit.set_up != self._set_up:
             self._make_ready(visit)
             self._set_up = visit.set_up
@@ -101,6 +112,7 @@ class Acquisition:
         *values, stored = _records(visit, index, reading, self._header.channels)
         self._file.append([*values, stored])
         assert isinstance(stored, RawReading)
+        self.done.pop((stored.visit, stored.point), None)
         self.done[stored.visit, stored.point] = stored
         self._tell_lost(visit, index, stored)
         self._trigger.stored(visit, index, stored.pm)

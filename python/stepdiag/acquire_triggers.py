@@ -46,6 +46,7 @@ class Context:
     wait_timeout: float  # s
     sign: int
     operator: Operator
+    last: tuple[int, int] | None = None  # visit and point of the reading that was taken last
 
 
 class Trigger(Protocol):
@@ -54,8 +55,8 @@ class Trigger(Protocol):
     def begin(self, visit: Visit, index: int, text: str) -> None:
         """Before a visit's first reading; `text` says where head and mirror stand."""
 
-    def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> None:
-        """Returns when the reading at this place of the visit is wanted."""
+    def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
+        """Returns when the reading at this place of the visit is wanted; False where it is the last one once more."""
 
     def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
         """The reading is on the disk."""
@@ -78,8 +79,9 @@ class KeyTrigger:
     def begin(self, visit: Visit, index: int, text: str) -> None:
         of_start(self.context).operator.tell(text)
 
-    def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> None:
+    def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
         of_start(self.context).operator.confirm(f"read {point_text(visit, index)}")
+        return True
 
     def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
         pass
@@ -114,17 +116,18 @@ class SettleTrigger:
         context.operator.confirm(f"read {point_text(visit, index)}, then move on")
         self._last = ()
 
-    def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> None:
+    def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
         if not any(value is not None for value in self._last):
             if self._last:  # the last reading was lost on every axis: nothing tells the next rest from it
                 of_start(self.context).operator.confirm(f"the last reading was lost: read {point_text(visit, index)}")
-            return
+            return True
         context = of_start(self.context)
         step = nominal[index] - nominal[self._last_index]
         if abs(step) < SMALLEST_STEP:
             context.operator.confirm(f"the distance does not change to it: read {point_text(visit, index)}")
-            return
-        self._await_step(visit, index, step)
+        else:
+            self._await_step(visit, index, step)
+        return True
 
     def _await_step(self, visit: Visit, index: int, step: float) -> None:
         context = of_start(self.context)

@@ -14,7 +14,8 @@ from stepdiag.visits import Visit
 
 class TcpTrigger:
     """A controller asks, by lines of text: READ <visit> <point> is answered by DONE <visit> <point> when the reading is
-    on the disk, or by FAIL <reason>."""
+    on the disk, or by FAIL <reason>. The last point may be asked for once more, by a controller that had no answer: it
+    stands there, and is read again."""
 
     LONGEST: Final = 256  # bytes of a line
 
@@ -29,31 +30,34 @@ class TcpTrigger:
         self._clients: dict[socket.socket, bytes] = {}
         self._asking: socket.socket | None = None
         self._context: Context | None = None
+        self._last: tuple[int, int] | None = None
+        self._wanted = (0, 0)
         self.address: tuple[str, int] = self._server.getsockname()[:2]
 
     def start(self, context: Context) -> None:
-        self._context = context
+        self._context, self._last = context, context.last
 
     def begin(self, visit: Visit, index: int, text: str) -> None:
         of_start(self._context).operator.tell(f"{text}; waiting for {point_text(visit, index)}")
 
-    def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> None:
+    def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
         context = of_start(self._context)
+        expected = (visit.number, int(visit.points[index]))
         deadline = time.monotonic() + context.wait_timeout
         while (left := deadline - time.monotonic()) > 0.0:
             for client, line in self._lines(left):
-                wrong = _wrong(line, visit, index)
-                if wrong is None:
-                    self._asking = client
-                    return
+                wanted, wrong = _wanted(line), _expectation(expected, line)
+                if wanted is not None and wanted in (expected, self._last):
+                    self._asking, self._wanted = client, wanted
+                    return wanted == expected
                 context.operator.tell(f"the controller asked in vain: {wrong}")
                 self._answer(client, f"FAIL {wrong}")
         raise Stopped(f"{point_text(visit, index)}: nobody asked for it in {context.wait_timeout:g} s")
 
     def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
         if self._asking is not None:
-            self._answer(self._asking, f"DONE {visit.number} {int(visit.points[index])}")
-        self._asking = None
+            self._answer(self._asking, f"DONE {self._wanted[0]} {self._wanted[1]}")
+        self._asking, self._last = None, self._wanted
 
     def failed(self, why: str) -> None:
         if self._asking is not None:
@@ -118,12 +122,17 @@ class TcpTrigger:
             client.close()
 
 
-def _wrong(line: bytes, visit: Visit, index: int) -> str | None:
+def _wanted(line: bytes) -> tuple[int, int] | None:
     words = line.decode("ascii", errors="replace").split()
     if len(words) != 3 or words[0] != "READ" or not all(word.isdigit() and len(word) < 10 for word in words[1:]):
+        return None
+    return int(words[1]), int(words[2])
+
+
+def _expectation(expected: tuple[int, int], line: bytes) -> str:
+    """What is wrong with a line, if it does not ask for this visit and point."""
+    wanted = _wanted(line)
+    if wanted is None:
+        words = line.decode("ascii", errors="replace").split()
         return f"expected READ <visit> <point>, got {' '.join(words)[:60]!a}"
-    got = (int(words[1]), int(words[2]))
-    expected = (visit.number, int(visit.points[index]))
-    if got != expected:
-        return f"expected visit {expected[0]} point {expected[1]}, got visit {got[0]} point {got[1]}"
-    return None
+    return f"expected visit {expected[0]} point {expected[1]}, got visit {wanted[0]} point {wanted[1]}"

@@ -85,7 +85,8 @@ class TwinInstrument:
     # --- the machine ---
 
     def move_to(self, position: Sequence[float], *, counts: bool = True) -> None:
-        """The axes' positions, mm: as they come from a controller. Every call is a new point, if it counts."""
+        """The axes' positions, mm: as they come from a controller. Every call is a new point, if it counts; of a visit
+        only one that moves."""
         target = np.array(position, dtype=float)
         if target.shape != (3,) or not np.all(np.isfinite(target)):
             raise InvalidArgument("moveTo: expected three finite numbers")
@@ -97,6 +98,7 @@ class TwinInstrument:
                     "+" if d > 0 else "-" if d < 0 else old for d, old in zip(moved, self._approach, strict=True)
                 )
             self._position = target
+            counts = counts and (self._visit is None or bool(np.any(moved)))
             self._row += counts
             self._index += counts
 

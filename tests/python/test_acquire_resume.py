@@ -114,6 +114,14 @@ def acquire_through_to_failure(described: Scenario, twin: Twin, output: Path, be
             running.result(10.0)
 
 
+def test_point_whose_answer_was_lost_with_the_process_is_read_again(tmp_path: Path, whole: Path) -> None:
+    described, output = scenario(), tmp_path / "run.csv"
+    with Twin(described) as twin:
+        stop_after(described, twin, output, 10)
+        assert acquire_through(described, twin, output, begin=9, resume="point").complete
+    assert readings(output) == readings(whole)
+
+
 def test_complete_run_has_nothing_to_go_on_with(tmp_path: Path, whole: Path) -> None:
     operator = Listener()
     whole.unlink()

@@ -49,11 +49,25 @@ def test_only_the_next_point_is_read(tmp_path: Path) -> None:
         with Controller(described, twin.address, trigger.address) as controller:
             assert controller.ask("READ 1 1") == "FAIL expected visit 1 point 0, got visit 1 point 1"
             assert controller.ask("READ 2 0") == "FAIL expected visit 1 point 0, got visit 2 point 0"
-            assert controller.ask("READ 1 0") == "DONE 1 0"
-            assert controller.ask("READ 1 0") == "FAIL expected visit 1 point 1, got visit 1 point 0"
-            controller.run(1)
+            controller.run(0, 2)
+            assert controller.ask("READ 1 0") == "FAIL expected visit 1 point 2, got visit 1 point 0"
+            controller.run(2)
         assert running.result(10).complete
     assert sum("asked in vain" in text for text in operator.told) == 3
+
+
+def test_last_point_is_read_again_for_a_controller_that_had_no_answer(tmp_path: Path) -> None:
+    described, trigger = scenario(noise="distance_um = 0.1\nseed = 3"), TcpTrigger()
+    with Twin(described) as twin, acquiring_from(described, twin, tmp_path / "run.csv", trigger) as (running, _):
+        with Controller(described, twin.address, trigger.address) as controller:
+            for index in range(28):
+                controller.run(index, index + 1)
+                if index in (0, 3, 6, 13):  # the last of a visit and of a set-up too
+                    controller.run(index, index + 1)
+        assert running.result(10).complete
+    assert sum(record.record == "reading" for record in read_raw(tmp_path / "run.raw.jsonl").records) == 32
+    run, expected = read_measurement(tmp_path / "run.csv"), simulate_scenario(described)
+    assert np.array_equal(run.channels["d1"], np.round(expected.channels["d1"] * 1e9) / 1e9)
 
 
 @pytest.mark.parametrize(
