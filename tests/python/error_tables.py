@@ -1,0 +1,68 @@
+"""Texts of calibration files for the tests of the compensator: random ones of every kind, and edits of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+
+COLUMNS = "parameter,position_mm,value,unit,standard_uncertainty"
+NAMES = [f"E{component}{axis}" for axis in "XYZ" for component in "XYZABC"]
+SQUARENESSES = ["C0Y", "B0Z", "A0Z"]
+VOLUME = (800.0, 600.0, 500.0)
+TOOL = (12.5, -30.0, 80.0)
+
+
+def all_chains() -> list[str]:
+    """The six orders of the axes, with the bed at each of its four places."""
+    chains = []
+    for order in permutations("XYZ"):
+        for bed in range(4):
+            links = [f"{axis}'" for axis in order[:bed]] + ["b", *order[bed:]]
+            chains.append(f"[w {' '.join(links)} t]")
+    return chains
+
+
+@dataclass(frozen=True)
+class RandomTable:
+    """Nodes of its own for each function: not equidistant, some beyond the travel, some short of its ends."""
+
+    seed: int
+    chain: str = "[w X' b Y Z t]"
+    volume: tuple[float, float, float] = VOLUME
+    tool: tuple[float, float, float] = TOOL
+    translation_um: float = 40.0
+    rotation_urad: float = 15.0
+    directed: bool = False
+
+    def text(self) -> str:
+        random = np.random.default_rng(self.seed)
+        lines = [*leading_lines(self.chain, self.volume, self.tool), COLUMNS + (",direction" if self.directed else "")]
+        for name in NAMES:
+            size = self.translation_um if name[1] in "XYZ" else self.rotation_urad
+            unit = "um" if name[1] in "XYZ" else "urad"
+            for direction in "+-" if self.directed and random.uniform() < 0.5 else [""]:
+                for p in self.nodes(random, self.volume["XYZ".index(name[2])]):
+                    row = f"{name},{p},{random.uniform(-size, size)},{unit},"
+                    lines.append(row + (f",{direction}" if self.directed else ""))
+        for name in SQUARENESSES:
+            value = random.uniform(-self.rotation_urad, self.rotation_urad)
+            lines.append(f"{name},,{value},urad," + ("," if self.directed else ""))
+        return "\n".join(lines) + "\n"
+
+    @staticmethod
+    def nodes(random: np.random.Generator, edge: float) -> list[float]:
+        # At least 7.5 mm apart: with the amplitudes above, errors change by less than the compensator's 0.1 mm/mm.
+        low, high = random.choice([0.0, 0.0, -20.0, 0.2 * edge]), random.choice([edge, edge, edge + 15.0, 0.8 * edge])
+        inner = random.choice(np.arange(1, 40), int(random.integers(0, 15)), replace=False)
+        return [float(low + (high - low) * k / 40.0) for k in sorted([0, *inner, 40])]
+
+
+def leading_lines(chain: str, volume: tuple[float, ...], tool: tuple[float, ...]) -> list[str]:
+    return [
+        "# format=stepdiag calibration 1",
+        f"# chain={chain}",
+        "# volume_mm=" + " ".join(map(str, volume)),
+        "# tool_mm=" + " ".join(map(str, tool)),
+    ]
