@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stepdiag._core import Calibration
+from stepdiag._core import Calibration, Compensator
 from stepdiag.export import (
     FUNCTIONS,
     SQUARENESSES,
@@ -26,7 +26,9 @@ def linuxcnc_kins(calibration: Calibration, output: Path, options: ExportOptions
     """The table, and the INI line that loads it."""
     missing = require(calibration, [*FUNCTIONS, *SQUARENESSES], options)
     tool, origin = tool_of(calibration, options), origin_of(options)
-    text = _csv_text(_with_tool(calibration, tool))
+    table = _with_tool(calibration, tool)
+    # What the module would refuse is refused here.
+    loaded = Compensator(table, calibration.chain, origin=origin, approach=options.approach or "mean")
     # INI files do not pass on quotes, and the module knows where the bed is.
     arguments = f"table={output.absolute()} chain={''.join(c for c in calibration.chain.name if c.isalpha())}"
     if origin.any():
@@ -39,12 +41,13 @@ def linuxcnc_kins(calibration: Calibration, output: Path, options: ExportOptions
         "sign: errors, actual - commanded of the tool relative to the workpiece; the module moves the joints by the "
         "inverse, joints + error = commanded",
         "loss: none, every node is kept",
+        f"table id {loaded.fingerprint:016x}, as the module's pins table-id-high and table-id-low tell it",
         *missing,
         f"INI file: [KINS] KINEMATICS = stepdiagkins {arguments}",
     ]
     if " " in str(output.absolute()):
         lines.append("note: KINEMATICS takes no space in a path: move the table to where there is none")
-    return Export({output: text}, lines)
+    return Export({output: _csv_text(table)}, lines)
 
 
 def _csv_text(calibration: Calibration) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from calibrations import calibrate, parts_of, same_calibration, simulate
+from calibrations import CHAIN, calibrate, parts_of, same_calibration, simulate
 from exported import CHAINS, calibration_of, export, random_calibration
 from refusal import refused
 
@@ -167,8 +167,26 @@ def test_an_export_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
 
 
 def test_a_machine_without_errors_needs_no_correction(tmp_path: Path) -> None:
-    functions = {f"E{c}{a}": ([0.0], [0.0]) for a in "XYZ" for c in "XYZABC"}
+    edges = zip("XYZ", (80.0, 60.0, 50.0), strict=True)
+    functions = {f"E{c}{a}": ([0.0, edge], [0.0, 0.0]) for a, edge in edges for c in "XYZABC"}
     calibration = calibration_of(sd.ErrorMap(functions, dict.fromkeys(("C0Y", "B0Z", "A0Z"), 0.0)))
     for to in FORMATS:
         assert export(calibration, to, tmp_path / OUTPUT[to])
     assert np.all(np.genfromtxt(tmp_path / "comp/joint0.comp")[:, 1] == [0.0, 80.0])
+
+
+def test_table_that_the_module_would_refuse_is_refused(tmp_path: Path) -> None:
+    """And what is written is loaded: the report tells its id."""
+    functions = {
+        f"E{c}{a}": ([0.0, edge], [0.0, 0.0])
+        for a, edge in zip("XYZ", (80.0, 60.0, 50.0), strict=True)
+        for c in "XYZABC"
+    }
+    squareness = dict.fromkeys(("C0Y", "B0Z", "A0Z"), 0.0)
+    steep = calibration_of(sd.ErrorMap(functions | {"EXX": ([0.0, 80.0], [0.0, 40.0])}, squareness))
+    with pytest.raises(sd.InvalidArgument, match="change by less than"):
+        export(steep, "linuxcnc-kins", tmp_path / "steep.csv")
+    assert not (tmp_path / "steep.csv").exists()
+    report = export(calibration_of(sd.ErrorMap(functions, squareness)), "linuxcnc-kins", tmp_path / "good.csv")
+    fingerprint = sd.Compensator(tmp_path / "good.csv", CHAIN).fingerprint
+    assert any(f"table id {fingerprint:016x}" in line for line in report)
