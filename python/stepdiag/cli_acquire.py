@@ -207,7 +207,7 @@ def _point(context: click.Context, option: click.Parameter, texts: tuple[str, ..
     points = set()
     for text in texts:
         visit, colon, point = text.partition(":")
-        if not colon or not visit.isdigit() or not point.isdigit():
+        if not colon or not visit.isdecimal() or not point.isdecimal():
             raise click.BadParameter(f"expected VISIT:POINT such as 2:5, got {text!r}")
         points.add((int(visit), int(point)))
     return frozenset(points)

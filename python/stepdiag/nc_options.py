@@ -51,7 +51,7 @@ def trigger_of(options: Options) -> Trigger:
         raise InvalidArgument(f"trigger: expected {options.trigger} or the code {options.trigger_code}, got both")
     trigger = options.trigger or ("code" if options.trigger_code else None)
     trigger = trigger or ("handshake" if options.dialect == "linuxcnc" else "dwell")
-    if trigger == "code" and not (options.trigger_code[:1] == "M" and options.trigger_code[1:].isdigit()):
+    if trigger == "code" and not (options.trigger_code[:1] == "M" and options.trigger_code[1:].isdecimal()):
         raise InvalidArgument(f'trigger code: expected an M-code such as M80, got "{options.trigger_code}"')
     if not 0.0 < options.timeout < np.inf:
         raise InvalidArgument(f"timeout: expected a time above 0, got {options.timeout:g}")
