@@ -179,7 +179,8 @@ def _resume(given: dict[str, Any]) -> "Resume | None":
 
 
 def _trigger(text: str) -> "Trigger":
-    from stepdiag.acquire_triggers import KeyTrigger, SettleTrigger
+    from stepdiag.acquire_triggers import KeyTrigger
+    from stepdiag.settle_trigger import SettleTrigger
     from stepdiag.tcp_trigger import TcpTrigger
 
     simple: dict[str, Callable[[], Trigger]] = {"key": KeyTrigger, "settle": SettleTrigger}

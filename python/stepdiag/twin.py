@@ -83,8 +83,7 @@ class Twin:
             thread.join()
 
     def _move_on(self) -> None:
-        """Through the points of every visit that a client begins."""
-        assert self._play is not None
+        """Through the points of every visit that a client begins, and on to the next one of the same set-up."""
         begun = self.instrument.visit_begun
         while begun.wait() and not self._ended.is_set():
             begun.clear()
@@ -92,7 +91,10 @@ class Twin:
             if number is None:
                 continue
             visit = self._visits[number - 1]
-            for position in visit.positions[index + 1 :]:
+            following = self._visits[number : number + 1]
+            ways = list(visit.positions[index + 1 :])
+            ways += [other.positions[0] for other in following if other.set_up == visit.set_up]
+            for position in ways:
                 if self._ended.wait(self._play) or begun.is_set():
                     break
                 self.instrument.move_to(position)

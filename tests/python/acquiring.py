@@ -54,6 +54,15 @@ def fast(**options: Any) -> AcquireOptions:
     return AcquireOptions(**({"settling": FAST, "wait_timeout": 20.0} | options))
 
 
+def points_of(described: Scenario) -> list[tuple[int, int, list[float]]]:
+    """Visit, point and position of all readings in order."""
+    return [
+        (visit.number, int(point), [float(x) for x in position])
+        for visit in visits_of(described)
+        for point, position in zip(visit.points, visit.positions, strict=True)
+    ]
+
+
 @dataclass
 class Listener:
     """An operator who notes what is told, and is always ready."""
@@ -72,11 +81,7 @@ class Controller:
     """Moves the twin through the plan and asks for readings, as a bridge of a controller does."""
 
     def __init__(self, described: Scenario, twin: tuple[str, int], trigger: tuple[str, int]) -> None:
-        self.points = [
-            (visit.number, int(point), [float(x) for x in position])
-            for visit in visits_of(described)
-            for point, position in zip(visit.points, visit.positions, strict=True)
-        ]
+        self.points = points_of(described)
         self._twin = Ids3010(*twin)
         self._socket = socket.create_connection(trigger, 10.0)
         self._file = self._socket.makefile("rw", newline="\n")

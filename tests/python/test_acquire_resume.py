@@ -6,13 +6,12 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import acquiring
 import numpy as np
 import pytest
-from acquiring import Controller, Listener, acquire_through, fast, scenario
+from acquiring import Controller, Listener, acquire_through, fast, points_of, scenario
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -66,15 +65,9 @@ def test_resumed_run_is_the_run_without_a_break(tmp_path: Path, whole: Path, end
         result = acquire_through(described, twin, output, begin=end, resume="point", operator=operator)
     assert result.complete
     assert readings(output) == readings(whole)
-    visit, point, _ = [*visits_and_points(described)][end]
+    visit, point, _ = points_of(described)[end]
     assert f"going on with visit {visit} " in operator.told[0]
     assert f"point {point} " in operator.told[0]
-
-
-def visits_and_points(described: Scenario) -> Iterator[tuple[int, int, list[float]]]:
-    for visit in acquiring.visits_of(described):
-        for point, position in zip(visit.points, visit.positions, strict=True):
-            yield visit.number, int(point), list(position)
 
 
 def test_line_and_set_up_can_be_read_once_more(tmp_path: Path, whole: Path) -> None:

@@ -1,7 +1,6 @@
 """Readings are taken when they are wanted: by a controller, by the operator, or where the mirror comes to rest."""
 
 import socket
-import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -9,18 +8,18 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import acquiring
 import numpy as np
 import pytest
-from acquiring import Controller, Listener, fast, scenario
+from acquiring import Controller, Listener, fast, points_of, scenario
 
 from stepdiag._core import InvalidArgument
 from stepdiag.acquire import Acquired, acquire
-from stepdiag.acquire_triggers import KeyTrigger, SettleTrigger, Stopped, Trigger
+from stepdiag.acquire_triggers import KeyTrigger, Stopped, Trigger
 from stepdiag.data_files import read_measurement
-from stepdiag.ids3010 import InstrumentError, Sample
+from stepdiag.ids3010 import InstrumentError
 from stepdiag.raw_file import read_raw
 from stepdiag.scenario import Scenario, simulate_scenario
+from stepdiag.settle_trigger import SettleTrigger
 from stepdiag.settling import Settling
 from stepdiag.tcp_trigger import TcpTrigger
 from stepdiag.twin import Twin
@@ -189,7 +188,7 @@ def test_trigger_that_cannot_listen_says_so() -> None:
 def test_operator_asks_for_every_reading(tmp_path: Path) -> None:
     described = scenario()
     with Twin(described) as twin:
-        points = [position for _, _, position in controller_points(described)]
+        points = [position for _, _, position in points_of(described)]
 
         class Moving(Listener):
             def confirm(self, text: str) -> None:
@@ -213,134 +212,3 @@ def test_operator_asks_for_every_reading(tmp_path: Path) -> None:
     )
     assert placements[1] == "set-up 1 stays as it is: run 1, backward"
     assert placements[2].startswith("set-up 2, line npp: beam from (154.55, ")
-
-
-def controller_points(described: Scenario) -> list[tuple[int, int, list[float]]]:
-    return [
-        (visit.number, int(point), [float(x) for x in position])
-        for visit in acquiring.visits_of(described)
-        for point, position in zip(visit.points, visit.positions, strict=True)
-    ]
-
-
-def test_mirror_at_rest_a_step_further_is_read(tmp_path: Path) -> None:
-    described = scenario()
-    settling = Settling(count=3, limit_um=0.1, average=2, interval=0.001)
-    points = controller_points(described)
-    begins = [index for index, (visit, _, _) in enumerate(points) if index == 0 or points[index - 1][0] != visit]
-
-    class Beginning(Listener):
-        def confirm(self, text: str) -> None:
-            super().confirm(text)
-            twin.instrument.move_to(points[begins[len(self.asked) - 1]][2])
-
-    operator = Beginning()
-    with Twin(described, behaviour=TwinBehaviour(settling=0.03)) as twin, ThreadPoolExecutor(1) as pool:
-        running = pool.submit(
-            acquire,
-            described,
-            twin.source,
-            tmp_path / "run.csv",
-            trigger=SettleTrigger(),
-            options=fast(settling=settling),
-            operator=operator,
-        )
-        for index, (_, _, position) in enumerate(points):
-            if index not in begins:
-                twin.instrument.move_to(position)
-            wait_for_readings(tmp_path / "run.raw.jsonl", index + 1)
-        result = running.result(10)
-    assert result.complete
-    assert result.lost == 0
-    assert len(operator.asked) == 4
-    run, expected = read_measurement(tmp_path / "run.csv"), simulate_scenario(described)
-    for name in ("d1", "d2", "d3"):
-        # What still rings after it is within the limit of 0.1 um, on every axis.
-        assert np.max(np.abs(run.channels[name] - expected.channels[name])) < 2e-4
-    values = [record for record in read_raw(tmp_path / "run.raw.jsonl").records if record.record == "value"]
-    assert any(record.kind == "settling" for record in values)
-
-
-def test_twin_that_moves_by_itself_is_followed(tmp_path: Path) -> None:
-    described = scenario(plan=LINE)
-    with Twin(described, play=0.5) as twin:  # a hundred times what a reading takes here
-        result = acquire(
-            described,
-            twin.source,
-            tmp_path / "run.csv",
-            trigger=SettleTrigger(),
-            options=fast(settling=Settling(count=3, average=2, interval=0.001)),
-            operator=Listener(),
-        )
-    assert result.complete
-    expected = np.round(simulate_scenario(described).channels["d2"] * 1e9) / 1e9
-    assert np.array_equal(read_measurement(tmp_path / "run.csv").channels["d2"], expected)
-
-
-def test_mirror_at_rest_elsewhere_is_not_read(tmp_path: Path) -> None:
-    described = scenario(plan=LINE)
-    operator = Listener()
-    seen = threading.Event()
-
-    class Watching(Listener):
-        def tell(self, text: str) -> None:
-            super().tell(text)
-            if "rests" in text:
-                seen.set()
-
-    operator = Watching()
-    with Twin(described) as twin, ThreadPoolExecutor(1) as pool:
-        points = [position for _, _, position in controller_points(described)]
-        running = pool.submit(
-            acquire,
-            described,
-            twin.source,
-            tmp_path / "run.csv",
-            trigger=SettleTrigger(),
-            options=fast(),
-            operator=operator,
-        )
-        raw = tmp_path / "run.raw.jsonl"
-        for index, position in enumerate(points):
-            if index == 2:
-                twin.instrument.move_to([80.0, 30.0, 0.0])  # half of the way to the next
-                assert seen.wait(5.0)
-                assert len(read_raw(raw).readings()) == 2
-            if index:
-                twin.instrument.move_to(position)
-            wait_for_readings(raw, index + 1)
-        assert running.result(10).complete
-    assert any("the mirror rests " in text and "point 2 at X80 Y60 Z0" in text for text in operator.told)
-
-
-def wait_for_readings(raw: Path, count: int) -> None:
-    deadline = time.monotonic() + 10.0
-    while time.monotonic() < deadline:
-        try:
-            if len(read_raw(raw).readings()) >= count:
-                return
-        except InvalidArgument:
-            pass  # not written yet
-        time.sleep(0.005)
-    raise AssertionError(f"no reading {count}")
-
-
-def test_rest_is_told_by_the_beams_that_were_read() -> None:
-    trigger = SettleTrigger()
-    described = scenario(plan=LINE)
-    visit = next(acquiring.visits_of(described))
-    from stepdiag.acquire_triggers import Context
-
-    rows = iter([(None, 2 * 10**9, None)] * 10)
-    operator = Listener()
-    trigger.start(Context(lambda: Sample(next(rows), (9, 0, 9)), fast().settling, 1.0, 1, operator))
-    trigger.begin(visit, 0, "")
-    trigger.wait(visit, 0, [0.0, 1.0])
-    trigger.stored(visit, 0, [0, 10**9, None])
-    trigger.wait(visit, 1, [0.0, 1.0])  # by the second beam, which moved by 1 mm
-    trigger.stored(visit, 1, [None, None, None])
-    trigger.wait(visit, 2, [0.0, 1.0, 2.0])
-    assert operator.asked[-1].startswith("the last reading was lost: read visit 1 ")
-    trigger.stored(visit, 2, [0, 0, 0])
-    trigger.wait(visit, 3, [0.0, 1.0, 2.0, 2.0])
-    assert operator.asked[-1].startswith("the distance does not change to it: read visit 1 ")
