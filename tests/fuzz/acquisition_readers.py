@@ -18,10 +18,10 @@ from stepdiag.raw_file import read_raw
 from stepdiag.run_from_raw import measurement_of
 from stepdiag.scenario import parse_scenario
 from stepdiag.settling import Settling
-from stepdiag.tcp_trigger import _wrong
+from stepdiag.tcp_trigger import _expectation
 from stepdiag.twin import Answers, Twin
 from stepdiag.twin_instrument import TwinInstrument
-from stepdiag.visits import Visit, visits_of
+from stepdiag.visits import Visit
 
 SCENARIO = parse_scenario(
     """
@@ -175,13 +175,11 @@ def replies() -> list[bytes]:
 # --- lines of a controller ---
 
 
-FIRST = next(visits_of(SCENARIO))
-
-
 def read_wishes(path: Path) -> None:
     for line in path.read_bytes().split(b"\n"):
-        wrong = _wrong(line, FIRST, 2)
-        assert wrong is None or (wrong.isascii() and len(wrong) < 200), wrong
+        wrong = _expectation((1, 2), line)
+        assert wrong.isascii(), wrong
+        assert len(wrong) < 200, wrong
 
 
 def wishes() -> list[bytes]:
