@@ -57,8 +57,9 @@ def raw_files() -> list[bytes]:
     with tempfile.TemporaryDirectory() as folder, Twin(SCENARIO) as twin:
 
         class Mover(KeyTrigger):
-            def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> None:
+            def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
                 twin.instrument.move_to(visit.positions[index])
+                return True
 
         output = Path(folder) / "run.csv"
         options = AcquireOptions(settling=Settling(count=2, average=1, interval=0.0))
