@@ -1,0 +1,195 @@
+// Is the compensator fit for a real-time thread? A table is loaded, memory is locked, the thread made SCHED_FIFO where
+// that is permitted; then CALLS calls of stepdiag_error, _command and _forward at random positions, during which
+//   - no allocation takes place: malloc and its kin are hooked;
+//   - no page fault takes place: getrusage before and after;
+//   - no system call takes place: seccomp's strict mode, in which a call other than read, write and _exit kills the
+//     program; results leave it by one write.
+// Every answer is checked: forward(command(t)) is t. Times of single calls are told and not judged: they are those of
+// this machine and of what else it does.
+#include <fcntl.h>
+#include <linux/seccomp.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "malloc_hook.hpp"
+#include "stepdiag/controller/compensator.h"
+#include "stepdiag/machine/error_map.hpp"
+
+namespace {
+
+using Position = std::array<double, 3>;
+
+// What a run found out; plain, so that a child can write it to its parent.
+struct Findings {
+    long allocations, minor_faults, major_faults;
+    double largest_residual;          // mm
+    long wrong;                       // statuses that are not 0
+    double seconds, longest;          // of all calls, of the longest
+    std::array<long, 5> slower_than;  // how many calls took more than 0.2, 1, 10, 100, 1000 us
+};
+constexpr std::array<double, 5> limits = {0.2e-6, 1e-6, 10e-6, 100e-6, 1000e-6};
+
+// By the vDSO: no system call. But it reads the time stamp counter, which strict mode forbids as well.
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+std::string write_table(const std::string& path) {
+    const Eigen::Vector3d volume(800.0, 600.0, 500.0);
+    stepdiag::ParameterTable table = stepdiag::make_random_error_map(volume, {}).table();
+    table.header = {
+        {"chain", "[w X' b Y Z t]"}, {"volume_mm", stepdiag::format_lengths(volume)}, {"tool_mm", "0.0 0.0 120.0"}};
+    stepdiag::write_parameter_table(table, path);
+    return path;
+}
+
+// `count` calls, a third of each kind. Nothing in here may touch memory for the first time.
+template <bool timed>
+void call(const stepdiag_compensator* compensator, const std::vector<Position>& targets, long count,
+          Findings& findings) {
+    const double tool[3] = {10.0, -20.0, 150.0};
+    double error[3], orientation[3], command[3], actual[3];
+    for (long i = 0; 3 * i < count; ++i) {
+        const double* target = targets[std::size_t(i) % targets.size()].data();
+        const double start = timed ? now() : 0.0;
+        unsigned status = stepdiag_command(compensator, target, i % 2 ? tool : nullptr, command);
+        const double middle = timed ? now() : 0.0;
+        status |= stepdiag_error(compensator, command, i % 2 ? tool : nullptr, error, orientation);
+        status |= stepdiag_forward(compensator, command, i % 2 ? tool : nullptr, actual);
+        const double took = timed ? std::max(middle - start, 0.5 * (now() - middle)) : 0.0;
+        findings.wrong += status != 0;
+        for (int a = 0; a < 3; ++a)
+            findings.largest_residual = std::max(findings.largest_residual, std::abs(actual[a] - target[a]));
+        findings.longest = std::max(findings.longest, took);
+        for (std::size_t k = 0; k < limits.size(); ++k) findings.slower_than[k] += took > limits[k];
+    }
+}
+
+// The calls in a process of their own, which seccomp ends if there is a system call among them.
+void measure(const stepdiag_compensator* compensator, const std::vector<Position>& targets, long count, bool strict,
+             int out) {
+    Findings warm = {}, findings = {};
+    call<true>(compensator, targets, 3 * long(targets.size()), warm);
+    rusage before = {}, after = {};
+    getrusage(RUSAGE_SELF, &after);  // once, so that its own pages are there
+    getrusage(RUSAGE_SELF, &before);
+    const long allocations = allocation_calls();
+    const double start = now();
+    if (!strict) call<true>(compensator, targets, count, findings);
+    else if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) == 0) call<false>(compensator, targets, count, findings);
+    else _exit(3);
+    if (!strict) findings.seconds = now() - start;
+    findings.allocations = allocation_calls() - allocations;
+    if (!strict) {
+        getrusage(RUSAGE_SELF, &after);
+        findings.minor_faults = after.ru_minflt - before.ru_minflt;
+        findings.major_faults = after.ru_majflt - before.ru_majflt;
+    }
+    const bool written = write(out, &findings, sizeof findings) == ssize_t(sizeof findings);
+    syscall(SYS_exit, written ? 0 : 4);  // not exit_group, which strict mode does not know
+}
+
+// Both proofs, each by its own child: page faults cannot be asked for once system calls are forbidden.
+bool run(const stepdiag_compensator* compensator, const std::vector<Position>& targets, long count, bool strict,
+         Findings& findings, int& status) {
+    int ends[2];
+    if (pipe(ends) != 0) return false;
+    const pid_t child = fork();
+    if (child == 0) {
+        close(ends[0]);
+        // Locked memory is not inherited.
+        if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) std::fprintf(stderr, "mlockall: %s\n", std::strerror(errno));
+        measure(compensator, targets, count, strict, ends[1]);
+    }
+    close(ends[1]);
+    const bool read_all = child > 0 && read(ends[0], &findings, sizeof findings) == ssize_t(sizeof findings);
+    close(ends[0]);
+    return child > 0 && waitpid(child, &status, 0) == child && read_all && WIFEXITED(status) &&
+           WEXITSTATUS(status) == 0;
+}
+
+// Whether strict mode does what is said of it.
+bool is_a_system_call_deadly() {
+    const pid_t child = fork();
+    if (child == 0) {
+        if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) == 0) getppid();
+        _exit(0);
+    }
+    int status = 0;
+    return child > 0 && waitpid(child, &status, 0) == child && WIFSIGNALED(status);
+}
+
+std::string scheduling() {
+    sched_param parameter = {};
+    parameter.sched_priority = 80;
+    if (sched_setscheduler(0, SCHED_FIFO, &parameter) == 0) return "SCHED_FIFO, priority 80";
+    return std::string("not real-time: SCHED_FIFO: ") + std::strerror(errno);
+}
+
+}  // namespace
+
+int main(int count, char** arguments) {
+    const long calls = count > 1 ? std::atol(arguments[1]) : 10'000'000;
+    const std::string path = write_table((count > 2 ? std::string(arguments[2]) : std::string("/tmp")) + "/realtime-" +
+                                         std::to_string(getpid()) + ".csv");
+    char message[300] = "";
+    stepdiag_compensator* compensator =
+        stepdiag_compensator_load(path.c_str(), "wX'bYZt", nullptr, message, sizeof message);
+    unlink(path.c_str());
+    if (!compensator || calls < 1) {
+        std::fprintf(stderr, "realtime: %s\n", compensator ? "usage: realtime [CALLS [FOLDER]]" : message);
+        return 2;
+    }
+    const bool is_counting = allocation_calls() > 100;  // by loading alone
+    std::mt19937_64 engine(1);
+    std::uniform_real_distribution<double> unit(0.0, 1.0);
+    std::vector<Position> targets(10'000);
+    for (Position& p : targets) p = {800.0 * unit(engine), 600.0 * unit(engine), 500.0 * unit(engine)};
+
+    std::printf("%ld calls of stepdiag_command, _error, _forward; %s\n", calls, scheduling().c_str());
+    std::fflush(stdout);
+    bool good = true;
+    const auto expect = [&](bool holds, const char* claim) {
+        std::printf("%s: %s\n", holds ? "ok" : "FAILED", claim);
+        good &= holds;
+    };
+    Findings findings = {};
+    int status = 0;
+    expect(run(compensator, targets, calls, false, findings, status), "all calls return, memory locked");
+    std::printf("  %.1f s; allocations and frees %ld, minor page faults %ld, major %ld; largest residual %.1e mm\n",
+                findings.seconds, findings.allocations, findings.minor_faults, findings.major_faults,
+                findings.largest_residual);
+    std::printf("  calls longer than 0.2, 1, 10, 100, 1000 us: %ld %ld %ld %ld %ld of %ld; longest %.1f us\n",
+                findings.slower_than[0], findings.slower_than[1], findings.slower_than[2], findings.slower_than[3],
+                findings.slower_than[4], calls / 3, 1e6 * findings.longest);
+    expect(is_counting && findings.allocations == 0, "no allocation, by a hook that counts");
+    expect(findings.minor_faults == 0 && findings.major_faults == 0, "no page fault");
+    expect(findings.wrong == 0, "every status is 0");
+    expect(findings.largest_residual <= stepdiag_inverse_bound(compensator),
+           "every forward of a command is its target");
+    findings = {};
+    const bool strict = run(compensator, targets, calls, true, findings, status);
+    if (WIFEXITED(status) && WEXITSTATUS(status) == 3) {
+        std::printf("not shown: seccomp is not permitted here\n");
+    } else {
+        expect(strict && is_a_system_call_deadly(), "no system call, in seccomp's strict mode, where one is deadly");
+        expect(findings.allocations == 0 && findings.wrong == 0, "and the same answers there");
+    }
+    stepdiag_compensator_free(compensator);
+    return good ? 0 : 1;
+}
