@@ -11,11 +11,12 @@ from stepdiag._core import InvalidArgument
 from stepdiag.acquire_loop import Acquisition, Resume
 from stepdiag.acquire_plan import channels_of, check_axes, described_plan, digest_of
 from stepdiag.acquire_triggers import Operator, Silent, Trigger
+from stepdiag.data_files import write_measurement
 from stepdiag.files import check_output
 from stepdiag.ids3010 import Ids3010, InstrumentError, parse_source
 from stepdiag.raw_file import RawContent, RawFile, check_new
 from stepdiag.raw_records import Header
-from stepdiag.run_from_raw import Zero, write_run
+from stepdiag.run_from_raw import Zero, measurement_of
 from stepdiag.scenario import Scenario
 from stepdiag.settling import Settling
 
@@ -110,7 +111,10 @@ def acquire(
                 work.go_on(content, resume or "point")
 
             def write() -> None:
-                write_run(path, output, zero=options.zero, uncertainties=options.uncertainties)
+                # What the raw file holds, without reading it again after every visit.
+                known = RawContent(path, header, tuple(work.done.values()), sound_bytes=0, torn_bytes=0)
+                run = measurement_of(known, zero=options.zero, uncertainties=options.uncertainties)
+                write_measurement(run, output)
 
             try:
                 work.run(source, write)
