@@ -110,7 +110,8 @@ class Controller:
     def run(self, begin: int = 0, end: int | None = None) -> None:
         """Reads these points of the plan; all of them are wanted."""
         for visit, point, position in self.points[begin:end]:
-            assert self.read(visit, point, position) == f"DONE {visit} {point}"
+            answer = self.read(visit, point, position)
+            assert answer == f"DONE {visit} {point}", answer
 
 
 def acquire_through(
