@@ -20,9 +20,14 @@ class LinuxcncError(RuntimeError):
     the session's log."""
 
 
+_held: list[int] = []  # this process's lock: waiting for oneself would take for ever
+
+
 @contextlib.contextmanager
 def linuxcnc_lock(timeout: float = 1800.0) -> Iterator[None]:
     """Held while LinuxCNC runs, or its modules are being installed: there is one of each on a computer."""
+    if _held:
+        raise LinuxcncError("this process runs LinuxCNC already; one session at a time can")
     path = Path(tempfile.gettempdir()) / "stepdiag-linuxcnc.lock"
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
     try:
@@ -35,8 +40,10 @@ def linuxcnc_lock(timeout: float = 1800.0) -> Iterator[None]:
                 if time.monotonic() > end:
                     raise LinuxcncError(f"{path}: still held by another run of LinuxCNC after {timeout:g} s") from None
                 time.sleep(0.05)
+        _held.append(descriptor)
         yield
     finally:
+        _held.clear()
         os.close(descriptor)
 
 
