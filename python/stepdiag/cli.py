@@ -88,21 +88,41 @@ def simulate(scenario: Path, output: Path) -> None:
 @click.option(
     "-o",
     "folder",
-    default="demo",
-    show_default=True,
     type=PATH,
     metavar="DIR",
-    help="Folder to write.",
+    help="Folder to write.  [default: demo, or demo-linuxcnc]",
 )
-def demo(folder: Path) -> None:
+@click.option(
+    "--controller",
+    type=click.Choice(["linuxcnc", "calculated"]),
+    help="Close the loop in LinuxCNC, or calculate the same without it.",
+)
+def demo(folder: Path | None, controller: str | None) -> None:
     """Simulate and evaluate the machine of the method's paper, and draw its Figure 5.
 
     Writes scenarios, truth, runs, calibrations, a table and the figure; go on from them with simulate and
     evaluate.
+
+    With --controller linuxcnc the loop is closed: LinuxCNC runs the measuring program on a virtual machine, the run
+    is evaluated, LinuxCNC compensates with the calibration, and is measured again (docs/loop.md).
     """
     from stepdiag.demo import run_demo
 
-    for line in run_demo(folder, progress=lambda text: click.echo(text, err=True)):
+    def progress(text: str) -> None:
+        click.echo(text, err=True)
+
+    if controller is None:
+        lines = run_demo(folder or Path("demo"), progress=progress)
+    else:
+        from stepdiag.linuxcnc_processes import LinuxcncError
+        from stepdiag.loop import run_loop
+        from stepdiag.loop_job import controller_of
+
+        try:
+            lines = run_loop(folder or Path(f"demo-{controller}"), controller_of(controller), progress=progress)
+        except LinuxcncError as error:
+            raise click.ClickException(str(error)) from error
+    for line in lines:
         click.echo(line)
 
 
