@@ -18,7 +18,7 @@ STEPS: Final = 50
 CHAIN: Final = "[w X' b Y Z t]"
 TOOL: Final = (0.0, 0.0, -50.0)
 SEED: Final = 0
-FINER: Final = 8  # nodes of the truth to a step of the plan
+FINER: Final = 8  # nodes of the truth to a step of the plan, at least
 SCREW_PITCH: Final = 10.0  # mm
 SCREW_AMPLITUDE: Final = 0.003  # mm
 
@@ -48,10 +48,15 @@ NOISE: Final = Case("noise", "as clean, with noise of 0.1 µm and 1 µrad", nois
 CASES: Final = (CLEAN, SCREW, NOISE)
 
 
+def finer(steps: int) -> int:
+    """How many nodes of the truth there are to a step: as many as resolve the screw, with few steps too."""
+    return -(-FINER * STEPS // steps)
+
+
 def write_truth(case: Case, folder: Path, steps: int = STEPS) -> None:
-    """The errors of a case's machine, with nodes FINER times as many as the plan's."""
+    """The errors of a case's machine, with nodes at those of the plan and at least FINER times as many."""
     screw = {"screw_pitch": SCREW_PITCH, "screw_amplitude": SCREW_AMPLITUDE} if case.screw else {}
-    truth = _core.random_error_map(VOLUME, seed=SEED, intervals=FINER * steps, **screw)
+    truth = _core.random_error_map(VOLUME, seed=SEED, intervals=steps * finer(steps), **screw)
     truth.write(folder / case.truth, chain=_core.Chain(CHAIN), volume=VOLUME, tool=TOOL)
 
 

@@ -39,6 +39,7 @@ def draw_errors(axes: Axes, outcomes: list[Outcome]) -> None:
     before = outcomes[0].points["random"].before
     draw_shares(axes, lengths(before), color="0.4", linestyle="-", label="before")
     axes.set_xscale("log")
+    axes.set_xlim(1e-7, 3e2)  # room for the legend
     axes.set_xlabel("error of the functional point, µm")
     axes.set_ylabel("share of points with a smaller one")
     axes.set_title("Volumetric error before and after compensation")

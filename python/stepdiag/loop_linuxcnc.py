@@ -54,9 +54,10 @@ class Linuxcnc:
             try:
                 for program in (job.program, *([self._points_program(job)] if len(job.points) else [])):
                     session.run_program(program, on_pause=_go_on(recorder, say), timeout=1800.0)
+                recorder.join(PATIENCE)
             finally:
                 listening.end()
-                recorder.join(PATIENCE)
+                recorder.join(1.0)  # of an interrupted loop it may still wait for somebody to ask; it ends by itself
         return recorder.result()
 
     def _configuration(self, job: Job, twin: Twin, listening: "_Listening") -> dict[str, Any]:
@@ -127,7 +128,8 @@ class _Recorder(threading.Thread):
         visit = _points_visit(self._job)
         self._trigger.start(Context(self._no_reading, SETTLING, 6 * PATIENCE, 1, Silent()))
         for index in range(len(visit.points)):
-            self._trigger.wait(visit, index, [])
+            while not self._trigger.wait(visit, index, []):  # the one before once more
+                self._trigger.stored(visit, index, [])
             self._joints.append(self._twin.instrument.state()["position_mm"])
             self._trigger.stored(visit, index, [])
 

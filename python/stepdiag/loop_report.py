@@ -9,7 +9,7 @@ import numpy as np
 from stepdiag import _core
 from stepdiag.demo import alias_of
 from stepdiag.loop import Outcome, whole_grid
-from stepdiag.loop_cases import CHAIN, DISTANCE_NOISE, FINER, RADIUS, SCREW_AMPLITUDE, SCREW_PITCH, TILT_NOISE
+from stepdiag.loop_cases import CHAIN, DISTANCE_NOISE, RADIUS, SCREW_AMPLITUDE, SCREW_PITCH, TILT_NOISE, finer
 from stepdiag.loop_points import Agreement, FloatArray, Sizes, errors_at
 from stepdiag.report import MICRO
 
@@ -20,7 +20,7 @@ WORDS = {"nodes": "nodes of the plan", "random": "random points"}
 def report_lines(outcomes: list[Outcome], repeated: dict[str, Agreement] | None, controller: str) -> Iterator[str]:
     steps = outcomes[0].scenario.plan.steps
     nodes, count = (len(outcomes[0].points[kind].targets) for kind in ("nodes", "random"))
-    yield f"The closed loop, moved by {controller}: {steps} steps an axis, the truth {FINER} times finer"
+    yield f"The closed loop, moved by {controller}: {steps} steps an axis, the truth {finer(steps)} times finer"
     yield from error_table(outcomes)
     yield f"({nodes} nodes and {count} random points, gone to before and after; the error is the whole vector's length)"
     yield ""
