@@ -79,7 +79,7 @@ class Acquisition:
                 self._trigger.begin(visit, index, self._instruction(visit, begun))
             begun = visit.number
             while not self._trigger.wait(visit, index, self._header.plan[visit.number - 1].nominal_mm):
-                self._take(*self._last_taken())
+                self._take(*self._last_taken(), once_more=True)
             self._take(visit, index)
             if index + 1 == len(visit.points):
                 write()
@@ -101,7 +101,7 @@ class Acquisition:
         visit = self._visits[number - 1]
         return visit, visit.points.tolist().index(point)
 
-    def _take(self, visit: Visit, index: int) -> None:
+    def _take(self, visit: Visit, index: int, *, once_more: bool = False) -> None:
         if self._is_twin and visit.number != self._visit:
             self._instrument.ask("stepdiag.twin.visit", [visit.number, index, self._header.digest])
         self._visit = visit.number
@@ -109,13 +109,20 @@ class Acquisition:
             self._make_ready(visit)
             self._set_up = visit.set_up
         reading = take_reading(self._read, len(self._axes), self._options.settling, told=self._instrument.error_text)
+        doubt = self._trigger.doubt(reading)
+        if doubt is not None:
+            reading.lost = dict.fromkeys(range(len(self._axes)), doubt)
         *values, stored = _records(visit, index, reading, self._header.channels)
-        self._file.append([*values, stored])
         assert isinstance(stored, RawReading)
-        self.done.pop((stored.visit, stored.point), None)
-        self.done[stored.visit, stored.point] = stored
         self._tell_lost(visit, index, stored)
-        self._trigger.stored(visit, index, stored.pm)
+        key = (stored.visit, stored.point)
+        if once_more and stored.is_lost and not self.done[key].is_lost:
+            self._file.append(values)  # the reading that there is was better
+        else:
+            self._file.append([*values, stored])
+            self.done.pop(key, None)
+            self.done[key] = stored
+        self._trigger.stored(visit, index, self.done[key].pm)
 
     def _tell_lost(self, visit: Visit, index: int, reading: RawReading) -> None:
         for channel, why in reading.lost.items():

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from stepdiag.ids3010 import InstrumentError, Sample
-from stepdiag.settling import Settling
+from stepdiag.settling import Reading, Settling
 from stepdiag.visits import Visit
 
 
@@ -56,6 +56,9 @@ class Trigger(Protocol):
     def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
         """Returns when the reading at this place of the visit is wanted; False where it is the last one once more."""
 
+    def doubt(self, reading: Reading) -> str | None:
+        """Why a reading is not of the point, if there is reason to think so."""
+
     def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
         """The reading is on the disk."""
 
@@ -80,6 +83,9 @@ class KeyTrigger:
     def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
         of_start(self.context).operator.confirm(f"read {point_text(visit, index)}")
         return True
+
+    def doubt(self, reading: Reading) -> str | None:
+        return None
 
     def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
         pass

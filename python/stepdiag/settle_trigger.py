@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Final
 
 from stepdiag.acquire_triggers import Context, Stopped, of_start, point_text
-from stepdiag.settling import Settling
+from stepdiag.settling import Reading, Settling
 from stepdiag.visits import Visit
 
 # mm. A rest counts as the next point within this share of the plan's shortest step, as the last one within BACK after
@@ -29,8 +29,11 @@ class SettleTrigger:
     def __init__(self) -> None:
         self._context: Context | None = None
         self._set_up = 0
-        self._last: Row | None = None  # None: nothing is known yet, the operator has just asked
+        self._last: Row | None = None  # of the last point that was read, in this set-up
+        self._is_asked = False  # the operator has just asked for a reading
         self._last_nominal = 0.0
+        self._nominal = 0.0  # of the point that is being read
+        self._rest: Row | None = None  # where the mirror was found at rest; an operator may ask before
         self._told = float("-inf")
 
     def start(self, context: Context) -> None:
@@ -41,24 +44,26 @@ class SettleTrigger:
         operator.tell(text)
         if visit.set_up != self._set_up:
             operator.confirm(f"read {point_text(visit, index)}, then move on")
-            self._last = None
+            self._last, self._is_asked = None, True
         self._set_up = visit.set_up
 
     def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
+        self._rest = None
+        if self._last is None and not self._is_asked:  # nothing tells the next rest from the point before
+            of_start(self._context).operator.confirm(f"the last reading was lost: read {point_text(visit, index)}")
+        self._is_asked = False
         is_next = self._last is None or self._await(self._last, visit, index, nominal)
-        if is_next:
-            self._last_nominal = nominal[index]
+        self._nominal = nominal[index] if is_next else self._last_nominal
         return is_next
 
     def _await(self, last: Row, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
-        operator = of_start(self._context).operator
-        if all(pm is None for pm in last):  # nothing tells the next rest from it
-            operator.confirm(f"the last reading was lost: read {point_text(visit, index)}")
-            return True
         step = nominal[index] - self._last_nominal
         if abs(step) < SMALLEST:
             if index > 0:
+                operator = of_start(self._context).operator
                 operator.confirm(f"the distance does not change to it: read {point_text(visit, index)}")
+            else:
+                self._rest = last
             return True
         return self._watch(last, visit, index, step, STEP_SHARE * _shortest(nominal, step))
 
@@ -74,6 +79,7 @@ class SettleTrigger:
                 self._complain("no beam: where the mirror rests cannot be told")
                 window.clear()
             elif at_rest(window, context.settling):
+                self._rest = window[-1]
                 if abs(moved - step) <= tolerance:
                     return True
                 if abs(moved) <= BACK and was_away:
@@ -93,8 +99,16 @@ class SettleTrigger:
             self._told = time.monotonic()
             of_start(self._context).operator.tell(text)
 
+    def doubt(self, reading: Reading) -> str | None:
+        """A program that does not wait long enough is at the next point before this one is read."""
+        moved = None if self._rest is None else _change(tuple(reading.mean_pm), self._rest, 1)
+        if moved is None or abs(moved) <= BACK:
+            return None
+        return f"the mirror moved on by {abs(moved):.4f} mm while it was read"
+
     def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
-        self._last = tuple(pm)
+        if any(value is not None for value in pm):  # else the next rest is told from the point before
+            self._last, self._last_nominal = tuple(pm), self._nominal
 
     def failed(self, why: str) -> None:
         pass

@@ -9,6 +9,7 @@ from typing import Final
 from stepdiag._core import InvalidArgument
 from stepdiag.acquire_triggers import Context, Stopped, of_start, point_text
 from stepdiag.files import reason
+from stepdiag.settling import Reading
 from stepdiag.visits import Visit
 
 
@@ -53,6 +54,9 @@ class TcpTrigger:
                 context.operator.tell(f"the controller asked in vain: {wrong}")
                 self._answer(client, f"FAIL {wrong}")
         raise Stopped(f"{point_text(visit, index)}: nobody asked for it in {context.wait_timeout:g} s")
+
+    def doubt(self, reading: Reading) -> str | None:
+        return None  # a controller waits for its answer
 
     def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
         if self._asking is not None:

@@ -2,8 +2,9 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +16,15 @@ from stepdiag.acquire import acquire
 from stepdiag.acquire_triggers import Context, Stopped
 from stepdiag.data_files import read_measurement
 from stepdiag.ids3010 import Sample
+from stepdiag.nc_options import Options, space_of
+from stepdiag.nc_path import Align, Feed, Read, actions_of
 from stepdiag.raw_file import read_raw
 from stepdiag.scenario import simulate_scenario
 from stepdiag.settle_trigger import SettleTrigger
-from stepdiag.settling import Settling
+from stepdiag.settling import Reading, Settling, take_reading
 from stepdiag.twin import Twin
 from stepdiag.twin_instrument import TwinBehaviour
-from stepdiag.visits import visits_of
+from stepdiag.visits import Visit, visits_of
 
 MILLIMETRE = 10**9  # pm
 LINE = 'lines = ["ppp"]\nsteps = 1'
@@ -143,9 +146,34 @@ def test_rest_is_told_by_the_beams_that_are_there() -> None:
     followed.begin()
     followed.stored(0.0, 0.0, None)
     assert followed.wait(1)
+
+
+def test_after_a_lost_reading_the_next_rest_is_told_from_the_point_before() -> None:
+    followed = Followed(at(0.0, 1.0, 2.01))
+    followed.begin()
+    assert followed.wait(1)
     followed.stored(None)
     assert followed.wait(2)
-    assert followed.operator.asked[-1].startswith("the last reading was lost: read visit 1 ")
+    assert followed.last == (2.01, 2.01, 2.01)
+
+
+def test_after_a_lost_beginning_the_operator_is_asked_again() -> None:
+    followed = Followed(at(0.0, 1.0))
+    followed.begin(distance=None)
+    assert followed.wait(1)
+    followed.stored(1.0)
+    assert [text.partition(":")[0] for text in followed.operator.asked[1:]] == ["the last reading was lost"]
+
+
+def test_reading_of_a_mirror_that_moved_on_is_doubted() -> None:
+    followed = Followed(at(0.0, 1.0))
+    followed.begin()
+    assert followed.wait(1)
+    for last, doubt in ((1.01, None), (2.0, "the mirror moved on by 1.0000 mm while it was read")):
+        rows = [*at(1.0), *at(*[last] * 4)]
+        pm = [Sample(tuple(round((d or 0.0) * MILLIMETRE) for d in row), (0, 0, 0)) for row in rows]
+        reading = take_reading(iter(pm).__next__, 3, replace(SETTLING, count=4))  # not before it moves
+        assert followed.trigger.doubt(reading) == doubt
 
 
 def test_missing_beams_are_told() -> None:
@@ -266,3 +294,72 @@ def test_mirror_at_rest_elsewhere_waits_for_the_point(tmp_path: Path) -> None:
             wait_for(lambda: taken(raw) > index, f"reading {index}")  # noqa: B023
         assert running.result(10).complete
     assert any("the mirror rests " in text and "point 2 at X80 Y60 Z0" in text for text in operator.told)
+
+
+def test_program_that_takes_up_backlash_is_followed(tmp_path: Path) -> None:
+    described = scenario(plan=LINE + "\nbackward = true")
+    space = space_of(described, Options(dialect="iso"))
+    aligned = threading.Event()
+
+    class Waiting(Listener):
+        def confirm(self, text: str) -> None:
+            super().confirm(text)
+            assert aligned.wait(10.0)
+
+    operator, raw, here = Waiting(), tmp_path / "run.raw.jsonl", np.zeros(3)
+    with Twin(described) as twin, ThreadPoolExecutor(1) as pool:
+        running = pool.submit(
+            acquire,
+            described,
+            twin.source,
+            tmp_path / "run.csv",
+            trigger=SettleTrigger(),
+            options=fast(settling=Settling(count=3, average=2, interval=0.001)),
+            operator=operator,
+        )
+        for action in actions_of(list(visits_of(described)), space):
+            if isinstance(action, Feed):
+                for share in np.linspace(0.1, 1.0, 10):
+                    twin.instrument.move_to(here + share * (action.position - here))
+                    time.sleep(0.002)
+                here = action.position
+            elif isinstance(action, Align):
+                aligned.set()
+                wait_for(lambda: taken(raw) == 1, "the operator's reading")
+            elif isinstance(action, Read):
+                key = (action.visit.number, action.point)
+                wait_for(lambda: key in read_raw(raw).readings(), f"reading {key}")  # noqa: B023
+                time.sleep(0.1)  # its dwell
+        result = running.result(10)
+    assert result.complete
+    assert len(operator.asked) == 1
+    expected = np.round(simulate_scenario(described).channels["d1"] * 1e9) / 1e9
+    assert np.array_equal(read_measurement(tmp_path / "run.csv").channels["d1"], expected)
+
+
+def test_repetition_that_is_lost_leaves_the_reading_that_there_is(tmp_path: Path) -> None:
+    described = scenario(plan=LINE)
+    doubted: list[int] = []
+
+    class Doubting(SettleTrigger):
+        """Asks for the first point twice, and doubts what comes then."""
+
+        def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
+            doubted.append(index)
+            return doubted.count(1) != 1 or index != 1
+
+        def doubt(self, reading: Reading) -> str | None:
+            return "doubted" if doubted == [0, 1] else None
+
+    operator = Listener()
+    with Twin(described) as twin:
+        result = acquire(
+            described, twin.source, tmp_path / "run.csv", trigger=Doubting(), options=fast(), operator=operator
+        )
+    assert result.complete
+    assert result.lost == 0
+    assert any("d1 is lost: doubted" in text for text in operator.told)
+    records = [record for record in read_raw(tmp_path / "run.raw.jsonl").records if record.record != "session"]
+    kinds = [record.record for record in records if record.record != "again" and record.point == 0]
+    assert kinds.count("reading") == 1
+    assert kinds.count("value") == 8
