@@ -123,7 +123,7 @@ class Driver:
         self.wait_for("homing", lambda: all(self.status.homed[:joints]), timeout)
         self.switch_to(linuxcnc.MODE_MDI, timeout)
 
-    def jog_joint(self, joint: int, distance: float, speed: float, timeout: float = 60.0) -> None:
+    def jog_joint(self, joint: int, distance: float, speed: float, world: bool, timeout: float = 60.0) -> None:
         """Moves one joint, in joint mode."""
         self.messages = []
         self.switch_to(linuxcnc.MODE_MANUAL, timeout)
@@ -132,8 +132,9 @@ class Driver:
         self.command.jog(linuxcnc.JOG_INCREMENT, True, joint, speed, distance)
         self.wait_for("jog", lambda: abs(self.motors()[joint] - goal) < 1e-3, timeout)
         self.at_rest(timeout)
-        self.free(False, timeout)
-        self.switch_to(linuxcnc.MODE_MDI, timeout)
+        if world:
+            self.free(False, timeout)
+            self.switch_to(linuxcnc.MODE_MDI, timeout)
 
     def free(self, joints: bool, timeout: float) -> None:
         """Joint mode, or world mode."""

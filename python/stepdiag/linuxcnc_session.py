@@ -254,9 +254,9 @@ class LinuxcncSession:
     def finish_mdi(self, timeout: float = 60.0) -> None:
         self._ask("finish_mdi", timeout, timeout=timeout)
 
-    def jog_joint(self, joint: int, distance: float, speed: float = 100.0) -> None:
-        """Moves one joint by itself, without kinematics, by a distance in mm."""
-        self._ask("jog_joint", joint=joint, distance=distance, speed=speed)
+    def jog_joint(self, joint: int, distance: float, speed: float = 100.0, *, world: bool = True) -> None:
+        """Moves one joint by itself, without kinematics, by a distance in mm; then back to world mode or not."""
+        self._ask("jog_joint", joint=joint, distance=distance, speed=speed, world=world)
 
     def run_program(
         self,

@@ -31,7 +31,7 @@ def test_half_way_of_a_slow_ramp_forward_undoes_inverse(table: Path, truth: Mach
 def test_compensation_off_from_the_start(table: Path) -> None:
     with LinuxcncSession(table=table, chain=CHAIN, hal=[f"setp {KINS}enable 0"]) as session:
         session.mdi("G53 G0 X100 Y100 Z100")
-        assert session.joints() == [100.0, 100.0, 100.0]
+        assert np.abs(np.array(session.joints()) - 100.0).max() < PROMISED
         assert session.pin(KINS + "applied") == 0.0
 
 
