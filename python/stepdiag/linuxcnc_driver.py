@@ -56,6 +56,12 @@ class Driver:
             said.append(("error: " if is_error else "message: ") + text.strip())
         return said
 
+    def take_complaints(self, what: str, fail_on_error: bool = True) -> None:
+        said = self.complaints()
+        self.messages += said
+        if fail_on_error and any(line.startswith("error: ") for line in said):
+            raise Trouble(f"{what}: " + "; ".join(said))
+
     def wait_for(self, what: str, reached: Callable[[], bool], timeout: float, *, fail_on_error: bool = True) -> None:
         end = time.monotonic() + timeout
         while True:
@@ -63,10 +69,7 @@ class Driver:
             self.status.poll()
             if reached():
                 return
-            said = self.complaints()
-            self.messages += said
-            if fail_on_error and any(line.startswith("error: ") for line in said):
-                raise Trouble(f"{what}: " + "; ".join(said))
+            self.take_complaints(what, fail_on_error)
             if time.monotonic() > end:
                 raise Trouble(f"{what}: not reached within {timeout:g} s")
             time.sleep(POLL)
@@ -156,6 +159,7 @@ class Driver:
     def finish_mdi(self, timeout: float = 60.0) -> None:
         self.done(self.code, timeout)
         self.wait_for(self.code, self.idle, timeout)
+        self.take_complaints(self.code)
 
     def visit(self, points: list[list[float]], timeout: float = 60.0) -> list[list[float]]:
         """Goes to each point by G53 G0 and reads where the joints are told to stand (joint.N.motor-pos-cmd)."""
@@ -211,7 +215,7 @@ class Driver:
             return self.idle() or bool(s.interp_state == linuxcnc.INTERP_PAUSED and s.inpos)
 
         self.wait_for("program", stands, timeout)
-        self.messages += self.complaints()
+        self.take_complaints("program")
         paused = self.status.interp_state == linuxcnc.INTERP_PAUSED
         return {"paused": paused, "line": self.status.motion_line, "messages": self.messages}
 

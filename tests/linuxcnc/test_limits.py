@@ -1,5 +1,6 @@
 """Outside the calibrated volume, at limits, and with corrections that are cut: what the integrator chose."""
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +63,9 @@ def test_an_arc_that_leaves_the_volume_stops_at_its_edge(table: Path) -> None:
         session.mdi("G53 G0 X30 Y100 Z100")
         with pytest.raises(LinuxcncError, match="kinematicsInverse failed"):
             session.mdi("G90 G17 G2 X30 Y200 I0 J50 F3000")
-        assert not session.state()["on"]
+        end = time.monotonic() + 10.0
+        while session.state()["on"]:
+            assert time.monotonic() < end
         where = session.state()["joint_position"]
         assert -0.1 < where[0] < 1.0
         session.turn_on(home=False)
@@ -95,7 +98,7 @@ def test_a_correction_is_cut_to_its_largest_length(table: Path) -> None:
 def test_the_origin_is_where_the_volume_begins(table: Path) -> None:
     with LinuxcncSession(table=table, chain=CHAIN, options={"origin": "-50,-300,-200.5"}) as session:
         point = (-10.0, -200.0, -100.0)
-        joints = session.visit([point])[0]
+        joints = np.array(session.visit([point])[0])
         assert np.abs(joints - expected(table, point, origin=(-50.0, -300.0, -200.5))).max() < ARITHMETIC
         inside = np.add(point, (50.0, 300.0, 200.5))
         assert np.abs(joints - point - (expected(table, tuple(inside)) - inside)).max() < ARITHMETIC
