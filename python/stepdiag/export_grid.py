@@ -6,13 +6,13 @@ interpolation, which is what most controllers and programs do.
 """
 
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
-from stepdiag.comparison_report import decimal
 from stepdiag.export import (
     AXES,
     FUNCTIONS,
@@ -34,7 +34,7 @@ from stepdiag.export import (
 GRID_FORMAT: Final = "stepdiag error grid 1"
 DEFAULT_NODES: Final = (11, 11, 11)
 MOST_POINTS: Final = 2_000_000  # a file of 200 MB
-MOST_SAMPLES: Final = 2_000_000  # of the search for the largest loss: seconds
+MOST_SAMPLES: Final = 1_000_000  # of the search for the largest loss: seconds
 
 
 def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> Export:
@@ -46,9 +46,9 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
     machine = Machine(calibration.chain, compensated_map(calibration, approach), tool)
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     error = machine.error(grid)
-    columns = [*(grid + origin).T, *error.T]
+    values = [error * 1e3]
     if options.orientation:
-        columns += [*_rotation(machine, grid).T]
+        values.append(_rotation(machine, grid) * 1e6)
     loss, place = interpolation_loss(machine, axes, calibration.volume)
 
     leading = {
@@ -67,7 +67,7 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
         "calibrated": calibration.date,
     }
     text = "".join(f"# {key}={value}\n" for key, value in leading.items() if value)
-    text += ",".join(_header(bool(options.orientation))) + "\n" + "".join(_rows(columns))
+    text += ",".join(_header(bool(options.orientation))) + "\n" + "".join(_rows(axes, origin, values))
     return Export({output: text}, _report(leading, axes, error, loss, place, missing))
 
 
@@ -108,10 +108,16 @@ def _header(orientation: bool) -> list[str]:
     return names + [f"e{axis}_urad" for axis in "abc"] if orientation else names
 
 
-def _rows(columns: list[FloatArray]) -> Iterator[str]:
-    shifts = [0, 0, 0, 3, 3, 3, 6, 6, 6][: len(columns)]
-    for row in zip(*(column.tolist() for column in columns), strict=True):
-        yield ",".join(decimal(value, shift) for value, shift in zip(row, shifts, strict=True)) + "\n"
+def _rows(axes: list[FloatArray], origin: FloatArray, values: list[FloatArray]) -> Iterator[str]:
+    """Positions that are read back to the same bits; nine digits of a µm or µrad, which nobody interpolates to."""
+    words = [[repr(float(p)) for p in axis + o] for axis, o in zip(axes, origin, strict=True)]
+    number = ",".join(["%.9f"] * sum(value.shape[1] for value in values)) + "\n"
+    rows = np.concatenate(values, axis=1)
+    rows = np.round(rows, 9) + 0.0  # no -0
+    width = len(words[2])
+    for line, (x, y) in enumerate(product(words[0], words[1])):
+        block = rows[line * width : (line + 1) * width].tolist()
+        yield "".join(f"{x},{y},{z},{number % tuple(row)}" for z, row in zip(words[2], block, strict=True))
 
 
 def interpolation_loss(machine: Machine, axes: list[FloatArray], volume: FloatArray) -> tuple[float, FloatArray]:
@@ -128,7 +134,7 @@ def interpolation_loss(machine: Machine, axes: list[FloatArray], volume: FloatAr
     def loss(points: list[FloatArray]) -> tuple[float, FloatArray]:
         grid = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1).reshape(-1, 3)
         interpolated = values
-        for k in range(3):
+        for k in sorted(range(3), key=lambda k: len(points[k]) / len(axes[k])):  # the smaller arrays first
             interpolated = _along(interpolated, axes[k], points[k], k)
         distance = np.linalg.norm(machine.error(grid) - interpolated.reshape(-1, 3), axis=1)
         worst = int(np.argmax(distance))

@@ -7,6 +7,7 @@ a curve, 1986). `best_subset` searches the least tolerance that a number of node
 none has a smaller largest deviation, but for the relative RESOLUTION of the search.
 """
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -18,8 +19,8 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int_]
 
 RESOLUTION: Final = 1e-4
-MOST_NODES: Final = 5_000  # the search takes ten seconds
-FIRST_WINDOW: Final = 32  # nodes looked at, as long as chords end within them
+MOST_NODES: Final = 5_000  # the search takes seconds
+ROWS_AT_ONCE: Final = 512  # bounds the memory
 
 
 def best_subset(x: FloatArray, functions: FloatArray, size: int) -> IntArray:
@@ -34,14 +35,16 @@ def best_subset(x: FloatArray, functions: FloatArray, size: int) -> IntArray:
     every = np.arange(len(x))
     if len(every) <= size:
         return every
-    low, high = 0.0, float(np.max(np.ptp(functions, axis=1)))  # one chord never deviates by more than the range
-    best = fewest_nodes(x, functions, 0.0)
+    window = 2 * len(x) // size + 8
+    best = fewest_nodes(x, functions, 0.0, window)
     if len(best) <= size:
         return best
-    best = np.array([0, len(x) - 1])
+    # Equal shares of the nodes deviate by some times the least, which saves the search many long chords.
+    best = np.linspace(0, len(x) - 1, size).round().astype(int)
+    low, high = 0.0, largest_deviation(x, functions, best)
     while high - low > RESOLUTION * high:
         middle = 0.5 * (low + high)
-        kept = fewest_nodes(x, functions, middle)
+        kept = fewest_nodes(x, functions, middle, window)
         if len(kept) <= size:
             best, high = kept, min(middle, largest_deviation(x, functions, kept))
         else:
@@ -49,39 +52,53 @@ def best_subset(x: FloatArray, functions: FloatArray, size: int) -> IntArray:
     return best
 
 
-def fewest_nodes(x: FloatArray, functions: FloatArray, tolerance: float) -> IntArray:
-    """The fewest nodes whose chords deviate by at most the tolerance from every function."""
+def fewest_nodes(x: FloatArray, functions: FloatArray, tolerance: float, window: int = 32) -> IntArray:
+    """The fewest nodes whose chords deviate by at most the tolerance from every function.
+
+    window: how many nodes ahead chords are expected to end; another costs time, nothing else."""
     n = len(x)
     # The slack keeps nodes on one straight line together, whatever the rounding of their values.
-    slack = tolerance + 4.0 * np.finfo(float).eps * np.max(np.abs(functions), axis=1, keepdims=True)
+    slack = tolerance + 4.0 * np.finfo(float).eps * np.max(np.abs(functions), axis=1)
     edges = np.full(n, n)  # from the first node, so far
     came_from = np.zeros(n, dtype=int)
     edges[0] = 0
-    for i in range(n - 1):
-        ends = _ends_of_chords(x, functions, slack, i)
-        ends = ends[edges[ends] > edges[i] + 1]
-        edges[ends], came_from[ends] = edges[i] + 1, i
+    for i, ends in enumerate(_all_ends_of_chords(x, functions, slack, window)):
+        better = ends[edges[ends] > edges[i] + 1]
+        edges[better], came_from[better] = edges[i] + 1, i
     path = [n - 1]
     while path[-1] != 0:
         path.append(int(came_from[path[-1]]))
     return np.array(path[::-1])
 
 
-def _ends_of_chords(x: FloatArray, functions: FloatArray, slack: FloatArray, i: int) -> IntArray:
-    """The nodes after i to which a chord from i may go: its slope must pass all those between."""
-    width = FIRST_WINDOW
-    while True:
-        step = x[i + 1 : i + 1 + width] - x[i]
-        slope = (functions[:, i + 1 : i + 1 + width] - functions[:, i, None]) / step
-        least = np.maximum.accumulate(slope - slack / step, axis=1)
-        most = np.minimum.accumulate(slope + slack / step, axis=1)
-        # Where no slope is left that passes all nodes so far, no chord goes farther.
-        if np.any(least[:, -1] > most[:, -1]) or i + 1 + width >= len(x):
-            break
-        width *= 2
-    passes = np.ones(slope.shape[1], dtype=bool)
-    passes[1:] = np.all((slope[:, 1:] >= least[:, :-1]) & (slope[:, 1:] <= most[:, :-1]), axis=0)
-    return i + 1 + np.flatnonzero(passes)
+def _all_ends_of_chords(x: FloatArray, functions: FloatArray, slack: FloatArray, window: int) -> Iterator[IntArray]:
+    """For each node but the last the nodes after it to which a chord may go."""
+    n = len(x)
+    for first in range(0, n - 1, ROWS_AT_ONCE):
+        begin = np.arange(first, min(first + ROWS_AT_ONCE, n - 1))
+        passes, goes_on = _chords(x, functions, slack, begin, window)
+        for row, i in enumerate(begin.tolist()):
+            ahead, farther = window, bool(goes_on[row])
+            through = passes[row]
+            while farther and i + 1 + ahead < n:
+                ahead *= 2
+                (through,), (farther,) = _chords(x, functions, slack, begin[row : row + 1], ahead)
+            yield i + 1 + np.flatnonzero(through[: n - 1 - i])
+
+
+def _chords(
+    x: FloatArray, functions: FloatArray, slack: FloatArray, begin: IntArray, ahead: int
+) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """(n, ahead): whether the slope of the chord from each node to those ahead passes all nodes between; and (n,)
+    whether a slope is left that passes all of them, so that chords may go farther."""
+    end = np.minimum(begin[:, None] + np.arange(1, ahead + 1), len(x) - 1)
+    step = x[end] - x[begin, None]
+    slope = (functions[:, end] - functions[:, begin, None]) / step
+    least = np.maximum.accumulate(slope - slack[:, None, None] / step, axis=2)
+    most = np.minimum.accumulate(slope + slack[:, None, None] / step, axis=2)
+    passes = np.ones(step.shape, dtype=bool)
+    passes[:, 1:] = np.all((slope[..., 1:] >= least[..., :-1]) & (slope[..., 1:] <= most[..., :-1]), axis=0)
+    return passes, np.all(least[..., -1] <= most[..., -1], axis=0)
 
 
 def largest_deviation(x: FloatArray, functions: FloatArray, kept: IntArray) -> float:

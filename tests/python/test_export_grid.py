@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 import stepdiag as sd
 
-# Written with full precision: what is left is the rounding of µm and mm, 1e-16 of 0.1 mm.
-SAME = 1e-16
+# Nine digits of a µm and of a µrad are written.
+MICRO = 0.51e-9
 
 
 @pytest.mark.parametrize("chain", CHAINS)
@@ -26,12 +26,10 @@ def test_points_of_the_grid_have_the_errors_of_the_machine(tmp_path: Path, chain
     positions = grid.vectors("x_mm", "y_mm", "z_mm") - (5.0, 0.0, -7.0)
     assert len(positions) == 60
     machine = machine_of(calibration)
-    error = grid.vectors("ex_um", "ey_um", "ez_um") * 1e-3
-    # Positions come back from the controller's coordinates with the rounding of 80 mm, and slopes are below 0.01.
-    assert np.max(np.abs(error - machine.error(positions))) < SAME + 1e-15
-    rotation = grid.vectors("ea_urad", "eb_urad", "ec_urad") * 1e-6
-    exact = Rotation.from_matrix(machine.pose(positions)[0]).as_rotvec()
-    assert np.max(np.abs(rotation - exact)) < 1e-12  # the sine of 2e-4 rad differs from the angle by 1.3e-12
+    assert np.max(np.abs(grid.vectors("ex_um", "ey_um", "ez_um") - machine.error(positions) * 1e3)) < MICRO
+    exact = Rotation.from_matrix(machine.pose(positions)[0]).as_rotvec() * 1e6
+    # The sine of 2e-4 rad differs from the angle by 1.3e-6 µrad.
+    assert np.max(np.abs(grid.vectors("ea_urad", "eb_urad", "ec_urad") - exact)) < 1.4e-6
 
 
 def test_one_error_is_found_where_it_is(tmp_path: Path) -> None:
@@ -43,7 +41,7 @@ def test_one_error_is_found_where_it_is(tmp_path: Path) -> None:
         [x, y, z] for x in (0.0, 80.0) for y in (0.0, 60.0) for z in (0.0, 50.0)
     ]
     assert not np.any(grid.vectors("ex_um", "ey_um"))
-    assert grid.columns["ez_um"] == pytest.approx([0.0] * 4 + [8.0] * 4, abs=1e-10)  # µm; the pose has 1e-14 mm
+    assert grid.columns["ez_um"] == pytest.approx([0.0] * 4 + [8.0] * 4, abs=MICRO)
 
 
 @settings(max_examples=15, deadline=None)
@@ -95,8 +93,8 @@ def test_the_mean_lies_between_both_directions(tmp_path: Path) -> None:
         error[approach] = GridFile(tmp_path / "grid.csv").vectors("ex_um", "ey_um", "ez_um")
     machine = machine_of(calibration)
     positions = GridFile(tmp_path / "grid.csv").vectors("x_mm", "y_mm", "z_mm")
-    assert np.max(np.abs(error["positive"] - machine.error(positions) * 1e3)) < 1e-12
-    assert np.max(np.abs(error["negative"] - machine.error(positions, "---") * 1e3)) < 1e-12
+    assert np.max(np.abs(error["positive"] - machine.error(positions) * 1e3)) < MICRO
+    assert np.max(np.abs(error["negative"] - machine.error(positions, "---") * 1e3)) < MICRO
     # Rotations are not linear: of second order, 60 µrad · 24 µm.
     assert np.max(np.abs(error["mean"] - 0.5 * (error["positive"] + error["negative"]))) < 1e-2
 
