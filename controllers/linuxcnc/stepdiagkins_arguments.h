@@ -24,8 +24,8 @@ static int read_numbers(const char* name, const char* text, double* values, int 
 static int read_choice(const char* name, const char* text, const char* const choices[3], int* value) {
     for (*value = 0; *value < 3; ++*value)
         if (choices[*value] && strcmp(text, choices[*value]) == 0) return 0;
-    COMPLAIN("%s: expected %s, %s%s%s, got \"%s\"\n", name, choices[0], choices[1], choices[2] ? " or " : "",
-             choices[2] ? choices[2] : "", text);
+    if (choices[2]) COMPLAIN("%s: expected %s, %s or %s, got \"%s\"\n", name, choices[0], choices[1], choices[2], text);
+    else COMPLAIN("%s: expected %s or %s, got \"%s\"\n", name, choices[0], choices[1], text);
     return -1;
 }
 

@@ -1,5 +1,7 @@
 """The files of a simulated three-axis machine for LinuxCNC: what a session (linuxcnc_session.py) starts."""
 
+import re
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,14 +10,19 @@ AXES = "XYZ"
 
 RECORD_DEPTH = 8000  # servo periods that may pass before they are fetched
 
+# Counts servo periods: each adds the offset to what came out in the last.
+CLOCK = """\
+loadrt offset names=session-clock
+addf session-clock.update-output servo-thread
+setp session-clock.offset 1
+net session-clock session-clock.out => session-clock.in
+"""
+
 HAL = """\
 loadrt [KINS]KINEMATICS
 loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS num_dio=8 num_aio=8
 addf motion-command-handler servo-thread
 addf motion-controller servo-thread
-loadrt integ names=session-clock
-addf session-clock servo-thread
-setp session-clock.in 1
 net estop-loop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
 net tool-prepared iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
 net tool-changed iocontrol.0.tool-change => iocontrol.0.tool-changed
@@ -49,6 +56,16 @@ def write_configuration(folder: Path, machine: Machine, display: str) -> Path:
     return ini
 
 
+def copy_configuration(folder: Path, configuration: Path, display: str) -> Path:
+    """The same of somebody's own configuration: a copy of its folder, with this display and a clock."""
+    shutil.copytree(configuration.parent, folder, dirs_exist_ok=True)
+    ini = folder / configuration.name
+    text = re.sub(r"(?m)^DISPLAY *=.*$", f"DISPLAY = {display}", ini.read_text(encoding="utf-8"))
+    ini.write_text(re.sub(r"(?m)^\[HAL\]\n((?:.+\n)*)", r"[HAL]\n\1HALFILE = session.hal\n", text), encoding="utf-8")
+    (folder / "session.hal").write_text(CLOCK, encoding="utf-8")
+    return ini
+
+
 def _hal(machine: Machine) -> str:
     loops = [f"net joint-{j} joint.{j}.motor-pos-cmd => joint.{j}.motor-pos-fb" for j in range(3)]
     recorder = []
@@ -60,7 +77,7 @@ def _hal(machine: Machine) -> str:
     for column, pin in enumerate(machine.record):
         own = [f"joint-{j}" for j in range(3) if pin == f"joint.{j}.motor-pos-cmd"]  # has a signal already
         recorder.append(f"net {own[0] if own else f'record-{column} {pin}'} => sampler.0.pin.{column}")
-    return HAL + "\n".join([*loops, *recorder, *machine.hal]) + "\n"
+    return HAL + CLOCK + "\n".join([*loops, *recorder, *machine.hal]) + "\n"
 
 
 def _tools(machine: Machine) -> str:

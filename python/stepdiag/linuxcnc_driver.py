@@ -5,6 +5,7 @@ one JSON object a line over a Unix socket. LinuxCNC ends when this program ends.
 For Debian's own Python, which has LinuxCNC's modules; nothing else of this package is imported here.
 """
 
+import contextlib
 import json
 import os
 import socket
@@ -36,7 +37,6 @@ class Driver:
         self.component.ready()
         self.status.poll()
         self.kinematic_joints = self.status.joints
-        self.period = float(os.environ["STEPDIAG_SERVO_PERIOD"])
 
     # --- waiting ---
     def end_if_alone(self) -> None:
@@ -174,7 +174,7 @@ class Driver:
         points goes on for 4 after the end of a move. The status is newer than that afterwards."""
         end = time.monotonic() + timeout
         started, last = self.clock(), self.motors()
-        while self.clock() - started < 6.5 * self.period:
+        while self.clock() - started < 6.5:
             time.sleep(POLL)
             now = self.motors()
             if now != last:
@@ -186,7 +186,7 @@ class Driver:
         return last
 
     def clock(self) -> float:
-        """Servo cycles gone by, as s."""
+        """Servo periods gone by."""
         return float(hal.get_value("session-clock.out"))
 
     def motors(self) -> list[float]:
@@ -289,15 +289,8 @@ def serve(connection: socket.socket) -> None:
             lines.flush()
 
 
-def main() -> int:
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-        connection.connect(os.environ["STEPDIAG_SESSION_SOCKET"])
-        try:
-            serve(connection)
-        except (OSError, KeyboardInterrupt):
-            return 1  # the session is gone
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as to_session:
+        to_session.connect(os.environ["STEPDIAG_SESSION_SOCKET"])
+        with contextlib.suppress(OSError, KeyboardInterrupt):  # the session is gone
+            serve(to_session)

@@ -9,7 +9,6 @@ display, and does what is asked for over a Unix socket. One LinuxCNC at a time r
 """
 
 import contextlib
-import json
 import os
 import shutil
 import signal
@@ -17,13 +16,14 @@ import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from stepdiag.linuxcnc_configuration import Machine, write_configuration
+from stepdiag.linuxcnc_configuration import Machine, copy_configuration, write_configuration
 from stepdiag.linuxcnc_processes import LinuxcncError, end_all_of, linuxcnc_lock, refuse_a_running_one
+from stepdiag.linuxcnc_requests import LinuxcncRequests
 
 PYTHON = "/usr/bin/python3"
 PACKAGES = ("linuxcnc-uspace", "linuxcnc-uspace-dev")
@@ -31,14 +31,13 @@ NOBODY = 65534
 
 __all__ = ["LinuxcncError", "LinuxcncSession", "linuxcnc_lock"]
 
-Setting = float | int | bool
 
-
-class LinuxcncSession:
+class LinuxcncSession(LinuxcncRequests):
     """Starts LinuxCNC in a folder of its own on entry, ends it and clears up on exit.
 
     table, chain: load the kinematics `stepdiagkins` with this calibration and chain ("wX'bYZt"); `options` are its
     further arguments, {"outside": "refuse", "margin": 5}. Without a table: `kinematics`.
+    configuration: an INI file of one's own instead, used in a copy of its folder; nothing else then counts.
     comp_files: {joint: file}, LinuxCNC's own screw compensation, of type `comp_type`.
     record: pins whose values in every servo period `recorded` returns.
     hal, ini: further lines and keys. Everything else as in Machine.
@@ -51,6 +50,7 @@ class LinuxcncSession:
         chain: str | None = None,
         options: Mapping[str, str | float] | None = None,
         kinematics: str | None = None,
+        configuration: str | os.PathLike[str] | None = None,
         comp_files: Mapping[int, str | os.PathLike[str]] | None = None,
         comp_type: int = 0,
         tools: Mapping[int, tuple[float, float, float]] | None = None,
@@ -66,6 +66,7 @@ class LinuxcncSession:
     ) -> None:
         self._table, self._chain, self._options = table, chain, dict(options or {})
         self._kinematics = kinematics
+        self._configuration = None if configuration is None else Path(configuration)
         self._comp_files = dict(comp_files or {})
         self._machine: dict[str, Any] = {
             "limits": limits,
@@ -113,9 +114,12 @@ class LinuxcncSession:
         self._stack.callback(shutil.rmtree, self.folder, ignore_errors=True)
         self._log_path = self.folder / "log.txt"
         self._stack.callback(self._keep_log)
-        self.folder.chmod(0o777 if os.geteuid() == 0 else 0o755)  # rtapi_app is somebody else's then
-        ini = write_configuration(self.folder, self._configured(), "./display")
+        if self._configuration is None:
+            ini = write_configuration(self.folder, self._configured(), "./display")
+        else:
+            ini = copy_configuration(self.folder, self._configuration, "./display")
         self._write_display()
+        self.folder.chmod(0o777 if os.geteuid() == 0 else 0o755)  # the real-time process is somebody else's then
 
         socket_path = self.folder / "session"
         listener = self._stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
@@ -158,7 +162,6 @@ class LinuxcncSession:
             "RTAPI_FIFO_PATH": str(self.folder / "rtapi"),
             "HOME": str(self.folder),  # LinuxCNC leaves files there
             "LANG": "C.UTF-8",
-            "STEPDIAG_SERVO_PERIOD": repr(self._machine["servo_period"] * 1e-9),
         }
         if os.geteuid() == 0:  # LinuxCNC's real-time process refuses to be root
             environment["RTAPI_UID"] = str(NOBODY)
@@ -225,114 +228,3 @@ class LinuxcncSession:
         with contextlib.suppress(OSError):
             return self._log_path.read_text(encoding="utf-8", errors="replace")
         return getattr(self, "_kept_log", "")
-
-    # --- requests ---
-    def _ask(self, verb: str, patience: float = 60.0, /, **arguments: Any) -> Any:
-        request = {"do": verb, **arguments}
-        self._connection.settimeout(patience + 10.0)  # the driver's own limit comes first
-        try:
-            self._lines.write(json.dumps(request) + "\n")
-            self._lines.flush()
-            line = self._lines.readline()
-        except OSError as error:
-            raise LinuxcncError(f"LinuxCNC does not answer ({verb}): {error}\n{self.log}") from error
-        if not line:
-            raise LinuxcncError(f"LinuxCNC has ended ({verb}):\n{self.log}")
-        answer = json.loads(line)
-        if "error" in answer:
-            raise LinuxcncError(answer["error"])
-        return answer["result"]
-
-    def mdi(self, code: str, timeout: float = 60.0) -> None:
-        """One line of G-code; returns when the machine stands."""
-        self._ask("mdi", timeout, code=code, timeout=timeout)
-
-    def start_mdi(self, code: str) -> None:
-        """Begins one line of G-code; `finish_mdi` waits for its end."""
-        self._ask("start_mdi", code=code)
-
-    def finish_mdi(self, timeout: float = 60.0) -> None:
-        self._ask("finish_mdi", timeout, timeout=timeout)
-
-    def jog_joint(self, joint: int, distance: float, speed: float = 100.0, *, world: bool = True) -> None:
-        """Moves one joint by itself, without kinematics, by a distance in mm; then back to world mode or not."""
-        self._ask("jog_joint", joint=joint, distance=distance, speed=speed, world=world)
-
-    def run_program(
-        self,
-        path: str | os.PathLike[str],
-        on_pause: Callable[[Self, int, list[str]], None] | None = None,
-        timeout: float = 600.0,
-    ) -> list[str]:
-        """Runs a program to its end; returns its messages. At each stop (M0) `on_pause(session, line, messages since
-        the last stop)` is called, then the program goes on."""
-        own = self.folder / Path(path).name
-        shutil.copyfile(path, own)
-        said: list[str] = []
-        outcome = self._ask("program", timeout, path=str(own), timeout=timeout)
-        while True:
-            new = outcome["messages"][len(said) :]
-            said = outcome["messages"]
-            if not outcome["paused"]:
-                return said
-            if on_pause is not None:
-                on_pause(self, outcome["line"], new)
-            outcome = self._ask("resume", timeout, timeout=timeout)
-
-    def visit(self, points: Sequence[Sequence[float]], timeout: float = 60.0) -> list[list[float]]:
-        """The joints' commands (motor-pos-cmd, screw compensation included) at machine positions, one by one."""
-        rows = [[float(v) for v in point] for point in points]
-        joints: list[list[float]] = self._ask("visit", timeout * max(1, len(rows)), points=rows, timeout=timeout)
-        return joints
-
-    def joints(self) -> list[float]:
-        """joint.N.motor-pos-cmd, mm, once the joints stand."""
-        joints: list[float] = self._ask("at_rest")
-        return joints
-
-    def joint_commands(self) -> list[float]:
-        """joint.N.pos-cmd, mm: without LinuxCNC's screw compensation."""
-        return [float(v) for v in self.pins([f"joint.{j}.pos-cmd" for j in range(3)])]
-
-    def position(self) -> list[float]:
-        """Where LinuxCNC says that the tool is, X, Y, Z in machine coordinates, mm: from the joints' feedback."""
-        self._ask("at_rest")
-        return [float(v) for v in self.state()["actual_position"][:3]]
-
-    def recorded(self, timeout: float = 20.0) -> list[list[float]]:
-        """What has been recorded until now: of each servo period its number and the pins' values."""
-        wanted, end = int(self.pin("sampler.0.sample-num")), time.monotonic() + timeout
-        while True:
-            *lines, _ = (self.folder / "record.txt").read_text(encoding="ascii").split("\n")
-            if lines and int(lines[-1].split()[0]) >= wanted - 1:
-                return [[float(value) for value in line.split()] for line in lines]
-            if time.monotonic() > end:
-                raise LinuxcncError(f"recording: period {wanted} not written within {timeout:g} s")
-            time.sleep(0.02)
-
-    def state(self) -> dict[str, Any]:
-        state: dict[str, Any] = self._ask("state")
-        return state
-
-    def pin(self, name: str) -> Setting:
-        value: Setting = self._ask("pin", name=name)
-        return value
-
-    def pins(self, names: Sequence[str]) -> list[Setting]:
-        values: list[Setting] = self._ask("pins", names=list(names))
-        return values
-
-    def wait_for_pin(self, name: str, value: Setting, timeout: float = 20.0) -> None:
-        self._ask("wait_for_pin", timeout, name=name, value=value, timeout=timeout)
-
-    def set_pin(self, name: str, value: Setting) -> None:
-        self._ask("set_pin", name=name, value=value)
-
-    def turn_on(self, *, home: bool = True) -> None:
-        self._ask("turn_on", home=home)
-
-    def turn_off(self) -> None:
-        self._ask("turn_off")
-
-    def abort(self) -> None:
-        self._ask("abort")
