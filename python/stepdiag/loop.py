@@ -21,7 +21,7 @@ from stepdiag.nc import measuring_program
 from stepdiag.nc_options import Options
 from stepdiag.scenario import Scenario, adjust_scenario, parse_scenario, read_scenario, simulate_scenario
 
-NODES: Final = 250  # nodes of the plan's grid that the controller goes to; all of them are calculated
+NODES: Final = 100  # nodes of the plan's grid that the controller goes to; all of them are calculated
 COUNT: Final = 1000  # random points
 SEEDS: Final = 40  # repetitions of the noisy case, by calculation
 POINTS_OF_A_SEED: Final = 100  # of each kind

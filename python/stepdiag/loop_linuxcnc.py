@@ -35,6 +35,9 @@ SPEED: Final = 1e6
 ACCELERATION: Final = 1e9
 
 
+TASK_CYCLE: Final = 0.0002  # s: most of a reading's time is the program's waiting for its turn
+
+
 class LoopError(LinuxcncError):
     """The loop broke: a reading was not stored, or the program stopped."""
 
@@ -52,8 +55,11 @@ class Linuxcnc:
             recorder = _Recorder(job, twin, listening)
             recorder.start()
             try:
-                for program in (job.program, *([self._points_program(job)] if len(job.points) else [])):
-                    session.run_program(program, on_pause=_go_on(recorder, say), timeout=1800.0)
+                go_on = _go_on(recorder, say)
+                session.run_program(job.program, on_pause=go_on, timeout=1800.0)
+                if len(job.points):
+                    say(f"go to {len(job.points)} points")
+                    session.run_program(self._points_program(job), on_pause=go_on, timeout=1800.0)
                 recorder.join(PATIENCE)
             finally:
                 listening.end()
@@ -65,6 +71,7 @@ class Linuxcnc:
         compensation = {} if job.table is None else {"table": job.table, "chain": CHAIN, "options": {"ramp": 0}}
         return {
             **compensation,
+            "ini": {"TASK": {"CYCLE_TIME": TASK_CYCLE}},
             "speed": SPEED,
             "acceleration": ACCELERATION,
             "hal": [
