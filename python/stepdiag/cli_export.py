@@ -31,7 +31,7 @@ MM = "<X Y Z>"
 @click.option(
     "--approach",
     type=click.Choice(("mean", "positive", "negative")),
-    help="Of tables with two directions of approach, which to export (isg, csv-grid).  [default: mean]",
+    help="Of tables with two directions of approach, which is compensated (not linuxcnc-comp).  [default: mean]",
 )
 @click.option(
     "--at",
