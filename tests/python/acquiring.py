@@ -121,12 +121,13 @@ def acquire_through(
     *,
     begin: int = 0,
     end: int | None = None,
+    trigger: TcpTrigger | None = None,
     operator: Listener | None = None,
     options: AcquireOptions | None = None,
     **others: Any,
 ) -> Acquired:
-    """A whole acquisition with a controller. Where `end` leaves points out, it stops as it does when nobody asks on."""
-    trigger = TcpTrigger()
+    """An acquisition with a controller that asks for these points of the plan."""
+    trigger = trigger or TcpTrigger()
     with ThreadPoolExecutor(1) as pool:
         running = pool.submit(
             acquire,

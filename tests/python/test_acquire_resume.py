@@ -6,7 +6,9 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import acquiring
 import numpy as np
@@ -24,6 +26,7 @@ from stepdiag.run_from_raw import measurement_of
 from stepdiag.scenario import Scenario
 from stepdiag.tcp_trigger import TcpTrigger
 from stepdiag.twin import Twin
+from stepdiag.visits import Visit
 
 CHANNELS = ("d1", "d2", "d3")
 
@@ -34,10 +37,24 @@ def readings(path: Path) -> list[str]:
     return [",".join(field for name, field in zip(rows[0], row, strict=True) if name != "time_s") for row in rows]
 
 
-def stop_after(described: Scenario, twin: Twin, output: Path, end: int, **others: object) -> None:
+class Stopping(TcpTrigger):
+    """Stops after so many readings, as it does when nobody asks on."""
+
+    def __init__(self, readings: int) -> None:
+        super().__init__()
+        self._left = readings
+
+    def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
+        if self._left == 0:
+            raise Stopped("nobody asked for it")
+        self._left -= 1
+        return super().wait(visit, index, nominal)
+
+
+def stop_after(described: Scenario, twin: Twin, output: Path, end: int, *, begin: int = 0, **others: Any) -> None:
     """An acquisition that nobody asks on."""
     with pytest.raises(Stopped, match="nobody asked for it"):
-        acquire_through(described, twin, output, end=end, options=fast(wait_timeout=0.2), **others)
+        acquire_through(described, twin, output, begin=begin, end=end, trigger=Stopping(end - begin), **others)
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ Request = dict[str, Any]
 
 
 def client(address: tuple[str, int], **given: Any) -> Ids3010:
-    return Ids3010(*address, **({"timeout": 0.15, "attempts": 1} | given))
+    return Ids3010(*address, **({"timeout": 10.0, "attempts": 1} | given))
 
 
 def only(method: str, answer: Callable[[Request], bytes | None]) -> Callable[[Request], bytes | None]:
@@ -139,7 +139,7 @@ def test_stream_without_an_end_is_refused() -> None:
 
 
 def error_of(answer: Callable[[Request], bytes | None], **given: Any) -> str:
-    with instrument(answer) as address, client(address, **given) as ids:
+    with instrument(answer) as address, client(address, timeout=0.3, **given) as ids:
         with pytest.raises(InstrumentError) as error:
             ids.read((0, 1, 2))
         assert str(error.value).startswith(f"ids3010://127.0.0.1:{address[1]}: ")
@@ -147,7 +147,7 @@ def error_of(answer: Callable[[Request], bytes | None], **given: Any) -> str:
 
 
 def late(request: Request) -> bytes:
-    time.sleep(0.4)
+    time.sleep(0.8)
     return sound(request)
 
 
@@ -158,11 +158,11 @@ def other_id(request: Request) -> bytes:
 @pytest.mark.parametrize(
     ("answer", "message"),
     [
-        (lambda r: b"", "no answer within 0.15 s"),
-        (lambda r: b'{"jsonrpc": "2.0", "resu', "no answer within 0.15 s"),
-        (late, "no answer within 0.15 s"),
+        (lambda r: b"", "no answer within 0.3 s"),
+        (lambda r: b'{"jsonrpc": "2.0", "resu', "no answer within 0.3 s"),
+        (late, "no answer within 0.3 s"),
         (lambda r: None, "the connection was closed"),
-        (other_id, "no answer within 0.15 s, only 1 with other ids"),
+        (other_id, "no answer within 0.3 s, only 1 with other ids"),
         (lambda r: b"HTTP/1.1 400 Bad Request\r\n", "expected a JSON-RPC reply, got 'HTTP/1.1 400 Bad Request"),
         (lambda r: b"\xff\xfe\x00\n", "expected a JSON-RPC reply"),
         (lambda r: b"{" * 5000 + b"\n", "expected a JSON-RPC reply"),
@@ -199,11 +199,11 @@ def test_late_answer_is_not_taken_for_the_next() -> None:
     def answer(request: Request) -> bytes:
         asked.append(request["id"])
         if len(asked) == 1:
-            time.sleep(0.3)
+            time.sleep(1.0)
             return reply(request, 0, 1, 1, 1)
         return reply(request, 0, 2, 2, 2)
 
-    with instrument(only("getAbsolutePositions", answer)) as address, client(address, attempts=3) as ids:
+    with instrument(only("getAbsolutePositions", answer)) as address, client(address, timeout=0.5, attempts=3) as ids:
         assert ids.read((0, 1, 2)).pm == (2, 2, 2)
 
 
