@@ -128,13 +128,28 @@ def _prepare(calibration: Calibration, to: str, output: Path, options: ExportOpt
 
 
 def require(calibration: Calibration, names: Sequence[str], options: ExportOptions) -> list[str]:
-    """Sentences on what of `names` is not determined. Raises InvalidArgument where there is such, unless allowed."""
+    """Sentences on what of `names` is not determined, or not up to the end of the volume.
+
+    Raises InvalidArgument where something is not determined, unless allowed."""
     missing = list(undetermined_of(calibration, names))
     if missing and not options.incomplete:
         raise InvalidArgument(
             f"not determined by this calibration: {', '.join(missing)}; with --incomplete it is exported as 0"
         )
-    return [f"NOT COMPENSATED, because not determined: {', '.join(missing)}"] if missing else []
+    said = [f"NOT COMPENSATED, because not determined: {', '.join(missing)}"] if missing else []
+    if held := list(_held(calibration, names)):
+        said.append(f"note: outside their nodes tables hold their end values: {', '.join(held)}")
+    return said
+
+
+def _held(calibration: Calibration, names: Sequence[str]) -> Iterator[str]:
+    for name in names:
+        if name in calibration.functions:
+            position, value, _ = calibration.functions[name]
+            if position[0] > SAME_NODE and value[0] != 0.0:
+                yield f"{name} below {position[0]:g} mm"
+            if position[-1] < calibration.volume[AXES.index(name[2])] - SAME_NODE and value[-1] != 0.0:
+                yield f"{name} above {position[-1]:g} mm"
 
 
 def undetermined_of(calibration: Calibration, names: Sequence[str]) -> Iterator[str]:

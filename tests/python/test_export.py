@@ -85,6 +85,16 @@ def test_a_scale_that_is_not_determined_is_no_scale_of_0(tmp_path: Path, to: str
     assert any("NOT COMPENSATED" in line and "EXX (slope)" in line for line in report)
 
 
+@pytest.mark.parametrize("to", FORMATS)
+def test_a_table_that_ends_before_the_volume_does_is_said_to_hold_its_end(tmp_path: Path, to: str) -> None:
+    errors = random_calibration(5).to_error_map()
+    position, value = errors.functions["EZZ"]
+    short = {"EZZ": (position[1:-1], value[1:-1])}
+    calibration = calibration_of(sd.ErrorMap(errors.functions | short, errors.squareness))
+    report = "\n".join(export(calibration, to, tmp_path / "out"))
+    assert f"EZZ below {position[1]:g} mm, EZZ above {position[-2]:g} mm" in report
+
+
 def test_a_reversal_that_is_known_but_for_a_constant_is_not_passed_on_in_silence(tmp_path: Path) -> None:
     parts = parts_of(random_calibration(8, reversal=True))
     calibration = sd.Calibration(**parts | {"undetermined_reversal_constants": ["EYY"]})
