@@ -46,13 +46,17 @@ class TcpTrigger:
         expected = (visit.number, int(visit.points[index]))
         deadline = time.monotonic() + context.wait_timeout
         while (left := deadline - time.monotonic()) > 0.0:
-            for client, line in self._lines(left):
-                wanted, wrong = _wanted(line), _expectation(expected, line)
-                if wanted is not None and wanted in (expected, self._last):
-                    self._asking, self._wanted = client, wanted
-                    return wanted == expected
-                context.operator.tell(f"the controller asked in vain: {wrong}")
-                self._answer(client, f"FAIL {wrong}")
+            asked = self._next_line(left)
+            if asked is None:
+                continue
+            client, line = asked
+            wanted = _wanted(line)
+            if wanted is not None and wanted in (expected, self._last):
+                self._asking, self._wanted = client, wanted
+                return wanted == expected
+            wrong = _expectation(expected, line)
+            context.operator.tell(f"the controller asked in vain: {wrong}")
+            self._answer(client, f"FAIL {wrong}")
         raise Stopped(f"{point_text(visit, index)}: nobody asked for it in {context.wait_timeout:g} s")
 
     def doubt(self, reading: Reading) -> str | None:
@@ -74,22 +78,21 @@ class TcpTrigger:
         self._selector.close()
         self._server.close()
 
-    def _lines(self, timeout: float) -> list[tuple[socket.socket, bytes]]:
-        """One line of each client that has sent a whole one, waiting for some if there is none."""
-        ready = [client for client, rest in self._clients.items() if b"\n" in rest]
+    def _next_line(self, timeout: float) -> tuple[socket.socket, bytes] | None:
+        """A whole line and who sent it, waiting for one if there is none. Clients take turns."""
+        ready = any(b"\n" in rest for rest in self._clients.values())
         for key, _ in self._selector.select(0.0 if ready else timeout):
             if key.fileobj is self._server:
                 self._accept()
-            elif isinstance(key.fileobj, socket.socket):
+            elif isinstance(key.fileobj, socket.socket) and b"\n" not in self._clients[key.fileobj]:
                 self._receive(key.fileobj)
-        lines = []
-        for client, rest in list(self._clients.items()):
-            line, end, rest = rest.partition(b"\n")
+        for client, text in self._clients.items():
+            line, end, rest = text.partition(b"\n")
             if end:
-                self._clients[client] = rest
-                lines.append((client, line))
-                break  # its answer comes before anybody else's turn
-        return lines
+                del self._clients[client]
+                self._clients[client] = rest  # at the end of the row
+                return client, line
+        return None
 
     def _accept(self) -> None:
         try:

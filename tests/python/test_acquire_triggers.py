@@ -118,6 +118,21 @@ def test_clients_come_and_go_and_each_gets_its_answer(tmp_path: Path) -> None:
         assert running.result(10).complete
 
 
+def test_client_that_floods_does_not_keep_others_waiting(tmp_path: Path) -> None:
+    described, trigger = scenario(plan=LINE), TcpTrigger()
+    with (
+        Twin(described) as twin,
+        acquiring_from(described, twin, tmp_path / "run.csv", trigger) as (running, _),
+        socket.create_connection(trigger.address, 10.0) as flood,
+    ):
+        flood.sendall(b"x\n" * 3000)
+        with Controller(described, twin.address, trigger.address) as controller:
+            controller.run()
+        assert running.result(10).complete
+        flood.settimeout(10.0)
+        assert flood.recv(20) == b"FAIL expected READ <"
+
+
 def test_answer_comes_when_the_reading_is_on_the_disk(tmp_path: Path) -> None:
     described, trigger = scenario(plan=LINE), TcpTrigger()
     with Twin(described) as twin, acquiring_from(described, twin, tmp_path / "run.csv", trigger) as (running, _):
