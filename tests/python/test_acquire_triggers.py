@@ -174,8 +174,9 @@ def test_instrument_that_goes_away_fails_the_reading_and_keeps_the_others(tmp_pa
     assert len(read_measurement(tmp_path / "run.csv")) == 2
 
 
-def hang() -> Any:
+def hang() -> tuple[list[int], list[int]]:
     time.sleep(1.5)
+    return [0, 0, 0], [0, 0, 0]
 
 
 def test_nobody_is_waited_for_without_end(tmp_path: Path) -> None:
