@@ -1,8 +1,10 @@
 // What a controller asks of a compensator, one position at a time, at random points of the volume: 21 errors, 50 steps
 // an axis (51 nodes; `fine`: 1,000). Answers are compared with Machine::error, and commands with their forward.
-//   error      error vector and orientation        command    the compensated position
-//   *_chain    each position follows from the last answer: what one call takes when nothing else is under way
-#include "stepdiag/controller/compensator.h"
+//   error_vector   the error vector alone           command    the compensated position
+//   error          error vector and orientation     forward    where the tool is
+//   *_chain        each position follows from the last answer: what one call takes when nothing else is under way
+
+#include "stepdiag/controller/compensator.hpp"
 
 #include <benchmark/benchmark.h>
 
@@ -11,7 +13,6 @@
 #include <vector>
 
 #include "expect.hpp"
-#include "stepdiag/controller/compensator.hpp"
 #include "stepdiag/machine/machine.hpp"
 
 namespace {
@@ -78,16 +79,22 @@ void run_chain(benchmark::State& state, Ask&& ask) {
     benchmark::DoNotOptimize(last);
 }
 
+const auto ask_vector = [](const stepdiag::Compensator& c, const Position& p) {
+    stepdiag::CompensatedPosition answer;
+    answer.status = c.error(p.data(), tool.data(), answer.position.data(), nullptr);
+    return answer;
+};
 const auto ask_error = [](const stepdiag::Compensator& c, const Position& p) { return c.error(p, tool); };
 const auto ask_command = [](const stepdiag::Compensator& c, const Position& p) { return c.command(p, tool); };
 const auto ask_forward = [](const stepdiag::Compensator& c, const Position& p) { return c.forward(p, tool); };
 
+void error_vector(benchmark::State& state) { run(state, 50, ask_vector); }
+void error_vector_chain(benchmark::State& state) { run_chain(state, ask_vector); }
+void error_vector_fine(benchmark::State& state) { run(state, 1000, ask_vector); }
 void error(benchmark::State& state) { run(state, 50, ask_error); }
 void command(benchmark::State& state) { run(state, 50, ask_command); }
 void forward(benchmark::State& state) { run(state, 50, ask_forward); }
-void error_fine(benchmark::State& state) { run(state, 1000, ask_error); }
 void command_fine(benchmark::State& state) { run(state, 1000, ask_command); }
-void error_chain(benchmark::State& state) { run_chain(state, ask_error); }
 void command_chain(benchmark::State& state) { run_chain(state, ask_command); }
 void forward_chain(benchmark::State& state) { run_chain(state, ask_forward); }
 
@@ -99,9 +106,10 @@ void machine_error(benchmark::State& state) {
     for (auto _ : state) benchmark::DoNotOptimize(machine.error(vector(bench.positions[i++ % points])));
 }
 
+BENCHMARK(error_vector);
+BENCHMARK(error_vector_chain);
+BENCHMARK(error_vector_fine);
 BENCHMARK(error);
-BENCHMARK(error_chain);
-BENCHMARK(error_fine);
 BENCHMARK(command);
 BENCHMARK(command_chain);
 BENCHMARK(command_fine);

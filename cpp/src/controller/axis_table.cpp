@@ -55,8 +55,6 @@ std::vector<double> boundaries(const std::array<std::vector<const FunctionTable*
     return all;
 }
 
-double& component(Vector3& v, int c) { return c == 0 ? v.x : c == 1 ? v.y : v.z; }
-
 }  // namespace
 
 AxisTable::AxisTable(const ErrorMap& errors, Axis axis, double edge, double margin, CompensatedApproach approach) {
@@ -76,15 +74,15 @@ AxisTable::AxisTable(const ErrorMap& errors, Axis axis, double edge, double marg
             for (const FunctionTable* table : functions[c]) {
                 const double share = 1.0 / double(functions[c].size());
                 const Piece piece = piece_of(*table, bounds[i]);
-                component(c < 3 ? interval.delta : interval.theta, c % 3) += share * piece.value;
-                component(c < 3 ? interval.delta_slope : interval.theta_slope, c % 3) += share * piece.slope;
+                interval.value[c] += share * piece.value;
+                interval.slope[c] += share * piece.slope;
             }
         for (const Squareness s : all_squarenesses) {
             const SquarenessTerm term = squareness_term(s);
             if (term.axis != axis) continue;
             const double slope = term.sign * errors.squareness(s);
-            component(interval.delta, term.component) += slope * bounds[i];
-            component(interval.delta_slope, term.component) += slope;
+            interval.value[term.component] += slope * bounds[i];
+            interval.slope[term.component] += slope;
         }
         intervals_.push_back(interval);
     }
@@ -100,7 +98,7 @@ AxisTable::AxisTable(const ErrorMap& errors, Axis axis, double edge, double marg
 std::size_t AxisTable::make_buckets(std::size_t count, double edge, double margin) {
     // A little wider than the edge's share: equidistant boundaries then all come to lie at the very end of a bucket,
     // however they are rounded, and what `find` asks for has the same answer throughout.
-    constexpr double wider = 1.0 + 1e-12;
+    constexpr double wider = 1.0 + 1e-14;
     buckets_per_mm_ = double(count) / (edge * wider);
     bucket_of_home_ = std::ceil(margin * buckets_per_mm_);
     first_.assign(bucket_of(edge + margin) + 1, 0);
@@ -108,6 +106,9 @@ std::size_t AxisTable::make_buckets(std::size_t count, double edge, double margi
     for (std::size_t i = 1; i < count_; ++i) ++inside[bucket_of(intervals_[i].lower)];
     for (std::size_t bucket = 1; bucket < first_.size(); ++bucket)
         first_[bucket] = first_[bucket - 1] + inside[bucket - 1];
+    is_regular_ = first_.size() == count_;
+    for (std::size_t bucket = 0; bucket < first_.size() && is_regular_; ++bucket)
+        is_regular_ = first_[bucket] == bucket;
     return *std::max_element(inside.begin(), inside.end());
 }
 

@@ -3,6 +3,7 @@
 // however the nodes are spread. Beyond the ends the first and last intervals go on.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -12,20 +13,27 @@
 
 namespace stepdiag {
 
+// Translation and rotation of an axis, mm and rad.
+struct AxisErrors {
+    Vector3 delta, theta;
+};
+
 // Two cache lines: whatever a position needs once its interval is known.
 struct alignas(64) AxisInterval {
+    // At `start` and by mm: delta x, y, z, then theta x, y, z.
+    std::array<double, 6> value = {}, slope = {};
     double lower = 0.0, upper = 0.0;  // positions in [lower, upper) belong here: -inf and +inf where the table ends
-    double start = 0.0;               // mm, where the values hold
-    Vector3 delta = {}, delta_slope = {};  // mm, mm/mm
-    Vector3 theta = {}, theta_slope = {};  // rad, rad/mm
+    double start = 0.0;               // mm
 
     bool holds(double position) const noexcept { return lower <= position && position < upper; }
-    STEPDIAG_INLINED Vector3 delta_at(double position) const noexcept {
-        return delta + (position - start) * delta_slope;
+
+    STEPDIAG_INLINED AxisErrors at(double position) const noexcept {
+        const double run = position - start;
+        return {{value[0] + run * slope[0], value[1] + run * slope[1], value[2] + run * slope[2]},
+                {value[3] + run * slope[3], value[4] + run * slope[4], value[5] + run * slope[5]}};
     }
-    STEPDIAG_INLINED Vector3 theta_at(double position) const noexcept {
-        return theta + (position - start) * theta_slope;
-    }
+    Vector3 delta_slope() const noexcept { return {slope[0], slope[1], slope[2]}; }
+    Vector3 theta_slope() const noexcept { return {slope[3], slope[4], slope[5]}; }
 };
 static_assert(sizeof(AxisInterval) == 128);
 
@@ -37,11 +45,14 @@ public:
     // the axis for more nodes than a controller should hold.
     AxisTable(const ErrorMap& errors, Axis axis, double edge, double margin, CompensatedApproach approach);
 
-    // The interval of a position between -margin and edge + margin. Buckets of equal width say between which intervals
-    // it is; halving finds it. Bucketing is monotone, with all its rounding, so a boundary in a lower bucket is below
-    // the position and one in a higher bucket above it.
+    // The interval of a position between -margin and edge + margin; where the nodes are equidistant perhaps its
+    // neighbour for positions within 1e-14 edges of the boundary, which there says the same. Buckets of equal width say
+    // between which intervals it is; halving finds it. Bucketing is monotone, with all its rounding, so a boundary in a
+    // lower bucket is below the position and one in a higher bucket above it.
     STEPDIAG_INLINED const AxisInterval& find(double position) const noexcept {
-        const AxisInterval* interval = &intervals_[first_[bucket_of(position)]];
+        const std::size_t bucket = bucket_of(position);
+        if (is_regular_) return intervals_[bucket];
+        const AxisInterval* interval = &intervals_[first_[bucket]];
         for (std::size_t step = largest_step_; step > 0; step /= 2)
             if (position >= interval[step - 1].upper) interval += step;
         return *interval;
@@ -61,6 +72,7 @@ private:
     std::vector<std::uint32_t> first_;  // of each bucket: the interval that holds its lowest positions
     double buckets_per_mm_ = 0.0, bucket_of_home_ = 0.0;
     std::size_t largest_step_ = 1;  // a power of two
+    bool is_regular_ = false;       // each bucket is an interval
 };
 
 }  // namespace stepdiag

@@ -49,20 +49,11 @@ void tell(const char* reason, char* message, size_t size) noexcept {
     message[length] = '\0';
 }
 
-void give(const std::array<double, 3>& result, double out[3]) noexcept {
-    if (out) std::copy(result.begin(), result.end(), out);
-}
-
-using Move = stepdiag::CompensatedPosition (Compensator::*)(const std::array<double, 3>&,
-                                                            const std::array<double, 3>&) const noexcept;
-
-unsigned move(Move move, const stepdiag_compensator* c, const double in[3], const double tool[3],
-              double out[3]) noexcept {
-    if (!c || !in) return STEPDIAG_REFUSED;
-    const auto result = (c->compensator.*move)(array(in), tool ? array(tool) : c->compensator.tool());
-    give(result.position, out);
-    return result.status;
-}
+// Where an answer goes that nobody wants.
+struct Scratch {
+    double numbers[3];
+    double* or_else(double* out) noexcept { return out ? out : numbers; }
+};
 
 }  // namespace
 
@@ -95,21 +86,22 @@ void stepdiag_compensator_free(stepdiag_compensator* compensator) { delete compe
 unsigned stepdiag_error(const stepdiag_compensator* compensator, const double position[3], const double tool[3],
                         double error[3], double orientation[3]) {
     if (!compensator || !position) return STEPDIAG_REFUSED;
-    const Compensator& c = compensator->compensator;
-    const stepdiag::MachineError result = c.error(array(position), tool ? array(tool) : c.tool());
-    give(result.position, error);
-    give(result.orientation, orientation);
-    return result.status;
+    Scratch scratch;
+    return compensator->compensator.error(position, tool, scratch.or_else(error), orientation);
 }
 
 unsigned stepdiag_command(const stepdiag_compensator* compensator, const double target[3], const double tool[3],
                           double command[3]) {
-    return move(&Compensator::command, compensator, target, tool, command);
+    if (!compensator || !target) return STEPDIAG_REFUSED;
+    Scratch scratch;
+    return compensator->compensator.command(target, tool, scratch.or_else(command));
 }
 
 unsigned stepdiag_forward(const stepdiag_compensator* compensator, const double command[3], const double tool[3],
                           double actual[3]) {
-    return move(&Compensator::forward, compensator, command, tool, actual);
+    if (!compensator || !command) return STEPDIAG_REFUSED;
+    Scratch scratch;
+    return compensator->compensator.forward(command, tool, scratch.or_else(actual));
 }
 
 uint64_t stepdiag_fingerprint(const stepdiag_compensator* compensator) {
@@ -121,6 +113,8 @@ double stepdiag_inverse_bound(const stepdiag_compensator* compensator) {
 }
 
 void stepdiag_calibration_tool(const stepdiag_compensator* compensator, double tool[3]) {
-    give(compensator ? compensator->compensator.tool() : std::array<double, 3>{}, tool);
+    if (!tool) return;
+    const auto own = compensator ? compensator->compensator.tool() : std::array<double, 3>{};
+    std::copy(own.begin(), own.end(), tool);
 }
 }

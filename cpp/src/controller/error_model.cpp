@@ -11,21 +11,6 @@ namespace {
 
 double norm(const Vector3& v) { return std::sqrt(dot(v, v)); }
 
-struct Quaternion {
-    double w;
-    Vector3 v;
-};
-
-Quaternion operator*(const Quaternion& a, const Quaternion& b) noexcept {
-    return {a.w * b.w - dot(a.v, b.v), a.w * b.v + b.w * a.v + cross(a.v, b.v)};
-}
-
-// Exp theta, off by less than 1e-19 up to largest_angle.
-Quaternion rotation(const Vector3& theta) noexcept {
-    const double angle2 = dot(theta, theta);
-    return {1.0 - angle2 * (1.0 / 8.0 - angle2 / 384.0), (0.5 - angle2 / 48.0) * theta};
-}
-
 // What one axis does at most, over a range of positions.
 struct Extremes {
     double delta = 0.0, delta_slope = 0.0, theta = 0.0, theta_slope = 0.0;
@@ -36,10 +21,10 @@ Extremes extremes(const AxisTable& table, double lowest, double highest) {
     Extremes most;
     for (const AxisInterval& interval : table)
         for (const double end : {std::max(interval.lower, lowest), std::min(interval.upper, highest)}) {
-            most.delta = std::max(most.delta, norm(interval.delta_at(end)));
-            most.theta = std::max(most.theta, norm(interval.theta_at(end)));
-            most.delta_slope = std::max(most.delta_slope, norm(interval.delta_slope));
-            most.theta_slope = std::max(most.theta_slope, norm(interval.theta_slope));
+            most.delta = std::max(most.delta, norm(interval.at(end).delta));
+            most.theta = std::max(most.theta, norm(interval.at(end).theta));
+            most.delta_slope = std::max(most.delta_slope, norm(interval.delta_slope()));
+            most.theta_slope = std::max(most.theta_slope, norm(interval.theta_slope()));
         }
     return most;
 }
@@ -57,14 +42,6 @@ ErrorModel::ErrorModel(const Chain& chain, const ErrorMap& errors, const std::ar
         order_[rank] = index(chain.order()[rank]);
         axes_before_bed_ += chain.carries_workpiece(chain.order()[rank]);
     }
-}
-
-Vector3 ErrorModel::orientation(const Vector3& p, const Cell& cell) const noexcept {
-    const std::array<Quaternion, 3> turns = {rotation(cell.x->theta_at(p.x)), rotation(cell.y->theta_at(p.y)),
-                                             rotation(cell.z->theta_at(p.z))};
-    const Vector3 half_sine = (turns[order_[0]] * turns[order_[1]] * turns[order_[2]]).v;
-    // 2 asin(s)/s; the next term is 2e-11 of it where all three axes turn by largest_angle, 1e-13 rad.
-    return (2.0 + dot(half_sine, half_sine) * (1.0 / 3.0)) * half_sine;
 }
 
 // With the point's distance from the joint of axis a never more than reach_a = |tool| + sum of |p_j| + |delta_j| from a

@@ -1,7 +1,6 @@
 // Three numbers and what the compensator does with them: as plain scalars, which compilers keep in registers.
 #pragma once
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 
@@ -39,18 +38,37 @@ STEPDIAG_INLINED double dot(const Vector3& a, const Vector3& b) noexcept { retur
 STEPDIAG_INLINED Vector3 cross(const Vector3& a, const Vector3& b) noexcept {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
+// v + a x b, in the order that makes two fused multiply-adds of each component.
+STEPDIAG_INLINED Vector3 add_cross(const Vector3& v, const Vector3& a, const Vector3& b) noexcept {
+    return {(v.x - a.z * b.y) + a.y * b.z, (v.y - a.x * b.z) + a.z * b.x, (v.z - a.y * b.x) + a.x * b.y};
+}
+// v x e_axis
 template <int axis>
-constexpr Vector3 unit() noexcept {
-    return {axis == 0 ? 1.0 : 0.0, axis == 1 ? 1.0 : 0.0, axis == 2 ? 1.0 : 0.0};
+STEPDIAG_INLINED Vector3 cross_unit(const Vector3& v) noexcept {
+    if constexpr (axis == 0) return {0.0, v.z, -v.y};
+    else if constexpr (axis == 1) return {-v.z, 0.0, v.x};
+    else return {v.y, -v.x, 0.0};
 }
-STEPDIAG_INLINED Vector3 clamp(const Vector3& v, const Vector3& lowest, const Vector3& highest) noexcept {
-    return {std::min(std::max(v.x, lowest.x), highest.x), std::min(std::max(v.y, lowest.y), highest.y),
-            std::min(std::max(v.z, lowest.z), highest.z)};
-}
+STEPDIAG_INLINED Vector3 read(const double* v) noexcept { return {v[0], v[1], v[2]}; }
+STEPDIAG_INLINED void write(const Vector3& v, double* out) noexcept { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
 
-STEPDIAG_INLINED Vector3 vector3(const std::array<double, 3>& v) noexcept { return {v[0], v[1], v[2]}; }
-inline Vector3 vector3(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-STEPDIAG_INLINED std::array<double, 3> array(const Vector3& v) noexcept { return {v.x, v.y, v.z}; }
+// Positions from `lowest` to `highest` in each component.
+struct Box {
+    Vector3 lowest, highest;
+
+    STEPDIAG_INLINED bool holds(const Vector3& v) const noexcept {  // never NaN
+        return lowest.x <= v.x && v.x <= highest.x && lowest.y <= v.y && v.y <= highest.y && lowest.z <= v.z &&
+               v.z <= highest.z;
+    }
+    STEPDIAG_INLINED Vector3 nearest(const Vector3& v) const noexcept {
+        return {std::min(std::max(v.x, lowest.x), highest.x), std::min(std::max(v.y, lowest.y), highest.y),
+                std::min(std::max(v.z, lowest.z), highest.z)};
+    }
+    Box grown(double by) const noexcept {
+        const Vector3 all = {by, by, by};
+        return {lowest - all, highest + all};
+    }
+};
 
 // Its columns.
 struct Matrix3 {

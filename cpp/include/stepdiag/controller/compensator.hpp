@@ -18,6 +18,7 @@
 
 namespace stepdiag {
 
+struct CompensatorTables;
 struct ParameterTable;
 
 // What holds outside the calibrated volume. An error is judged by its position, a command by its target, a forward by
@@ -79,6 +80,12 @@ public:
     CompensatedPosition command(const std::array<double, 3>& target, const std::array<double, 3>& tool) const noexcept;
     CompensatedPosition forward(const std::array<double, 3>& command, const std::array<double, 3>& tool) const noexcept;
 
+    // The same on three numbers each, as in C; the answer, of which the status is returned, may replace the question.
+    // `tool` may be null: that of the calibration. `orientation` may be null: it takes a third of the time.
+    unsigned error(const double* position, const double* tool, double* error, double* orientation) const noexcept;
+    unsigned command(const double* target, const double* tool, double* command) const noexcept;
+    unsigned forward(const double* command, const double* tool, double* actual) const noexcept;
+
     // The table in force: a hash of chain, volume, tool, nodes and values, whatever the file's spelling and order.
     // Options, uncertainties, method and date are not in it.
     std::uint64_t fingerprint() const noexcept;
@@ -91,8 +98,7 @@ public:
     const std::vector<std::string>& uncompensated() const noexcept;
 
 private:
-    struct Tables;
-    std::unique_ptr<const Tables> tables_;
+    std::unique_ptr<const CompensatorTables> tables_;
 };
 
 }  // namespace stepdiag

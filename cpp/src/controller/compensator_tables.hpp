@@ -1,0 +1,137 @@
+// What a compensator holds once it is loaded, and what a controller asks of it.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "controller/error_model.hpp"
+#include "controller/vector3.hpp"
+#include "stepdiag/controller/compensator.hpp"
+
+namespace stepdiag {
+
+// What the inverse may leave; the rest of Compensator::inverse_bound is for rounding: t + k and c + e, each to 1.5e-11
+// mm and better where position and origin are within 100 m.
+inline constexpr double iteration_bound = 4e-11;  // mm
+
+struct CompensatorTables;
+
+// The answers for one order of the axes and one instruction set, chosen once.
+struct Answers {
+    using Tables = CompensatorTables;
+    unsigned (*error)(const Tables&, const double* position, const double* tool, double* error,
+                      double* orientation) noexcept;
+    unsigned (*command)(const Tables&, const double* target, const double* tool, double* command) noexcept;
+    unsigned (*forward)(const Tables&, const double* command, const double* tool, double* actual) noexcept;
+};
+
+struct CompensatorTables {
+    ErrorModel model;
+    Answers answers;
+    Vector3 origin;
+    Box known;                      // where the model is asked; the errors beyond are those of the nearest point
+    Box everywhere;                 // what counts as a position
+    Box inside, inside_of_results;  // what counts as inside the volume: where a tool shall be, where it is
+    Outside outside;
+    double margin, largest_correction, largest_correction2, largest_tool2;
+    int step_count;
+    std::array<double, 3> volume, tool;
+    std::uint64_t fingerprint;
+    std::vector<std::string> uncompensated;
+
+    // The correction for e. Shortening never takes two vectors farther apart, as clamping never takes two positions: a
+    // table that contracts does so with both.
+    STEPDIAG_INLINED Vector3 capped(const Vector3& e, unsigned& status) const noexcept {
+        const double length2 = dot(e, e);
+        if (length2 <= largest_correction2) return e;
+        status |= compensation_capped;
+        return largest_correction / std::sqrt(length2) * e;
+    }
+
+    STEPDIAG_INLINED bool is_usable(const Vector3& p, const Vector3& tool_offset) const noexcept {  // never NaN
+        return everywhere.holds(p) && dot(tool_offset, tool_offset) <= largest_tool2;
+    }
+    // Of a place in the volume's coordinates that `inside` does not hold.
+    unsigned status_outside(const Vector3& p, const Box& inside) const noexcept {
+        const bool refused =
+            outside == Outside::refuse || (outside == Outside::linear && !inside.grown(margin).holds(p));
+        return refused ? compensation_outside | compensation_refused : unsigned(compensation_outside);
+    }
+    // Of where a tool shall be, or where axes stand; most of them are inside.
+    STEPDIAG_INLINED unsigned status(const Vector3& p, const Vector3& tool_offset) const noexcept {
+        if (inside.holds(p) && dot(tool_offset, tool_offset) <= largest_tool2) return 0;
+        return is_usable(p, tool_offset) ? status_outside(p, inside) : unsigned(compensation_refused);
+    }
+};
+
+template <class Order>
+STEPDIAG_INLINED unsigned answer_error(Order order, const CompensatorTables& t, const double* position,
+                                       const double* tool, double* error, double* orientation) noexcept {
+    const Vector3 asked = read(position), offset = read(tool), p = asked - t.origin;
+    const unsigned status = t.status(p, offset);
+    if (status & compensation_refused) {
+        write({0.0, 0.0, 0.0}, error);
+        if (orientation) write({0.0, 0.0, 0.0}, orientation);
+        return status;
+    }
+    const Vector3 nearest = t.known.nearest(p);
+    const ErrorModel::Cell cell = t.model.cell(nearest);
+    const Vector3 e = t.model.error(order, nearest, offset, cell);
+    write(e, error);
+    if (orientation) write(t.model.orientation(order, nearest, cell), orientation);
+    return dot(e, e) > t.largest_correction2 ? status | compensation_capped : status;
+}
+
+// The correction k with k + e(p + k) = 0 by Newton's method with one slope S, that at the target:
+//   r <- k + e(p + k),   k <- k - (r - S r)
+// Errors at two places differ by q times their distance at most, and |S| <= q, so each step leaves (2 q + q^2) |r| at
+// most, over any number of kinks; within a cell of the table it leaves q^2 |r|, and two steps do. The residual r is
+// what forward will be off by.
+template <class Order>
+STEPDIAG_INLINED unsigned answer_command(Order order, const CompensatorTables& t, const double* target,
+                                         const double* tool, double* command) noexcept {
+    const Vector3 asked = read(target), offset = read(tool), p = asked - t.origin;
+    const unsigned status = t.status(p, offset);
+    if (status & compensation_refused) return write(asked, command), status;
+    Vector3 nearest = t.known.nearest(p);
+    ErrorModel::Cell cell = t.model.cell(nearest);
+    const Matrix3 slope = t.model.slope(order, nearest, offset, cell);
+    unsigned capped = 0;
+    Vector3 k = {0.0, 0.0, 0.0}, r = t.capped(t.model.error(order, nearest, offset, cell), capped);
+    for (int step = 0; step < t.step_count && dot(r, r) > iteration_bound * iteration_bound; ++step) {
+        k = k - (r - slope * r);
+        nearest = t.known.nearest(p + k);
+        if (!cell.holds(nearest)) cell = t.model.cell(nearest);
+        capped = 0;
+        r = k + t.capped(t.model.error(order, nearest, offset, cell), capped);
+    }
+    write(asked + k, command);
+    return status | capped;
+}
+
+template <class Order>
+STEPDIAG_INLINED unsigned answer_forward(Order order, const CompensatorTables& t, const double* command,
+                                         const double* tool, double* actual) noexcept {
+    const Vector3 asked = read(command), offset = read(tool);
+    const Vector3 p = asked - t.origin;
+    if (!t.is_usable(p, offset)) return write(asked, actual), compensation_refused;
+    const Vector3 nearest = t.known.nearest(p);
+    unsigned capped = 0;
+    const Vector3 result = asked + t.capped(t.model.error(order, nearest, offset, t.model.cell(nearest)), capped);
+    const Vector3 at = result - t.origin;
+    const unsigned status = t.inside_of_results.holds(at) ? 0 : t.status_outside(at, t.inside_of_results);
+    if (status & compensation_refused) return write(asked, actual), status;
+    return write(result, actual), status | capped;
+}
+
+// Fused: by AVX2 and FMA, a quarter faster; the last digits of an error (1e-16 of it) are others.
+Answers answers_for(const Chain& chain, bool fused);
+bool are_fused_answers_known();  // to this processor
+
+std::unique_ptr<CompensatorTables> make_tables(const ParameterTable& table, const std::string& name,
+                                               const std::string& chain, const CompensatorOptions& options);
+
+}  // namespace stepdiag
