@@ -15,7 +15,7 @@ from stepdiag import _core
 from stepdiag.files import make_folder, write_whole
 from stepdiag.loop_cases import CASES, CHAIN, NOISE, STEPS, Case, scenario_text, write_scenario, write_truth
 from stepdiag.loop_job import PATIENCE, Controller, FloatArray, Job
-from stepdiag.loop_points import Agreement, agreement, covariances, errors_at, grid_nodes, random_points
+from stepdiag.loop_points import Agreement, Sizes, agreement, covariances, errors_at, grid_nodes, random_points
 from stepdiag.loop_recheck import Translations, translations
 from stepdiag.nc import measuring_program
 from stepdiag.nc_options import Options
@@ -167,13 +167,14 @@ def repetitions(outcome: Outcome, seeds: int) -> dict[str, Agreement]:
     return {name: agreement(np.concatenate(errors[name]), np.concatenate(variances[name])) for name in errors}
 
 
-def whole_grid(outcome: Outcome) -> float:
-    """The largest error that compensation leaves at any node of the plan's grid, by calculation, mm."""
+def whole_grid(outcome: Outcome) -> tuple[float, float]:
+    """The largest errors at any node of the plan's grid, before and after compensation, by calculation, mm."""
     nodes = [outcome.scenario.plan.nodes(axis) for axis in "XYZ"]
     compensator = _core.Compensator(outcome.table, CHAIN)
-    largest = 0.0
+    before = after = 0.0
     for x in nodes[0]:
         targets = np.stack(np.meshgrid([x], nodes[1], nodes[2], indexing="ij"), axis=-1).reshape(-1, 3)
+        before = max(before, Sizes.of(outcome.machine.error(targets)).largest)
         left = errors_at(outcome.machine, compensator.command(targets), targets)
-        largest = max(largest, float(np.linalg.norm(left, axis=1).max()))
-    return largest
+        after = max(after, Sizes.of(left).largest)
+    return before, after

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -54,9 +55,10 @@ def node_note(outcomes: list[Outcome]) -> Iterator[str]:
     for outcome in outcomes:
         if not outcome.case.noise:
             count = (outcome.scenario.plan.steps + 1) ** 3
+            before, after = whole_grid(outcome)
             yield (
                 f"{outcome.case.name}: largest error at any of the {count:,} nodes, calculated: "
-                f"{whole_grid(outcome) * UM:.3g} µm"
+                f"{before * UM:.4g} µm before, {after * UM:.3g} µm after: {before / after:,.0f} times smaller"
             )
     yield "Between nodes what is left is the truth's departure from straight lines between them: more steps resolve it."
 
@@ -70,7 +72,9 @@ def screw_note(outcome: Outcome) -> Iterator[str]:
         nodes, fine = outcome.scenario.plan.nodes(name), np.linspace(0.0, outcome.scenario.plan.volume[axis], 20001)
         at, between = (float(np.max(np.abs(left_along(outcome, axis, p)[:, axis]))) for p in (nodes, fine))
         yield f"E{name}{name:<4}{step:7.3g} mm{alias_of(step):>22}{at * UM:>13.2g} µm{between * UM:>13.2g} µm"
-    yield "Its slope is 1.9 µm/mm, and the axes stand up to 0.1 mm beside a node: 0.2 µm can be left even at nodes."
+    slope, beside = 2.0 * math.pi * SCREW_AMPLITUDE / SCREW_PITCH, Sizes.of(outcome.points["nodes"].before).largest
+    yield f"Its slope is {slope * UM:.2g} µm/mm, and compensated axes stand up to {beside:.2g} mm beside a node:"
+    yield f"{slope * beside * UM:.2g} µm can be left even at nodes."
     yield "Steps of at most a quarter of the pitch would resolve it."
 
 
