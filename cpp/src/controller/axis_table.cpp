@@ -101,14 +101,13 @@ std::size_t AxisTable::make_buckets(std::size_t count, double edge, double margi
     constexpr double wider = 1.0 + 1e-14;
     buckets_per_mm_ = double(count) / (edge * wider);
     bucket_of_home_ = std::ceil(margin * buckets_per_mm_);
-    first_.assign(bucket_of(edge + margin) + 1, 0);
+    first_.assign(bucket_of(edge + margin) + 2, 0);       // one more: `find` may be compiled to round otherwise
     std::vector<std::uint32_t> inside(first_.size(), 0);  // boundaries in each bucket
     for (std::size_t i = 1; i < count_; ++i) ++inside[bucket_of(intervals_[i].lower)];
     for (std::size_t bucket = 1; bucket < first_.size(); ++bucket)
         first_[bucket] = first_[bucket - 1] + inside[bucket - 1];
-    is_regular_ = first_.size() == count_;
-    for (std::size_t bucket = 0; bucket < first_.size() && is_regular_; ++bucket)
-        is_regular_ = first_[bucket] == bucket;
+    is_regular_ = margin == 0.0 && count == count_;
+    for (std::size_t bucket = 0; bucket < count && is_regular_; ++bucket) is_regular_ = first_[bucket] == bucket;
     return *std::max_element(inside.begin(), inside.end());
 }
 

@@ -45,10 +45,9 @@ public:
     // the axis for more nodes than a controller should hold.
     AxisTable(const ErrorMap& errors, Axis axis, double edge, double margin, CompensatedApproach approach);
 
-    // The interval of a position between -margin and edge + margin; where the nodes are equidistant perhaps its
-    // neighbour for positions within 1e-14 edges of the boundary, which there says the same. Buckets of equal width say
-    // between which intervals it is; halving finds it. Bucketing is monotone, with all its rounding, so a boundary in a
-    // lower bucket is below the position and one in a higher bucket above it.
+    // The interval of a position between -margin and edge + margin; within rounding of a boundary (1e-14 edges) perhaps
+    // its neighbour, which says the same there. Buckets of equal width say between which intervals it is; halving finds
+    // it. Bucketing is monotone: a boundary in a lower bucket is below the position, one in a higher bucket above it.
     STEPDIAG_INLINED const AxisInterval& find(double position) const noexcept {
         const std::size_t bucket = bucket_of(position);
         if (is_regular_) return intervals_[bucket];

@@ -117,4 +117,9 @@ void stepdiag_calibration_tool(const stepdiag_compensator* compensator, double t
     const auto own = compensator ? compensator->compensator.tool() : std::array<double, 3>{};
     std::copy(own.begin(), own.end(), tool);
 }
+
+const char* stepdiag_uncompensated(const stepdiag_compensator* compensator, size_t index) {
+    if (!compensator || index >= compensator->compensator.uncompensated().size()) return nullptr;
+    return compensator->compensator.uncompensated()[index].c_str();
+}
 }

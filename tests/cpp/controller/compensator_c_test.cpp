@@ -44,6 +44,19 @@ TEST(CompensatorC, SaysWhatTheCppLibrarySays) {
     }
 }
 
+TEST(CompensatorC, WhatIsNotCompensatedIsCounted) {
+    ParameterTable table = random_table();
+    table.functions[4].reset(), table.squarenesses[2].reset();
+    const std::string path = ::testing::TempDir() + "uncompensated.csv";
+    write_parameter_table(table, path);
+    stepdiag_compensator* compensator = stepdiag_compensator_load(path.c_str(), "wX'bYZt", nullptr, nullptr, 0);
+    EXPECT_STREQ(stepdiag_uncompensated(compensator, 0), "EBX");
+    EXPECT_STREQ(stepdiag_uncompensated(compensator, 1), "A0Z");
+    EXPECT_EQ(stepdiag_uncompensated(compensator, 2), nullptr);
+    EXPECT_EQ(stepdiag_uncompensated(nullptr, 0), nullptr);
+    stepdiag_compensator_free(compensator);
+}
+
 TEST(CompensatorC, TheAnswerMayReplaceTheQuestion) {
     const Loaded loaded;
     double p[3] = {100.0, 200.0, 300.0}, separate[3];

@@ -19,6 +19,7 @@ enum stepdiag_approach { STEPDIAG_MEAN = 0, STEPDIAG_POSITIVE = 1, STEPDIAG_NEGA
 /* Flags of a status; 0 is an answer inside the volume. */
 enum stepdiag_status { STEPDIAG_OUTSIDE = 1, STEPDIAG_CAPPED = 2, STEPDIAG_REFUSED = 4 };
 
+/* See CompensatorOptions. Start from stepdiag_default_options(), so that new ones find their defaults. */
 typedef struct {
     double origin[3];
     int outside; /* enum stepdiag_outside */
@@ -35,7 +36,9 @@ stepdiag_compensator* stepdiag_compensator_load(const char* path, const char* ch
                                                 char* message, size_t message_size);
 void stepdiag_compensator_free(stepdiag_compensator* compensator);
 
-/* Each returns the status. `tool` may be NULL: the tool of the calibration. `orientation` may be NULL. */
+/* Each returns the status; without a compensator or a position that is STEPDIAG_REFUSED. `tool` may be NULL: the tool of
+ * the calibration. Where an answer goes may be NULL, too, or where the position is; without `orientation` an error takes a
+ * third less time. */
 unsigned stepdiag_error(const stepdiag_compensator* compensator, const double position[3], const double tool[3],
                         double error[3], double orientation[3]);
 unsigned stepdiag_command(const stepdiag_compensator* compensator, const double target[3], const double tool[3],
@@ -46,6 +49,8 @@ unsigned stepdiag_forward(const stepdiag_compensator* compensator, const double 
 uint64_t stepdiag_fingerprint(const stepdiag_compensator* compensator);
 double stepdiag_inverse_bound(const stepdiag_compensator* compensator);
 void stepdiag_calibration_tool(const stepdiag_compensator* compensator, double tool[3]);
+/* What the table does not tell, counted from 0: "EXX", "EYX (slope)", "C0Y". NULL after the last. */
+const char* stepdiag_uncompensated(const stepdiag_compensator* compensator, size_t index);
 
 #ifdef __cplusplus
 }
