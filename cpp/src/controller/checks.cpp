@@ -77,10 +77,12 @@ void check_nodes(const ParameterTable& table, const Eigen::Vector3d& volume, con
 
 std::vector<std::string> not_told(const ParameterTable& table, const Eigen::Vector3d& volume, const std::string& name) {
     const auto slopes = functions_listed(table, "undetermined_slopes", name);
+    const auto constants = functions_listed(table, "undetermined_reversal_constants", name);
     std::vector<std::string> missing;
     for_each_function(table, [&](FunctionId id, const std::optional<FunctionTable>& function) {
         if (!function) return missing.push_back(id.name());
         if (slopes.count(id.name())) missing.push_back(id.name() + " (slope)");
+        if (constants.count(id.name())) missing.push_back(id.name() + " (reversal at home)");
         const double first = function->position.front(), last = function->position.back();
         if (first > node_slack) missing.push_back(id.name() + " (below " + text(first) + " mm)");
         if (last < volume[index(id.axis)] - node_slack) missing.push_back(id.name() + " (above " + text(last) + " mm)");

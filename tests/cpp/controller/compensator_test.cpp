@@ -277,9 +277,10 @@ TEST(Compensator, WhatTheTableDoesNotTellIsSaid) {
     table.functions[0]->position.pop_back(), table.functions[0]->value.pop_back();
     table.functions[0]->standard_uncertainty.pop_back();
     table.header["undetermined_slopes"] = "EYY EAZ";
+    table.header["undetermined_reversal_constants"] = "EZZ";
     const Compensator compensator(table, "table", test_chain);
-    EXPECT_EQ(compensator.uncompensated(),
-              (std::vector<std::string>{"EXX (above 784.0 mm)", "EAX", "EYY (slope)", "EAZ (slope)", "C0Y"}));
+    EXPECT_EQ(compensator.uncompensated(), (std::vector<std::string>{"EXX (above 784.0 mm)", "EAX", "EYY (slope)",
+                                                                     "EZZ (reversal at home)", "EAZ (slope)", "C0Y"}));
     EXPECT_TRUE(Compensator(random_table(), "table", test_chain).uncompensated().empty());
 }
 
