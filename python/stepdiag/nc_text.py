@@ -1,5 +1,6 @@
 """The words of a measuring program: G-code of LinuxCNC, and what ISO 6983 and most controllers have in common."""
 
+import textwrap
 import unicodedata
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -66,17 +67,16 @@ class Writer:
         return [*([f"({message})"] if self.dialect == "linuxcnc" else self.comment(text)), "M0"]
 
     def _plain(self, text: str) -> str:
-        """ASCII without parentheses, which would end a comment; ISO's letters are capitals."""
+        """ASCII without parentheses, which would end a comment, or %, which ends a program; ISO's are capitals."""
         text = unicodedata.normalize("NFKD", text.replace("µ", "u"))
-        text = text.replace("(", "[").replace(")", "]")
+        text = text.replace("(", "[").replace(")", "]").replace("%", "?")
         text = "".join(c if " " <= c <= "~" else "?" for c in text if not unicodedata.combining(c))
         return text.upper() if self.dialect == "iso" else text
 
 
 def _wrapped(text: str) -> list[str]:
-    import textwrap
-
-    return textwrap.wrap(text, WIDTH) or [""]
+    # What goes on does not begin a line: (MSG, ...), (PY, ...) and the like are more than comments to LinuxCNC.
+    return textwrap.wrap(text, WIDTH, subsequent_indent="... ") or [""]
 
 
 def numbered(lines: list[str]) -> list[str]:

@@ -197,3 +197,15 @@ def test_the_command_writes_the_program_and_tells_its_time(tmp_path: Path, capsy
     )
     assert main(["nc", str(path), "-o", str(path)]) == 2
     assert main(["nc", str(path), "-o", str(output), "--trigger", "handshake", "--dialect", "iso"]) == 2
+
+
+def test_a_file_name_cannot_leave_its_comment() -> None:
+    name = "a)b(py,%\n" + "x" * 60 + " py,import os " + "y" * 60 + "µ.toml"
+    scenario = parse_scenario(SCENARIO.format(lines='["ppp"]', plan="", steps=2), name)
+    program = measuring_program(scenario, Options())
+    assert len(trace(program.text, iso=False).readings) == program.readings
+    head = program.text.split("\nG21")[0].splitlines()
+    assert all(line[0] == "(" and line[-1] == ")" and line.isascii() for line in head)
+    assert not any(line.lower().startswith(("(py", "(msg", "(debug")) for line in head)
+    iso = measuring_program(scenario, Options(dialect="iso")).text
+    assert iso.count("%") == 2
