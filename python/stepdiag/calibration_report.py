@@ -9,7 +9,7 @@ from stepdiag._core import Calibration
 from stepdiag.comparison import KINDS, kind_of
 from stepdiag.comparison_report import decimal
 from stepdiag.functional_point import functional_point_straightness
-from stepdiag.report import UNIT, in_report_units
+from stepdiag.report import UNIT, in_report_units, reversal_rows, undetermined_rows
 
 FUNCTIONAL_POINT_FORMAT: Final = "stepdiag functional point 1"
 
@@ -29,18 +29,20 @@ def calibration_report(calibration: Calibration) -> Iterator[str]:
             largest = _largest(kind, [(value, place) for value, _, place in values])
             uncertain = _largest(kind, [(u, place) for _, u, place in values])
             yield f"{kind:<14}{largest:<32}{uncertain}"
+    yield from reversal_rows(calibration)
+    yield "signs: actual less commanded; rotations and squarenesses by the right-hand rule"
     yield f"reference: {calibration.straightness_reference}"
     yield from _functional_point(calibration)
-    for sentence in calibration.undetermined:
-        yield f"undetermined: {sentence}"
+    yield from undetermined_rows(calibration)
 
 
 def _values(calibration: Calibration, kind: str) -> Iterator[tuple[float, float, str]]:
     """Value, standard uncertainty and place of every value of a kind."""
     for name, (position, value, uncertainty) in calibration.functions.items():
         if kind_of(name) == kind:
+            shape = "'s shape" if name in calibration.undetermined_slopes else ""
             for p, v, u in zip(position.tolist(), value.tolist(), uncertainty.tolist(), strict=True):
-                yield v, u, f"{name} at {p:g} mm"
+                yield v, u, f"{name}{shape} at {p:g} mm"
     for name, (angle, u) in calibration.squareness.items():
         if kind_of(name) == kind:
             yield angle, u, name

@@ -1,5 +1,6 @@
 """What the commands tell about their results, as lines of text."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
@@ -159,8 +160,10 @@ def reversal_rows(calibration: Calibration) -> Iterator[str]:
     for kind in KINDS:
         if kind in largest:
             error, uncertainty_of_it, where = largest[kind]
-            size, u = in_report_units(kind, error), in_report_units(kind, uncertainty_of_it)
-            yield f"  {kind:<13}{size:9.3g} {UNIT[kind]:<5} ({where}; standard uncertainty {u:.2g} {UNIT[kind]})"
+            u = "not known"  # as of a calibration that was read from CSV
+            if not math.isnan(uncertainty_of_it):
+                u = f"{in_report_units(kind, uncertainty_of_it):.2g} {UNIT[kind]}"
+            yield f"  {kind:<13}{in_report_units(kind, error):9.3g} {UNIT[kind]:<5} ({where}; standard uncertainty {u})"
 
 
 def uncertainty_rows(calibration: Calibration) -> Iterator[str]:

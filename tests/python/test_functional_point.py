@@ -156,8 +156,30 @@ def test_report_of_a_calibration_that_knows_little(tmp_path: Path, capsys: pytes
     assert main(["report", str(tmp_path / "little.nc")]) == 0
     said = capsys.readouterr().out.splitlines()
     assert said[0].startswith("method: not known")
-    assert [line.split()[0] for line in said[3:]] == ["positioning", "reference:"]
+    assert [line.split()[0] for line in said[3:]] == ["positioning", "signs:", "reference:"]
     assert said[3].endswith("not known")
+
+
+def test_report_tells_shapes_from_errors_and_what_reversal_there_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    nodes, u = [0.0, 400.0, 800.0], [1e-4] * 3
+    calibration = sd.Calibration(
+        "",
+        CHAIN,
+        VOLUME,
+        (0, 0, 0),
+        {"EXX": (nodes, [0.0, 0.012, 0.0], u), "EYX": (nodes, [0.0, 0.003, 0.0], u)},
+        undetermined_slopes=["EXX"],
+        reversal={"EYX": (nodes, [0.0, -0.004, 0.001], u)},
+    )
+    sd.write_calibration(calibration, tmp_path / "calibration.csv")
+    assert main(["report", str(tmp_path / "calibration.csv")]) == 0
+    said = capsys.readouterr().out
+    assert "(EXX's shape at 400 mm)" in said
+    assert "note: a function of undetermined slope is given by its shape, with both ends at 0" in said
+    assert "-4 µm    (EYX at 400 mm; standard uncertainty not known)" in said
+    assert "signs: actual less commanded" in said
 
 
 def test_report_refuses_to_write_over_its_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
