@@ -13,6 +13,7 @@ import pytest
 
 from stepdiag.nc import measuring_program
 from stepdiag.nc_options import Options
+from stepdiag.nc_text import Trigger
 from stepdiag.scenario import Scenario, parse_scenario
 from stepdiag.visits import visits_of
 
@@ -109,4 +110,15 @@ def test_the_interpreter_takes_iso_programs_too(
     visits = list(visits_of(scenario))
     expected = np.concatenate([visit.positions for visit in visits]) + origin
     np.testing.assert_allclose(positions, expected, rtol=0.0, atol=2 * PRINTED)  # the program has four decimals as well
+    np.testing.assert_array_equal(sides, [visit.approach for visit in visits for _ in visit.points])
+
+
+@pytest.mark.parametrize(("trigger", "reading"), [("pulse", "SET_AUX_OUTPUT_BIT"), ("dwell", "DWELL")])
+def test_the_other_triggers_are_at_the_same_points(tmp_path: Path, trigger: Trigger, reading: str) -> None:
+    scenario, origin = scenario_of(BODY, '["p00"]', 5, "backward = true"), (10.0, 0.0, -5.0)
+    program = measuring_program(scenario, Options(trigger=trigger, coordinates="G55", origin=origin))
+    positions, sides, _ = readings_of(interpret(program.text, tmp_path), reading)
+    visits = list(visits_of(scenario))
+    expected = np.concatenate([visit.positions for visit in visits]) + origin
+    np.testing.assert_allclose(positions, expected, rtol=0.0, atol=PRINTED)
     np.testing.assert_array_equal(sides, [visit.approach for visit in visits for _ in visit.points])
