@@ -29,7 +29,9 @@ def linuxcnc_lock(timeout: float = 1800.0) -> Iterator[None]:
     if _held:
         raise LinuxcncError("this process runs LinuxCNC already; one session at a time can")
     path = Path(tempfile.gettempdir()) / "stepdiag-linuxcnc.lock"
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    with contextlib.suppress(FileExistsError):
+        os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)  # somebody else's file may be locked too
     try:
         end = time.monotonic() + timeout
         while True:
