@@ -7,6 +7,8 @@
 The points come after the run in the same way, as one more visit: what is stored of it is where the joints stood.
 """
 
+import shutil
+import tempfile
 import threading
 from collections.abc import Sequence
 from pathlib import Path
@@ -51,22 +53,26 @@ class Linuxcnc:
         if not BRIDGE.is_file():
             raise InvalidArgument(f"{BRIDGE}: not found; the loop needs the source folder of stepdiag")
         listening = _Listening()
-        with Twin(job.scenario) as twin, LinuxcncSession(**self._configuration(job, twin, listening)) as session:
-            recorder = _Recorder(job, twin, listening)
-            recorder.start()
-            try:
-                go_on = _go_on(recorder, say)
-                session.run_program(job.program, on_pause=go_on, timeout=1800.0)
-                if len(job.points):
-                    say(f"go to {len(job.points)} points")
-                    session.run_program(self._points_program(job), on_pause=go_on, timeout=1800.0)
-                recorder.join(PATIENCE)
-            finally:
-                listening.end()
-                recorder.join(1.0)  # of an interrupted loop it may still wait for somebody to ask; it ends by itself
+        try:
+            # HAL's files take no path with a space.
+            with Twin(job.scenario) as twin, tempfile.TemporaryDirectory(prefix="stepdiag-bridge-") as folder:
+                bridge = shutil.copy(BRIDGE, folder)
+                with LinuxcncSession(**self._configuration(job, bridge, twin, listening)) as session:
+                    return self._run(job, say, session, _Recorder(job, twin, listening))
+        finally:
+            listening.end()
+
+    def _run(self, job: Job, say: Say, session: LinuxcncSession, recorder: "_Recorder") -> FloatArray:
+        recorder.start()  # of an interrupted loop it may go on waiting for somebody to ask; it ends by itself
+        go_on = _go_on(recorder, say)
+        session.run_program(job.program, on_pause=go_on, timeout=1800.0)
+        if len(job.points):
+            say(f"go to {len(job.points)} points")
+            session.run_program(self._points_program(job), on_pause=go_on, timeout=1800.0)
+        recorder.join(PATIENCE)
         return recorder.result()
 
-    def _configuration(self, job: Job, twin: Twin, listening: "_Listening") -> dict[str, Any]:
+    def _configuration(self, job: Job, bridge: str, twin: Twin, listening: "_Listening") -> dict[str, Any]:
         acquisition = ":".join(map(str, listening.address))
         compensation = {} if job.table is None else {"table": job.table, "chain": CHAIN, "options": {"ramp": 0}}
         return {
@@ -75,7 +81,7 @@ class Linuxcnc:
             "speed": SPEED,
             "acceleration": ACCELERATION,
             "hal": [
-                f"loadusr -Wn stepdiag-bridge /usr/bin/python3 -P {BRIDGE} --acquire {acquisition} "
+                f"loadusr -Wn stepdiag-bridge /usr/bin/python3 -P {bridge} --acquire {acquisition} "
                 f"--twin {twin.address[0]}:{twin.address[1]} --timeout {PATIENCE:g}",
                 *(f"net joint-{joint} => stepdiag-bridge.joint-{axis}" for joint, axis in enumerate("xyz")),
                 "net reading-visit motion.analog-out-00 => stepdiag-bridge.visit",
