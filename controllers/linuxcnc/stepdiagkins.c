@@ -128,18 +128,23 @@ static unsigned joints_of(const double world[3], double joints[3]) {
     return status;
 }
 
-// With a share of the correction: the fixed point of world <- joints - s (command(world) - world), from a start that is
-// already within the change of the error over the length of the correction. The errors' slopes are below 0.1 (a table
-// with steeper ones does not load), so that each turn gains a digit.
+// With a share of the correction: the fixed point of world <- joints - s (command(world) - world). The errors' slopes
+// are below 0.1 (a table with steeper ones does not load), so that each turn gains a digit. At the edge of the volume
+// the forward, for all of the correction, may be refused where the world is not.
 static unsigned world_of(const double joints[3], double world[3]) {
     enum { TURNS = 16 };
-    const unsigned status = stepdiag_forward(compensator, joints, now.tool, world);
-    if (now.share == 1.0 || status & STEPDIAG_REFUSED) return status;
+    unsigned status = stepdiag_forward(compensator, joints, now.tool, world);
+    if (now.share == 1.0) return status;
+    if (now.share == 0.0) {
+        memcpy(world, joints, 3 * sizeof *world);
+        return stepdiag_error(compensator, joints, now.tool, NULL, NULL);
+    }
     for (int i = 0; i < 3; ++i) world[i] = joints[i] + now.share * (world[i] - joints[i]);
-    if (now.share == 0.0) return status;
     for (int turn = 0; turn < TURNS; ++turn) {
         double command[3], change = 0.0;
-        if (stepdiag_command(compensator, world, now.tool, command) & STEPDIAG_REFUSED) break;  // at the very edge
+        const unsigned inverse = stepdiag_command(compensator, world, now.tool, command);
+        if (inverse & STEPDIAG_REFUSED) break;
+        status = inverse;
         for (int i = 0; i < 3; ++i) {
             const double next = joints[i] - now.share * (command[i] - world[i]);
             change = fmax(change, fabs(next - world[i]));

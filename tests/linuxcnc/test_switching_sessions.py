@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from linuxcnc_machine import CHAIN, KINS, TOOL, VOLUME, distances, make_errors
 
 from stepdiag import Machine
@@ -26,6 +27,22 @@ def test_half_way_of_a_slow_ramp_forward_undoes_inverse(table: Path, truth: Mach
         assert 0.0 < distances(np.array(joints) - POINT)[0] < distances(full)[0]
         # 5 periods of a ramp whose speed is at most 1.5 correction / ramp; 100 where periods come late.
         assert worst < 100 * PERIOD * 1.5 * distances(full)[0] / 60
+
+
+@pytest.mark.parametrize("corner", [(0.0, 0.0, 0.0), VOLUME, (0.0, VOLUME[1], 0.0)])
+def test_a_ramp_at_the_edge_of_the_volume_is_not_refused(corner: tuple[float, ...], table: Path) -> None:
+    with LinuxcncSession(table=table, chain=CHAIN, options={"ramp": 1.5, "outside": "refuse"}) as session:
+        session.mdi("G53 G0 X{} Y{} Z{}".format(*corner))
+        session.set_pin(KINS + "enable", False)
+        session.wait_for_pin(KINS + "applied", 0.0)
+        session.joints()
+        assert session.pins([KINS + "inside", KINS + "status"]) == [True, 0]
+        session.set_pin(KINS + "enable", True)
+        session.wait_for_pin(KINS + "applied", 1.0)
+        session.joints()
+        assert session.pins([KINS + "inside", KINS + "status"]) == [True, 0]
+        assert session.state()["on"]
+        assert np.abs(np.array(session.position()) - corner).max() < PROMISED
 
 
 def test_compensation_off_from_the_start(table: Path) -> None:
