@@ -81,6 +81,25 @@ def test_errors_at_the_nodes_and_beside_them_are_those_of_the_conventions(tmp_pa
             both.compare(positions)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_common_nodes_one_in_each_equal_share_of_an_axis_are_still_uneven(tmp_path: Path, seed: int) -> None:
+    """Equidistant nodes may be found faster. These look alike when they are counted, and are not equidistant."""
+    random = np.random.default_rng(seed)
+    count = 2 + seed
+    rows = []
+    for axis, edge in zip("XYZ", VOLUME, strict=True):
+        inner = (np.arange(count - 1) + random.uniform(0.05, 1.0, count - 1)) * edge / count
+        for component in "XYZABC":
+            size, unit = (40.0, "um") if component in "XYZ" else (15.0, "urad")
+            rows += [
+                f"E{component}{axis},{float(p)},{random.uniform(-size, size)},{unit}," for p in (0.0, *inner, edge)
+            ]
+    text = "\n".join([*leading_lines("[w X' b Y Z t]", VOLUME, TOOL), COLUMNS, *rows]) + "\n"
+    both = Both(tmp_path, text)
+    both.compare(inside(20 + seed, 12), status=0)
+    both.compare_commands(inside(40 + seed, 3))
+
+
 def test_large_angles_are_turned_exactly(tmp_path: Path) -> None:
     """1 mrad each: without second order errors would be off by micrometres; a series leaves 5e-13 mm at most."""
     rows = [

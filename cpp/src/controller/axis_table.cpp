@@ -106,8 +106,11 @@ std::size_t AxisTable::make_buckets(std::size_t count, double edge, double margi
     for (std::size_t i = 1; i < count_; ++i) ++inside[bucket_of(intervals_[i].lower)];
     for (std::size_t bucket = 1; bucket < first_.size(); ++bucket)
         first_[bucket] = first_[bucket - 1] + inside[bucket - 1];
+    // One boundary in each bucket is not enough: it must be at the bucket's end, or half a bucket is another interval.
     is_regular_ = margin == 0.0 && count == count_;
-    for (std::size_t bucket = 0; bucket < count && is_regular_; ++bucket) is_regular_ = first_[bucket] == bucket;
+    for (std::size_t i = 1; i < count && is_regular_; ++i)
+        is_regular_ =
+            first_[i] == i && std::abs(intervals_[i].lower - edge * double(i) / double(count)) <= 1e-14 * edge;
     return *std::max_element(inside.begin(), inside.end());
 }
 
