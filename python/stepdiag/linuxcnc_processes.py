@@ -53,11 +53,15 @@ def refuse_a_running_one(patience: float = 15.0) -> None:
     """Another LinuxCNC, of a user or a real machine, must not be touched. One of a session that has crashed ends by
     itself or is ended here: the lock is held, so that no other session lives."""
     end = time.monotonic() + patience
-    while running := sorted({name for _, name in processes() if name in PROCESSES}):
+    while True:
+        running = sorted({name for _, name in processes() if name in PROCESSES})
+        old = of_sessions("/")  # also the script that clears up last, and would clear away what is begun now
+        if not running and not old:
+            break
         if time.monotonic() > end:
             raise LinuxcncError(f"another LinuxCNC runs on this computer ({', '.join(running)}); one at a time can")
         if time.monotonic() > end - patience / 2:
-            end_processes(of_sessions("/"))
+            end_processes(old)
         time.sleep(0.1)
     remove_leavings()
 

@@ -43,6 +43,7 @@ def run(session: LinuxcncSession, folder: Path) -> tuple[Points, list[tuple[int,
     program.write_text(PROGRAM, encoding="ascii")
     stops: list[tuple[int, list[str]]] = []
     session.mdi("G53 G0 X100 Y100 Z50")
+    session.joints()
     before = len(session.recorded())
     session.run_program(program, lambda _, line, messages: stops.append((line, messages)))
     session.joints()
@@ -123,6 +124,7 @@ def test_enabling_on_the_way_leaves_the_path_smooth(table: Path, truth: Machine,
     """The machine moves slowly through a volume while the compensation is turned off and on again."""
     with session_of(table) as session:
         session.mdi("G53 G0 X100 Y100 Z100")
+        session.joints()
         before = len(session.recorded())
         session.start_mdi("G53 G1 F3000 X250 Y200 Z150")  # 187 mm at 50 mm/s
         session.set_pin(KINS + "enable", False)
