@@ -94,6 +94,8 @@ def acquire(
         path = raw or raw_path(output)
         if path.resolve() == output.resolve():
             raise InvalidArgument(f"{path}: expected different names for the raw file and the output")
+        if output.exists() and not path.exists():
+            raise InvalidArgument(f"{output}: exists, and was not made from {path}: move it away, or name another -o")
         plan = described_plan(scenario)
         header = Header(
             created=datetime.now(UTC),

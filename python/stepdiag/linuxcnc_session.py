@@ -119,7 +119,7 @@ class LinuxcncSession(LinuxcncRequests):
         else:
             ini = copy_configuration(self.folder, self._configuration, "./display")
         self._write_display()
-        self.folder.chmod(0o777 if os.geteuid() == 0 else 0o755)  # the real-time process is somebody else's then
+        self.folder.chmod(0o1777 if os.geteuid() == 0 else 0o755)  # the real-time process is somebody else's then
 
         socket_path = self.folder / "session"
         listener = self._stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))

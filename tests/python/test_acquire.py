@@ -228,6 +228,13 @@ def test_sources_that_name_no_instrument_are_refused(tmp_path: Path, source: str
         acquiring.acquire(scenario(), source, tmp_path / "run.csv", trigger=TcpTrigger())
 
 
+def test_a_measurement_without_its_raw_file_is_not_written_over(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text("another measurement")
+    with pytest.raises(InvalidArgument, match=r"run\.csv: exists, and was not made from .*run\.raw\.jsonl"):
+        acquiring.acquire(scenario(), "ids3010://127.0.0.1:1", tmp_path / "run.csv", trigger=TcpTrigger())
+    assert (tmp_path / "run.csv").read_text() == "another measurement"
+
+
 @pytest.mark.parametrize(
     "given", [{"sign": 0}, {"attempts": 0}, {"timeout": 0.0}, {"timeout": float("nan")}, {"wait_timeout": -1.0}]
 )
