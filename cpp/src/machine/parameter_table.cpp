@@ -11,6 +11,8 @@ namespace {
 
 // Leading lines that a reader looks for first; the others follow by name.
 const std::vector<std::string> first_keys = {"format", "chain", "volume_mm", "tool_mm"};
+// Of the file, not of the table: how many rows follow the header row.
+const std::string rows_key = "rows";
 
 // Power of ten from the unit in the file to the native one.
 constexpr int micro_to_milli = -3;   // um -> mm
@@ -32,6 +34,7 @@ public:
     ParameterTable read() {
         read_header();
         find_columns();
+        check_rows();
         for (const CsvRow& row : csv_.rows) read_row(row);
         for (int i = 0; i < function_count; ++i)
             if (!table_.functions[i]) std::swap(table_.functions[i], table_.negative_functions[i]);
@@ -56,11 +59,23 @@ private:
             if (key == "format" && given != error_map_format && given != calibration_format)
                 fail(comment.line, "format: expected " + quoted(error_map_format) + " or " +
                                        quoted(calibration_format) + ", got " + quoted(given));
+            if (key == rows_key) {
+                rows_ = {{given}, comment.line};
+                continue;
+            }
             const bool is_known = std::find(first_keys.begin(), first_keys.end(), key) != first_keys.end();
             if (is_known && table_.header.count(key))
                 fail(comment.line, "the leading line " + quoted(key) + " is given twice");
             table_.header[key] = given;
         }
+    }
+
+    // A file that was cut between two rows looks sound; the number of its rows tells.
+    void check_rows() const {
+        const std::string came = std::to_string(csv_.rows.size());
+        if (rows_.line > 0 && rows_.fields.front() != came)
+            fail(rows_.line, "rows: expected " + quoted(rows_.fields.front()) + ", got " + came +
+                                 "; the file was cut, or rows were added: without this line it is read as it is");
     }
 
     void find_columns() {
@@ -151,6 +166,7 @@ private:
     CsvFile csv_;
     std::array<std::optional<std::size_t>, column_count> field_;
     std::map<std::string, bool> is_directed_;  // by parameter
+    CsvRow rows_{{}, 0};                       // the leading line that counts them
     ParameterTable table_;
 };
 
@@ -189,11 +205,10 @@ ParameterTable read_parameter_table(const std::string& path) {
 }
 
 std::string format_parameter_table(const ParameterTable& table) {
-    std::string text = format_header(table.header);
+    std::string text;
+    int count = 0;
     const bool directed = std::any_of(table.negative_functions.begin(), table.negative_functions.end(),
                                       [](const auto& function) { return function.has_value(); });
-    text +=
-        std::string("parameter,position_mm,value,unit,standard_uncertainty") + (directed ? ",direction" : "") + "\n";
     const auto row = [&](const std::string& parameter, const std::string& position, double value, bool rotation,
                          std::optional<double> uncertainty, const char* direction) {
         if (!std::isfinite(value) || !std::isfinite(uncertainty.value_or(0.0)))
@@ -201,6 +216,7 @@ std::string format_parameter_table(const ParameterTable& table) {
         const int shift = rotation ? -micro_to_radian : -micro_to_milli;
         text += parameter + "," + position + "," + format_decimal(value, shift) + (rotation ? ",urad," : ",um,") +
                 (uncertainty ? format_decimal(*uncertainty, shift) : "") + (directed ? "," : "") + direction + "\n";
+        ++count;
     };
     const auto rows = [&](FunctionId id, const FunctionTable& function, const char* direction) {
         for (std::size_t k = 0; k < function.position.size(); ++k)
@@ -219,7 +235,9 @@ std::string format_parameter_table(const ParameterTable& table) {
     for (const Squareness s : all_squarenesses)
         if (const auto& entry = table.squarenesses[static_cast<int>(s)])
             row(name(s), "", entry->value, true, entry->standard_uncertainty, "");
-    return text;
+    const std::string counted = table.header.empty() ? "" : "# " + rows_key + "=" + std::to_string(count) + "\n";
+    return format_header(table.header) + counted + "parameter,position_mm,value,unit,standard_uncertainty" +
+           (directed ? ",direction" : "") + "\n" + text;
 }
 
 std::string format_lengths(const Eigen::Vector3d& lengths) {

@@ -251,7 +251,17 @@ TEST(ParameterTable, FormatChainVolumeAndToolAreWrittenFirst) {
                     {"method", "m"}, {"tool_mm", "t"}, {"volume_mm", "v"}};
     const std::string text = format_parameter_table(table);
     EXPECT_EQ(text.substr(0, text.find("parameter")),
-              "# format=stepdiag calibration 1\n# chain=c\n# volume_mm=v\n# tool_mm=t\n# a=1\n# method=m\n");
+              "# format=stepdiag calibration 1\n# chain=c\n# volume_mm=v\n# tool_mm=t\n# a=1\n# method=m\n# rows=0\n");
+}
+
+TEST(ParameterTable, FileThatWasCutBetweenRowsIsRefused) {
+    ParameterTable table;
+    table.header = {{"format", stepdiag::calibration_format}};
+    table.functions[0] = FunctionTable{{0.0, 1.0}, {0.0, 2.0}, {std::nullopt, std::nullopt}};
+    const std::string text = format_parameter_table(table);
+    EXPECT_EQ(parse_parameter_table(text, "t.csv").header, table.header);  // the count is the file's, not the table's
+    const std::string cut = text.substr(0, text.rfind("EXX"));
+    expect_refused([&] { parse_parameter_table(cut, "t.csv"); }, "t.csv, line 2: rows: expected \"2\", got 1");
 }
 
 TEST(ParameterTable, HeaderThatCouldNotBeReadBackIsNotWritten) {

@@ -44,10 +44,10 @@ inline constexpr const char* error_map_format = "stepdiag error map 1";
 inline constexpr const char* calibration_format = "stepdiag calibration 1";
 
 // Columns may stand in any order. Throws InvalidArgument naming file and line: unreadable or binary file, another
-// format; format, chain, volume_mm or tool_mm given twice; a column missing, unknown or doubled, unknown parameter or
-// unit, a number that is none or not finite, positions that do not ascend, a squareness with a position or given twice,
-// a parameter of which some rows have a direction and some have none. What is given for one direction alone is taken
-// for both.
+// format; format, chain, volume_mm or tool_mm given twice; rows that the leading line "# rows=" does not count, as of a
+// file that was cut; a column missing, unknown or doubled, unknown parameter or unit, a number that is none or not
+// finite, positions that do not ascend, a squareness with a position or given twice, a parameter of which some rows
+// have a direction and some have none. What is given for one direction alone is taken for both.
 ParameterTable read_parameter_table(const std::string& path);
 ParameterTable parse_parameter_table(std::string_view text, const std::string& file_name);
 
