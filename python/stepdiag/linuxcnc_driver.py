@@ -18,6 +18,7 @@ import hal  # type: ignore[import-not-found]
 import linuxcnc  # type: ignore[import-not-found]
 
 POLL = 0.001  # s between looks at the status: below the servo period nothing new is seen
+LATE = 0.2  # s for what else LinuxCNC says of an error: its motion and its task tell one after the other
 
 
 class Trouble(Exception):
@@ -58,8 +59,12 @@ class Driver:
 
     def take_complaints(self, what: str, fail_on_error: bool = True) -> None:
         said = self.complaints()
+        failed = fail_on_error and any(line.startswith("error: ") for line in said)
+        if failed:
+            time.sleep(LATE)
+            said += self.complaints()
         self.messages += said
-        if fail_on_error and any(line.startswith("error: ") for line in said):
+        if failed:
             raise Trouble(f"{what}: " + "; ".join(said))
 
     def wait_for(self, what: str, reached: Callable[[], bool], timeout: float, *, fail_on_error: bool = True) -> None:
@@ -81,6 +86,7 @@ class Driver:
         """Until the last command has been carried out. (LinuxCNC's wait_complete cannot be interrupted.)"""
         self.wait_for(what, lambda: self.received() and self.status.state != linuxcnc.RCS_EXEC, timeout)
         if self.status.state == linuxcnc.RCS_ERROR:
+            time.sleep(LATE)
             raise Trouble(f"{what}: " + ("; ".join(self.complaints()) or "refused by LinuxCNC"))
 
     def idle(self) -> bool:
