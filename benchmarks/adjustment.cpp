@@ -15,10 +15,10 @@
 #include <ctime>
 
 #include "adjustment_run.hpp"
-#include "evaluation/adjustment_solver.hpp"
+#include "adjustment/gauss_newton.hpp"
 #include "stepdiag/core/random.hpp"
-#include "stepdiag/core/random_lanes.hpp"
-#include "stepdiag/evaluation/batch.hpp"
+#include "stepdiag/core/random_blocks.hpp"
+#include "stepdiag/batch/batch_evaluator.hpp"
 
 namespace {
 

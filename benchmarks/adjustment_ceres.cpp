@@ -9,7 +9,7 @@
 #include <deque>
 
 #include "adjustment_run.hpp"
-#include "evaluation/adjustment_problem.hpp"
+#include "adjustment/adjustment_problem.hpp"
 
 namespace {
 

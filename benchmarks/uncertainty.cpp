@@ -12,13 +12,13 @@
 #include <vector>
 
 #include "expect.hpp"
-#include "stepdiag/core/random_lanes.hpp"
+#include "stepdiag/core/random_blocks.hpp"
 #include "stepdiag/core/rotation.hpp"
 #include "stepdiag/core/units.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
-#include "stepdiag/uncertainty/monte_carlo.hpp"
+#include "stepdiag/monte_carlo/monte_carlo.hpp"
 #include "stepdiag/uncertainty/virtual_calibration.hpp"
-#include "uncertainty/lane_run.hpp"
+#include "uncertainty/simd_sampler.hpp"
 
 namespace {
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "bindings.hpp"
-#include "stepdiag/evaluation/batch.hpp"
+#include "stepdiag/batch/batch_evaluator.hpp"
 
 namespace stepdiag::bindings {
 

@@ -1,5 +1,5 @@
 #include "bindings.hpp"
-#include "stepdiag/evaluation/adjustment.hpp"
+#include "stepdiag/adjustment/adjustment.hpp"
 #include "stepdiag/evaluation/conventional.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
 

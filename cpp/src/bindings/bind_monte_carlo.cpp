@@ -3,8 +3,8 @@
 #include <limits>
 
 #include "bindings.hpp"
-#include "stepdiag/uncertainty/function_model.hpp"
-#include "stepdiag/uncertainty/monte_carlo.hpp"
+#include "stepdiag/monte_carlo/function_model.hpp"
+#include "stepdiag/monte_carlo/monte_carlo.hpp"
 
 namespace stepdiag::bindings {
 namespace {

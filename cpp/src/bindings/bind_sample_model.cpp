@@ -1,8 +1,8 @@
 #include <algorithm>
 
 #include "bindings.hpp"
-#include "stepdiag/core/random_lanes.hpp"
-#include "stepdiag/uncertainty/sample_model.hpp"
+#include "stepdiag/core/random_blocks.hpp"
+#include "stepdiag/monte_carlo/sample_model.hpp"
 
 namespace stepdiag::bindings {
 namespace {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "stepdiag/core/error.hpp"
-#include "stepdiag/evaluation/adjustment.hpp"
+#include "stepdiag/adjustment/adjustment.hpp"
 #include "stepdiag/machine/chain.hpp"
 #include "stepdiag/optics/body.hpp"
 #include "stepdiag/simulation/simulate.hpp"

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "evaluation/linear_program.hpp"
-#include "evaluation/visits.hpp"
+#include "evaluation/passes.hpp"
 
 namespace stepdiag {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/visits.hpp"
+#include "evaluation/passes.hpp"
 #include "stepdiag/evaluation/least_squares.hpp"
 
 namespace stepdiag {

@@ -15,7 +15,7 @@
 #include <hwy/foreach_target.h>  // compiles this file once for every instruction set
 
 // Vectors before the physics that is calculated with them:
-#include "core/lanes-inl.hpp"
+#include "core/simd-inl.hpp"
 //
 #include "optics/encounter-inl.hpp"
 #include "optics/prepared_route.hpp"

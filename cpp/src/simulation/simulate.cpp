@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "simulation/visit_readings.hpp"
+#include "simulation/pass_readings.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "stepdiag/core/error.hpp"
-#include "uncertainty/lane_run.hpp"
+#include "uncertainty/simd_sampler.hpp"
 
 namespace stepdiag {
 namespace {

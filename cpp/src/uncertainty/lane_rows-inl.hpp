@@ -6,8 +6,8 @@
 #define STEPDIAG_LANE_ROWS_INL
 #endif
 
-#include "core/lanes-inl.hpp"
-#include "uncertainty/lane_kernels.hpp"
+#include "core/simd-inl.hpp"
+#include "uncertainty/simd_pass.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace stepdiag {

@@ -1,4 +1,4 @@
-#include "uncertainty/lane_kernels.hpp"
+#include "uncertainty/simd_pass.hpp"
 #include "uncertainty/run_slots.hpp"
 
 // Not those instruction sets that differ from another one only in what is not used here.

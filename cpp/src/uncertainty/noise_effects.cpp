@@ -5,7 +5,7 @@
 #include <cmath>
 #include <variant>
 
-#include "simulation/visit_readings.hpp"
+#include "simulation/pass_readings.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {

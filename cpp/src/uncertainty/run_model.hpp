@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "simulation/visit_readings.hpp"
+#include "simulation/pass_readings.hpp"
 #include "stepdiag/uncertainty/virtual_calibration.hpp"
 #include "uncertainty/draws.hpp"
 #include "uncertainty/run_slots.hpp"

@@ -9,9 +9,9 @@
 
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/core/random.hpp"
-#include "stepdiag/core/random_lanes.hpp"
-#include "uncertainty/general_way.hpp"
-#include "uncertainty/lane_run.hpp"
+#include "stepdiag/core/random_blocks.hpp"
+#include "uncertainty/scalar_sampler.hpp"
+#include "uncertainty/simd_sampler.hpp"
 #include "uncertainty/run_model.hpp"
 
 namespace stepdiag {

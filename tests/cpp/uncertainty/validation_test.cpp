@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "refuses.hpp"
-#include "stepdiag/uncertainty/function_model.hpp"
+#include "stepdiag/monte_carlo/function_model.hpp"
 
 namespace {
 

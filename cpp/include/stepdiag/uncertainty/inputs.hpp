@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdiag/uncertainty/distribution.hpp"
+#include "stepdiag/monte_carlo/distribution.hpp"
 
 namespace stepdiag {
 

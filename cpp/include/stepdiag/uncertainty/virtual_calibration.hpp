@@ -23,10 +23,10 @@
 #include <string>
 #include <vector>
 
-#include "stepdiag/evaluation/batch.hpp"
+#include "stepdiag/batch/batch_evaluator.hpp"
 #include "stepdiag/simulation/simulate.hpp"
 #include "stepdiag/uncertainty/inputs.hpp"
-#include "stepdiag/uncertainty/sample_model.hpp"
+#include "stepdiag/monte_carlo/sample_model.hpp"
 
 namespace stepdiag {
 

@@ -1,0 +1,170 @@
+#include "stepdiag/adjustment/adjustment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <unsupported/Eigen/SpecialFunctions>
+
+#include "adjustment/adjustment_result.hpp"
+#include "adjustment/outlier_search.hpp"
+#include "batch/prepared_adjustment.hpp"
+#include "adjustment/smoothness.hpp"
+#include "stepdiag/core/error.hpp"
+#include "stepdiag/core/units.hpp"
+
+namespace stepdiag {
+namespace {
+
+void check_options(const AdjustmentOptions& options, const Plan& plan) {
+    if (!(options.outlier_probability >= 0.0 && options.outlier_probability <= 0.5))
+        throw InvalidArgument("adjustment outlier_probability: expected a probability from 0 to 0.5");
+    if (const auto& s = options.smoothness)
+        for (const auto& [key, value] : {std::pair("translation", s->translation), std::pair("rotation", s->rotation)})
+            if (!(value == 0.0 || (value >= 1e-9 && value <= 1e6)))
+                throw InvalidArgument(std::string("smoothness ") + key +
+                                      ": expected 0 or a deviation of 1e-9 to 1e6 mm or rad");
+    for (const auto& entry : options.setup_by_line)
+        if (!plan.contains(Line::parse(entry.first)))
+            throw InvalidArgument("adjustment: line \"" + entry.first + "\" is not in the plan");
+}
+
+std::array<double, function_count> smoothness_at_start(const AdjustmentOptions& options) {
+    if (!options.smoothness || options.smoothness->cross_validated) return {};
+    return given_deviations(*options.smoothness);
+}
+
+// No machine is off by a hundredth of its travel: then it is not the machine that the readings tell of.
+void refuse_absurd(const Calibration& calibration) {
+    for (int i = 0; i < function_count; ++i) {
+        const FunctionId id = FunctionId::at(i);
+        if (!calibration.functions[i] || id.is_rotation()) continue;
+        for (const double value : calibration.functions[i]->value)
+            if (std::abs(value) > 1e-2 * calibration.volume[index(id.axis)])
+                throw InvalidArgument(
+                    "adjustment: " + id.name() + " comes out as " + std::to_string(value) +
+                    " mm, more than a hundredth of the travel; expected distances in mm that grow along "
+                    "the line, half of the way to the mirror and back");
+    }
+}
+
+std::vector<std::string> describe(const Observability& observability, const Eigen::VectorXd& x,
+                                  const BorderedBand& inverse) {
+    std::vector<std::string> sentences;
+    for (const KnownCombination& combination : observability.combinations()) {
+        std::ostringstream text;
+        text.precision(4);
+        text << combination.text << " = " << combination.form.value(x) / microradian << " +- "
+             << std::sqrt(std::max(0.0, combination.form.variance(inverse))) / microradian
+             << (combination.is_angle ? " urad" : " um/m");
+        sentences.push_back(text.str());
+    }
+    return sentences;
+}
+
+}  // namespace
+
+double Adjustment::variance_factor() const {
+    return degrees_of_freedom > 0 ? weighted_square_sum / degrees_of_freedom : 1.0;
+}
+
+std::vector<std::size_t> Adjustment::outliers() const {
+    std::vector<std::size_t> list;
+    for (std::size_t r = 0; r < residuals.size(); ++r)
+        if (!residuals[r].used()) list.push_back(r);
+    std::stable_sort(list.begin(), list.end(),
+                     [&](std::size_t i, std::size_t j) { return residuals[i].outlier < residuals[j].outlier; });
+    return list;
+}
+
+Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
+                  const HeadCalibrations& heads, const AdjustmentOptions& options) {
+    check_options(options, plan);
+    AdjustmentProblem problem(measurement, plan, chain, tool, heads, options);
+    if (problem.readings().empty())
+        throw InvalidArgument("adjustment: nothing can be determined: the run has no readings that count");
+    AdjustmentSolver solver(problem, smoothness_at_start(options));
+    AdjustmentTables tables(problem);
+    const Observability observability(solver, tables);
+    const CalibratedForms forms = choose_forms(tables);
+    solver.assume_usual(observability.determined());
+
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
+    Adjustment result{
+        {"", chain, {}, {}, {}, {}, {}, {}, {}}, {}, {}, 0.0, 0, 1.0, 0, {}, smoothness_at_start(options)};
+    OutlierSearch outliers(problem, solver, options);
+    result.iterations = outliers.solve_without_gross(observability.determined(), x);
+    if (options.outlier_probability > 0.0) outliers.run(observability.determined(), x);
+    if (options.smoothness && options.smoothness->cross_validated) {
+        result.smoothness = cross_validate(solver, x, options);
+        solver.solve(x);
+    }
+
+    outliers.look(x);
+    const BorderedBand& inverse = outliers.inverse();
+    result.calibration = make_calibration(problem, tables, forms, x, inverse);
+    const std::vector<bool> known = known_unknowns(problem, observability.determined(), inverse);
+    result.calibration.undetermined = observability.sentences(known);
+    if (!is_anything_determined(result.calibration))
+        throw InvalidArgument(
+            "adjustment: nothing can be determined. " +
+            (result.calibration.undetermined.empty() ? std::string() : result.calibration.undetermined.front()));
+    refuse_absurd(result.calibration);
+    if (options.full_covariance) result.calibration.covariance = full_covariance(problem, forms, solver.factor());
+    result.setup = setup_estimates(problem, known, x, inverse);
+    result.residuals = outliers.residuals();
+    std::stable_sort(result.residuals.begin(), result.residuals.end(),
+                     [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
+    result.combinations = describe(observability, x, inverse);
+    result.weighted_square_sum = solver.equations().square_sum(x);
+    result.degrees_of_freedom = degrees_of_freedom(solver);
+    if (result.degrees_of_freedom > 0)
+        result.chi_square_probability =
+            Eigen::numext::igammac(0.5 * result.degrees_of_freedom, 0.5 * result.weighted_square_sum);
+    return result;
+}
+
+struct Adjuster::State : PreparedAdjustment {
+    Eigen::Index rows;
+    std::vector<std::string> channels;
+    std::vector<int> channel_of_reading;
+
+    State(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
+          const HeadCalibrations& heads, const AdjustmentOptions& options)
+        : PreparedAdjustment(measurement, plan, chain, tool, heads, options, stepdiag::smoothness_at_start(options)),
+          rows(Eigen::Index(measurement.size())) {
+        check_options(options, plan);
+        for (const Channel& channel : measurement.channels()) channels.push_back(channel.name);
+        channel_of_reading.reserve(problem.readings().size());
+        for (const AdjustedReading& reading : problem.readings())
+            channel_of_reading.push_back(
+                int(std::find(channels.begin(), channels.end(), problem.channel_name(reading)) - channels.begin()));
+    }
+};
+
+Adjuster::Adjuster(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
+                   const HeadCalibrations& heads, const AdjustmentOptions& options)
+    : state_(std::make_unique<State>(measurement, plan, chain, tool, heads, options)) {}
+Adjuster::~Adjuster() = default;
+Adjuster::Adjuster(Adjuster&&) noexcept = default;
+
+Eigen::VectorXd Adjuster::evaluate(const Eigen::MatrixXd& readings) {
+    State& s = *state_;
+    if (readings.rows() != Eigen::Index(s.channels.size()) || readings.cols() != s.rows)
+        throw InvalidArgument("readings: expected " + std::to_string(s.channels.size()) + " rows, one a channel, and " +
+                              std::to_string(s.rows) + " columns, one a row of the measurement, got " +
+                              std::to_string(readings.rows()) + " x " + std::to_string(readings.cols()));
+    auto& list = s.problem.readings();
+    for (std::size_t r = 0; r < list.size(); ++r) {
+        list[r].value = readings(s.channel_of_reading[r], Eigen::Index(list[r].row));
+        if (!std::isfinite(list[r].value))
+            throw InvalidArgument("readings: " + s.channels[s.channel_of_reading[r]] + " of row " +
+                                  std::to_string(list[r].row) + " was read at first, and is not finite now");
+    }
+    Eigen::VectorXd x = s.start;
+    s.solver.solve_nearby(x);
+    Eigen::VectorXd values(s.forms.size());
+    for (std::size_t i = 0; i < s.forms.size(); ++i) values[Eigen::Index(i)] = s.forms[i].value(x);
+    return values;
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,65 @@
+#include "stepdiag/batch/batch_evaluator.hpp"
+
+#include <limits>
+
+#include "batch/batch_method.hpp"
+
+namespace stepdiag {
+namespace {
+
+std::vector<CalibrationEntry> entries_of(const Calibration& calibration) {
+    std::vector<CalibrationEntry> entries;
+    for (int i = 0; i < function_count; ++i)
+        if (const auto& function = calibration.functions[i])
+            for (const double position : function->position) entries.push_back({FunctionId::at(i).name(), position});
+    for (const Squareness s : all_squarenesses)
+        if (calibration.squarenesses[static_cast<int>(s)])
+            entries.push_back({name(s), std::numeric_limits<double>::quiet_NaN()});
+    return entries;
+}
+
+}  // namespace
+
+BatchMap::BatchMap(Calibration calibration) : entries(entries_of(calibration)), of_pattern(std::move(calibration)) {}
+
+std::vector<int> signal_channels(const Measurement& measurement) {
+    std::vector<int> signals;
+    for (std::size_t c = 0; c < measurement.channels().size(); ++c)
+        if (const std::string& name = measurement.channels()[c].name; name != "time" && name != "temperature")
+            signals.push_back(int(c));
+    return signals;
+}
+
+struct BatchEvaluator::Map {
+    std::unique_ptr<const BatchMap> of_method;
+};
+
+struct BatchEvaluator::Worker::State {
+    std::unique_ptr<BatchMap::Worker> of_method;
+};
+
+BatchEvaluator::BatchEvaluator(const Measurement& pattern, const Plan& plan, const Chain& chain,
+                               const Eigen::Vector3d& tool, const HeadCalibrations& heads,
+                               const BatchOptions& options) {
+    const bool is_linear =
+        options.method == EvaluationMethod::conventional || options.method == EvaluationMethod::enhanced;
+    const BatchPattern given{pattern, plan, chain, tool, heads, options};
+    map_ = std::make_unique<const Map>(Map{is_linear ? make_linear_batch(given) : make_adjustment_batch(given)});
+}
+BatchEvaluator::~BatchEvaluator() = default;
+BatchEvaluator::BatchEvaluator(BatchEvaluator&&) noexcept = default;
+
+const std::vector<CalibrationEntry>& BatchEvaluator::entries() const { return map_->of_method->entries; }
+const Calibration& BatchEvaluator::of_pattern() const { return map_->of_method->of_pattern; }
+Eigen::MatrixXd BatchEvaluator::gain() const { return map_->of_method->gain(); }
+
+BatchEvaluator::Worker::Worker(const BatchEvaluator& evaluator)
+    : state_(std::make_unique<State>(State{evaluator.map_->of_method->worker()})) {}
+BatchEvaluator::Worker::~Worker() = default;
+BatchEvaluator::Worker::Worker(Worker&&) noexcept = default;
+
+void BatchEvaluator::Worker::evaluate(const double* readings, std::size_t lanes, double* values, std::size_t stride) {
+    state_->of_method->evaluate(readings, lanes, values, stride);
+}
+
+}  // namespace stepdiag

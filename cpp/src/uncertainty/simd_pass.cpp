@@ -1,0 +1,252 @@
+#include "uncertainty/simd_pass.hpp"
+
+// Not those instruction sets that differ from another one only in what is not used here.
+#include <hwy/detect_targets.h>
+#undef HWY_DISABLED_TARGETS
+#ifdef HWY_AVX3_ZEN4  // since Highway 1.1
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4 | HWY_AVX3_SPR)
+#else
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
+#endif
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "uncertainty/simd_pass.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once for every instruction set
+
+// Vectors before the physics that is calculated with them:
+#include "core/simd-inl.hpp"
+//
+#include "optics/encounter-inl.hpp"
+#include "uncertainty/lane_rows-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace stepdiag {
+namespace HWY_NAMESPACE {
+namespace {
+
+// --- faces as `meet` takes them ---
+
+struct CommonFace {
+    const LaneFace& face;
+
+    STEPDIAG_INLINE Pair rotation(int k) const { return common(face.plane[k]); }
+    STEPDIAG_INLINE Pair translation(int k) const { return common(face.plane[9 + k]); }
+    STEPDIAG_INLINE Pair index() const { return common(face.index_before); }
+    STEPDIAG_INLINE Pair inverse_index() const { return common(face.inverse_index); }
+    STEPDIAG_INLINE Pair index_ratio() const { return common(face.index_ratio); }
+    STEPDIAG_INLINE Pair one_less_ratio2() const { return common(face.one_less_ratio2); }
+};
+
+struct FaceByLane {
+    const LaneFace& face;
+    std::size_t lane;
+
+    STEPDIAG_INLINE Pair rotation(int k) const { return at(face.plane_rows[k], lane); }
+    STEPDIAG_INLINE Pair translation(int k) const { return at(face.plane_rows[9 + k], lane); }
+    STEPDIAG_INLINE Pair index() const { return at(*face.before_row, lane); }
+    STEPDIAG_INLINE Pair inverse_index() const { return common(1.0) / index(); }
+    STEPDIAG_INLINE Pair index_ratio() const { return index() / at(*face.after_row, lane); }
+    STEPDIAG_INLINE Pair one_less_ratio2() const { return sub_mul(index_ratio(), index_ratio(), common(1.0)); }
+};
+
+// The mirror at one pose.
+struct Mirror {
+    const LaneSetup& setup;
+    std::size_t lane;
+    Pair normal[3];  // in the sensor frame
+    Pair centre[3];
+    Pair air, inverse_air;
+
+    struct Met {
+        Event event = Event::reflected;
+        bool deflects = true;
+        const Outline* outline;
+    };
+    STEPDIAG_INLINE Pair rotation(int k) const { return k < 6 ? at(setup.mirror_axes[k], lane) : normal[k - 6]; }
+    STEPDIAG_INLINE Pair translation(int k) const {
+        return negative(mul_add(rotation(3 * k), centre[0],
+                                mul_add(rotation(3 * k + 1), centre[1], rotation(3 * k + 2) * centre[2])));
+    }
+    STEPDIAG_INLINE Pair index() const { return air; }
+    STEPDIAG_INLINE Pair inverse_index() const { return inverse_air; }
+    STEPDIAG_INLINE Pair index_ratio() const { return common(1.0); }
+    STEPDIAG_INLINE Pair one_less_ratio2() const { return common(0.0); }
+};
+
+STEPDIAG_INLINE void through(const std::vector<LaneFace>& faces, std::size_t lane, Pair gap, Light<Pair>& light) {
+    for (const LaneFace& face : faces) {
+        if (face.plane_rows) meet(face, FaceByLane{face, lane}, gap, light);
+        else meet(face, CommonFace{face}, gap, light);
+    }
+}
+
+// v <- Exp(w) v, by the series of rotation_exp; lanes above 1e-3 rad, where it ends, are not followed.
+STEPDIAG_INLINE void turn(const Pair (&w)[3], Pair (&v)[3], MaskPair& followed) {
+    const Pair angle2 = mul_add(w[0], w[0], mul_add(w[1], w[1], w[2] * w[2]));
+    followed = both(followed, angle2 <= common(1e-6));
+    const Pair sinc = mul_add(angle2, mul_add(angle2, common(1.0 / 120), common(-1.0 / 6)), common(1.0));
+    const Pair versine = mul_add(angle2, mul_add(angle2, common(1.0 / 720), common(-1.0 / 24)), common(0.5));
+    const auto cross = [&](const Pair(&a)[3], int k) HWY_ATTR {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        return sub_mul(w[j], a[i], w[i] * a[j]);
+    };
+    const Pair once[3] = {cross(v, 0), cross(v, 1), cross(v, 2)};
+    const Pair twice[3] = {cross(once, 0), cross(once, 1), cross(once, 2)};
+    for (int k = 0; k < 3; ++k) v[k] = mul_add(versine, twice[k], mul_add(sinc, once[k], v[k]));
+}
+
+// The mirror of a pose in the sensor frame: normal R S^-1 n, centre S^-1 (p - o).
+STEPDIAG_INLINE void place_mirror(const LaneVisit& visit, std::size_t row, std::size_t lane, Mirror& mirror,
+                                  MaskPair& followed) {
+    const LaneSetup& setup = *visit.setup;
+    const ToolPose& pose = visit.poses[row];
+    Pair normal[3], point[3];
+    const Pair n[3] = {at(setup.mirror_normal[0], lane), at(setup.mirror_normal[1], lane),
+                       at(setup.mirror_normal[2], lane)};
+    for (int k = 0; k < 3; ++k) {
+        const double* const r = pose.rotation + 3 * k;
+        normal[k] = mul_add(common(r[0]), n[0], mul_add(common(r[1]), n[1], common(r[2]) * n[2]));
+        point[k] = common(pose.position[k]);
+    }
+    if (visit.displaced) {
+        const LaneRow* const by = visit.displaced + 6 * row;
+        for (int k = 0; k < 3; ++k) point[k] = point[k] + at(by[k], lane);
+        const Pair w[3] = {at(by[3], lane), at(by[4], lane), at(by[5], lane)};
+        turn(w, normal, followed);
+    }
+    for (int k = 0; k < 3; ++k) {
+        const Pair r[3] = {at(setup.sensor_R_machine[3 * k], lane), at(setup.sensor_R_machine[3 * k + 1], lane),
+                           at(setup.sensor_R_machine[3 * k + 2], lane)};
+        mirror.normal[k] = mul_add(r[0], normal[0], mul_add(r[1], normal[1], r[2] * normal[2]));
+        mirror.centre[k] = dot_add(r, point, at(setup.translation[k], lane));
+    }
+}
+
+// L tan^2 phi
+STEPDIAG_INLINE Pair excess_of(const Mirror& mirror) {
+    const Pair inverse = common(1.0) / mirror.normal[2];
+    const Pair length = negative(mirror.translation(2)) * inverse;
+    const Pair tilt2 = mul_add(mirror.normal[0], mirror.normal[0], mirror.normal[1] * mirror.normal[1]);
+    return length * tilt2 * inverse * inverse;
+}
+
+// --- what a detector says ---
+
+STEPDIAG_INLINE void detect(const LaneBeam& beam, std::size_t lane, Light<Pair>& light, double* to) {
+    if (beam.detector == LaneDetector::spot) {
+        for (int axis = 0; axis < 2; ++axis) {
+            const LaneRow* const map = beam.detector_rows + 4 * axis;
+            const Pair row[3] = {at(map[0], lane), at(map[1], lane), at(map[2], lane)};
+            store(dot_add(row, light.point, at(map[3], lane)), to + std::size_t(axis) * run_lanes + lane);
+        }
+        return;
+    }
+    const Pair distance = mul_add(common(beam.scale), light.optical_length, at(*beam.offset, lane));
+    store(distance, to + lane);
+    light.followed = both(light.followed, is_finite(distance));
+    if (beam.detector == LaneDetector::ideal) {
+        const Pair half = common(1.0) / (common(1.0) - light.direction[2]);
+        store(light.direction[1] * half, to + run_lanes + lane);
+        store(negative(light.direction[0] * half), to + 2 * run_lanes + lane);
+        return;
+    }
+    const LaneRow* const axis = beam.detector_rows;
+    const Pair along = mul_add(at(axis[0], lane), light.direction[0],
+                               mul_add(at(axis[1], lane), light.direction[1], at(axis[2], lane) * light.direction[2]));
+    light.followed = both(light.followed, along <= common(-beam.least_cosine));
+}
+
+}  // namespace
+
+// --- kernels ---
+
+void trace_visit(const LaneVisit& visit, const Outline& outline, const std::vector<LaneBeam>& beams, double nearest) {
+    const Pair gap = common(nearest);
+    const Mirror::Met met{Event::reflected, true, &outline};
+    Light<Pair> out[most_lane_beams];
+    for (std::size_t lane = 0; lane < run_lanes; lane += 2 * hn::Lanes(Tag())) {
+        MaskPair followed = all_true();
+        for (std::size_t b = 0; b < beams.size(); ++b) {
+            const LaneRow* const s = beams[b].source;
+            out[b] = {{at(s[0], lane), at(s[1], lane), at(s[2], lane)},
+                      {at(s[3], lane), at(s[4], lane), at(s[5], lane)},
+                      common(0.0),
+                      common(0.0),
+                      all_true()};
+            through(beams[b].out, lane, gap, out[b]);
+            followed = both(followed, out[b].followed);
+        }
+        for (std::size_t row = 0; row < visit.rows; ++row) {
+            Mirror mirror{*visit.setup, lane, {}, {}, {}, {}};
+            place_mirror(visit, row, lane, mirror, followed);
+            if (visit.excess) store(excess_of(mirror), visit.excess[row].value + lane);
+            for (std::size_t b = 0; b < beams.size(); ++b) {
+                const LaneBeam& beam = beams[b];
+                Light<Pair> light = out[b];
+                mirror.air = at(*beam.air, lane);
+                mirror.inverse_air = common(1.0);  // nobody asks for the reduced length
+                meet(met, mirror, gap, light);
+                through(beam.back, lane, gap, light);
+                detect(beam, lane, light,
+                       visit.readings + (row * visit.channels + std::size_t(beam.channel)) * run_lanes);
+                followed = both(followed, light.followed);
+            }
+        }
+        keep(followed, visit.followed + lane);
+    }
+}
+
+void define_visit(const LaneVisit& visit, const LaneClosed& closed) {
+    for (std::size_t lane = 0; lane < run_lanes; lane += 2 * hn::Lanes(Tag())) {
+        const Pair ratio = at(*closed.index_ratio, lane), zero = common(0.0), one = common(1.0);
+        MaskPair followed = is_finite(ratio);  // else the air is out of its equation's range
+        for (std::size_t row = 0; row < visit.rows; ++row) {
+            Mirror mirror{*visit.setup, lane, {}, {}, {}, {}};
+            place_mirror(visit, row, lane, mirror, followed);
+            if (visit.excess) store(excess_of(mirror), visit.excess[row].value + lane);
+            const Pair inverse = one / mirror.normal[2];
+            const Pair alpha = negative(mirror.normal[1] * inverse), beta = mirror.normal[0] * inverse;
+            const Pair length = mul_add(beta, mirror.centre[0], sub_mul(alpha, mirror.centre[1], mirror.centre[2]));
+            const Pair w = sub_mul(alpha, alpha, sub_mul(beta, beta, one));  // 1 - t
+            const Pair by_w = one / w;
+            const Pair distance = length * by_w;
+            followed = both(followed, both(both(mirror.normal[2] > zero, w > zero), length > zero));
+            double* const to = visit.readings + row * visit.channels * run_lanes + lane;
+            if (closed.psd_distance) {
+                const Pair reach = mul_add(at(*closed.psd_distance, lane), by_w, distance);
+                const Pair gain = reach + reach;
+                store(distance * ratio, to);
+                store(negative(gain * beta), to + run_lanes);
+                store(gain * alpha, to + 2 * run_lanes);
+            } else {
+                for (std::size_t i = 0; i < visit.channels; ++i) {
+                    const Pair u = at(closed.beams[2 * i], lane), v = at(closed.beams[2 * i + 1], lane);
+                    store(mul_add(sub_mul(beta, u, alpha * v), by_w, distance) * ratio, to + i * run_lanes);
+                }
+            }
+        }
+        keep(followed, visit.followed + lane);
+    }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace stepdiag
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace stepdiag {
+namespace {
+
+HWY_EXPORT(trace_visit);
+HWY_EXPORT(define_visit);
+
+}  // namespace
+
+void trace_lanes(const LaneVisit& visit, const Outline& mirror, const std::vector<LaneBeam>& beams, double gap) {
+    HWY_DYNAMIC_DISPATCH(trace_visit)(visit, mirror, beams, gap);
+}
+void define_lanes(const LaneVisit& visit, const LaneClosed& closed) {
+    HWY_DYNAMIC_DISPATCH(define_visit)(visit, closed);
+}
+
+}  // namespace stepdiag
+#endif  // HWY_ONCE
