@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <limits>
 
 #include "stepdiag/core/error.hpp"
 #include "uncertainty/contributions.hpp"
+#include "stepdiag/uncertainty/derived.hpp"
+#include "uncertainty/noise_effects.hpp"
 
 namespace stepdiag {
 
@@ -180,6 +183,186 @@ VectorXd Propagation::second_order_uncertainty() const {
     VectorXd variance = standard_uncertainty.cwiseAbs2() + 2.0 * second_order.rowwise().squaredNorm();
     if (knows_products) variance += product_variance;
     return variance.cwiseSqrt();
+}
+
+// --- through virtual calibrations ---
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index largest_gain = 400'000'000;  // numbers: 3.2 GB
+
+// GUM 4.2.3: s/sqrt(n) of n repeated readings, with n - 1 degrees of freedom, where JCGM 101 has a t distribution.
+double gum_uncertainty(const Distribution& d) {
+    return d.kind == DistributionKind::student_t ? d.spread : d.standard_uncertainty();
+}
+
+// Derived outputs below the entries.
+MatrixXd with_derived(const MatrixXd& of_entries, const std::vector<DerivedOutput>& derived) {
+    MatrixXd all(of_entries.rows() + Index(derived.size()), of_entries.cols());
+    all.topRows(of_entries.rows()) = of_entries;
+    for (std::size_t d = 0; d < derived.size(); ++d)
+        all.row(of_entries.rows() + Index(d)) = derived[d].row.transpose() * of_entries;
+    return all;
+}
+
+MatrixXd correlation_of(const UncertainInputs& inputs) {
+    if (inputs.correlations.empty()) return {};
+    const Index count = Index(inputs.inputs.size());
+    MatrixXd correlation = MatrixXd::Identity(count, count);
+    for (const CorrelatedInputs& together : inputs.correlations)
+        for (std::size_t i = 0; i < together.members.size(); ++i)
+            for (std::size_t j = 0; j < together.members.size(); ++j)
+                correlation(together.members[i], together.members[j]) = together.correlation(Index(i), Index(j));
+    return correlation;
+}
+
+// Each input at its expectation and a standard uncertainty to both sides.
+struct InputEffects {
+    std::vector<PropagatedInput> inputs;
+    VectorXd value;  // at the expectations
+    MatrixXd first_order, second_order;
+};
+
+InputEffects input_effects(const VirtualCalibrations& calibrations) {
+    const auto& uncertain = calibrations.run().inputs.inputs;
+    const Index count = Index(uncertain.size());
+    MatrixXd deviations(count, 2 * count + 1);
+    for (Index i = 0; i < count; ++i) deviations.row(i).setConstant(uncertain[std::size_t(i)].distribution.expectation);
+    InputEffects effects;
+    for (Index i = 0; i < count; ++i) {
+        const UncertainInput& input = uncertain[std::size_t(i)];
+        const Distribution& d = input.distribution;
+        const double u = gum_uncertainty(d);
+        deviations(i, 1 + 2 * i) += u;
+        deviations(i, 2 + 2 * i) -= u;
+        effects.inputs.push_back({name(input), budget_group(input), u, d.degrees_of_freedom, -1, d.kind});
+    }
+    const MatrixXd outputs = calibrations.evaluate_at(deviations);
+    effects.value = outputs.col(0);
+    effects.first_order.resize(outputs.rows(), count);
+    effects.second_order.resize(outputs.rows(), count);
+    if (!effects.value.allFinite())
+        throw InvalidArgument("virtual calibrations: without deviations there is no result");
+    for (Index i = 0; i < count; ++i) {
+        const auto up = outputs.col(1 + 2 * i), down = outputs.col(2 + 2 * i);
+        if (!up.allFinite() || !down.allFinite())
+            throw InvalidArgument(effects.inputs[std::size_t(i)].name +
+                                  ": with a deviation of its standard uncertainty there is no result");
+        effects.first_order.col(i) = (up - down) / 2.0;
+        effects.second_order.col(i) = (up - effects.value + (down - effects.value)) / 2.0;
+    }
+    return effects;
+}
+
+// d_ij = (f(+i, +j) + f(-i, -j) - 2 f)/2 - s_i - s_j, s the second order of one input: odd orders cancel.
+void add_products(const VirtualCalibrations& calibrations, const InputEffects& effects, const MatrixXd& correlation,
+                  Propagation& result) {
+    const auto& uncertain = calibrations.run().inputs.inputs;
+    const Index count = Index(uncertain.size());
+    if (count > largest_product_inputs) return;
+    result.knows_products = true;
+    result.strongest_product.assign(std::size_t(effects.value.size()), {});
+    result.product_variance = result.product_shift = VectorXd::Zero(effects.value.size());
+    VectorXd expectation(count);
+    for (Index i = 0; i < count; ++i) expectation[i] = uncertain[std::size_t(i)].distribution.expectation;
+    for (Index i = 0; i + 1 < count; ++i) {
+        const Index others = count - 1 - i;
+        MatrixXd deviations = expectation.replicate(1, 2 * others);
+        for (Index k = 0; k < others; ++k)
+            for (const int side : {0, 1})
+                for (const Index input : {i, i + 1 + k})
+                    deviations(input, 2 * k + side) +=
+                        (side == 0 ? 1.0 : -1.0) * effects.inputs[std::size_t(input)].standard_uncertainty;
+        const MatrixXd outputs = calibrations.evaluate_at(deviations);
+        for (Index k = 0; k < others; ++k) {
+            const Index j = i + 1 + k;
+            const VectorXd product =
+                (outputs.col(2 * k) - effects.value + (outputs.col(2 * k + 1) - effects.value)) / 2.0 -
+                effects.second_order.col(i) - effects.second_order.col(j);
+            result.product_variance += product.cwiseAbs2();
+            if (correlation.size() > 0) result.product_shift += correlation(i, j) * product;
+            for (Index o = 0; o < product.size(); ++o)
+                if (auto& strongest = result.strongest_product[std::size_t(o)];
+                    std::abs(product[o]) > std::abs(strongest.value))
+                    strongest = {i, j, product[o]};
+        }
+    }
+    // A pair that leaves the evaluation without a result leaves nothing to be said.
+    result.knows_products = result.product_variance.allFinite();
+}
+
+MatrixXd gain_of(const VirtualCalibrations& calibrations) {
+    const Index entries = Index(calibrations.evaluator().entries().size());
+    Index channels = 0;
+    for (const Channel& channel : calibrations.nominal().channels())
+        if (channel.name != "time" && channel.name != "temperature") ++channels;
+    if (entries * channels > largest_gain / std::max<Index>(Index(calibrations.nominal().size()), 1))
+        throw InvalidArgument("propagation: expected at most " + std::to_string(largest_gain) +
+                              " sensitivities to readings, got more by far too many steps; the Monte Carlo method "
+                              "does without them");
+    return with_derived(calibrations.evaluator().gain(), calibrations.derived());
+}
+
+}  // namespace
+
+Propagation propagate(const VirtualCalibrations& calibrations, bool full_covariance) {
+    const UncertainInputs& uncertain = calibrations.run().inputs;
+    InputEffects effects = input_effects(calibrations);
+    struct Part {
+        std::string group;
+        MatrixXd effect;
+        double degrees_of_freedom;
+    };
+    VectorXd value = effects.value;
+    std::vector<Part> parts;
+    const VectorXd by_sensors = sensor_noise(calibrations.run());
+    if (!uncertain.noise.empty() || by_sensors.size() > 0) {
+        const NoiseEffects noises(calibrations, gain_of(calibrations));
+        for (const ReadingNoise& noise : uncertain.noise) {
+            MatrixXd effect = noises.of(noise);
+            value += effect.rowwise().sum() * noise.distribution.expectation;
+            effect *= gum_uncertainty(noise.distribution);
+            parts.push_back({budget_group(noise), std::move(effect), noise.distribution.degrees_of_freedom});
+        }
+        if (by_sensors.size() > 0)
+            parts.push_back(
+                {"noise of sensors", noises.gain() * by_sensors.asDiagonal(), std::numeric_limits<double>::infinity()});
+    }
+    Contributions sum(calibrations.outputs(), value, full_covariance);
+    for (const Part& part : parts) sum.add(part.group, part.effect, part.degrees_of_freedom);
+    const MatrixXd correlation = correlation_of(uncertain);
+    sum.add_inputs(effects.inputs, effects.first_order, effects.second_order, correlation);
+    Propagation result = sum.result();
+    add_products(calibrations, effects, correlation, result);
+    return result;
+}
+
+Propagation propagate(const Calibration& calibration, const VirtualCalibrations& calibrations, bool full_covariance) {
+    const auto entries = calibration_entries(calibration);
+    const auto& expected = calibrations.evaluator().entries();
+    const auto same = [](const CalibrationEntry& a, const CalibrationEntry& b) {
+        return a.parameter == b.parameter && (std::isnan(a.position) || std::abs(a.position - b.position) <= 1e-6);
+    };
+    if (entries.size() != expected.size() || !std::equal(entries.begin(), entries.end(), expected.begin(), same))
+        throw InvalidArgument("calibration: expected the parameters and nodes of the virtual calibrations (" +
+                              std::to_string(expected.size()) + " values), got others (" +
+                              std::to_string(entries.size()) + ")");
+    if (calibration.covariance.size() == 0)
+        throw InvalidArgument("calibration: expected one evaluated with full covariance");
+    const MatrixXd rows =
+        with_derived(MatrixXd::Identity(Index(entries.size()), Index(entries.size())), calibrations.derived());
+    const InputEffects effects = input_effects(calibrations);
+    Contributions sum(calibrations.outputs(), rows * calibration_values(calibration), full_covariance);
+    sum.add_covariance("readings", rows * calibration.covariance * rows.transpose());
+    const MatrixXd correlation = correlation_of(calibrations.run().inputs);
+    sum.add_inputs(effects.inputs, effects.first_order, effects.second_order, correlation);
+    Propagation result = sum.result();
+    add_products(calibrations, effects, correlation, result);
+    return result;
 }
 
 }  // namespace stepdiag
