@@ -7,7 +7,6 @@
 
 #include "adjustment/adjustment_result.hpp"
 #include "adjustment/outlier_search.hpp"
-#include "batch/prepared_adjustment.hpp"
 #include "adjustment/smoothness.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/core/units.hpp"
@@ -121,50 +120,6 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
         result.chi_square_probability =
             Eigen::numext::igammac(0.5 * result.degrees_of_freedom, 0.5 * result.weighted_square_sum);
     return result;
-}
-
-struct Adjuster::State : PreparedAdjustment {
-    Eigen::Index rows;
-    std::vector<std::string> channels;
-    std::vector<int> channel_of_reading;
-
-    State(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
-          const HeadCalibrations& heads, const AdjustmentOptions& options)
-        : PreparedAdjustment(measurement, plan, chain, tool, heads, options, stepdiag::smoothness_at_start(options)),
-          rows(Eigen::Index(measurement.size())) {
-        check_options(options, plan);
-        for (const Channel& channel : measurement.channels()) channels.push_back(channel.name);
-        channel_of_reading.reserve(problem.readings().size());
-        for (const AdjustedReading& reading : problem.readings())
-            channel_of_reading.push_back(
-                int(std::find(channels.begin(), channels.end(), problem.channel_name(reading)) - channels.begin()));
-    }
-};
-
-Adjuster::Adjuster(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
-                   const HeadCalibrations& heads, const AdjustmentOptions& options)
-    : state_(std::make_unique<State>(measurement, plan, chain, tool, heads, options)) {}
-Adjuster::~Adjuster() = default;
-Adjuster::Adjuster(Adjuster&&) noexcept = default;
-
-Eigen::VectorXd Adjuster::evaluate(const Eigen::MatrixXd& readings) {
-    State& s = *state_;
-    if (readings.rows() != Eigen::Index(s.channels.size()) || readings.cols() != s.rows)
-        throw InvalidArgument("readings: expected " + std::to_string(s.channels.size()) + " rows, one a channel, and " +
-                              std::to_string(s.rows) + " columns, one a row of the measurement, got " +
-                              std::to_string(readings.rows()) + " x " + std::to_string(readings.cols()));
-    auto& list = s.problem.readings();
-    for (std::size_t r = 0; r < list.size(); ++r) {
-        list[r].value = readings(s.channel_of_reading[r], Eigen::Index(list[r].row));
-        if (!std::isfinite(list[r].value))
-            throw InvalidArgument("readings: " + s.channels[s.channel_of_reading[r]] + " of row " +
-                                  std::to_string(list[r].row) + " was read at first, and is not finite now");
-    }
-    Eigen::VectorXd x = s.start;
-    s.solver.solve_nearby(x);
-    Eigen::VectorXd values(s.forms.size());
-    for (std::size_t i = 0; i < s.forms.size(); ++i) values[Eigen::Index(i)] = s.forms[i].value(x);
-    return values;
 }
 
 }  // namespace stepdiag

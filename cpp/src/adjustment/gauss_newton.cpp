@@ -135,23 +135,6 @@ int AdjustmentSolver::solve(Eigen::VectorXd& x) {
     throw InvalidArgument("adjustment: finds no machine and set-up that explain the readings");
 }
 
-void AdjustmentSolver::solve_nearby(Eigen::VectorXd& x) {
-    constexpr int most_nearby = 6;
-    constexpr double enough = 1e-3;  // of a standard uncertainty
-    const Eigen::VectorXd start = x;
-    double effect = std::numeric_limits<double>::infinity();
-    for (int count = 0; count < most_nearby; ++count) {
-        equations_.linearise(x, false);
-        const Step step = this->step(x);
-        x += step.dx;
-        if (step.effect * (step.effect / effect) < enough) return;  // by the step that would be next
-        effect = step.effect;
-    }
-    x = start;
-    solve(x);
-    factorize(start);
-}
-
 // Anderson acceleration (D. G. Anderson, J. ACM 12 (1965) 547) of the sequence x + dx(x): the combination of the last
 // steps that is least says where they lead.
 void AdjustmentSolver::StepHistory::add(const Eigen::VectorXd& x, const Eigen::VectorXd& dx,

@@ -35,9 +35,6 @@ public:
     std::optional<int> try_solve(Eigen::VectorXd& x, int most_steps = usual_most_steps, bool accelerated = true);
     // Throws InvalidArgument where it is not reached.
     int solve(Eigen::VectorXd& x);
-    // The same with derivatives and factor as they are, for readings that differ by little more than noise; falls back
-    // to solve. What it leaves is the product of noise and of the derivatives' change: a hundredth of an uncertainty.
-    void solve_nearby(Eigen::VectorXd& x);
     // Derivatives and factor at x, for what has changed (readings left out, smoothness) or for uncertainties.
     void factorize(const Eigen::VectorXd& x);
     // Derivatives at x, and the factor where it is of somewhere else.

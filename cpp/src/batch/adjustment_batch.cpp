@@ -1,7 +1,8 @@
+#include "batch/adjustment_batch.hpp"
+
 #include <algorithm>
 #include <utility>
 
-#include "batch/batch_method.hpp"
 #include "batch/simd_adjustment.hpp"
 #include "adjustment/smoothness.hpp"
 

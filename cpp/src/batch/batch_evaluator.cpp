@@ -1,34 +1,9 @@
 #include "stepdiag/batch/batch_evaluator.hpp"
 
-#include <limits>
-
-#include "batch/batch_method.hpp"
+#include "batch/adjustment_batch.hpp"
+#include "batch/linear_batch.hpp"
 
 namespace stepdiag {
-namespace {
-
-std::vector<CalibrationEntry> entries_of(const Calibration& calibration) {
-    std::vector<CalibrationEntry> entries;
-    for (int i = 0; i < function_count; ++i)
-        if (const auto& function = calibration.functions[i])
-            for (const double position : function->position) entries.push_back({FunctionId::at(i).name(), position});
-    for (const Squareness s : all_squarenesses)
-        if (calibration.squarenesses[static_cast<int>(s)])
-            entries.push_back({name(s), std::numeric_limits<double>::quiet_NaN()});
-    return entries;
-}
-
-}  // namespace
-
-BatchMap::BatchMap(Calibration calibration) : entries(entries_of(calibration)), of_pattern(std::move(calibration)) {}
-
-std::vector<int> signal_channels(const Measurement& measurement) {
-    std::vector<int> signals;
-    for (std::size_t c = 0; c < measurement.channels().size(); ++c)
-        if (const std::string& name = measurement.channels()[c].name; name != "time" && name != "temperature")
-            signals.push_back(int(c));
-    return signals;
-}
 
 struct BatchEvaluator::Map {
     std::unique_ptr<const BatchMap> of_method;

@@ -41,7 +41,4 @@ struct BatchPattern {
 // Channels of a set of readings, by their place in Measurement::channels(): all but time and temperature.
 std::vector<int> signal_channels(const Measurement& measurement);
 
-std::unique_ptr<const BatchMap> make_linear_batch(const BatchPattern& pattern);      // conventional, enhanced
-std::unique_ptr<const BatchMap> make_adjustment_batch(const BatchPattern& pattern);  // adjustment, one_step
-
 }  // namespace stepdiag

@@ -1,9 +1,10 @@
+#include "batch/linear_batch.hpp"
+
 #include <hwy/aligned_allocator.h>
 
 #include <algorithm>
 #include <limits>
 
-#include "batch/batch_method.hpp"
 #include "evaluation/linear_evaluation.hpp"
 #include "evaluation/linear_maps.hpp"
 #include "batch/simd_reduction.hpp"

@@ -208,6 +208,41 @@ HWY_EXPORT(scratch_numbers);
 
 }  // namespace
 
+LaneProblem::LaneProblem(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input)
+    : kind(ChannelKind::ideal), unknowns(problem.size()), channels(0), tool(problem.tool()), setup_size(0) {
+    const auto place = [&](int unknown) { return unknown == no_unknown ? unknowns : unknown; };
+    for (const LineSetup& setup : problem.setups()) {
+        const ChannelModel& model = setup.model;
+        kind = model.kind();
+        channels = std::max(channels, model.channels());
+        setup_size = std::max(setup_size, model.setup_size());
+        Setup& to = setups.emplace_back(Setup{{}, model.machine_R_line(), model.origin(), &model.head()});
+        for (const int unknown : setup.unknown) to.unknown.push_back(place(unknown));
+    }
+    for (const AxisNode& node : problem.nodes()) {
+        Node& to = nodes.emplace_back();
+        for (int c = 0; c < 6; ++c) to.unknown[c] = place(node.unknown[c]);
+        to.position = {};
+        to.position[index(node.axis)] = node.position;
+    }
+    nodes.push_back({{unknowns, unknowns, unknowns, unknowns, unknowns, unknowns}, {}});  // home
+    const auto& order = problem.chain().order();
+    for (int p = 0; p < 3; ++p) carries_workpiece[p] = problem.chain().carries_workpiece(order[p]);
+    for (const AdjustedPoint& point : problem.points()) {
+        Point& to = points.emplace_back();
+        to = {point.setup, {}, point.place.travel, point.place.time, int(of_points.size())};
+        for (int p = 0; p < 3; ++p) {
+            const int node = point.node[index(order[p])];
+            to.node[p] = node == no_unknown ? int(nodes.size()) - 1 : node;
+        }
+        of_points.resize(of_points.size() + channels, {no_reading, 0, 0.0});
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            const AdjustedReading& reading = problem.readings()[r];
+            of_points[to.first_channel + reading.channel] = {r, input[r], 1.0 / reading.standard_uncertainty};
+        }
+    }
+}
+
 LaneModel::LaneModel(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input)
     : problem_(problem, input), scratch_(std::ptrdiff_t(HWY_DYNAMIC_DISPATCH(scratch_numbers)(problem_))) {}
 

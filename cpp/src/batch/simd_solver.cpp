@@ -189,6 +189,41 @@ HWY_EXPORT(solve);
 
 }  // namespace
 
+LaneJacobian::LaneJacobian(const NormalEquations& equations) {
+    for (const AdjustedPoint& point : equations.problem().points())
+        for (int first = point.first_reading; first < point.end_reading; first += most_rows) {
+            const int rows = std::min(most_rows, point.end_reading - first);
+            Bundle bundle{first, rows, 0, numbers_.unknown.size(), numbers_.derivative.size()};
+            const auto common = equations.row(point, first);
+            for (int k = 0; k < common.size; ++k) {
+                if (common.unknown[k] == no_unknown) continue;
+                numbers_.unknown.push_back(common.unknown[k]);
+                for (int i = 0; i < rows; ++i)
+                    numbers_.derivative.push_back(equations.row(point, first + i).derivative[k]);
+                ++bundle.unknowns;
+            }
+            numbers_.bundles.push_back(bundle);
+        }
+}
+
+LaneFactor::LaneFactor(const BorderedFactor& factor) {
+    constexpr int six = BorderedBand::block_size;
+    const BorderedBand& l = factor.band();
+    numbers_.border = l.border();
+    for (int column = 0; column < l.blocks(); ++column) {
+        numbers_.rows.push_back(six * (l.reach(column) - column));
+        for (int row = column; row <= l.reach(column); ++row)
+            for (int i = 0; i < six; ++i)
+                for (int k = 0; k < six; ++k) numbers_.column.push_back(l.block(row, column)(i, k));
+        for (int i = 0; i < l.border(); ++i)
+            for (int k = 0; k < six; ++k) numbers_.column.push_back(l.border_rows(column)(i, k));
+    }
+    const auto corner = factor.corner_factor();
+    numbers_.corner_order.assign(factor.corner_order().begin(), factor.corner_order().begin() + corner.cols());
+    for (int k = 0; k < corner.cols(); ++k)
+        for (int i = 0; i < corner.rows(); ++i) numbers_.corner.push_back(i == k ? 1.0 / corner(i, k) : corner(i, k));
+}
+
 void LaneJacobian::add_transposed(const double* readings, double* unknowns) const {
     HWY_DYNAMIC_DISPATCH(add_transposed)(numbers_, readings, unknowns);
 }

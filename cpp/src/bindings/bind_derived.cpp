@@ -1,7 +1,7 @@
 #include <pybind11/typing.h>
 
 #include "bindings.hpp"
-#include "stepdiag/uncertainty/derived.hpp"
+#include "stepdiag/uncertainty/volumetric_accuracy.hpp"
 
 namespace stepdiag::bindings {
 namespace {

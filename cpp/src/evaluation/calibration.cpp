@@ -62,6 +62,25 @@ std::string straightness_reference(const Chain& chain, const Eigen::Vector3d& to
            (there.empty() ? "the same" : join(there, ", "));
 }
 
+std::vector<CalibrationEntry> calibration_entries(const Calibration& calibration) {
+    std::vector<CalibrationEntry> entries;
+    for (int i = 0; i < function_count; ++i)
+        if (const auto& function = calibration.functions[i])
+            for (const double position : function->position) entries.push_back({FunctionId::at(i).name(), position});
+    for (const Squareness s : all_squarenesses)
+        if (calibration.squarenesses[static_cast<int>(s)]) entries.push_back({name(s), std::numeric_limits<double>::quiet_NaN()});
+    return entries;
+}
+
+Eigen::VectorXd calibration_values(const Calibration& calibration) {
+    std::vector<double> values;
+    for (const auto& function : calibration.functions)
+        if (function) values.insert(values.end(), function->value.begin(), function->value.end());
+    for (const auto& squareness : calibration.squarenesses)
+        if (squareness) values.push_back(squareness->value);
+    return Eigen::Map<const Eigen::VectorXd>(values.data(), Eigen::Index(values.size()));
+}
+
 bool is_anything_determined(const Calibration& calibration) {
     const auto known = [](const auto& parameter) { return parameter.has_value(); };
     return std::any_of(calibration.functions.begin(), calibration.functions.end(), known) ||

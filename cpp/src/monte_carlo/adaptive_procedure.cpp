@@ -1,11 +1,17 @@
+#include "stepdiag/monte_carlo/adaptive_procedure.hpp"
+
 #include <cmath>
 #include <limits>
-#include <string>
 
 #include "stepdiag/core/error.hpp"
 #include "monte_carlo/partial_statistics.hpp"
 
 namespace stepdiag {
+namespace {
+
+constexpr std::string_view adaptive_kind = "stepdiag adaptive 1\n";  // the number: the version of the format
+
+}  // namespace
 
 AdaptiveProcedure::AdaptiveProcedure(const Bins& bins)
     : bins_(bins),
@@ -67,6 +73,29 @@ MonteCarloResult AdaptiveProcedure::result(const PartialStatistics& all) const {
     MonteCarloResult result = all.result();
     result.stability = stability(all);
     return result;
+}
+
+std::string AdaptiveProcedure::to_bytes() const {
+    ByteWriter to(adaptive_kind);
+    write(to, bins_.content());
+    to.number(blocks_);
+    to.matrix(average_.matrix());
+    to.matrix(squares_.matrix());
+    return std::move(to).finish();
+}
+
+AdaptiveProcedure AdaptiveProcedure::from_bytes(std::string_view bytes) {
+    ByteReader from(bytes, adaptive_kind, "adaptive procedure");
+    AdaptiveProcedure procedure(read_bins(from));
+    procedure.blocks_ = from.number<std::uint64_t>();
+    const Eigen::MatrixXd average = from.matrix(), squares = from.matrix();
+    from.expect(average.cols() == 4 && squares.cols() == 4);
+    procedure.average_ = average.array();
+    procedure.squares_ = squares.array();
+    const Eigen::Index outputs = Eigen::Index(procedure.bins_.outputs().size());
+    from.expect(procedure.average_.rows() == outputs && procedure.squares_.rows() == outputs);
+    from.finish();
+    return procedure;
 }
 
 }  // namespace stepdiag

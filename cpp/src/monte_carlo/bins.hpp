@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "monte_carlo/byte_format.hpp"
 #include "stepdiag/monte_carlo/monte_carlo.hpp"
 
 namespace stepdiag {
@@ -75,5 +76,11 @@ struct Counts {
     std::vector<JointCounts> joint;
     std::map<std::uint64_t, std::vector<double>> kept;  // by leaf: kept outputs x leaf_samples
 };
+
+// As parts of other bytes. Counts are read into those of their bins.
+void write(ByteWriter& to, const Bins::Content& bins);
+Bins read_bins(ByteReader& from);
+void write(ByteWriter& to, const Counts& counts);
+void read_counts(ByteReader& from, std::size_t kept_outputs, Counts& counts);
 
 }  // namespace stepdiag

@@ -3,6 +3,7 @@
 #include <array>
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <sstream>
 
@@ -97,6 +98,27 @@ double t_quantile(double probability, double degrees_of_freedom) {
     if (!(degrees_of_freedom > 0.0)) refuse("degrees of freedom", "a number above 0", degrees_of_freedom);
     if (std::isinf(degrees_of_freedom)) return normal_quantile(probability);
     return boost::math::quantile(boost::math::students_t(degrees_of_freedom), probability);
+}
+
+Eigen::MatrixXd correlation_factor(const Eigen::MatrixXd& correlation, const std::string& name) {
+    // Entries are given with a few digits; what rounding of doubles makes of them is far below.
+    constexpr double rounding = 1e-9;
+    if (correlation.rows() != correlation.cols() || correlation.rows() == 0)
+        throw InvalidArgument(name + ": expected a square matrix, got " + std::to_string(correlation.rows()) + " x " +
+                              std::to_string(correlation.cols()));
+    if (!correlation.allFinite()) throw InvalidArgument(name + ": expected finite numbers");
+    if (!((correlation.diagonal().array() - 1.0).abs() < rounding).all())
+        throw InvalidArgument(name + ": expected 1 on the diagonal");
+    if (!((correlation - correlation.transpose()).array().abs() < rounding).all())
+        throw InvalidArgument(name + ": expected a symmetric matrix");
+
+    const Eigen::LDLT<Eigen::MatrixXd> ldlt(correlation);
+    const Eigen::VectorXd roots = ldlt.vectorD().cwiseMax(0.0).cwiseSqrt();
+    Eigen::MatrixXd factor = Eigen::MatrixXd(ldlt.matrixL()) * roots.asDiagonal();
+    factor = ldlt.transpositionsP().transpose() * factor;
+    if (!((factor * factor.transpose() - correlation).array().abs() < rounding).all())
+        throw InvalidArgument(name + ": expected a positive semidefinite matrix: no numbers are correlated like that");
+    return factor;
 }
 
 }  // namespace stepdiag

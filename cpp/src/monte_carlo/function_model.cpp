@@ -6,7 +6,7 @@
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/core/random.hpp"
 #include "stepdiag/core/random_blocks.hpp"
-#include "stepdiag/optics/replay.hpp"
+#include "stepdiag/core/instruction_set.hpp"
 
 namespace stepdiag {
 

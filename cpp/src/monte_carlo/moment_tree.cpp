@@ -59,4 +59,26 @@ std::vector<LeafRange> MomentTree::leaves() const {
     return ranges;
 }
 
+void write(ByteWriter& to, const Moments& moments) {
+    to.number(moments.samples);
+    to.number(moments.lost);
+    to.doubles(moments.first.data(), std::size_t(moments.first.size()));
+    to.doubles(moments.second.data(), std::size_t(moments.second.size()));
+    to.matrix(moments.products);
+}
+
+Moments read_moments(ByteReader& from, std::size_t outputs, bool covariance) {
+    Moments moments;
+    moments.samples = from.number<std::uint64_t>();
+    moments.lost = from.number<std::uint64_t>();
+    for (Eigen::VectorXd* sums : {&moments.first, &moments.second}) {
+        sums->resize(Eigen::Index(outputs));
+        from.doubles(sums->data(), outputs);
+    }
+    moments.products = from.matrix();
+    const Eigen::Index size = covariance ? Eigen::Index(outputs) : 0;
+    from.expect(moments.products.rows() == size && moments.products.cols() == size);
+    return moments;
+}
+
 }  // namespace stepdiag

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <map>
 
+#include "monte_carlo/byte_format.hpp"
 #include "stepdiag/monte_carlo/monte_carlo.hpp"
 
 namespace stepdiag {
@@ -20,6 +21,9 @@ struct Moments {
 
     Moments& operator+=(const Moments& other);
 };
+
+void write(ByteWriter& to, const Moments& moments);
+Moments read_moments(ByteReader& from, std::size_t outputs, bool covariance);
 
 class MomentTree {
 public:

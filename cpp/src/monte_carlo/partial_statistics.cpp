@@ -9,6 +9,8 @@
 namespace stepdiag {
 namespace {
 
+constexpr std::string_view statistics_kind = "stepdiag statistics 1\n";  // the number: the version of the format
+
 // Every sample in the order of its index, those of leaves that are not there left out.
 std::map<std::size_t, std::vector<double>> kept_values(const StatisticsOptions& options, const Counts& counts) {
     std::map<std::size_t, std::vector<double>> kept;
@@ -119,6 +121,35 @@ MonteCarloResult PartialStatistics::result() const {
     for (std::size_t i = 0; i < bins.joint.size(); ++i)
         result.joint.push_back(joint_region(bins.joint[i], counts.joint[i], bins.options.coverage));
     return result;
+}
+
+std::string PartialStatistics::to_bytes() const {
+    ByteWriter to(statistics_kind);
+    write(to, bins().content());
+    to.size(state_->tree.nodes().size());
+    for (const auto& [first_leaf, node] : state_->tree.nodes()) {
+        to.number(first_leaf);
+        to.number(std::int32_t(node.level));
+        write(to, node.moments);
+    }
+    write(to, state_->counts);
+    return std::move(to).finish();
+}
+
+PartialStatistics PartialStatistics::from_bytes(std::string_view bytes) {
+    ByteReader from(bytes, statistics_kind, "statistics");
+    PartialStatistics part(read_bins(from));
+    const Bins::Content& bins = part.bins().content();
+    const std::size_t nodes = from.size();
+    for (std::size_t i = 0; i < nodes; ++i) {
+        const auto first_leaf = from.number<std::uint64_t>();
+        const int level = from.number<std::int32_t>();
+        from.expect(level >= 0 && level < 32 && first_leaf < largest_leaf_count);
+        part.state_->tree.add(first_leaf, {level, read_moments(from, bins.outputs.size(), bins.options.covariance)});
+    }
+    read_counts(from, bins.options.kept.size(), part.state_->counts);
+    from.finish();
+    return part;
 }
 
 }  // namespace stepdiag

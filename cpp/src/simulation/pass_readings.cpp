@@ -168,30 +168,4 @@ void add_noise(SignalRow& row, const std::vector<std::string>& channels, const N
     }
 }
 
-std::vector<PlanPoint> points_of(const Plan& plan, const PlannedVisit& visit) {
-    std::vector<PlanPoint> points = plan.points(visit.line, visit.run);
-    if (visit.direction == Direction::backward) std::reverse(points.begin(), points.end());
-    return points;
-}
-
-std::vector<PlannedVisit> planned_visits(const Plan& plan, const SimulationOptions& options) {
-    std::vector<Line> lines = plan.lines();
-    lines.insert(lines.end(), plan.scale_lines().begin(), plan.scale_lines().end());
-    std::vector<PlannedVisit> visits;
-    std::uint64_t row = 0;
-    for (const Line& line : lines) {
-        const std::size_t points = plan.points(line).size();
-        for (int repeat = 0; repeat < options.repeats; ++repeat) {
-            const std::uint64_t setup_row = row;
-            const int run = options.backward ? 2 * repeat : repeat;
-            visits.push_back({line, run, Direction::forward, row, setup_row});
-            row += points;
-            if (!options.backward) continue;
-            visits.push_back({line, run + 1, Direction::backward, row, setup_row});
-            row += points;
-        }
-    }
-    return visits;
-}
-
 }  // namespace stepdiag

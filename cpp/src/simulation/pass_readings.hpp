@@ -9,18 +9,6 @@
 
 namespace stepdiag {
 
-// One way along a line, and the rows where it and its set-up begin.
-struct PlannedVisit {
-    Line line;
-    int run;
-    Direction direction;
-    std::uint64_t first_row;
-    std::uint64_t setup_row;
-};
-std::vector<PlannedVisit> planned_visits(const Plan& plan, const SimulationOptions& options);
-// In the order in which they are read.
-std::vector<PlanPoint> points_of(const Plan& plan, const PlannedVisit& visit);
-
 // Throw InvalidArgument as simulate() says.
 void check_run(const Plan& plan, const Heads& heads, const SimulationOptions& options);
 void check_misalignment(const Misalignment& misalignment, const Head& head, const Line& line);

@@ -34,7 +34,7 @@ Measurement simulate(const Machine& machine, const Plan& plan, const Heads& head
     std::vector<Channel> channels;
     for (const std::string& name : names) channels.push_back({name, {}});
     const double seconds = options.seconds_per_reading.value_or(0.0);
-    for (const PlannedVisit& visit : planned_visits(plan, options)) {
+    for (const PlannedVisit& visit : planned_passes(plan, options.repeats, options.backward)) {
         const Line& line = visit.line;
         const Head& head = heads.of(line);
         const Eigen::Vector2d mirror = mirror_size(head, plan);

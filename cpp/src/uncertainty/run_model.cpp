@@ -114,7 +114,7 @@ RunModel::RunModel(const VirtualRun& given, std::uint64_t seed) : run(given), dr
     channels = signal_names(run.heads.head);
     const int beams = run.heads.head.layout == HeadLayout::multi_beam ? int(channels.size()) : 0;
 
-    for (const PlannedVisit& visit : planned_visits(run.plan, run.simulation)) {
+    for (const PlannedVisit& visit : planned_passes(run.plan, run.simulation.repeats, run.simulation.backward)) {
         const Line& line = visit.line;
         const Head& head = run.heads.of(line);
         const Misalignment misalignment = stepdiag::misalignment_of(run.simulation, line);

@@ -185,28 +185,6 @@ TEST(Adjustment, CovarianceHasTheVariancesOfTheTables) {
     EXPECT_EQ(i, calibration.covariance.rows());
 }
 
-TEST(Adjustment, AdjusterGivesWhatAdjustGives) {
-    const Workshop shop;
-    const Measurement first = shop.run();
-    stepdiag::Adjuster adjuster(first, shop.plan(), shop.machine().chain(), shop.tool, shop.head.calibration());
-    auto options = shop.simulation();
-    options.noise = {0.1e-3, 1e-6, 0.0, 8};
-    const Measurement second = simulate(shop.machine(), shop.plan(), shop.head, options);
-    Eigen::MatrixXd readings(second.channels().size(), second.size());
-    for (std::size_t c = 0; c < second.channels().size(); ++c)
-        for (std::size_t row = 0; row < second.size(); ++row)
-            readings(Eigen::Index(c), Eigen::Index(row)) = *second.channels()[c].value[row];
-    const Eigen::VectorXd values = adjuster.evaluate(readings);
-    AdjustmentOptions keep;
-    keep.outlier_probability = 0.0;
-    const auto calibration = shop.adjust(second, keep).calibration;
-    Eigen::Index i = 0;
-    for (const auto& function : calibration.functions)
-        for (const double value : function->value)
-            EXPECT_NEAR(values[i++], value, 2e-5);  // mm and rad: a hundredth of the uncertainty of positions
-    EXPECT_EQ(i + 3, values.size());
-}
-
 TEST(Adjustment, TellsReversalWhereRunsGoBothWays) {
     const Workshop shop;
     auto options = shop.simulation();

@@ -7,6 +7,7 @@
 #include "refuses.hpp"
 #include "stepdiag/optics/replay.hpp"
 #include "stepdiag/monte_carlo/function_model.hpp"
+#include "stepdiag/monte_carlo/adaptive_procedure.hpp"
 #include "stepdiag/monte_carlo/monte_carlo.hpp"
 
 using namespace stepdiag;

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "refuses.hpp"
+#include "stepdiag/uncertainty/volumetric_accuracy.hpp"
 
 namespace {
 

@@ -10,7 +10,6 @@
 #include <array>
 #include <limits>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -122,24 +121,5 @@ struct Adjustment {
 // without times, options that make no sense, or where nothing at all can be determined.
 Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
                   const HeadCalibrations& heads, const AdjustmentOptions& options = {});
-
-// The same plan and pattern of readings evaluated again and again: what is known of a first run (ordering, factor,
-// start) serves the next ones.
-class Adjuster {
-public:
-    Adjuster(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
-             const HeadCalibrations& heads, const AdjustmentOptions& options = {});
-    ~Adjuster();
-    Adjuster(Adjuster&&) noexcept;
-
-    // The values of the calibration's tables (order of Calibration::covariance) from other readings; `readings` has one
-    // row a channel of the first measurement, one column a row of it. Nothing is left out as an outlier. Not
-    // synchronised: one Adjuster a thread.
-    Eigen::VectorXd evaluate(const Eigen::MatrixXd& readings);
-
-private:
-    struct State;
-    std::unique_ptr<State> state_;
-};
 
 }  // namespace stepdiag

@@ -22,12 +22,6 @@ struct BatchOptions {
     AdjustmentOptions adjustment = {};    // adjustment, one_step: nothing is left out as an outlier
 };
 
-// A value of a calibration's tables (order of Calibration::covariance).
-struct CalibrationEntry {
-    std::string parameter;  // "EXX", ..., "C0Y"
-    double position;        // mm; NaN for a squareness
-};
-
 class BatchEvaluator {
 public:
     // `pattern`: a run of this plan whose readings are there; rows and channels of all sets are like its own. For the

@@ -59,6 +59,16 @@ struct Calibration {
     std::string date = {};  // of the evaluation: ISO 8601, UTC; empty where it is not known
 };
 
+// A value of a calibration's tables (order of Calibration::covariance).
+struct CalibrationEntry {
+    std::string parameter;  // "EXX", ..., "C0Y"
+    double position;        // mm; NaN for a squareness
+};
+
+// The entries of a calibration in the order of Calibration::covariance, and their values.
+std::vector<CalibrationEntry> calibration_entries(const Calibration& calibration);
+Eigen::VectorXd calibration_values(const Calibration& calibration);
+
 // Throws InvalidArgument naming the parameter where a calibration put together by hand is none: a volume that is not
 // positive, nodes that do not ascend, values that are not finite, uncertainties below 0, a covariance that is no matrix
 // of these values (its size, symmetry, |c_ij| <= u_i u_j, c_ii = u_i^2), sentences of more than one line.

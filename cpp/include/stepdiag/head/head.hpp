@@ -16,6 +16,7 @@
 #include "stepdiag/head/traced_head.hpp"
 #include "stepdiag/measurement/head_calibration.hpp"
 #include "stepdiag/measurement/reading.hpp"
+#include "stepdiag/core/air.hpp"
 #include "stepdiag/optics/medium.hpp"
 
 namespace stepdiag {

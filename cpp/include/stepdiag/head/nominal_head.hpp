@@ -8,7 +8,7 @@
 
 #include "stepdiag/head/design.hpp"
 #include "stepdiag/measurement/head_calibration.hpp"
-#include "stepdiag/optics/medium.hpp"
+#include "stepdiag/core/air.hpp"
 
 namespace stepdiag {
 

@@ -1,8 +1,10 @@
 // The distributions that JCGM 101 (6.4) assigns to input quantities, by expectation and spread.
 #pragma once
 
+#include <Eigen/Core>
 #include <limits>
 #include <string>
+#include <vector>
 
 namespace stepdiag {
 
@@ -39,6 +41,16 @@ void check(const Distribution& distribution, const std::string& name);
 // takes: normal takes `normal`; student_t and curvilinear_trapezoid u and v; the others u. (t by the polar formula of
 // Bailey, Mathematics of Computation 62 (1994) 779.)
 double draw(const Distribution& distribution, double normal, double u, double v);
+
+// Inputs that are jointly normal: `members` index the inputs, all of them normal.
+struct CorrelatedInputs {
+    std::vector<int> members;
+    Eigen::MatrixXd correlation;
+};
+
+// F with F F^T = `correlation`: F times independent standard normal numbers has that correlation. Semidefinite ones are
+// taken too. Throws InvalidArgument, beginning with `name`, for what is no correlation matrix.
+Eigen::MatrixXd correlation_factor(const Eigen::MatrixXd& correlation, const std::string& name);
 
 // The quantile function: of a normal, of a t distribution (coverage factors). Throws InvalidArgument for a probability
 // outside (0, 1) and degrees of freedom not above 0.

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "stepdiag/monte_carlo/distribution.hpp"
-#include "stepdiag/uncertainty/inputs.hpp"
 #include "stepdiag/monte_carlo/sample_model.hpp"
 
 namespace stepdiag {
