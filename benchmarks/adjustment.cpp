@@ -13,11 +13,11 @@
 #include <cmath>
 #include <ctime>
 
-#include "adjustment_run.hpp"
 #include "adjustment/gauss_newton.hpp"
+#include "adjustment_run.hpp"
+#include "stepdiag/batch/batch_evaluator.hpp"
 #include "stepdiag/core/random.hpp"
 #include "stepdiag/core/random_blocks.hpp"
-#include "stepdiag/batch/batch_evaluator.hpp"
 
 namespace {
 
@@ -43,7 +43,7 @@ void solve(benchmark::State& state) {
     const auto problem = problem_of(AdjustmentRun(int(state.range(0))));
     for (auto _ : state) {
         Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
-        stepdiag::AdjustmentSolver solver(problem, {});
+        stepdiag::GaussNewton solver(problem, {});
         benchmark::DoNotOptimize(solver.solve(x));
     }
 }
@@ -51,7 +51,7 @@ void solve(benchmark::State& state) {
 void variances(benchmark::State& state) {
     const auto problem = problem_of(AdjustmentRun(int(state.range(0))));
     Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
-    stepdiag::AdjustmentSolver solver(problem, {});
+    stepdiag::GaussNewton solver(problem, {});
     solver.solve(x);
     for (auto _ : state) {
         solver.factorize(x);

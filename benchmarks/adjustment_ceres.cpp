@@ -8,8 +8,8 @@
 
 #include <deque>
 
-#include "adjustment_run.hpp"
 #include "adjustment/adjustment_problem.hpp"
+#include "adjustment_run.hpp"
 
 namespace {
 

@@ -81,7 +81,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     AdjustmentProblem problem(measurement, plan, chain, tool, heads, options);
     if (problem.readings().empty())
         throw InvalidArgument("adjustment: nothing can be determined: the run has no readings that count");
-    AdjustmentSolver solver(problem, smoothness_at_start(options));
+    GaussNewton solver(problem, smoothness_at_start(options));
     AdjustmentTables tables(problem);
     const Observability observability(solver, tables);
     const CalibratedForms forms = choose_forms(tables);

@@ -5,8 +5,8 @@
 #include <map>
 #include <tuple>
 
-#include "evaluation/measurement_rows.hpp"
 #include "adjustment/setup_priors.hpp"
+#include "evaluation/measurement_rows.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -75,7 +75,7 @@ AdjustmentProblem::AdjustmentProblem(const Measurement& measurement, const Plan&
 void AdjustmentProblem::collect_setups(const Measurement& measurement, const AdjustmentOptions& options) {
     setup_of_row_.resize(measurement.size());
     std::map<std::string, int> current;  // set-up by line
-    for (const auto& entry : rows_by_visit(measurement)) {
+    for (const auto& entry : rows_by_pass(measurement)) {
         const std::vector<std::size_t>& rows = entry.second;
         const Line line = measurement.stations()[rows.front()].line;
         const bool backward = direction_of(measurement, rows) == Direction::backward;

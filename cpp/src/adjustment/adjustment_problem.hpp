@@ -52,7 +52,7 @@ struct AdjustedReading {
     bool used() const { return outlier == 0; }
 };
 
-// One point of one visit, and its readings: readings[first_reading .. end_reading).
+// One point of one pass, and its readings: readings[first_reading .. end_reading).
 struct AdjustedPoint {
     int setup;
     std::array<int, 3> node;  // by axis: index of the AxisNode; no_unknown: at home

@@ -1,8 +1,8 @@
 // What an adjustment gives back, from its unknowns and their covariance. Internal: not installed.
 #pragma once
 
-#include "adjustment/gauss_newton.hpp"
 #include "adjustment/adjustment_tables.hpp"
+#include "adjustment/gauss_newton.hpp"
 #include "adjustment/observability.hpp"
 #include "stepdiag/adjustment/adjustment.hpp"
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "adjustment/rank_decision.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -13,8 +14,7 @@ namespace {
 constexpr double factor_holds = 3e-11;
 }  // namespace
 
-AdjustmentSolver::AdjustmentSolver(const AdjustmentProblem& problem,
-                                   const std::array<double, function_count>& smoothness)
+GaussNewton::GaussNewton(const AdjustmentProblem& problem, const std::array<double, function_count>& smoothness)
     : equations_(problem), matrix_(equations_.matrix()) {
     equations_.make_smooth(smoothness);
     equations_.linearise(Eigen::VectorXd::Zero(problem.size()));
@@ -22,11 +22,10 @@ AdjustmentSolver::AdjustmentSolver(const AdjustmentProblem& problem,
     factorize();
     factorized_at_.setZero(problem.size());
     held_ = factor_->held();
-    for (const int j : held_)  // the band has places without an unknown
-        if (j >= 6 * problem.blocks() || j % 6 < 3 || problem.has_rotations()) dependent_.push_back(j);
+    dependent_ = dependent_unknowns(problem, *factor_);
 }
 
-void AdjustmentSolver::assume_usual(const std::vector<bool>& determined) {
+void GaussNewton::assume_usual(const std::vector<bool>& determined) {
     if (dependent_.empty()) return;
     equations_.assume_usual(determined, Eigen::VectorXd::Zero(matrix_.size()));
     held_.clear();
@@ -34,14 +33,14 @@ void AdjustmentSolver::assume_usual(const std::vector<bool>& determined) {
     held_ = factor_->held();
 }
 
-void AdjustmentSolver::factorize(const Eigen::VectorXd& x) {
+void GaussNewton::factorize(const Eigen::VectorXd& x) {
     equations_.linearise(x);
     factorize();
     factorized_at_ = x;
     fresh_ = false;
 }
 
-void AdjustmentSolver::factorize() {
+void GaussNewton::factorize() {
     equations_.assemble(matrix_);
     scale_ = matrix_.diagonal().cwiseSqrt();
     for (const int j : held_) element(matrix_, j, j) = 0.0;  // which holds it again
@@ -49,7 +48,7 @@ void AdjustmentSolver::factorize() {
     else factor_.emplace(matrix_, rank_threshold);
 }
 
-void AdjustmentSolver::refresh(const Eigen::VectorXd& x) {
+void GaussNewton::refresh(const Eigen::VectorXd& x) {
     double change = 0.0;
     for (int j = 0; j < x.size(); ++j)
         change = std::max(change, std::abs(x[j] - factorized_at_[j]) * equations_.problem().change_scale()[j]);
@@ -57,7 +56,7 @@ void AdjustmentSolver::refresh(const Eigen::VectorXd& x) {
     else equations_.linearise(x);
 }
 
-Eigen::VectorXd AdjustmentSolver::null_vector(int held) const {
+Eigen::VectorXd GaussNewton::null_vector(int held) const {
     Eigen::VectorXd vector = Eigen::VectorXd::Unit(scale_.size(), held);
     // The second round takes off what the first left by rounding.
     for (int round = 0; round < 2; ++round) {
@@ -68,7 +67,7 @@ Eigen::VectorXd AdjustmentSolver::null_vector(int held) const {
     return vector;
 }
 
-AdjustmentSolver::Step AdjustmentSolver::step(const Eigen::VectorXd& x) const {
+GaussNewton::Step GaussNewton::step(const Eigen::VectorXd& x) const {
     const Eigen::VectorXd gradient = equations_.gradient(x);
     Step step{gradient, 0.0, 0.0, 0.0};
     factor_->solve(step.dx);
@@ -79,7 +78,7 @@ AdjustmentSolver::Step AdjustmentSolver::step(const Eigen::VectorXd& x) const {
     return step;
 }
 
-bool AdjustmentSolver::is_settled(const Step& step, double ratio, const Eigen::VectorXd& x) const {
+bool GaussNewton::is_settled(const Step& step, double ratio, const Eigen::VectorXd& x) const {
     constexpr double enough = 1e-9;     // of a standard uncertainty
     constexpr double rounding = 1e-6;   // of a step: of double precision, the condition takes this much
     constexpr double no_effect = 1e-6;  // where a step may be rounding
@@ -90,7 +89,7 @@ bool AdjustmentSolver::is_settled(const Step& step, double ratio, const Eigen::V
     return ratio > 1e-3 && step.decrement < settled * std::max(1.0, scatter);
 }
 
-std::optional<int> AdjustmentSolver::try_solve(Eigen::VectorXd& x, int most_steps, bool accelerated) {
+std::optional<int> GaussNewton::try_solve(Eigen::VectorXd& x, int most_steps, bool accelerated) {
     constexpr double slow = 0.1;
     constexpr double infinite = std::numeric_limits<double>::infinity();
     double change = fresh_ && x.isZero(0.0) ? 0.0 : infinite, effect = infinite;
@@ -118,7 +117,7 @@ std::optional<int> AdjustmentSolver::try_solve(Eigen::VectorXd& x, int most_step
     return std::nullopt;
 }
 
-void AdjustmentSolver::descend(Eigen::VectorXd& x, const Eigen::VectorXd& move, const Eigen::VectorXd& step) {
+void GaussNewton::descend(Eigen::VectorXd& x, const Eigen::VectorXd& move, const Eigen::VectorXd& step) {
     constexpr int most_halvings = 12;
     const double before = equations_.square_sum(x);
     Eigen::VectorXd part = move;
@@ -130,15 +129,14 @@ void AdjustmentSolver::descend(Eigen::VectorXd& x, const Eigen::VectorXd& move, 
     x += part;
 }
 
-int AdjustmentSolver::solve(Eigen::VectorXd& x) {
+int GaussNewton::solve(Eigen::VectorXd& x) {
     if (const auto count = try_solve(x)) return *count;
     throw InvalidArgument("adjustment: finds no machine and set-up that explain the readings");
 }
 
 // Anderson acceleration (D. G. Anderson, J. ACM 12 (1965) 547) of the sequence x + dx(x): the combination of the last
 // steps that is least says where they lead.
-void AdjustmentSolver::StepHistory::add(const Eigen::VectorXd& x, const Eigen::VectorXd& dx,
-                                        const Eigen::VectorXd& scale) {
+void GaussNewton::StepHistory::add(const Eigen::VectorXd& x, const Eigen::VectorXd& dx, const Eigen::VectorXd& scale) {
     constexpr std::size_t most = 6;
     if (last_x.size() > 0) {
         moves.push_back(x - last_x);
@@ -153,7 +151,7 @@ void AdjustmentSolver::StepHistory::add(const Eigen::VectorXd& x, const Eigen::V
     weight = scale;
 }
 
-Eigen::VectorXd AdjustmentSolver::StepHistory::accelerated() const {
+Eigen::VectorXd GaussNewton::StepHistory::accelerated() const {
     const Eigen::Index count = Eigen::Index(changes.size());
     Eigen::VectorXd result = last_dx;
     if (count == 0) return result;

@@ -9,14 +9,10 @@
 
 namespace stepdiag {
 
-// Rank is decided on the normal equations at zero, columns scaled to 1: a pivot at or below this counts as 0. It is the
-// square of a singular value: directions known 3e5 times worse than the best ones still count as determined.
-inline constexpr double rank_threshold = 1e-11;
-
-class AdjustmentSolver {
+class GaussNewton {
 public:
     // `smoothness`: deviations of second differences by function, 0 for none.
-    AdjustmentSolver(const AdjustmentProblem& problem, const std::array<double, function_count>& smoothness);
+    GaussNewton(const AdjustmentProblem& problem, const std::array<double, function_count>& smoothness);
 
     NormalEquations& equations() { return equations_; }
     const NormalEquations& equations() const { return equations_; }

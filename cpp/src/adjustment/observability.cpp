@@ -16,7 +16,7 @@ namespace {
 constexpr double touching = 1e-5;
 
 // The unit of each unknown in which all columns of the problem have length 1.
-Eigen::VectorXd column_units(const AdjustmentSolver& solver) {
+Eigen::VectorXd column_units(const GaussNewton& solver) {
     Eigen::VectorXd units = solver.scale();
     for (double& unit : units) unit = unit > 0.0 ? 1.0 / unit : 1.0;
     return units;
@@ -63,7 +63,7 @@ std::string place(const LineSetup& setup) {
 
 }  // namespace
 
-Observability::Observability(const AdjustmentSolver& solver, AdjustmentTables& tables)
+Observability::Observability(const GaussNewton& solver, AdjustmentTables& tables)
     : problem_(solver.equations().problem()), tables_(tables), determined_(problem_.size(), true) {
     std::vector<FunctionId> sloped;
     for (int i = 0; i < function_count; ++i)

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "adjustment/gauss_newton.hpp"
 #include "adjustment/adjustment_tables.hpp"
+#include "adjustment/gauss_newton.hpp"
 
 namespace stepdiag {
 
@@ -20,7 +20,7 @@ struct KnownCombination {
 class Observability {
 public:
     // Marks the tables' forms.
-    Observability(const AdjustmentSolver& solver, AdjustmentTables& tables);
+    Observability(const GaussNewton& solver, AdjustmentTables& tables);
 
     const std::vector<bool>& determined() const { return determined_; }
     // One sentence each: what is missing, why, and what would help.

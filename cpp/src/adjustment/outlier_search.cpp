@@ -15,7 +15,7 @@ double size(const ReadingResidual& residual) { return residual.used() ? std::abs
 
 }  // namespace
 
-int degrees_of_freedom(const AdjustmentSolver& solver) {
+int degrees_of_freedom(const GaussNewton& solver) {
     const AdjustmentProblem& problem = solver.equations().problem();
     int count = int(solver.equations().smooth_rows().size()) - problem.unknowns() + int(solver.dependent().size());
     for (const AdjustedReading& reading : problem.readings()) count += reading.used();
@@ -23,7 +23,7 @@ int degrees_of_freedom(const AdjustmentSolver& solver) {
     return count;
 }
 
-OutlierSearch::OutlierSearch(AdjustmentProblem& problem, AdjustmentSolver& solver, const AdjustmentOptions& options)
+OutlierSearch::OutlierSearch(AdjustmentProblem& problem, GaussNewton& solver, const AdjustmentOptions& options)
     : problem_(problem), solver_(solver), inverse_(solver.equations().matrix()) {
     const double count = double(problem.readings().size());
     limit_ = options.outlier_probability > 0.0 ? -Eigen::numext::ndtri(options.outlier_probability / (2.0 * count))
@@ -101,8 +101,7 @@ std::optional<int> OutlierSearch::solve_from_zero(const std::vector<bool>& deter
     for (const Way& way : ways) {
         Eigen::VectorXd solution = Eigen::VectorXd::Zero(x.size());
         solver_.equations().assume_usual(determined, solution, way.part);
-        const std::optional<int> steps =
-            solver_.try_solve(solution, AdjustmentSolver::usual_most_steps, way.accelerated);
+        const std::optional<int> steps = solver_.try_solve(solution, GaussNewton::usual_most_steps, way.accelerated);
         const double square_sum = solver_.equations().square_sum(solution);
         if (steps && square_sum < least) {
             count = steps;

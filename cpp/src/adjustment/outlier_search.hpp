@@ -10,13 +10,13 @@
 namespace stepdiag {
 
 // Of readings, priors and smoothness over unknowns.
-int degrees_of_freedom(const AdjustmentSolver& solver);
+int degrees_of_freedom(const GaussNewton& solver);
 
 // Adjusts, and leaves out readings that do not fit, the worst first (W. Baarda's data snooping, each reading against
 // what the others say of it), and adjusts again; puts them back where they are too many.
 class OutlierSearch {
 public:
-    OutlierSearch(AdjustmentProblem& problem, AdjustmentSolver& solver, const AdjustmentOptions& options);
+    OutlierSearch(AdjustmentProblem& problem, GaussNewton& solver, const AdjustmentOptions& options);
 
     // From zero. A reading that is a thousand uncertainties off may keep Gauss-Newton from settling, or settle it far
     // away: where readings scatter that much, the worst is left out by what the first step says, which is linear, and
@@ -39,7 +39,7 @@ private:
     void put_back(int kept);
 
     AdjustmentProblem& problem_;
-    AdjustmentSolver& solver_;
+    GaussNewton& solver_;
     double limit_;
     int most_, found_ = 0;
     std::vector<SmoothRow> roughness_;

@@ -17,7 +17,7 @@ struct Validation {
     double freedom;
 };
 
-Validation validate(AdjustmentSolver& solver, const Eigen::VectorXd& x, const Deviations& deviations) {
+Validation validate(GaussNewton& solver, const Eigen::VectorXd& x, const Deviations& deviations) {
     solver.equations().make_smooth(deviations);
     solver.factorize(x);
     const NormalEquations& equations = solver.equations();
@@ -44,7 +44,7 @@ Validation validate(AdjustmentSolver& solver, const Eigen::VectorXd& x, const De
 }
 
 // What was found may be smoother than what comes out with it, where curvature is coherent: not below that.
-Deviations not_below_own_roughness(AdjustmentSolver& solver, const Eigen::VectorXd& x, Deviations deviations) {
+Deviations not_below_own_roughness(GaussNewton& solver, const Eigen::VectorXd& x, Deviations deviations) {
     solver.equations().make_smooth(deviations);
     solver.factorize(x);
     Eigen::VectorXd smoothed = solver.equations().gradient(x);
@@ -70,7 +70,7 @@ std::array<double, function_count> given_deviations(const Smoothness& smoothness
     return deviations;
 }
 
-std::array<double, function_count> cross_validate(AdjustmentSolver& solver, const Eigen::VectorXd& x,
+std::array<double, function_count> cross_validate(GaussNewton& solver, const Eigen::VectorXd& x,
                                                   const AdjustmentOptions& options) {
     constexpr double least_gain = 1e-4;  // of the score: less is not worth a smoother function
     constexpr double factor = 4.0;

@@ -14,7 +14,7 @@ std::array<double, function_count> given_deviations(const Smoothness& smoothness
 // the weighted square sum of the residuals, H the matrix that makes adjusted readings of readings. On the problem
 // linearised at x; function by function, so that one that is not smooth hides behind no other. Leaves the equations
 // with the deviations found.
-std::array<double, function_count> cross_validate(AdjustmentSolver& solver, const Eigen::VectorXd& x,
+std::array<double, function_count> cross_validate(GaussNewton& solver, const Eigen::VectorXd& x,
                                                   const AdjustmentOptions& options);
 
 }  // namespace stepdiag

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "batch/simd_adjustment.hpp"
 #include "adjustment/smoothness.hpp"
+#include "batch/simd_adjustment.hpp"
 
 namespace stepdiag {
 namespace {
@@ -37,15 +37,15 @@ std::vector<std::ptrdiff_t> inputs(const AdjustmentProblem& problem, const Measu
     return list;
 }
 
-class AdjustmentBatch : public BatchMap {
+class AdjustmentBatch : public BatchMethod {
 public:
     AdjustmentBatch(const BatchPattern& pattern, const Adjustment& adjustment)
-        : BatchMap(adjustment.calibration),
+        : BatchMethod(adjustment.calibration),
           in_one_step_(pattern.options.method == EvaluationMethod::one_step),
           readings_(pattern.measurement.size() * signal_channels(pattern.measurement).size()),
           start_(prepare(pattern, adjustment)) {}
 
-    class Worker : public BatchMap::Worker {
+    class Worker : public BatchMethod::Worker {
     public:
         explicit Worker(const AdjustmentBatch& batch) : in_one_step_(batch.in_one_step_), lanes_(*batch.start_) {}
 
@@ -58,28 +58,28 @@ public:
 
     private:
         bool in_one_step_;
-        LaneAdjustment lanes_;
+        SimdAdjustment lanes_;
     };
-    std::unique_ptr<BatchMap::Worker> worker() const override { return std::make_unique<Worker>(*this); }
+    std::unique_ptr<BatchMethod::Worker> worker() const override { return std::make_unique<Worker>(*this); }
 
-    Eigen::MatrixXd gain() const override { return lane_gain(*start_, readings_); }
+    Eigen::MatrixXd gain() const override { return simd_gain(*start_, readings_); }
 
 private:
-    static std::unique_ptr<const LaneStart> prepare(const BatchPattern& p, const Adjustment& adjustment) {
+    static std::unique_ptr<const SimdStart> prepare(const BatchPattern& p, const Adjustment& adjustment) {
         const PreparedAdjustment prepared(p.measurement, p.plan, p.chain, p.tool, p.heads,
                                           without_outliers(p.options.adjustment), adjustment.smoothness);
-        return std::make_unique<const LaneStart>(prepared, inputs(prepared.problem, p.measurement),
+        return std::make_unique<const SimdStart>(prepared, inputs(prepared.problem, p.measurement),
                                                  standard_uncertainties(adjustment.calibration));
     }
 
     bool in_one_step_;
     std::size_t readings_;  // of a set
-    std::unique_ptr<const LaneStart> start_;
+    std::unique_ptr<const SimdStart> start_;
 };
 
 }  // namespace
 
-std::unique_ptr<const BatchMap> make_adjustment_batch(const BatchPattern& p) {
+std::unique_ptr<const BatchMethod> make_adjustment_batch(const BatchPattern& p) {
     const Adjustment adjustment =
         adjust(p.measurement, p.plan, p.chain, p.tool, p.heads, without_outliers(p.options.adjustment));
     return std::make_unique<const AdjustmentBatch>(p, adjustment);

@@ -5,6 +5,6 @@
 
 namespace stepdiag {
 
-std::unique_ptr<const BatchMap> make_adjustment_batch(const BatchPattern& pattern);
+std::unique_ptr<const BatchMethod> make_adjustment_batch(const BatchPattern& pattern);
 
 }  // namespace stepdiag

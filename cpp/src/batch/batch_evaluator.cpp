@@ -6,11 +6,11 @@
 namespace stepdiag {
 
 struct BatchEvaluator::Map {
-    std::unique_ptr<const BatchMap> of_method;
+    std::unique_ptr<const BatchMethod> of_method;
 };
 
 struct BatchEvaluator::Worker::State {
-    std::unique_ptr<BatchMap::Worker> of_method;
+    std::unique_ptr<BatchMethod::Worker> of_method;
 };
 
 BatchEvaluator::BatchEvaluator(const Measurement& pattern, const Plan& plan, const Chain& chain,

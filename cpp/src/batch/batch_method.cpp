@@ -2,7 +2,8 @@
 
 namespace stepdiag {
 
-BatchMap::BatchMap(Calibration calibration) : entries(calibration_entries(calibration)), of_pattern(std::move(calibration)) {}
+BatchMethod::BatchMethod(Calibration calibration)
+    : entries(calibration_entries(calibration)), of_pattern(std::move(calibration)) {}
 
 std::vector<int> signal_channels(const Measurement& measurement) {
     std::vector<int> signals;

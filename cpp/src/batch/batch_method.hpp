@@ -8,9 +8,9 @@
 
 namespace stepdiag {
 
-class BatchMap {
+class BatchMethod {
 public:
-    virtual ~BatchMap() = default;
+    virtual ~BatchMethod() = default;
 
     std::vector<CalibrationEntry> entries;
     Calibration of_pattern;
@@ -25,7 +25,7 @@ public:
     virtual Eigen::MatrixXd gain() const = 0;
 
 protected:
-    explicit BatchMap(Calibration of_pattern);  // entries: those of its tables
+    explicit BatchMethod(Calibration of_pattern);  // entries: those of its tables
 };
 
 // The pattern and what it is evaluated with.

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <limits>
 
+#include "batch/simd_reduction.hpp"
 #include "evaluation/linear_evaluation.hpp"
 #include "evaluation/linear_maps.hpp"
-#include "batch/simd_reduction.hpp"
 #include "stepdiag/core/random_blocks.hpp"
 #include "stepdiag/evaluation/conventional.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
@@ -29,8 +29,8 @@ Calibration evaluate(const BatchPattern& p) {
                           : evaluate_conventional(p.measurement, p.plan, p.chain, p.tool, p.heads, options);
 }
 
-std::vector<Visit> visits_of(const BatchPattern& p, const ReadingUncertainty& uncertainty) {
-    return collect_visits(p.measurement, p.plan, p.heads, uncertainty, length_kind(p));
+std::vector<Pass> passes_of(const BatchPattern& p, const ReadingUncertainty& uncertainty) {
+    return collect_passes(p.measurement, p.plan, p.heads, uncertainty, length_kind(p));
 }
 
 // The same readings, each of the standard uncertainty that it has by its quantity alone.
@@ -40,13 +40,13 @@ Measurement without_uncertainties(const Measurement& measurement) {
     return Measurement(measurement.stations(), channels);
 }
 
-class LinearBatch : public BatchMap {
+class LinearBatch : public BatchMethod {
 public:
-    LinearBatch(const BatchPattern& pattern, const std::vector<Visit>& visits)
-        : BatchMap(evaluate(pattern)),
-          reduction_(pattern.measurement, pattern.heads, visits, length_kind(pattern)),
-          program_(is_enhanced(pattern) ? enhanced_program(visits, pattern.plan, pattern.chain, pattern.tool)
-                                        : conventional_program(visits, pattern.plan)),
+    LinearBatch(const BatchPattern& pattern, const std::vector<Pass>& passes)
+        : BatchMethod(evaluate(pattern)),
+          reduction_(pattern.measurement, pattern.heads, passes, length_kind(pattern)),
+          program_(is_enhanced(pattern) ? enhanced_program(passes, pattern.plan, pattern.chain, pattern.tool)
+                                        : conventional_program(passes, pattern.plan)),
           effects_(effects_of_raw_channels(pattern)) {}
 
     std::unique_ptr<Worker> worker() const override { return std::make_unique<LinearWorker>(*this); }
@@ -89,7 +89,7 @@ private:
 
         void evaluate(const double* readings, std::size_t lanes, double* values, std::size_t stride) override {
             for (std::size_t lane = 0; lane < lanes; lane += program_lanes) {
-                const LaneReduction::Lost lost = batch_.reduction_.reduce(readings + lane, lanes, registers_.get());
+                const SimdReduction::Lost lost = batch_.reduction_.reduce(readings + lane, lanes, registers_.get());
                 batch_.program_.run(registers_.get(), values + lane, stride);
                 for (std::size_t k = 0; k < program_lanes; ++k)
                     for (std::size_t output = 0; lost[k] && output < batch_.program_.outputs(); ++output)
@@ -106,10 +106,10 @@ private:
         const Measurement measurement = without_uncertainties(pattern.measurement);
         const BatchPattern unweighted{measurement,  pattern.plan,  pattern.chain,
                                       pattern.tool, pattern.heads, pattern.options};
-        const auto visits = visits_of(unweighted, ReadingUncertainty{1.0, 1.0, 1.0});
-        std::vector<const VisitPoint*> points;
-        for (const Visit& visit : visits)
-            for (const VisitPoint& point : visit.points) points.push_back(&point);
+        const auto passes = passes_of(unweighted, ReadingUncertainty{1.0, 1.0, 1.0});
+        std::vector<const PassPoint*> points;
+        for (const Pass& pass : passes)
+            for (const PassPoint& point : pass.points) points.push_back(&point);
         std::vector<RawEffect> effects(measurement.size() * signal_channels(measurement).size());
         const std::uint32_t* raw = reduction_.raws();
         for (const ReducedRow& row : reduction_.rows())
@@ -118,15 +118,15 @@ private:
         return effects;
     }
 
-    LaneReduction reduction_;
+    SimdReduction reduction_;
     LinearProgram program_;
     std::vector<RawEffect> effects_;  // by raw channel: row * channels + channel
 };
 
 }  // namespace
 
-std::unique_ptr<const BatchMap> make_linear_batch(const BatchPattern& pattern) {
-    return std::make_unique<const LinearBatch>(pattern, visits_of(pattern, pattern.options.uncertainty));
+std::unique_ptr<const BatchMethod> make_linear_batch(const BatchPattern& pattern) {
+    return std::make_unique<const LinearBatch>(pattern, passes_of(pattern, pattern.options.uncertainty));
 }
 
 }  // namespace stepdiag

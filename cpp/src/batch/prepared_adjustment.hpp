@@ -12,7 +12,7 @@ struct PreparedAdjustment {
     // Deviations of second differences, 0: none. Those that were cross-validated are not in force at the start, where
     // it is decided what is determined.
     std::array<double, function_count> smoothness_at_start, smoothness;
-    AdjustmentSolver solver;
+    GaussNewton solver;
     std::vector<LinearForm> forms;  // the values of the calibration's tables
     std::vector<bool> determined;
     Eigen::VectorXd start;  // the solution; unknowns that are not determined are taken to be there

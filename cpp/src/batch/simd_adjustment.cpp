@@ -15,7 +15,7 @@ using Lanes = double[lane_group];
 
 }  // namespace
 
-LaneStart::LaneStart(const PreparedAdjustment& prepared, const std::vector<std::ptrdiff_t>& input,
+SimdStart::SimdStart(const PreparedAdjustment& prepared, const std::vector<std::ptrdiff_t>& input,
                      const std::vector<double>& standard_uncertainty)
     : pattern(prepared), input(input), jacobian(pattern.solver.equations()), factor(pattern.solver.factor()) {
     for (const AdjustedReading& reading : pattern.problem.readings()) {
@@ -25,11 +25,11 @@ LaneStart::LaneStart(const PreparedAdjustment& prepared, const std::vector<std::
     for (const double u : standard_uncertainty) one_over_uncertainty.push_back(u > 0.0 ? 1.0 / u : 0.0);
 }
 
-void LaneNumbers::fill(const Eigen::VectorXd& same) {
+void SimdNumbers::fill(const Eigen::VectorXd& same) {
     for (Eigen::Index i = 0; i < same.size(); ++i) std::fill_n(at(i), lane_group, same[i]);
 }
 
-LaneAdjustment::LaneAdjustment(const LaneStart& start)
+SimdAdjustment::SimdAdjustment(const SimdStart& start)
     : start_(start),
       model_(start.pattern.problem, start.input),
       x_(start.pattern.problem.size() + 1),
@@ -40,11 +40,11 @@ LaneAdjustment::LaneAdjustment(const LaneStart& start)
       difference_(Eigen::Index(start.input.size())) {}
 
 // Values are F x, and dx = N^-1 J^T (d reading/u): rows of F N^-1 J^T, lane_group at once.
-Eigen::MatrixXd lane_gain(const LaneStart& start, std::size_t readings) {
+Eigen::MatrixXd simd_gain(const SimdStart& start, std::size_t readings) {
     const std::vector<LinearForm>& forms = start.pattern.forms;
     Eigen::MatrixXd gain = Eigen::MatrixXd::Zero(Eigen::Index(forms.size()), Eigen::Index(readings));
     const Eigen::Index unknowns = start.pattern.start.size();
-    LaneNumbers column(unknowns), row{Eigen::Index(start.input.size())};
+    SimdNumbers column(unknowns), row{Eigen::Index(start.input.size())};
     for (std::size_t first = 0; first < forms.size(); first += lane_group) {
         const std::size_t count = std::min(lane_group, forms.size() - first);
         column.fill(Eigen::VectorXd::Zero(unknowns));
@@ -62,7 +62,7 @@ Eigen::MatrixXd lane_gain(const LaneStart& start, std::size_t readings) {
 
 // Of the changes, the last two tell how the next ones go on: steps shrink by turns, so that it is two steps whose ratio
 // holds.
-void LaneAdjustment::Progress::add(double largest) {
+void SimdAdjustment::Progress::add(double largest) {
     constexpr double diverges = 1e4, shrinks = 0.25;
     constexpr int early = 4, late = 12, most_steps_left = 16;
     constexpr double safety = 10.0;  // the first ratios are those of second order
@@ -71,22 +71,22 @@ void LaneAdjustment::Progress::add(double largest) {
     ++steps;
     if (!std::isfinite(largest) || (steps > 1 && largest > diverges * std::max(1.0, first))) {
         state = failed;
-    } else if (largest < lane_tolerance) {
+    } else if (largest < settled_tolerance) {
         state = settled;
     } else if (steps >= 3) {
         const double ratio = change[0] / change[2];
         const double left = (change[0] + change[1]) * ratio / (1.0 - ratio);
-        if (ratio < shrinks && safety * left < lane_tolerance) state = settled;
+        if (ratio < shrinks && safety * left < settled_tolerance) state = settled;
         // As they went on the whole; full steps are dearer one by one.
         if (steps == early) at_early = std::max(change[0], change[1]);
         const double rate = std::log(at_early / change[0]) / (steps - early + 1);
-        if (state == goes_on && steps >= late && !(std::log(largest / lane_tolerance) < most_steps_left * rate))
+        if (state == goes_on && steps >= late && !(std::log(largest / settled_tolerance) < most_steps_left * rate))
             state = failed;
     }
     if (state == goes_on && steps >= most_steps) state = failed;
 }
 
-void LaneAdjustment::begin() {
+void SimdAdjustment::begin() {
     x_.fill(start_.pattern.start);
     std::fill_n(x_.at(start_.pattern.problem.size()), lane_group, 0.0);
     centre_.fill(Eigen::VectorXd::Zero(start_.pattern.start.size()));
@@ -94,7 +94,7 @@ void LaneAdjustment::begin() {
     progress_.fill({});
 }
 
-void LaneAdjustment::step(const double* readings, std::size_t stride) {
+void SimdAdjustment::step(const double* readings, std::size_t stride) {
     const NormalEquations& equations = start_.pattern.solver.equations();
     bool is_valid[lane_group];
     model_.evaluate({x_.data(), readings, stride, s_.data(), r_.data(), dx_.data(), is_valid});
@@ -125,7 +125,7 @@ void LaneAdjustment::step(const double* readings, std::size_t stride) {
 }
 
 // The largest change of a value, in its standard uncertainty; NaN where one is.
-void LaneAdjustment::find_changes(double* largest) const {
+void SimdAdjustment::find_changes(double* largest) const {
     std::fill_n(largest, lane_group, 0.0);
     for (std::size_t e = 0; e < start_.pattern.forms.size(); ++e) {
         const LinearForm& form = start_.pattern.forms[e];
@@ -140,13 +140,13 @@ void LaneAdjustment::find_changes(double* largest) const {
 }
 
 // Of the residuals before the last step.
-void LaneAdjustment::find_square_sum(double* sum) const {
+void SimdAdjustment::find_square_sum(double* sum) const {
     std::fill_n(sum, lane_group, 0.0);
     for (std::size_t r = 0; r < start_.input.size(); ++r)
         for (std::size_t i = 0; i < lane_group; ++i) sum[i] += r_.at(Eigen::Index(r))[i] * r_.at(Eigen::Index(r))[i];
 }
 
-void LaneAdjustment::move() {
+void SimdAdjustment::move() {
     Lanes part;
     for (std::size_t i = 0; i < lane_group; ++i) part[i] = progress_[i].state == Progress::goes_on ? 1.0 : 0.0;
     for (Eigen::Index j = 0; j < start_.pattern.start.size(); ++j) {
@@ -157,13 +157,13 @@ void LaneAdjustment::move() {
 }
 
 // What is open is taken to be at 0 first, then where it came out (outlier_search.cpp).
-void LaneAdjustment::recentre(std::size_t lane) {
+void SimdAdjustment::recentre(std::size_t lane) {
     for (Eigen::Index j = 0; j < start_.pattern.start.size(); ++j) centre_.at(j)[lane] = x_.at(j)[lane];
     progress_[lane] = {};
     progress_[lane].recentred = true;
 }
 
-void LaneAdjustment::adjust(const double* readings, std::size_t stride, double* values, std::size_t value_stride) {
+void SimdAdjustment::adjust(const double* readings, std::size_t stride, double* values, std::size_t value_stride) {
     begin();
     const bool has_open = !start_.pattern.solver.dependent().empty();
     counts_.fill({0, false});
@@ -192,7 +192,7 @@ void LaneAdjustment::adjust(const double* readings, std::size_t stride, double* 
     put_values(values, value_stride);
 }
 
-void LaneAdjustment::adjust_in_one_step(const double* readings, std::size_t stride, double* values,
+void SimdAdjustment::adjust_in_one_step(const double* readings, std::size_t stride, double* values,
                                         std::size_t value_stride) {
     x_.fill(start_.pattern.start);
     std::fill_n(dx_.data(), lane_group * std::size_t(start_.pattern.start.size() + 1), 0.0);
@@ -209,7 +209,7 @@ void LaneAdjustment::adjust_in_one_step(const double* readings, std::size_t stri
     put_values(values, value_stride);
 }
 
-void LaneAdjustment::put_values(double* values, std::size_t value_stride) const {
+void SimdAdjustment::put_values(double* values, std::size_t value_stride) const {
     for (std::size_t e = 0; e < start_.pattern.forms.size(); ++e) {
         const LinearForm& form = start_.pattern.forms[e];
         Lanes value = {};
@@ -221,14 +221,14 @@ void LaneAdjustment::put_values(double* values, std::size_t value_stride) const 
     }
 }
 
-bool LaneAdjustment::has_all_readings(const double* readings, std::size_t stride, std::size_t lane) const {
+bool SimdAdjustment::has_all_readings(const double* readings, std::size_t stride, std::size_t lane) const {
     return std::all_of(start_.input.begin(), start_.input.end(), [&](std::ptrdiff_t input) {
         return std::isfinite(readings[std::size_t(input) * stride + lane]);
     });
 }
 
 // With derivatives and factor of its own at each step.
-void LaneAdjustment::adjust_in_full(const double* readings, std::size_t stride, std::size_t lane) {
+void SimdAdjustment::adjust_in_full(const double* readings, std::size_t stride, std::size_t lane) {
     if (!in_full_) in_full_ = std::make_unique<PreparedAdjustment>(start_.pattern);
     PreparedAdjustment& own = *in_full_;
     auto& list = own.problem.readings();

@@ -4,36 +4,36 @@
 #include <memory>
 #include <vector>
 
+#include "batch/prepared_adjustment.hpp"
 #include "batch/simd_model.hpp"
 #include "batch/simd_solver.hpp"
-#include "batch/prepared_adjustment.hpp"
 
 namespace stepdiag {
 
 // What is left of a solution, by the steps that led there, as a part of each value's standard uncertainty: converged.
-inline constexpr double lane_tolerance = 5e-5;
+inline constexpr double settled_tolerance = 5e-5;
 
 // What all threads read: the problem, its solution for the pattern's readings, derivatives and factor there.
-struct LaneStart {
+struct SimdStart {
     PreparedAdjustment pattern;
     std::vector<std::ptrdiff_t> input;         // by reading of the problem: which of a set's readings
     std::vector<double> weight;                // likewise: 1/u
     std::vector<double> value;                 // likewise: the pattern's
     std::vector<double> one_over_uncertainty;  // by value of the tables; 0 of those that are 0 by definition
-    LaneJacobian jacobian;
-    LaneFactor factor;
+    SimdJacobian jacobian;
+    SimdFactor factor;
 
-    LaneStart(const PreparedAdjustment& pattern, const std::vector<std::ptrdiff_t>& input,
+    SimdStart(const PreparedAdjustment& pattern, const std::vector<std::ptrdiff_t>& input,
               const std::vector<double>& standard_uncertainty);
 };
 
 // d value / d reading at the start, readings being those of a set: values x readings, from the normal equations.
-Eigen::MatrixXd lane_gain(const LaneStart& start, std::size_t readings);
+Eigen::MatrixXd simd_gain(const SimdStart& start, std::size_t readings);
 
 // Unknowns or readings of lane_group lanes, [index * lane_group + lane].
-class LaneNumbers {
+class SimdNumbers {
 public:
-    explicit LaneNumbers(Eigen::Index count) : numbers_(count * Eigen::Index(lane_group)) {}
+    explicit SimdNumbers(Eigen::Index count) : numbers_(count * Eigen::Index(lane_group)) {}
     double* data() { return numbers_.data(); }
     const double* data() const { return numbers_.data(); }
     double* at(Eigen::Index index) { return numbers_.data() + index * Eigen::Index(lane_group); }
@@ -51,9 +51,9 @@ private:
 //   s + ds = r(x) - J0 dx,   J(x)^T s + J0^T ds - P (x + dx) = 0
 //   => N0 dx = J0^T (r(x) - s) + J(x)^T s - P x,   s := r(x) - J0 dx,
 // which is at rest where J(x)^T r(x) = P x: at the adjustment's own solution, by a factor of (J - J0)/J0 a step.
-class LaneAdjustment {
+class SimdAdjustment {
 public:
-    explicit LaneAdjustment(const LaneStart& start);
+    explicit SimdAdjustment(const SimdStart& start);
 
     // Of lane_group sets, readings[input * stride + lane]: values[value * value_stride + lane]; NaN where a reading is
     // no number or no solution is found.
@@ -90,10 +90,10 @@ private:
     bool has_all_readings(const double* readings, std::size_t stride, std::size_t lane) const;
     void adjust_in_full(const double* readings, std::size_t stride, std::size_t lane);
 
-    const LaneStart& start_;
-    LaneModel model_;
+    const SimdStart& start_;
+    SimdModel model_;
     std::unique_ptr<PreparedAdjustment> in_full_;  // made where it is needed first
-    LaneNumbers x_, dx_, centre_, s_, r_, difference_;
+    SimdNumbers x_, dx_, centre_, s_, r_, difference_;
     std::array<Progress, lane_group> progress_;
     std::array<Count, lane_group> counts_;
 };

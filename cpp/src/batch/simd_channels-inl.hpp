@@ -1,10 +1,10 @@
 // A point's channels from its length and tilts, and forces on them back again, with a lane for each set of readings
-// (lane_model.hpp). After lane_rotation-inl.hpp.
-#if defined(STEPDIAG_LANE_CHANNELS_INL) == defined(HWY_TARGET_TOGGLE)
-#ifdef STEPDIAG_LANE_CHANNELS_INL
-#undef STEPDIAG_LANE_CHANNELS_INL
+// (simd_model.hpp). After simd_rotation-inl.hpp.
+#if defined(STEPDIAG_SIMD_CHANNELS_INL) == defined(HWY_TARGET_TOGGLE)
+#ifdef STEPDIAG_SIMD_CHANNELS_INL
+#undef STEPDIAG_SIMD_CHANNELS_INL
 #else
-#define STEPDIAG_LANE_CHANNELS_INL
+#define STEPDIAG_SIMD_CHANNELS_INL
 #endif
 
 #include "batch/simd_model.hpp"
@@ -28,8 +28,8 @@ enum SetupPart : int {
 
 // One vector of lanes of one problem: where its numbers are.
 struct Chunk {
-    const LaneProblem& problem;
-    const LaneModel::At& at;
+    const SimdProblem& problem;
+    const SimdModel::At& at;
     std::size_t lane;
     double* nodes;
     double* setups;
@@ -45,7 +45,7 @@ struct Chunk {
         hn::StoreU(hn::Add(hn::LoadU(Tag(), to), force), Tag(), to);
     }
     // Puts the residual of a channel that the model says reads `value`; gives the force of its s.
-    HWY_INLINE Vector force(const LaneProblem::Channel& channel, Vector value) const {
+    HWY_INLINE Vector force(const SimdProblem::Channel& channel, Vector value) const {
         const Vector read = hn::LoadU(Tag(), at.readings + std::size_t(channel.input) * at.stride + lane);
         const Vector weight = hn::Set(Tag(), channel.weight);
         hn::StoreU(hn::Mul(weight, hn::Sub(read, value)), Tag(), at.r + place(channel.reading));
@@ -80,7 +80,7 @@ struct Tilt {
 // The channels of a point (ChannelModel::read_channels) and back again.
 class Channels {
 public:
-    HWY_INLINE Channels(const Chunk& chunk, const LaneProblem::Point& point, double* setup, Tilt& tilt)
+    HWY_INLINE Channels(const Chunk& chunk, const SimdProblem::Point& point, double* setup, Tilt& tilt)
         : chunk_(chunk), point_(point), setup_(setup), pulls_(setup_columns + chunk.problem.setup_size), tilt_(tilt) {
         const Vector one = hn::Set(Tag(), 1.0);
         w_ = hn::NegMulAdd(tilt.alpha, tilt.alpha, hn::NegMulAdd(tilt.beta, tilt.beta, one));
@@ -92,7 +92,7 @@ public:
     }
 
     // `beam`: number of d1 ... dn, from 0.
-    HWY_INLINE void pull_distance(const LaneProblem::Channel& channel, const Eigen::Vector2d& offset, int beam) {
+    HWY_INLINE void pull_distance(const SimdProblem::Channel& channel, const Eigen::Vector2d& offset, int beam) {
         const Vector x = hn::Set(Tag(), offset.x()), y = hn::Set(Tag(), offset.y());
         const Vector arm = hn::MulSub(tilt_.alpha, y, hn::Mul(tilt_.beta, x));
         const Vector q = hn::Mul(hn::MulAdd(scale_, arm, tilt_.length), inverse_w_);
@@ -110,14 +110,14 @@ public:
         if (beam > 0) pull(setup::beam_constants + beam - 1, force);
     }
 
-    HWY_INLINE void pull_tilt(const LaneProblem::Channel& channel, Vector tilt, Vector& tilt_pull) {
+    HWY_INLINE void pull_tilt(const SimdProblem::Channel& channel, Vector tilt, Vector& tilt_pull) {
         const Vector force = chunk_.force(channel, hn::Mul(scale_, tilt));
         tilt_pull = hn::MulAdd(force, scale_, tilt_pull);
         pull(setup::gain, hn::Mul(force, tilt));
     }
 
     // spot = scale lever (-beta, alpha) + zero, lever = 2 beyond/w
-    HWY_INLINE void pull_spot(const LaneProblem::Channel* x, const LaneProblem::Channel* y,
+    HWY_INLINE void pull_spot(const SimdProblem::Channel* x, const SimdProblem::Channel* y,
                               const HeadCalibration& head) {
         const Vector bx = hn::Set(Tag(), head.spot_beam.x()), by = hn::Set(Tag(), head.spot_beam.y());
         const Vector arm = hn::MulSub(tilt_.alpha, by, hn::Mul(tilt_.beta, bx));
@@ -147,18 +147,18 @@ private:
     HWY_INLINE void pull(int column, Vector force) { add(setup_, pulls_ + column, force); }
 
     const Chunk& chunk_;
-    const LaneProblem::Point& point_;
+    const SimdProblem::Point& point_;
     double* setup_;
     int pulls_;
     Tilt& tilt_;
     Vector w_, inverse_w_, scale_, constant_;
 };
 
-HWY_INLINE void pull_channels(const Chunk& chunk, const LaneProblem::Point& point, double* setup, Tilt& tilt) {
+HWY_INLINE void pull_channels(const Chunk& chunk, const SimdProblem::Point& point, double* setup, Tilt& tilt) {
     Channels channels(chunk, point, setup, tilt);
-    const LaneProblem::Channel* of = chunk.problem.of_points.data() + point.first_channel;
+    const SimdProblem::Channel* of = chunk.problem.of_points.data() + point.first_channel;
     const HeadCalibration& head = *chunk.problem.setups[point.setup].head;
-    const auto there = [&](int i) { return of[i].reading != LaneProblem::no_reading; };
+    const auto there = [&](int i) { return of[i].reading != SimdProblem::no_reading; };
     if (chunk.problem.kind == ChannelKind::multi_beam) {
         for (int i = 0; i < chunk.problem.channels; ++i)
             if (there(i)) channels.pull_distance(of[i], head.beam_offsets[i], i);

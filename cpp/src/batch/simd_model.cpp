@@ -22,7 +22,7 @@ namespace HWY_NAMESPACE {
 
 void prepare_nodes(Chunk& chunk) {
     for (std::size_t n = 0; n < chunk.problem.nodes.size(); ++n) {
-        const LaneProblem::Node& node = chunk.problem.nodes[n];
+        const SimdProblem::Node& node = chunk.problem.nodes[n];
         const auto unknown = [&](int c) HWY_ATTR { return chunk.unknown(node.unknown[c]); };
         const Vector3 turn{unknown(3), unknown(4), unknown(5)};
         const Vector angle2 = dot(turn, turn);
@@ -48,7 +48,7 @@ HWY_INLINE SetupAngles angles_of(const double* from) {
 
 void prepare_setups(Chunk& chunk) {
     for (std::size_t s = 0; s < chunk.problem.setups.size(); ++s) {
-        const LaneProblem::Setup& setup = chunk.problem.setups[s];
+        const SimdProblem::Setup& setup = chunk.problem.setups[s];
         double* to = chunk.setup(int(s));
         for (int c = 0; c < chunk.problem.setup_size; ++c) {
             const bool there = c < int(setup.unknown.size());
@@ -77,7 +77,7 @@ struct MirrorPull {
 };
 
 // From the mirror's pose to the readings and back (ChannelModel::read).
-HWY_INLINE MirrorPull pull_mirror(const Chunk& chunk, const LaneProblem::Point& point, const Vector3& position,
+HWY_INLINE MirrorPull pull_mirror(const Chunk& chunk, const SimdProblem::Point& point, const Vector3& position,
                                   const Vector3& normal) {
     double* setup = chunk.setup(point.setup);
     const Matrix3 machine_R_sensor = part9(setup, sensor);
@@ -105,8 +105,8 @@ HWY_INLINE MirrorPull pull_mirror(const Chunk& chunk, const LaneProblem::Point& 
 }
 
 // Through the chain from the tool to the workpiece, and the forces back to the tool.
-HWY_INLINE void pull_point(const Chunk& chunk, const LaneProblem::Point& point) {
-    const LaneProblem& problem = chunk.problem;
+HWY_INLINE void pull_point(const Chunk& chunk, const SimdProblem::Point& point) {
+    const SimdProblem& problem = chunk.problem;
     double* setup = chunk.setup(point.setup);
     Vector3 position = common3(problem.tool.data());
     Vector3 normal = part3(setup, mirror_normal);
@@ -149,7 +149,7 @@ void finish_nodes(const Chunk& chunk) {
 
 void finish_setups(const Chunk& chunk) {
     for (std::size_t s = 0; s < chunk.problem.setups.size(); ++s) {
-        const LaneProblem::Setup& setup = chunk.problem.setups[s];
+        const SimdProblem::Setup& setup = chunk.problem.setups[s];
         double* at = chunk.setup(int(s));
         const int pulls = setup_columns + chunk.problem.setup_size;
         const SetupAngles angles = angles_of(at);
@@ -174,14 +174,14 @@ void finish_setups(const Chunk& chunk) {
     }
 }
 
-void evaluate_lanes(const LaneProblem& problem, const LaneModel::At& at, double* scratch) {
+void evaluate_lanes(const SimdProblem& problem, const SimdModel::At& at, double* scratch) {
     const std::size_t width = hn::Lanes(Tag());
     double* const setups = scratch + problem.nodes.size() * node_parts * width;
     for (std::size_t lane = 0; lane < lane_group; lane += width) {
         Chunk chunk{problem, at, lane, scratch, setups, hn::Zero(Tag())};
         prepare_nodes(chunk);
         prepare_setups(chunk);
-        for (const LaneProblem::Point& point : problem.points) pull_point(chunk, point);
+        for (const SimdProblem::Point& point : problem.points) pull_point(chunk, point);
         finish_nodes(chunk);
         finish_setups(chunk);
         double largest[widest_vector];
@@ -190,7 +190,7 @@ void evaluate_lanes(const LaneProblem& problem, const LaneModel::At& at, double*
     }
 }
 
-std::size_t scratch_numbers(const LaneProblem& problem) {
+std::size_t scratch_numbers(const SimdProblem& problem) {
     return hn::Lanes(Tag()) *
            (problem.nodes.size() * node_parts + problem.setups.size() * (setup_columns + 2 * problem.setup_size));
 }
@@ -208,7 +208,7 @@ HWY_EXPORT(scratch_numbers);
 
 }  // namespace
 
-LaneProblem::LaneProblem(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input)
+SimdProblem::SimdProblem(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input)
     : kind(ChannelKind::ideal), unknowns(problem.size()), channels(0), tool(problem.tool()), setup_size(0) {
     const auto place = [&](int unknown) { return unknown == no_unknown ? unknowns : unknown; };
     for (const LineSetup& setup : problem.setups()) {
@@ -243,10 +243,10 @@ LaneProblem::LaneProblem(const AdjustmentProblem& problem, const std::vector<std
     }
 }
 
-LaneModel::LaneModel(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input)
+SimdModel::SimdModel(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input)
     : problem_(problem, input), scratch_(std::ptrdiff_t(HWY_DYNAMIC_DISPATCH(scratch_numbers)(problem_))) {}
 
-void LaneModel::evaluate(const At& at) {
+void SimdModel::evaluate(const At& at) {
     std::fill_n(at.pulled, lane_group * std::size_t(problem_.unknowns + 1), 0.0);
     HWY_DYNAMIC_DISPATCH(evaluate_lanes)(problem_, at, scratch_.data());
 }

@@ -17,7 +17,7 @@ namespace stepdiag {
 // Numbers of lanes stand as number[index * lane_group + lane]. After the last unknown there is one more place: 0 in x,
 // and without meaning in a gradient. It stands for what is not unknown.
 // The problem as plain numbers.
-struct LaneProblem {
+struct SimdProblem {
     struct Channel {
         int reading;           // of the adjustment's problem; no_reading where the pattern has none
         std::ptrdiff_t input;  // which of a set's readings
@@ -53,12 +53,12 @@ struct LaneProblem {
     int setup_size;  // the largest
 
     // `input`: by reading of the problem, which of a set's readings it is. The problem must live as long.
-    LaneProblem(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input);
+    SimdProblem(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input);
 };
 
-class LaneModel {
+class SimdModel {
 public:
-    LaneModel(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input);
+    SimdModel(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input);
 
     // Numbers by reading of the problem: [reading * lane_group + lane]; a set's readings: readings[input * stride +
     // lane]. Gives r, and J(x)^T s in `pulled`. `is_valid`: by lane, false where a rotation is too large for the series
@@ -75,7 +75,7 @@ public:
     void evaluate(const At& at);
 
 private:
-    LaneProblem problem_;
+    SimdProblem problem_;
     AlignedNumbers scratch_;
 };
 

@@ -1,4 +1,5 @@
 #include "batch/simd_reduction.hpp"
+
 #include "batch/batch_method.hpp"
 #include "evaluation/linear_evaluation.hpp"
 #include "evaluation/measurement_rows.hpp"
@@ -154,9 +155,9 @@ private:
 
 }  // namespace
 
-LaneReduction::Lost reduce_lanes(const LaneReduction& reduction, const double* readings, std::size_t stride,
+SimdReduction::Lost reduce_lanes(const SimdReduction& reduction, const double* readings, std::size_t stride,
                                  double* inputs) {
-    LaneReduction::Lost lost;
+    SimdReduction::Lost lost;
     for (std::size_t lane = 0; lane < program_lanes; lane += 2 * hn::Lanes(Tag())) {
         Reducer reducer(readings + lane, stride, inputs + lane);
         const std::uint32_t* raws = reduction.raws();
@@ -183,7 +184,7 @@ HWY_EXPORT(reduce_lanes);
 
 }  // namespace
 
-LaneReduction::Lost LaneReduction::reduce(const double* readings, std::size_t stride, double* inputs) const {
+SimdReduction::Lost SimdReduction::reduce(const double* readings, std::size_t stride, double* inputs) const {
     return HWY_DYNAMIC_DISPATCH(reduce_lanes)(*this, readings, stride, inputs);
 }
 
@@ -210,7 +211,7 @@ private:
     std::vector<int> signals_;
 };
 
-// Raw channels of one row as visits.cpp takes them; `raws` empty where the reading is lost.
+// Raw channels of one row as passes.cpp takes them; `raws` empty where the reading is lost.
 struct TakenRow {
     ReducedRow::Kind kind = ReducedRow::distance;
     std::vector<std::uint32_t> raws = {};
@@ -249,25 +250,25 @@ TakenRow take_row(const Measurement& pattern, const RawPlaces& places, std::size
 
 }  // namespace
 
-LaneReduction::LaneReduction(const Measurement& pattern, const HeadCalibrations& heads,
-                             const std::vector<Visit>& visits, LengthKind kind) {
+SimdReduction::SimdReduction(const Measurement& pattern, const HeadCalibrations& heads, const std::vector<Pass>& passes,
+                             LengthKind kind) {
     const RawPlaces places(pattern);
-    const auto rows = rows_by_visit(pattern);
+    const auto rows = rows_by_pass(pattern);
     auto members = rows.begin();
-    for (const Visit& visit : visits) {
+    for (const Pass& pass : passes) {
         for (const std::size_t row : (members++)->second) {
             const int number = pattern.stations()[row].point;
-            const VisitPoint& point = visit.points[number];
-            const HeadCalibration& head = heads.of(visit.line.name());
+            const PassPoint& point = pass.points[number];
+            const HeadCalibration& head = heads.of(pass.line.name());
             const TakenRow taken = take_row(pattern, places, row, head, kind);
             if (taken.raws.empty() || (taken.kind == ReducedRow::distance && !point.has_length)) continue;
             ReducedRow reduced{};
             reduced.kind = taken.kind;
             reduced.raws = std::uint32_t(taken.raws.size());
-            reduced.place = std::uint32_t(values_per_reading * (visit.first_reading + number));
+            reduced.place = std::uint32_t(values_per_reading * (pass.first_reading + number));
             reduced.by_distance_alone = kind == LengthKind::distance;
             reduced.lateral_x = point.lateral.x(), reduced.lateral_y = point.lateral.y();
-            reduced.travel = visit.direction().dot(point.plan.commanded - visit.points.front().plan.commanded);
+            reduced.travel = pass.direction().dot(point.plan.commanded - pass.points.front().plan.commanded);
             reduced.psd_distance = head.psd_distance.value_or(0.0);
             reduced.spot_beam_x = head.spot_beam.x(), reduced.spot_beam_y = head.spot_beam.y();
             reduced.is_beside = !head.spot_beam.isZero(0.0);

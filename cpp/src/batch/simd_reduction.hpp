@@ -1,4 +1,4 @@
-// The reduction of raw channels to lengths and tilts (visits.cpp, measurement/reading.cpp) for many sets of readings of
+// The reduction of raw channels to lengths and tilts (passes.cpp, measurement/reading.cpp) for many sets of readings of
 // one pattern, a set a lane. Internal.
 #pragma once
 
@@ -23,10 +23,10 @@ struct ReducedRow {
     bool is_beside;  // the beam that makes the spot, beside the axis
 };
 
-class LaneReduction {
+class SimdReduction {
 public:
-    // Rows and channels are those of `pattern`, from which `visits` were collected.
-    LaneReduction(const Measurement& pattern, const HeadCalibrations& heads, const std::vector<Visit>& visits,
+    // Rows and channels are those of `pattern`, from which `passes` were collected.
+    SimdReduction(const Measurement& pattern, const HeadCalibrations& heads, const std::vector<Pass>& passes,
                   LengthKind kind);
 
     // program_lanes sets, from readings[raw * stride + lane] to inputs[place * program_lanes + lane]. `lost`: the lanes

@@ -1,9 +1,9 @@
 // Vectors of space and small rotations with a lane for each set of readings.
-#if defined(STEPDIAG_LANE_ROTATION_INL) == defined(HWY_TARGET_TOGGLE)
-#ifdef STEPDIAG_LANE_ROTATION_INL
-#undef STEPDIAG_LANE_ROTATION_INL
+#if defined(STEPDIAG_SIMD_ROTATION_INL) == defined(HWY_TARGET_TOGGLE)
+#ifdef STEPDIAG_SIMD_ROTATION_INL
+#undef STEPDIAG_SIMD_ROTATION_INL
 #else
-#define STEPDIAG_LANE_ROTATION_INL
+#define STEPDIAG_SIMD_ROTATION_INL
 #endif
 
 #include <hwy/highway.h>

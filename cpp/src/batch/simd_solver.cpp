@@ -51,7 +51,7 @@ HWY_INLINE void scale(double factor, Pair& x) {
 HWY_INLINE std::size_t pair_lanes() { return 2 * hn::Lanes(Tag()); }
 
 template <int Rows>
-HWY_INLINE void add_transposed_bundle(const LaneJacobian::Numbers& jacobian, const LaneJacobian::Bundle& bundle,
+HWY_INLINE void add_transposed_bundle(const SimdJacobian::Numbers& jacobian, const SimdJacobian::Bundle& bundle,
                                       const double* readings, double* unknowns) {
     Pair force[Rows];
     for (int i = 0; i < Rows; ++i) force[i] = load(readings + lane_group * std::size_t(bundle.first_reading + i));
@@ -66,7 +66,7 @@ HWY_INLINE void add_transposed_bundle(const LaneJacobian::Numbers& jacobian, con
 }
 
 template <int Rows>
-HWY_INLINE void multiply_bundle(const LaneJacobian::Numbers& jacobian, const LaneJacobian::Bundle& bundle,
+HWY_INLINE void multiply_bundle(const SimdJacobian::Numbers& jacobian, const SimdJacobian::Bundle& bundle,
                                 const double* unknowns, double* readings) {
     Pair sum[Rows];
     for (int i = 0; i < Rows; ++i) sum[i] = {hn::Zero(Tag()), hn::Zero(Tag())};
@@ -79,18 +79,18 @@ HWY_INLINE void multiply_bundle(const LaneJacobian::Numbers& jacobian, const Lan
     for (int i = 0; i < Rows; ++i) store(sum[i], readings + lane_group * std::size_t(bundle.first_reading + i));
 }
 
-void add_transposed(const LaneJacobian::Numbers& jacobian, const double* readings, double* unknowns) {
+void add_transposed(const SimdJacobian::Numbers& jacobian, const double* readings, double* unknowns) {
     for (std::size_t lane = 0; lane < lane_group; lane += pair_lanes())
-        for (const LaneJacobian::Bundle& bundle : jacobian.bundles) {
+        for (const SimdJacobian::Bundle& bundle : jacobian.bundles) {
             if (bundle.rows == 3) add_transposed_bundle<3>(jacobian, bundle, readings + lane, unknowns + lane);
             else if (bundle.rows == 2) add_transposed_bundle<2>(jacobian, bundle, readings + lane, unknowns + lane);
             else add_transposed_bundle<1>(jacobian, bundle, readings + lane, unknowns + lane);
         }
 }
 
-void multiply(const LaneJacobian::Numbers& jacobian, const double* unknowns, double* readings) {
+void multiply(const SimdJacobian::Numbers& jacobian, const double* unknowns, double* readings) {
     for (std::size_t lane = 0; lane < lane_group; lane += pair_lanes())
-        for (const LaneJacobian::Bundle& bundle : jacobian.bundles) {
+        for (const SimdJacobian::Bundle& bundle : jacobian.bundles) {
             if (bundle.rows == 3) multiply_bundle<3>(jacobian, bundle, unknowns + lane, readings + lane);
             else if (bundle.rows == 2) multiply_bundle<2>(jacobian, bundle, unknowns + lane, readings + lane);
             else multiply_bundle<1>(jacobian, bundle, unknowns + lane, readings + lane);
@@ -116,7 +116,7 @@ HWY_INLINE const double* collect(const double* l, int rows, const double* y, Pai
     return l;
 }
 
-void solve_corner(const LaneFactor::Numbers& factor, double* border) {
+void solve_corner(const SimdFactor::Numbers& factor, double* border) {
     const int rank = int(factor.corner_order.size());
     std::vector<double> numbers(2 * lane_group * std::size_t(rank));  // no more than a pair of the widest vectors each
     const std::size_t width = pair_lanes();
@@ -140,7 +140,7 @@ void solve_corner(const LaneFactor::Numbers& factor, double* border) {
     for (int i = 0; i < rank; ++i) store(load(at(i)), border + lane_group * std::size_t(factor.corner_order[i]));
 }
 
-void solve_pair(const LaneFactor::Numbers& factor, double* x) {
+void solve_pair(const SimdFactor::Numbers& factor, double* x) {
     const int blocks = int(factor.rows.size());
     const auto block = [&](int column) { return x + lane_group * std::size_t(six * column); };
     double* border = block(blocks);
@@ -171,7 +171,7 @@ void solve_pair(const LaneFactor::Numbers& factor, double* x) {
     }
 }
 
-void solve(const LaneFactor::Numbers& factor, double* x) {
+void solve(const SimdFactor::Numbers& factor, double* x) {
     for (std::size_t lane = 0; lane < lane_group; lane += pair_lanes()) solve_pair(factor, x + lane);
 }
 
@@ -189,7 +189,7 @@ HWY_EXPORT(solve);
 
 }  // namespace
 
-LaneJacobian::LaneJacobian(const NormalEquations& equations) {
+SimdJacobian::SimdJacobian(const NormalEquations& equations) {
     for (const AdjustedPoint& point : equations.problem().points())
         for (int first = point.first_reading; first < point.end_reading; first += most_rows) {
             const int rows = std::min(most_rows, point.end_reading - first);
@@ -206,7 +206,7 @@ LaneJacobian::LaneJacobian(const NormalEquations& equations) {
         }
 }
 
-LaneFactor::LaneFactor(const BorderedFactor& factor) {
+SimdFactor::SimdFactor(const BorderedFactor& factor) {
     constexpr int six = BorderedBand::block_size;
     const BorderedBand& l = factor.band();
     numbers_.border = l.border();
@@ -224,15 +224,15 @@ LaneFactor::LaneFactor(const BorderedFactor& factor) {
         for (int i = 0; i < corner.rows(); ++i) numbers_.corner.push_back(i == k ? 1.0 / corner(i, k) : corner(i, k));
 }
 
-void LaneJacobian::add_transposed(const double* readings, double* unknowns) const {
+void SimdJacobian::add_transposed(const double* readings, double* unknowns) const {
     HWY_DYNAMIC_DISPATCH(add_transposed)(numbers_, readings, unknowns);
 }
 
-void LaneJacobian::multiply(const double* unknowns, double* readings) const {
+void SimdJacobian::multiply(const double* unknowns, double* readings) const {
     HWY_DYNAMIC_DISPATCH(multiply)(numbers_, unknowns, readings);
 }
 
-void LaneFactor::solve(double* right_hand_side) const { HWY_DYNAMIC_DISPATCH(solve)(numbers_, right_hand_side); }
+void SimdFactor::solve(double* right_hand_side) const { HWY_DYNAMIC_DISPATCH(solve)(numbers_, right_hand_side); }
 
 }  // namespace stepdiag
 #endif  // HWY_ONCE

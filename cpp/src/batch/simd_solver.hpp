@@ -1,4 +1,4 @@
-// The adjustment's linear algebra for many right-hand sides at once, one a lane (lane_model.hpp), with derivatives and
+// The adjustment's linear algebra for many right-hand sides at once, one a lane (simd_model.hpp), with derivatives and
 // factor as they are at one place. Internal: not installed.
 #pragma once
 
@@ -9,9 +9,9 @@
 namespace stepdiag {
 
 // J, the derivatives of all weighted readings.
-class LaneJacobian {
+class SimdJacobian {
 public:
-    explicit LaneJacobian(const NormalEquations& equations);
+    explicit SimdJacobian(const NormalEquations& equations);
 
     void add_transposed(const double* readings, double* unknowns) const;  // unknowns += J^T readings
     void multiply(const double* unknowns, double* readings) const;        // readings = J unknowns
@@ -35,9 +35,9 @@ private:
 };
 
 // L of N = L L^T, in the order in which it is read.
-class LaneFactor {
+class SimdFactor {
 public:
-    explicit LaneFactor(const BorderedFactor& factor);
+    explicit SimdFactor(const BorderedFactor& factor);
 
     void solve(double* right_hand_side) const;  // in place; held unknowns are 0
 

@@ -3,8 +3,8 @@
 #include <limits>
 
 #include "bindings.hpp"
-#include "stepdiag/monte_carlo/function_model.hpp"
 #include "stepdiag/monte_carlo/adaptive_procedure.hpp"
+#include "stepdiag/monte_carlo/function_model.hpp"
 #include "stepdiag/monte_carlo/monte_carlo.hpp"
 
 namespace stepdiag::bindings {

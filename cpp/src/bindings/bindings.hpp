@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "stepdiag/core/error.hpp"
 #include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/core/error.hpp"
 #include "stepdiag/machine/chain.hpp"
 #include "stepdiag/optics/body.hpp"
 #include "stepdiag/simulation/simulate.hpp"

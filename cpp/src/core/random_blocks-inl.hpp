@@ -1,9 +1,9 @@
-// Random numbers of many samples at once, for loops over vectors of lanes: see stepdiag/core/random_lanes.hpp.
-#if defined(STEPDIAG_RANDOM_LANES_INL) == defined(HWY_TARGET_TOGGLE)
-#ifdef STEPDIAG_RANDOM_LANES_INL
-#undef STEPDIAG_RANDOM_LANES_INL
+// Random numbers of many samples at once, for loops over vectors of lanes: see stepdiag/core/random_blocks.hpp.
+#if defined(STEPDIAG_RANDOM_BLOCKS_INL) == defined(HWY_TARGET_TOGGLE)
+#ifdef STEPDIAG_RANDOM_BLOCKS_INL
+#undef STEPDIAG_RANDOM_BLOCKS_INL
 #else
-#define STEPDIAG_RANDOM_LANES_INL
+#define STEPDIAG_RANDOM_BLOCKS_INL
 #endif
 
 #include <cstdint>

@@ -19,7 +19,7 @@ namespace stepdiag {
 namespace HWY_NAMESPACE {
 
 template <class Numbers>
-STEPDIAG_INLINE void fill(const RandomLanes& lanes, std::size_t items, double* out, Numbers numbers) {
+STEPDIAG_INLINE void fill(const RandomBlocks& lanes, std::size_t items, double* out, Numbers numbers) {
     const WordTag words;
     const std::size_t width = hn::Lanes(words);
     const RoundKeys keys(lanes.seed);
@@ -35,11 +35,11 @@ STEPDIAG_INLINE void fill(const RandomLanes& lanes, std::size_t items, double* o
         }
 }
 
-void fill_uniform_lanes(const RandomLanes& lanes, std::size_t items, double* out) {
+void fill_uniform_lanes(const RandomBlocks& lanes, std::size_t items, double* out) {
     fill(lanes, items, out, [](const auto&... block) HWY_ATTR { return uniform_lanes(block...); });
 }
 
-void fill_normal_lanes(const RandomLanes& lanes, std::size_t items, double* out) {
+void fill_normal_lanes(const RandomBlocks& lanes, std::size_t items, double* out) {
     fill(lanes, items, out, [](const auto&... block) HWY_ATTR { return normal_lanes(block...); });
 }
 
@@ -56,11 +56,11 @@ HWY_EXPORT(fill_normal_lanes);
 
 }  // namespace
 
-void fill_uniform(const RandomLanes& lanes, std::size_t items, double* out) {
+void fill_uniform(const RandomBlocks& lanes, std::size_t items, double* out) {
     HWY_DYNAMIC_DISPATCH(fill_uniform_lanes)(lanes, items, out);
 }
 
-void fill_normal(const RandomLanes& lanes, std::size_t items, double* out) {
+void fill_normal(const RandomBlocks& lanes, std::size_t items, double* out) {
     HWY_DYNAMIC_DISPATCH(fill_normal_lanes)(lanes, items, out);
 }
 

@@ -1,9 +1,9 @@
 // Vectors of lanes as a number type, two at a time.
-#if defined(STEPDIAG_LANES_INL) == defined(HWY_TARGET_TOGGLE)
-#ifdef STEPDIAG_LANES_INL
-#undef STEPDIAG_LANES_INL
+#if defined(STEPDIAG_SIMD_INL) == defined(HWY_TARGET_TOGGLE)
+#ifdef STEPDIAG_SIMD_INL
+#undef STEPDIAG_SIMD_INL
 #else
-#define STEPDIAG_LANES_INL
+#define STEPDIAG_SIMD_INL
 #endif
 
 #include <hwy/highway.h>

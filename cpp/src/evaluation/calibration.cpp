@@ -68,7 +68,8 @@ std::vector<CalibrationEntry> calibration_entries(const Calibration& calibration
         if (const auto& function = calibration.functions[i])
             for (const double position : function->position) entries.push_back({FunctionId::at(i).name(), position});
     for (const Squareness s : all_squarenesses)
-        if (calibration.squarenesses[static_cast<int>(s)]) entries.push_back({name(s), std::numeric_limits<double>::quiet_NaN()});
+        if (calibration.squarenesses[static_cast<int>(s)])
+            entries.push_back({name(s), std::numeric_limits<double>::quiet_NaN()});
     return entries;
 }
 

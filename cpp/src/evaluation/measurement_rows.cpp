@@ -32,7 +32,7 @@ std::optional<RawValue> raw_value(const Channel* channel, std::size_t row, doubl
     return RawValue{*channel->value[row], own.value_or(usual_uncertainty)};
 }
 
-std::map<std::pair<int, std::string>, std::vector<std::size_t>> rows_by_visit(const Measurement& measurement) {
+std::map<std::pair<int, std::string>, std::vector<std::size_t>> rows_by_pass(const Measurement& measurement) {
     std::map<std::pair<int, std::string>, std::vector<std::size_t>> rows;
     for (std::size_t i = 0; i < measurement.size(); ++i)
         rows[{measurement.stations()[i].run, measurement.stations()[i].line.name()}].push_back(i);

@@ -20,8 +20,8 @@ struct RawValue {
 };
 std::optional<RawValue> raw_value(const Channel* channel, std::size_t row, double usual_uncertainty);
 
-// The rows of each visit, a run's line, by run and line.
-std::map<std::pair<int, std::string>, std::vector<std::size_t>> rows_by_visit(const Measurement& measurement);
+// The rows of each pass, a run's line, by run and line.
+std::map<std::pair<int, std::string>, std::vector<std::size_t>> rows_by_pass(const Measurement& measurement);
 
 // These throw InvalidArgument: for uncertainties that are not positive; for channels that do not fit the heads; naming
 // the row, for a line or point that is not the plan's, or a commanded position more than 1 um off the plan's.

@@ -124,7 +124,7 @@ private:
 // Length and tilts of a point from the reduced reading. The length is linear in the parameters only after the product
 // of tilt and lever arm is taken off: L = q_z + beta q_x - alpha q_y with q the vector from beam origin to functional
 // point.
-void fill_point(VisitPoint& point, const Reduced& reduced, double travel, bool is_scale_line, LengthKind kind) {
+void fill_point(PassPoint& point, const Reduced& reduced, double travel, bool is_scale_line, LengthKind kind) {
     const Reading& reading = reduced.reading;
     point.has_tilt = reduced.has_tilt;
     // A scale line runs along its own beam: no lever arm, so that it needs no tilts.
@@ -146,49 +146,49 @@ void fill_point(VisitPoint& point, const Reduced& reduced, double travel, bool i
 
 }  // namespace
 
-Eigen::Vector3d VisitPoint::variance() const {
+Eigen::Vector3d PassPoint::variance() const {
     Eigen::Vector3d variance = Eigen::Vector3d::Zero();
     for (const auto& effect : effects) variance += effect.cwiseAbs2();
     return variance;
 }
 
-std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& plan, const HeadCalibrations& heads,
-                                  const ReadingUncertainty& uncertainty, LengthKind kind) {
+std::vector<Pass> collect_passes(const Measurement& measurement, const Plan& plan, const HeadCalibrations& heads,
+                                 const ReadingUncertainty& uncertainty, LengthKind kind) {
     check_uncertainty(uncertainty);
     const Reducer reducer(measurement, heads, uncertainty, kind);
-    const auto rows = rows_by_visit(measurement);
+    const auto rows = rows_by_pass(measurement);
 
-    std::vector<Visit> visits;
+    std::vector<Pass> passes;
     int readings = 0;
     for (const auto& entry : rows) {
         const std::vector<std::size_t>& members = entry.second;
         const Line line = measurement.stations()[members.front()].line;
         const auto planned = planned_points(measurement, members.front(), plan);
-        Visit visit{line, plan.is_scale_line(line), plan.frame(line), {}, readings};
-        for (const PlanPoint& point : planned) visit.points.emplace_back().plan = point;
+        Pass pass{line, plan.is_scale_line(line), plan.frame(line), {}, readings};
+        for (const PlanPoint& point : planned) pass.points.emplace_back().plan = point;
         const Eigen::Vector3d start = planned.front().commanded;
         for (const std::size_t row : members) {
             const Station& station = measurement.stations()[row];
             check_station(measurement, row, planned);
-            VisitPoint& point = visit.points[station.point];
+            PassPoint& point = pass.points[station.point];
             // The file's position only finds the point: it may have been rounded when it was written.
-            const Eigen::Vector3d travel = visit.frame.transpose() * (planned[station.point].commanded - start);
+            const Eigen::Vector3d travel = pass.frame.transpose() * (planned[station.point].commanded - start);
             point.lateral = travel.head<2>();
-            fill_point(point, reducer.reduce(row), travel.z(), visit.is_scale_line, kind);
+            fill_point(point, reducer.reduce(row), travel.z(), pass.is_scale_line, kind);
         }
-        readings += int(visit.points.size());
-        visits.push_back(std::move(visit));
+        readings += int(pass.points.size());
+        passes.push_back(std::move(pass));
     }
-    return visits;
+    return passes;
 }
 
-std::array<AxisSteps, 3> collect_steps(const std::vector<Visit>& visits, const Plan& plan) {
+std::array<AxisSteps, 3> collect_steps(const std::vector<Pass>& passes, const Plan& plan) {
     std::array<AxisSteps, 3> steps;
     for (auto& axis : steps) axis.resize(plan.steps());
-    for (std::size_t v = 0; v < visits.size(); ++v) {
-        if (visits[v].is_scale_line) continue;
-        for (std::size_t k = 0; k + 1 < visits[v].points.size(); ++k) {
-            const PlanPoint &from = visits[v].points[k].plan, &to = visits[v].points[k + 1].plan;
+    for (std::size_t v = 0; v < passes.size(); ++v) {
+        if (passes[v].is_scale_line) continue;
+        for (std::size_t k = 0; k + 1 < passes[v].points.size(); ++k) {
+            const PlanPoint &from = passes[v].points[k].plan, &to = passes[v].points[k + 1].plan;
             const int axis = index(*to.moved);
             steps[axis][std::min(from.node[axis], to.node[axis])].push_back(
                 {int(v), int(k), to.node[axis] > from.node[axis] ? 1.0 : -1.0});

@@ -1,4 +1,4 @@
-// A run as the linear evaluations see it: each measured line is a visit to its points, each reading reduced to a length
+// A run as the linear evaluations see it: each measured line is a pass to its points, each reading reduced to a length
 // and two tilts that the parameters enter linearly. Internal: not installed.
 #pragma once
 
@@ -14,7 +14,7 @@ namespace stepdiag {
 // How one raw channel of a reading moves (length, alpha, beta) by one standard uncertainty.
 using ChannelEffect = Eigen::Vector3d;
 
-struct VisitPoint {
+struct PassPoint {
     PlanPoint plan;
     Eigen::Vector2d lateral =
         Eigen::Vector2d::Zero();  // commanded travel from the line's first point, in local x and y, mm
@@ -26,12 +26,12 @@ struct VisitPoint {
     Eigen::Vector3d variance() const;
 };
 
-struct Visit {
+struct Pass {
     Line line;
     bool is_scale_line;
     Eigen::Matrix3d frame;  // machine_R_line
-    std::vector<VisitPoint> points;
-    int first_reading;  // readings of all visits are counted through: that of points[0]
+    std::vector<PassPoint> points;
+    int first_reading;  // readings of all passes are counted through: that of points[0]
 
     Eigen::Vector3d direction() const { return frame.col(2); }
 };
@@ -43,16 +43,16 @@ enum class LengthKind {
 
 // Throws InvalidArgument naming the row for a line or point that is not the plan's, a commanded position more than 1 um
 // off the plan's, channels that do not fit the head, or readings that no mirror gives.
-std::vector<Visit> collect_visits(const Measurement& measurement, const Plan& plan, const HeadCalibrations& heads,
-                                  const ReadingUncertainty& uncertainty, LengthKind kind);
+std::vector<Pass> collect_passes(const Measurement& measurement, const Plan& plan, const HeadCalibrations& heads,
+                                 const ReadingUncertainty& uncertainty, LengthKind kind);
 
-// A step of one axis over one of its intervals, as one visit made it; scale lines make none.
+// A step of one axis over one of its intervals, as one pass made it; scale lines make none.
 struct Step {
-    int visit;
+    int pass;
     int point;    // from `point` to `point + 1`
     double sign;  // travel sign: increments times sign count in the axis' own direction
 };
 using AxisSteps = std::vector<std::vector<Step>>;  // per interval, counted from home
-std::array<AxisSteps, 3> collect_steps(const std::vector<Visit>& visits, const Plan& plan);
+std::array<AxisSteps, 3> collect_steps(const std::vector<Pass>& passes, const Plan& plan);
 
 }  // namespace stepdiag

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <limits>
 
-#include "stepdiag/core/error.hpp"
 #include "monte_carlo/partial_statistics.hpp"
+#include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
 namespace {

@@ -1,9 +1,9 @@
 #include "stepdiag/monte_carlo/distribution.hpp"
 
+#include <Eigen/Cholesky>
 #include <array>
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <sstream>
 

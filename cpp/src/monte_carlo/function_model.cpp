@@ -4,9 +4,9 @@
 #include <string>
 
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/core/instruction_set.hpp"
 #include "stepdiag/core/random.hpp"
 #include "stepdiag/core/random_blocks.hpp"
-#include "stepdiag/core/instruction_set.hpp"
 
 namespace stepdiag {
 
@@ -54,13 +54,13 @@ FunctionModel::FunctionModel(Function function, std::vector<Distribution> distri
     }
 }
 
-std::string FunctionModel::target() const { return replay_target(); }
+std::string FunctionModel::target() const { return instruction_set(); }
 
 std::unique_ptr<SampleModel::Worker> FunctionModel::worker() const { return std::make_unique<FunctionWorker>(*this); }
 
 void FunctionModel::draw(std::uint64_t first_sample, Eigen::Ref<Values> inputs) const {
     const std::size_t samples = std::size_t(inputs.cols()), count = distributions_.size();
-    const RandomLanes lanes{seed_, RandomStream::monte_carlo, first_sample, samples};
+    const RandomBlocks lanes{seed_, RandomStream::monte_carlo, first_sample, samples};
     Values normals(Eigen::Index((count + 1) / 2 * 2), inputs.cols());
     fill_normal(lanes, (count + 1) / 2, normals.data());
     for (const CorrelatedInputs& correlated : correlations_) {
@@ -71,7 +71,7 @@ void FunctionModel::draw(std::uint64_t first_sample, Eigen::Ref<Values> inputs) 
     for (std::size_t i = 0; i < count; ++i) {
         const Distribution& distribution = distributions_[i];
         if (distribution.kind != DistributionKind::normal) {
-            RandomLanes of_input = lanes;
+            RandomBlocks of_input = lanes;
             of_input.first_item = std::uint32_t(i);
             of_input.draw = 1;
             fill_uniform(of_input, 1, uniform.data());

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "stepdiag/core/random_blocks.hpp"
 #include "core/block_product.hpp"
+#include "stepdiag/core/random_blocks.hpp"
 
 namespace stepdiag {
 namespace {
@@ -77,7 +77,7 @@ LeafWorker::LeafWorker(const SampleModel& model, const Bins::Content& bins)
 
 std::optional<Moments> LeafWorker::run(std::uint64_t leaf, Counts& counts, const std::atomic<bool>& stop) {
     constexpr double infinity = std::numeric_limits<double>::infinity();
-    std::fill(sums_.begin(), sums_.end(), LaneSums{0.0, 0.0, infinity, -infinity});
+    std::fill(sums_.begin(), sums_.end(), RowSums{0.0, 0.0, infinity, -infinity});
     lost_.clear();
     samples_ = 0;
     first_sample_ = leaf * leaf_samples;
@@ -104,7 +104,7 @@ void LeafWorker::add_block(std::uint64_t first_sample, std::size_t samples) {
     sum_and_bin(block_.data(), outputs, samples, scales_.data(), block_sums_.data(), indices_.data() + samples_,
                 leaf_samples);
     std::size_t good = samples;
-    const auto is_finite = [](const LaneSums& sums) { return std::isfinite(sums.second); };
+    const auto is_finite = [](const RowSums& sums) { return std::isfinite(sums.second); };
     if (!std::all_of(block_sums_.begin(), block_sums_.end(), is_finite)) {
         good = leave_out_lost(first_sample, samples);
         sum_and_bin_any(block_.data(), outputs, good, samples, scales_.data(), block_sums_.data(),

@@ -35,8 +35,8 @@ private:
 
     const Bins::Content& bins_;
     std::unique_ptr<SampleModel::Worker> model_;
-    std::vector<LaneBins> scales_;
-    std::vector<LaneSums> block_sums_, sums_;
+    std::vector<BinScale> scales_;
+    std::vector<RowSums> block_sums_, sums_;
     std::vector<double> block_;
     std::vector<std::uint16_t> indices_;  // outputs x leaf_samples; the first `samples_` of each count
     std::vector<std::size_t> gather_;     // outputs whose values are needed

@@ -1,14 +1,14 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <string>
-#include <limits>
 
-#include "stepdiag/core/error.hpp"
-#include "stepdiag/core/random_blocks.hpp"
 #include "monte_carlo/leaf_worker.hpp"
 #include "monte_carlo/partial_statistics.hpp"
 #include "monte_carlo/threads.hpp"
+#include "stepdiag/core/error.hpp"
+#include "stepdiag/core/random_blocks.hpp"
 
 namespace stepdiag {
 namespace {

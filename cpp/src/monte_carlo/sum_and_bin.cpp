@@ -24,7 +24,7 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 using Tag = hn::CappedTag<double, 16>;  // lane_group
 
-HWY_INLINE LaneSums row(const double* values, std::size_t samples, const LaneBins& scale, std::uint16_t* bins) {
+HWY_INLINE RowSums row(const double* values, std::size_t samples, const BinScale& scale, std::uint16_t* bins) {
     const Tag tag;
     const hn::Rebind<std::int32_t, Tag> integers;
     const hn::Rebind<std::uint16_t, Tag> indices;
@@ -49,7 +49,7 @@ HWY_INLINE LaneSums row(const double* values, std::size_t samples, const LaneBin
             hn::GetLane(hn::MinOfLanes(tag, lowest)), hn::GetLane(hn::MaxOfLanes(tag, highest))};
 }
 
-void rows_of_block(const double* values, std::size_t rows, std::size_t samples, const LaneBins* scales, LaneSums* sums,
+void rows_of_block(const double* values, std::size_t rows, std::size_t samples, const BinScale* scales, RowSums* sums,
                    std::uint16_t* bins, std::size_t stride) {
     for (std::size_t i = 0; i < rows; ++i) sums[i] = row(values + i * samples, samples, scales[i], bins + i * stride);
 }
@@ -66,17 +66,17 @@ HWY_EXPORT(rows_of_block);
 
 }  // namespace
 
-void sum_and_bin(const double* values, std::size_t rows, std::size_t samples, const LaneBins* scales, LaneSums* sums,
+void sum_and_bin(const double* values, std::size_t rows, std::size_t samples, const BinScale* scales, RowSums* sums,
                  std::uint16_t* bins, std::size_t stride) {
     HWY_DYNAMIC_DISPATCH(rows_of_block)(values, rows, samples, scales, sums, bins, stride);
 }
 
 void sum_and_bin_any(const double* values, std::size_t rows, std::size_t samples, std::size_t value_stride,
-                     const LaneBins* scales, LaneSums* sums, std::uint16_t* bins, std::size_t stride) {
+                     const BinScale* scales, RowSums* sums, std::uint16_t* bins, std::size_t stride) {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < rows; ++i) {
-        const LaneBins& scale = scales[i];
-        LaneSums sum{0.0, 0.0, infinity, -infinity};
+        const BinScale& scale = scales[i];
+        RowSums sum{0.0, 0.0, infinity, -infinity};
         for (std::size_t s = 0; s < samples; ++s) {
             const double value = values[i * value_stride + s], deviation = value - scale.mean;
             sum.first += deviation;

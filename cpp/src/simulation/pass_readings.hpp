@@ -1,4 +1,4 @@
-// The parts of simulate(): the visits of a run, what a head reads on one of them, what its set-up makes of that.
+// The parts of simulate(): the passes of a run, what a head reads on one of them, what its set-up makes of that.
 #pragma once
 
 #include <cstdint>

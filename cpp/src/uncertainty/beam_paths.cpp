@@ -12,7 +12,7 @@
 namespace stepdiag {
 namespace {
 
-// Their ways go about 2.5 standard deviations to each side of the nominal ones, and must have as much room again.
+// Their paths go about 2.5 standard deviations to each side of the nominal ones, and must have as much room again.
 constexpr std::uint64_t route_samples = 32;
 constexpr double beyond_the_pilot = 1.0;
 
@@ -37,7 +37,7 @@ double largest_turn(const RunModel& model) {
 }
 
 Outline mirror_outline(const RunModel& model, const Eigen::Vector2d& size) {
-    constexpr double largest_repeatability = 1e-3;  // rad: beyond, lanes are not followed (lane_kernels.cpp)
+    constexpr double largest_repeatability = 1e-3;  // rad: beyond, lanes are not followed (simd_pass.cpp)
     const double turn =
         largest_turn(model) + (model.has(NoiseQuantity::orientation) ? largest_repeatability : 0.0) + 1e-9;
     const Eigen::Vector2d half = 0.5 * size - Eigen::Vector2d::Constant(0.5 * size.norm() * turn);
@@ -61,13 +61,13 @@ std::vector<MovedComponent> moved_components(const RunModel& model, const Head& 
     return all;
 }
 
-// Of a visit's rows those whose mirror stands farthest to each side, nearest and farthest, or is turned most.
-std::vector<MirrorPose> outermost(const RunModel& model, const RunVisit& visit, const Eigen::VectorXd& deviations) {
-    const Misalignment misalignment = misalignment_of(model.lines[visit.line].with(deviations));
-    const HeadSetup setup = set_up(*visit.head, visit.frame, visit.first_point, visit.mirror, misalignment);
+// Of a pass's rows those whose mirror stands farthest to each side, nearest and farthest, or is turned most.
+std::vector<MirrorPose> outermost(const RunModel& model, const RunPass& pass, const Eigen::VectorXd& deviations) {
+    const Misalignment misalignment = misalignment_of(model.lines[pass.line].with(deviations));
+    const HeadSetup setup = set_up(*pass.head, pass.frame, pass.first_point, pass.mirror, misalignment);
     std::vector<MirrorPose> all, chosen;
-    for (std::size_t k = 0; k < visit.rows; ++k) {
-        const Pose& pose = model.poses[visit.visit.first_row + k];
+    for (std::size_t k = 0; k < pass.rows; ++k) {
+        const Pose& pose = model.poses[pass.planned.first_row + k];
         all.push_back(mirror_in_sensor_frame(setup, pose.position, pose.rotation));
     }
     for (int number = 0; number < 5; ++number) {
@@ -89,18 +89,18 @@ TracedHead traced_at(const RunModel& model, const Head& head, const Eigen::Vecto
     return TracedHead(*moved.design, moved.pose_errors, model.environment(head, shared), mirror);
 }
 
-// The paths on this way that the mirror poses have.
-void add_paths(const TracedHead& traced, const BeamWay& way, const std::vector<MirrorPose>& mirrors,
-               std::vector<std::vector<Segment>>& paths) {
+// The segments on this path that the mirror poses have.
+void add_segments(const TracedHead& traced, const BeamPath& path, const std::vector<MirrorPose>& mirrors,
+                  std::vector<std::vector<Segment>>& segments) {
     for (const MirrorPose& mirror : mirrors) {
-        const RayTree tree = traced.trace(way.beam, mirror);
-        const std::vector<int> wanted = traced.wanted_segments(tree, way.beam);
-        if (!wanted.empty() && same_faces(record_route(tree, wanted.front()), way.route))
-            paths.push_back(path_segments(tree, wanted.front()));
+        const RayTree tree = traced.trace(path.beam, mirror);
+        const std::vector<int> wanted = traced.wanted_segments(tree, path.beam);
+        if (!wanted.empty() && same_faces(record_route(tree, wanted.front()), path.route))
+            segments.push_back(path_segments(tree, wanted.front()));
     }
 }
 
-std::optional<BeamWay> record_way(const TracedHead& traced, const std::vector<MirrorPose>& mirrors, int beam) {
+std::optional<BeamPath> record_path(const TracedHead& traced, const std::vector<MirrorPose>& mirrors, int beam) {
     const TracedHead::BeamOptics& optics = traced.optics(beam);
     for (const MirrorPose& mirror : mirrors) {
         const RayTree tree = traced.trace(beam, mirror);
@@ -116,39 +116,39 @@ std::optional<BeamWay> record_way(const TracedHead& traced, const std::vector<Mi
         const int source = int(design.bodies.size()) + beam;
         const int detector =
             light.interferometer ? source : int(design.bodies.size() + design.beams.size() + sensor_of(design, light));
-        return BeamWay{beam,
-                       0,
-                       light.mode.wavelength,
-                       optics.source,
-                       optics.detector,
-                       optics.air.index,
-                       route,
-                       std::size_t(at - route.encounters.begin()),
-                       optics.frames,
-                       optics.outlines,
-                       optics.component,
-                       source,
-                       detector};
+        return BeamPath{beam,
+                        0,
+                        light.mode.wavelength,
+                        optics.source,
+                        optics.detector,
+                        optics.air.index,
+                        route,
+                        std::size_t(at - route.encounters.begin()),
+                        optics.frames,
+                        optics.outlines,
+                        optics.component,
+                        source,
+                        detector};
     }
     return std::nullopt;
 }
 
-bool is_bright_enough(const HeadDesign& design, const BeamWay& way) {
-    const HeadBeam& light = design.beams[std::size_t(way.beam)];
+bool is_bright_enough(const HeadDesign& design, const BeamPath& path) {
+    const HeadBeam& light = design.beams[std::size_t(path.beam)];
     if (light.interferometer) return true;
     const auto& device = std::get<LateralEffect>(design.sensors[sensor_of(design, light)].device);
-    return way.route.power >= device.least_power;
+    return path.route.power >= device.least_power;
 }
 
-// Whether no other face comes near the ways, at the outermost poses of all visits with this head and of some samples.
+// Whether no other face comes near the paths, at the outermost poses of all passes with this head and of some samples.
 bool is_clear(const RunModel& model, const Head& head, const Eigen::Vector2d& mirror, const TracedHead& traced,
-              const std::vector<BeamWay>& ways) {
-    std::vector<std::vector<std::vector<Segment>>> paths(ways.size());
+              const std::vector<BeamPath>& paths) {
+    std::vector<std::vector<std::vector<Segment>>> segments(paths.size());
     const auto add = [&](const TracedHead& own, const Eigen::VectorXd& deviations) {
-        for (const RunVisit& visit : model.visits)
-            if (visit.head == &head && visit.visit.first_row == visit.visit.setup_row)
-                for (std::size_t w = 0; w < ways.size(); ++w)
-                    add_paths(own, ways[w], outermost(model, visit, deviations), paths[w]);
+        for (const RunPass& pass : model.passes)
+            if (pass.head == &head && pass.planned.first_row == pass.planned.setup_row)
+                for (std::size_t w = 0; w < paths.size(); ++w)
+                    add_segments(own, paths[w], outermost(model, pass, deviations), segments[w]);
     };
     add(traced, model.draws.expectations());
     const bool same_head = model.moved_parts.empty() && !model.has_uncertain_air();
@@ -160,9 +160,9 @@ bool is_clear(const RunModel& model, const Head& head, const Eigen::Vector2d& mi
         } catch (const InvalidArgument&) {  // air out of range: a sample without result
         }
     }
-    for (std::size_t w = 0; w < ways.size(); ++w)
-        if (!paths[w].empty() && !pass_clear(paths[w], traced.optics(ways[w].beam).fixed, ways[w].component,
-                                             ways[w].source_component, beyond_the_pilot))
+    for (std::size_t w = 0; w < paths.size(); ++w)
+        if (!segments[w].empty() && !pass_clear(segments[w], traced.optics(paths[w].beam).fixed, paths[w].component,
+                                                paths[w].source_component, beyond_the_pilot))
             return false;
     return true;
 }
@@ -176,29 +176,29 @@ Placement MovedComponent::at(const std::vector<double>& deviations) const {
     return moved(designed, error);
 }
 
-std::optional<HeadWays> record_ways(const RunModel& model, const Head& head) {
-    const auto visit =
-        std::find_if(model.visits.begin(), model.visits.end(), [&](const RunVisit& v) { return v.head == &head; });
+std::optional<HeadPaths> record_paths(const RunModel& model, const Head& head) {
+    const auto pass =
+        std::find_if(model.passes.begin(), model.passes.end(), [&](const RunPass& v) { return v.head == &head; });
     const Outline reference{{}, true, Eigen::Vector2d::Constant(head.aperture / 2.0), {}};
-    HeadWays ways{&head, reference, mirror_outline(model, visit->mirror), 1e-3, {}, {}, {}};
-    if (!head.design) return ways;
-    if (!reads_axes_alone(*head.design) || head.design->beams.size() > most_lane_beams) return std::nullopt;
+    HeadPaths paths{&head, reference, mirror_outline(model, pass->mirror), 1e-3, {}, {}, {}};
+    if (!head.design) return paths;
+    if (!reads_axes_alone(*head.design) || head.design->beams.size() > most_simd_beams) return std::nullopt;
 
-    ways.nominal = nominal_head(*head.design, head.standoff, model.assumed(head));
-    ways.moved = moved_components(model, head);
+    paths.nominal = nominal_head(*head.design, head.standoff, model.assumed(head));
+    paths.moved = moved_components(model, head);
     const Eigen::VectorXd expectations = model.draws.expectations();
-    const TracedHead traced = traced_at(model, head, visit->mirror, expectations);
-    const std::vector<MirrorPose> mirrors = outermost(model, *visit, expectations);
-    ways.gap = traced.optics(0).fixed.self_intersection_gap();
+    const TracedHead traced = traced_at(model, head, pass->mirror, expectations);
+    const std::vector<MirrorPose> mirrors = outermost(model, *pass, expectations);
+    paths.gap = traced.optics(0).fixed.self_intersection_gap();
     int channel = 0;
     for (const int beam : signal_order(*head.design)) {
-        std::optional<BeamWay> way = record_way(traced, mirrors, beam);
-        if (!way || !is_bright_enough(*head.design, *way)) return std::nullopt;
-        way->channel = channel++;
-        ways.beams.push_back(std::move(*way));
+        std::optional<BeamPath> path = record_path(traced, mirrors, beam);
+        if (!path || !is_bright_enough(*head.design, *path)) return std::nullopt;
+        path->channel = channel++;
+        paths.beams.push_back(std::move(*path));
     }
-    if (!is_clear(model, head, visit->mirror, traced, ways.beams)) return std::nullopt;
-    return ways;
+    if (!is_clear(model, head, pass->mirror, traced, paths.beams)) return std::nullopt;
+    return paths;
 }
 
 }  // namespace stepdiag

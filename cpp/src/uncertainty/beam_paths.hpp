@@ -1,4 +1,4 @@
-// The ways of a head's beams as the run with every input at its expectation has them, recorded once for all samples.
+// The paths of a head's beams as the run with every input at its expectation has them, recorded once for all samples.
 #pragma once
 
 #include <memory>
@@ -17,13 +17,13 @@ struct MovedComponent {
     int component;  // bodies, beams, sensors counted through
     Placement designed;
     PoseError nominal;
-    Placement expected;                       // where the ways were recorded
+    Placement expected;                       // where the paths were recorded
     std::vector<std::pair<int, int>> inputs;  // number (MovedPart), input
 
     Placement at(const std::vector<double>& deviations) const;
 };
 
-struct BeamWay {
+struct BeamPath {
     int beam;
     int channel;
     double wavelength;
@@ -38,12 +38,12 @@ struct BeamWay {
     int source_component, detector_component;
 };
 
-struct HeadWays {
+struct HeadPaths {
     const Head* head;
     Outline reference;  // of a head without a design: the square that takes the beam back
     Outline mirror;     // as small as a mirror that turns with the tool is at least
     double gap;
-    std::vector<BeamWay> beams;  // of a design
+    std::vector<BeamPath> beams;  // of a design
     NominalHead nominal;
     std::vector<MovedComponent> moved;
 };
@@ -51,6 +51,6 @@ struct HeadWays {
 // None where samples of this head cannot be replayed: its detectors see more than the axis of one beam (cameras,
 // coupled modes, ghosts), draw numbers or round, its nominal light does not arrive as designed, or another face is
 // near.
-std::optional<HeadWays> record_ways(const RunModel& model, const Head& head);
+std::optional<HeadPaths> record_paths(const RunModel& model, const Head& head);
 
 }  // namespace stepdiag

@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "stepdiag/core/error.hpp"
-#include "uncertainty/contributions.hpp"
 #include "stepdiag/uncertainty/derived.hpp"
+#include "uncertainty/contributions.hpp"
 #include "uncertainty/noise_effects.hpp"
 
 namespace stepdiag {

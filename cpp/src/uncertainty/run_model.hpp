@@ -12,7 +12,7 @@
 namespace stepdiag {
 
 // The numbers of a line's set-up, nominal or with deviations: those of Misalignment, and of its scale.
-namespace slot {
+namespace field {
 enum : int {
     reflector = 0,  // a, b
     laser = 2,      // a, b
@@ -28,7 +28,7 @@ enum : int {
 };
 }
 // The numbers that all lines share.
-namespace shared_slot {
+namespace shared_field {
 enum : int {
     reading_model = 0,
     temperature = 1,
@@ -42,12 +42,12 @@ enum : int {
 };
 }
 
-// The input `input` adds to the number `slot`.
+// The input `input` adds to the number `field`.
 struct Deviating {
-    int slot;
+    int field;
     int input;
 };
-struct Slots {
+struct Fields {
     std::vector<double> nominal;
     std::vector<Deviating> uncertain;
 
@@ -69,14 +69,14 @@ struct RunRow {
     bool is_last_point;
 };
 
-struct RunVisit {
-    PlannedVisit visit;
+struct RunPass {
+    PlannedPass planned;
     const Head* head;
     Eigen::Matrix3d frame;
     Eigen::Vector3d first_point;  // commanded, tool offset included
     Eigen::Vector2d mirror;
     std::size_t rows;
-    std::size_t line;  // index of its Slots
+    std::size_t line;  // index of its Fields
 };
 
 struct NoiseTerm {
@@ -94,18 +94,18 @@ struct RunModel {
     const Draws draws;
     double seconds;
     std::vector<std::string> channels;
-    std::vector<RunVisit> visits;
+    std::vector<RunPass> passes;
     std::vector<RunRow> rows;
-    std::vector<Pose> poses;   // nominal tool, by row
-    std::vector<Slots> lines;  // by line of the plan, scale lines last
-    Slots shared;
+    std::vector<Pose> poses;    // nominal tool, by row
+    std::vector<Fields> lines;  // by line of the plan, scale lines last
+    Fields shared;
     std::vector<MovedPart> moved_parts;
 
     bool has(NoiseQuantity quantity) const;
     bool moves_poses() const;  // something displaces the tool by sample
     bool has_uncertain_air() const;
 
-    // Of one head, at these numbers of the shared slots.
+    // Of one head, at these numbers of the shared fields.
     Environment environment(const Head& head, const std::vector<double>& shared_numbers) const;
     Environment assumed(const Head& head) const;
     Head head(const Head& nominal, const std::vector<double>& shared_numbers, const Eigen::VectorXd& deviations) const;

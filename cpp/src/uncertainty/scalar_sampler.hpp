@@ -1,5 +1,5 @@
 // One sample of a virtual run the general way, reading by reading: what simulate() does with the sample's own head,
-// set-ups and air at the sample's own tool poses. The fast way in lanes (lane_run) is checked against it, and falls
+// set-ups and air at the sample's own tool poses. The fast way in lanes (simd_sampler) is checked against it, and falls
 // back on it.
 #pragma once
 
@@ -19,24 +19,24 @@ struct Displacement {
     Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
 };
 
-class GeneralWay {
+class ScalarSampler {
 public:
-    explicit GeneralWay(const RunModel& model);
+    explicit ScalarSampler(const RunModel& model);
 
     // Raw readings: [row * channels + channel], NaN where lost. Reading noise with a sample, none without.
     Eigen::VectorXd readings(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample) const;
-    // The same of some rows of one visit, without noise, each traced as a whole; a row each, NaN where lost.
-    Eigen::MatrixXd trace(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample, const RunVisit& visit,
+    // The same of some rows of one pass, without noise, each traced as a whole; a row each, NaN where lost.
+    Eigen::MatrixXd trace(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample, const RunPass& pass,
                           const std::vector<std::size_t>& rows) const;
 
 private:
     std::vector<Displacement> displacements(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample,
                                             std::size_t rows) const;
-    std::vector<SignalRow> raw(const RunVisit& visit, const Head& head, const HeadSetup& setup,
+    std::vector<SignalRow> raw(const RunPass& pass, const Head& head, const HeadSetup& setup,
                                const Misalignment& misalignment, const std::vector<double>& shared,
                                const std::vector<Pose>& poses, std::optional<std::uint64_t> sample,
                                std::size_t first_row, double verified_share) const;
-    Eigen::MatrixXd read(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample, const RunVisit& visit,
+    Eigen::MatrixXd read(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample, const RunPass& pass,
                          const std::vector<std::size_t>& rows, const std::vector<Displacement>& displaced,
                          double verified_share) const;
     void add_noise(std::uint64_t sample, Eigen::VectorXd& readings) const;

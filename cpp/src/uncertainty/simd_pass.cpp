@@ -27,7 +27,7 @@ namespace {
 // --- rows of lanes as vectors ---
 
 STEPDIAG_INLINE Pair common(double value) { return broadcast(Type<Pair>(), value); }
-STEPDIAG_INLINE Pair at(const LaneRow& row, std::size_t lane) { return load(row.value + lane); }
+STEPDIAG_INLINE Pair at(const SimdRow& row, std::size_t lane) { return load(row.value + lane); }
 STEPDIAG_INLINE MaskPair all_true() {
     const Pair zero = common(0.0);
     return zero <= zero;
@@ -41,7 +41,7 @@ STEPDIAG_INLINE void keep(MaskPair followed, std::uint8_t* to) {
 // --- faces as `meet` takes them ---
 
 struct CommonFace {
-    const LaneFace& face;
+    const SimdFace& face;
 
     STEPDIAG_INLINE Pair rotation(int k) const { return common(face.plane[k]); }
     STEPDIAG_INLINE Pair translation(int k) const { return common(face.plane[9 + k]); }
@@ -52,7 +52,7 @@ struct CommonFace {
 };
 
 struct FaceByLane {
-    const LaneFace& face;
+    const SimdFace& face;
     std::size_t lane;
 
     STEPDIAG_INLINE Pair rotation(int k) const { return at(face.plane_rows[k], lane); }
@@ -65,7 +65,7 @@ struct FaceByLane {
 
 // The mirror at one pose.
 struct Mirror {
-    const LaneSetup& setup;
+    const SimdSetup& setup;
     std::size_t lane;
     Pair normal[3];  // in the sensor frame
     Pair centre[3];
@@ -87,8 +87,8 @@ struct Mirror {
     STEPDIAG_INLINE Pair one_less_ratio2() const { return common(0.0); }
 };
 
-STEPDIAG_INLINE void through(const std::vector<LaneFace>& faces, std::size_t lane, Pair gap, Light<Pair>& light) {
-    for (const LaneFace& face : faces) {
+STEPDIAG_INLINE void through(const std::vector<SimdFace>& faces, std::size_t lane, Pair gap, Light<Pair>& light) {
+    for (const SimdFace& face : faces) {
         if (face.plane_rows) meet(face, FaceByLane{face, lane}, gap, light);
         else meet(face, CommonFace{face}, gap, light);
     }
@@ -110,10 +110,10 @@ STEPDIAG_INLINE void turn(const Pair (&w)[3], Pair (&v)[3], MaskPair& followed) 
 }
 
 // The mirror of a pose in the sensor frame: normal R S^-1 n, centre S^-1 (p - o).
-STEPDIAG_INLINE void place_mirror(const LaneVisit& visit, std::size_t row, std::size_t lane, Mirror& mirror,
+STEPDIAG_INLINE void place_mirror(const SimdPass& pass, std::size_t row, std::size_t lane, Mirror& mirror,
                                   MaskPair& followed) {
-    const LaneSetup& setup = *visit.setup;
-    const ToolPose& pose = visit.poses[row];
+    const SimdSetup& setup = *pass.setup;
+    const ToolPose& pose = pass.poses[row];
     Pair normal[3], point[3];
     const Pair n[3] = {at(setup.mirror_normal[0], lane), at(setup.mirror_normal[1], lane),
                        at(setup.mirror_normal[2], lane)};
@@ -122,8 +122,8 @@ STEPDIAG_INLINE void place_mirror(const LaneVisit& visit, std::size_t row, std::
         normal[k] = mul_add(common(r[0]), n[0], mul_add(common(r[1]), n[1], common(r[2]) * n[2]));
         point[k] = common(pose.position[k]);
     }
-    if (visit.displaced) {
-        const LaneRow* const by = visit.displaced + 6 * row;
+    if (pass.displaced) {
+        const SimdRow* const by = pass.displaced + 6 * row;
         for (int k = 0; k < 3; ++k) point[k] = point[k] + at(by[k], lane);
         const Pair w[3] = {at(by[3], lane), at(by[4], lane), at(by[5], lane)};
         turn(w, normal, followed);
@@ -146,25 +146,25 @@ STEPDIAG_INLINE Pair excess_of(const Mirror& mirror) {
 
 // --- what a detector says ---
 
-STEPDIAG_INLINE void detect(const LaneBeam& beam, std::size_t lane, Light<Pair>& light, double* to) {
-    if (beam.detector == LaneDetector::spot) {
+STEPDIAG_INLINE void detect(const SimdBeam& beam, std::size_t lane, Light<Pair>& light, double* to) {
+    if (beam.detector == SimdDetector::spot) {
         for (int axis = 0; axis < 2; ++axis) {
-            const LaneRow* const map = beam.detector_rows + 4 * axis;
+            const SimdRow* const map = beam.detector_rows + 4 * axis;
             const Pair row[3] = {at(map[0], lane), at(map[1], lane), at(map[2], lane)};
-            store(dot_add(row, light.point, at(map[3], lane)), to + std::size_t(axis) * run_lanes + lane);
+            store(dot_add(row, light.point, at(map[3], lane)), to + std::size_t(axis) * lane_group + lane);
         }
         return;
     }
     const Pair distance = mul_add(common(beam.scale), light.optical_length, at(*beam.offset, lane));
     store(distance, to + lane);
     light.followed = both(light.followed, is_finite(distance));
-    if (beam.detector == LaneDetector::ideal) {
+    if (beam.detector == SimdDetector::ideal) {
         const Pair half = common(1.0) / (common(1.0) - light.direction[2]);
-        store(light.direction[1] * half, to + run_lanes + lane);
-        store(negative(light.direction[0] * half), to + 2 * run_lanes + lane);
+        store(light.direction[1] * half, to + lane_group + lane);
+        store(negative(light.direction[0] * half), to + 2 * lane_group + lane);
         return;
     }
-    const LaneRow* const axis = beam.detector_rows;
+    const SimdRow* const axis = beam.detector_rows;
     const Pair along = mul_add(at(axis[0], lane), light.direction[0],
                                mul_add(at(axis[1], lane), light.direction[1], at(axis[2], lane) * light.direction[2]));
     light.followed = both(light.followed, along <= common(-beam.least_cosine));
@@ -198,14 +198,14 @@ STEPDIAG_INLINE void product(const A& a, const Pair (&b)[9], Pair (&c)[9]) {
 
 // --- kernels ---
 
-void trace_visit(const LaneVisit& visit, const Outline& outline, const std::vector<LaneBeam>& beams, double nearest) {
+void trace(const SimdPass& pass, const Outline& outline, const std::vector<SimdBeam>& beams, double nearest) {
     const Pair gap = common(nearest);
     const Mirror::Met met{Event::reflected, true, &outline};
-    Light<Pair> out[most_lane_beams];
-    for (std::size_t lane = 0; lane < run_lanes; lane += 2 * hn::Lanes(Tag())) {
+    Light<Pair> out[most_simd_beams];
+    for (std::size_t lane = 0; lane < lane_group; lane += 2 * hn::Lanes(Tag())) {
         MaskPair followed = all_true();
         for (std::size_t b = 0; b < beams.size(); ++b) {
-            const LaneRow* const s = beams[b].source;
+            const SimdRow* const s = beams[b].source;
             out[b] = {{at(s[0], lane), at(s[1], lane), at(s[2], lane)},
                       {at(s[3], lane), at(s[4], lane), at(s[5], lane)},
                       common(0.0),
@@ -214,34 +214,34 @@ void trace_visit(const LaneVisit& visit, const Outline& outline, const std::vect
             through(beams[b].out, lane, gap, out[b]);
             followed = both(followed, out[b].followed);
         }
-        for (std::size_t row = 0; row < visit.rows; ++row) {
-            Mirror mirror{*visit.setup, lane, {}, {}, {}, {}};
-            place_mirror(visit, row, lane, mirror, followed);
-            if (visit.excess) store(excess_of(mirror), visit.excess[row].value + lane);
+        for (std::size_t row = 0; row < pass.rows; ++row) {
+            Mirror mirror{*pass.setup, lane, {}, {}, {}, {}};
+            place_mirror(pass, row, lane, mirror, followed);
+            if (pass.excess) store(excess_of(mirror), pass.excess[row].value + lane);
             for (std::size_t b = 0; b < beams.size(); ++b) {
-                const LaneBeam& beam = beams[b];
+                const SimdBeam& beam = beams[b];
                 Light<Pair> light = out[b];
                 mirror.air = at(*beam.air, lane);
                 mirror.inverse_air = common(1.0);  // nobody asks for the reduced length
                 meet(met, mirror, gap, light);
                 through(beam.back, lane, gap, light);
                 detect(beam, lane, light,
-                       visit.readings + (row * visit.channels + std::size_t(beam.channel)) * run_lanes);
+                       pass.readings + (row * pass.channels + std::size_t(beam.channel)) * lane_group);
                 followed = both(followed, light.followed);
             }
         }
-        keep(followed, visit.followed + lane);
+        keep(followed, pass.followed + lane);
     }
 }
 
-void define_visit(const LaneVisit& visit, const LaneClosed& closed) {
-    for (std::size_t lane = 0; lane < run_lanes; lane += 2 * hn::Lanes(Tag())) {
+void define(const SimdPass& pass, const SimdClosed& closed) {
+    for (std::size_t lane = 0; lane < lane_group; lane += 2 * hn::Lanes(Tag())) {
         const Pair ratio = at(*closed.index_ratio, lane), zero = common(0.0), one = common(1.0);
         MaskPair followed = is_finite(ratio);  // else the air is out of its equation's range
-        for (std::size_t row = 0; row < visit.rows; ++row) {
-            Mirror mirror{*visit.setup, lane, {}, {}, {}, {}};
-            place_mirror(visit, row, lane, mirror, followed);
-            if (visit.excess) store(excess_of(mirror), visit.excess[row].value + lane);
+        for (std::size_t row = 0; row < pass.rows; ++row) {
+            Mirror mirror{*pass.setup, lane, {}, {}, {}, {}};
+            place_mirror(pass, row, lane, mirror, followed);
+            if (pass.excess) store(excess_of(mirror), pass.excess[row].value + lane);
             const Pair inverse = one / mirror.normal[2];
             const Pair alpha = negative(mirror.normal[1] * inverse), beta = mirror.normal[0] * inverse;
             const Pair length = mul_add(beta, mirror.centre[0], sub_mul(alpha, mirror.centre[1], mirror.centre[2]));
@@ -249,41 +249,42 @@ void define_visit(const LaneVisit& visit, const LaneClosed& closed) {
             const Pair by_w = one / w;
             const Pair distance = length * by_w;
             followed = both(followed, both(both(mirror.normal[2] > zero, w > zero), length > zero));
-            double* const to = visit.readings + row * visit.channels * run_lanes + lane;
+            double* const to = pass.readings + row * pass.channels * lane_group + lane;
             if (closed.psd_distance) {
                 const Pair reach = mul_add(at(*closed.psd_distance, lane), by_w, distance);
                 const Pair gain = reach + reach;
                 store(distance * ratio, to);
-                store(negative(gain * beta), to + run_lanes);
-                store(gain * alpha, to + 2 * run_lanes);
+                store(negative(gain * beta), to + lane_group);
+                store(gain * alpha, to + 2 * lane_group);
             } else {
-                for (std::size_t i = 0; i < visit.channels; ++i) {
+                for (std::size_t i = 0; i < pass.channels; ++i) {
                     const Pair u = at(closed.beams[2 * i], lane), v = at(closed.beams[2 * i + 1], lane);
-                    store(mul_add(sub_mul(beta, u, alpha * v), by_w, distance) * ratio, to + i * run_lanes);
+                    store(mul_add(sub_mul(beta, u, alpha * v), by_w, distance) * ratio, to + i * lane_group);
                 }
             }
         }
-        keep(followed, visit.followed + lane);
+        keep(followed, pass.followed + lane);
     }
 }
 
-void set_up_visit(const LineFrame& line, const LaneRow* slots, LaneSetup& setup, std::uint8_t* followed_lanes) {
+void place_head_and_mirror(const LineFrame& line, const SimdRow* fields, SimdSetup& setup,
+                           std::uint8_t* followed_lanes) {
     const auto frame = [&](int k) HWY_ATTR { return common(line.frame[k]); };
-    for (std::size_t lane = 0; lane < run_lanes; lane += 2 * hn::Lanes(Tag())) {
-        const auto number = [&](int k) HWY_ATTR { return at(slots[k], lane); };
+    for (std::size_t lane = 0; lane < lane_group; lane += 2 * hn::Lanes(Tag())) {
+        const auto number = [&](int k) HWY_ATTR { return at(fields[k], lane); };
         const Pair zero = common(0.0);
         MaskPair followed = all_true();
         Pair turned[9], rolled[9], tilted[9], sensor[9], mirror[9];
-        exponential(number(slot::laser), number(slot::laser + 1), zero, turned, followed);
+        exponential(number(field::laser), number(field::laser + 1), zero, turned, followed);
         product(frame, turned, tilted);
-        exponential(zero, zero, number(slot::roll), rolled, followed);
+        exponential(zero, zero, number(field::roll), rolled, followed);
         product([&](int k) HWY_ATTR { return tilted[k]; }, rolled, sensor);
-        exponential(number(slot::reflector), number(slot::reflector + 1), zero, turned, followed);
+        exponential(number(field::reflector), number(field::reflector + 1), zero, turned, followed);
         product(frame, turned, mirror);
         Pair origin[3];
         for (int k = 0; k < 3; ++k)
-            origin[k] = mul_add(frame(3 * k), number(slot::lateral),
-                                mul_add(frame(3 * k + 1), number(slot::lateral + 1), common(line.origin[k])));
+            origin[k] = mul_add(frame(3 * k), number(field::lateral),
+                                mul_add(frame(3 * k + 1), number(field::lateral + 1), common(line.origin[k])));
         for (int i = 0; i < 3; ++i) {  // rows of sensor_R_machine are columns of machine_R_sensor
             for (int j = 0; j < 3; ++j) store(sensor[3 * j + i], setup.sensor_R_machine[3 * i + j].value + lane);
             const auto in_sensor = [&](Pair x, Pair y, Pair z) HWY_ATTR {
@@ -299,16 +300,16 @@ void set_up_visit(const LineFrame& line, const LaneRow* slots, LaneSetup& setup,
     }
 }
 
-void correct_visit(const LaneVisit& visit, const LaneCorrection& c) {
-    for (std::size_t lane = 0; lane < run_lanes; lane += 2 * hn::Lanes(Tag())) {
+void correct(const SimdPass& pass, const SimdCorrection& c) {
+    for (std::size_t lane = 0; lane < lane_group; lane += 2 * hn::Lanes(Tag())) {
         const Pair drift = at(*c.drift, lane), model = at(*c.model, lane), w = at(*c.wavelength, lane);
         const Pair factor = at(*c.factor, lane), length = at(*c.length, lane), gain = at(*c.gain, lane);
-        for (std::size_t row = 0; row < visit.rows; ++row) {
+        for (std::size_t row = 0; row < pass.rows; ++row) {
             Pair added = drift * common(c.elapsed[row]);
-            if (visit.excess) added = mul_add(model, at(visit.excess[row], lane), added);
+            if (pass.excess) added = mul_add(model, at(pass.excess[row], lane), added);
             const Pair scaled = mul_add(factor, common(c.travel[row]), length * common(c.is_last[row]));
-            for (std::size_t i = 0; i < visit.channels; ++i) {
-                double* const reading = visit.readings + (row * visit.channels + i) * run_lanes + lane;
+            for (std::size_t i = 0; i < pass.channels; ++i) {
+                double* const reading = pass.readings + (row * pass.channels + i) * lane_group + lane;
                 const Pair value = load(reading), constant = at(c.constant[i], lane);
                 if (c.is_distance[i]) store(mul_add(value + (constant + added), w, scaled), reading);
                 else store(mul_add(value, gain, constant), reading);
@@ -321,9 +322,9 @@ void add_noise_rows(const double* normals, std::size_t rows, double spread, doub
                     std::size_t stride) {
     const Pair factor = common(spread), constant = common(expectation);
     for (std::size_t row = 0; row < rows; ++row)
-        for (std::size_t lane = 0; lane < run_lanes; lane += 2 * hn::Lanes(Tag())) {
+        for (std::size_t lane = 0; lane < lane_group; lane += 2 * hn::Lanes(Tag())) {
             double* const to = readings + row * stride + lane;
-            store(mul_add(factor, load(normals + row * run_lanes + lane), constant) + load(to), to);
+            store(mul_add(factor, load(normals + row * lane_group + lane), constant) + load(to), to);
         }
 }
 
@@ -335,29 +336,27 @@ HWY_AFTER_NAMESPACE();
 namespace stepdiag {
 namespace {
 
-HWY_EXPORT(trace_visit);
-HWY_EXPORT(define_visit);
-HWY_EXPORT(set_up_visit);
-HWY_EXPORT(correct_visit);
+HWY_EXPORT(trace);
+HWY_EXPORT(define);
+HWY_EXPORT(place_head_and_mirror);
+HWY_EXPORT(correct);
 HWY_EXPORT(add_noise_rows);
 
 }  // namespace
 
-void trace_lanes(const LaneVisit& visit, const Outline& mirror, const std::vector<LaneBeam>& beams, double gap) {
-    HWY_DYNAMIC_DISPATCH(trace_visit)(visit, mirror, beams, gap);
+void trace_pass(const SimdPass& pass, const Outline& mirror, const std::vector<SimdBeam>& beams, double gap) {
+    HWY_DYNAMIC_DISPATCH(trace)(pass, mirror, beams, gap);
 }
-void define_lanes(const LaneVisit& visit, const LaneClosed& closed) {
-    HWY_DYNAMIC_DISPATCH(define_visit)(visit, closed);
-}
+void define_pass(const SimdPass& pass, const SimdClosed& closed) { HWY_DYNAMIC_DISPATCH(define)(pass, closed); }
 
-void set_up_lanes(const LineFrame& line, const LaneRow* slots, LaneSetup& setup, std::uint8_t* followed) {
-    HWY_DYNAMIC_DISPATCH(set_up_visit)(line, slots, setup, followed);
+void set_up_pass(const LineFrame& line, const SimdRow* fields, SimdSetup& setup, std::uint8_t* followed) {
+    HWY_DYNAMIC_DISPATCH(place_head_and_mirror)(line, fields, setup, followed);
 }
-void correct_lanes(const LaneVisit& visit, const LaneCorrection& correction) {
-    HWY_DYNAMIC_DISPATCH(correct_visit)(visit, correction);
+void correct_pass(const SimdPass& pass, const SimdCorrection& correction) {
+    HWY_DYNAMIC_DISPATCH(correct)(pass, correction);
 }
-void add_noise_lanes(const double* normals, std::size_t rows, double spread, double expectation, double* readings,
-                     std::size_t stride) {
+void add_noise_to_pass(const double* normals, std::size_t rows, double spread, double expectation, double* readings,
+                       std::size_t stride) {
     HWY_DYNAMIC_DISPATCH(add_noise_rows)(normals, rows, spread, expectation, readings, stride);
 }
 

@@ -1,4 +1,4 @@
-// The fast way: the readings of `run_lanes` samples at once, one a lane, every pose by replay (lane_kernels).
+// The fast path: the readings of `lane_group` samples at once, one a lane, every pose by replay (simd_pass).
 #pragma once
 
 #include <map>
@@ -6,44 +6,44 @@
 #include <optional>
 #include <vector>
 
-#include "uncertainty/simd_pass.hpp"
 #include "uncertainty/beam_paths.hpp"
+#include "uncertainty/simd_pass.hpp"
 
 namespace stepdiag {
 
-class LaneRun {
+class SimdSampler {
 public:
-    // None where a head has to be read the general way (record_ways), or all poses are to be traced.
-    static std::unique_ptr<const LaneRun> make(const RunModel& model);
+    // None where a head has to be read the general path (record_paths), or all poses are to be traced.
+    static std::unique_ptr<const SimdSampler> make(const RunModel& model);
 
     // What a thread writes to.
     class Scratch {
     public:
-        explicit Scratch(const LaneRun& run);
+        explicit Scratch(const SimdSampler& run);
 
     private:
-        friend class LaneRun;
+        friend class SimdSampler;
         // A head's numbers by lane, and the beams that point at them.
         struct HeadRows {
-            std::vector<LaneRow> rows;
-            std::vector<LaneBeam> beams;
-            LaneRow* index_ratio = nullptr;  // closed layouts
-            LaneRow* psd_distance = nullptr;
-            LaneRow* beam_offsets = nullptr;
+            std::vector<SimdRow> rows;
+            std::vector<SimdBeam> beams;
+            SimdRow* index_ratio = nullptr;  // closed layouts
+            SimdRow* psd_distance = nullptr;
+            SimdRow* beam_offsets = nullptr;
         };
         std::vector<HeadRows> heads;
-        std::vector<std::vector<LaneRow>> slots;  // by line
-        std::vector<LaneSetup> setups;
-        std::vector<std::vector<LaneRow>> closed_beams;  // by line, gain included
-        std::vector<LaneRow> shared;
-        std::vector<LaneRow> displaced;
-        std::vector<LaneRow> excess;
-        std::vector<LaneRow> numbers;  // drawn
+        std::vector<std::vector<SimdRow>> fields;  // by line
+        std::vector<SimdSetup> setups;
+        std::vector<std::vector<SimdRow>> closed_beams;  // by line, gain included
+        std::vector<SimdRow> shared;
+        std::vector<SimdRow> displaced;
+        std::vector<SimdRow> excess;
+        std::vector<SimdRow> numbers;  // drawn
     };
 
-    // Readings without noise: [(row * channels + channel) * run_lanes + lane]. `deviations`: [input * run_lanes +
+    // Readings without noise: [(row * channels + channel) * lane_group + lane]. `deviations`: [input * lane_group +
     // lane]. `first_sample`: of the displacements of the tool that are drawn; none: none are. `followed` becomes 0 for
-    // lanes that have to be read the general way.
+    // lanes that have to be read the general path.
     void trace(const double* deviations, std::optional<std::uint64_t> first_sample, Scratch& scratch, double* readings,
                std::uint8_t* followed) const;
     // Adds the reading noise.
@@ -56,17 +56,18 @@ private:
         bool setup_varies, corrects;
     };
 
-    explicit LaneRun(const RunModel& model) : model_(model) {}
-    void prepare_head(const HeadWays& ways, Scratch::HeadRows& to) const;
-    void fill_head(const HeadWays& ways, const double* deviations, const Scratch& scratch, Scratch::HeadRows& to) const;
-    void fill_air(const HeadWays& ways, const Scratch& scratch, Scratch::HeadRows& to) const;
-    void move_parts(const HeadWays& ways, const double* deviations, Scratch::HeadRows& to) const;
-    void fill_slots(const Slots& slots, const double* deviations, std::vector<LaneRow>& to) const;
+    explicit SimdSampler(const RunModel& model) : model_(model) {}
+    void prepare_head(const HeadPaths& paths, Scratch::HeadRows& to) const;
+    void fill_head(const HeadPaths& paths, const double* deviations, const Scratch& scratch,
+                   Scratch::HeadRows& to) const;
+    void fill_air(const HeadPaths& paths, const Scratch& scratch, Scratch::HeadRows& to) const;
+    void move_parts(const HeadPaths& paths, const double* deviations, Scratch::HeadRows& to) const;
+    void fill_fields(const Fields& fields, const double* deviations, std::vector<SimdRow>& to) const;
     void displace(std::optional<std::uint64_t> first_sample, Scratch& scratch) const;
-    void correct(const RunVisit& visit, const LaneVisit& lanes, const Scratch& scratch) const;
+    void correct(const RunPass& pass, const SimdPass& lanes, const Scratch& scratch) const;
 
     const RunModel& model_;
-    std::vector<HeadWays> heads_;
+    std::vector<HeadPaths> heads_;
     std::vector<Line> lines_;
     std::vector<ToolPose> poses_;
     std::vector<double> elapsed_, travel_, is_last_;

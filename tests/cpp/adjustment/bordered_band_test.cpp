@@ -8,7 +8,7 @@
 #include <random>
 #include <string>
 
-#include "stepdiag/optics/replay.hpp"
+#include "stepdiag/core/instruction_set.hpp"
 
 namespace {
 
@@ -224,11 +224,11 @@ TEST(BorderedBand, DiagonalBlocksMayBeFilledBeyondTheirTriangle) {
 
 TEST(BorderedBand, AllInstructionSetsAgreeToRounding) {
     const auto matrix = random_normal_matrix(random_reach(23, 9, 1), 71, 1);
-    const std::string chosen = stepdiag::replay_target();  // chosen for all of the library at once
-    for (const std::string& name : stepdiag::replay_targets()) {
+    const std::string chosen = stepdiag::instruction_set();  // chosen for all of the library at once
+    for (const std::string& name : stepdiag::instruction_sets()) {
         SCOPED_TRACE(name);
-        stepdiag::choose_replay_target(name);
+        stepdiag::choose_instruction_set(name);
         expect_dense_answers(matrix, BorderedFactor(matrix, threshold));
     }
-    stepdiag::choose_replay_target(chosen);
+    stepdiag::choose_instruction_set(chosen);
 }

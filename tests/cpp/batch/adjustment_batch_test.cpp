@@ -5,7 +5,7 @@
 
 #include "batch/batch_workshop.hpp"
 #include "refuses.hpp"
-#include "stepdiag/optics/replay.hpp"
+#include "stepdiag/core/instruction_set.hpp"
 
 namespace {
 
@@ -131,19 +131,19 @@ TEST(BatchAdjustment, ALaneKnowsNothingOfItsNeighbours) {
 }
 
 TEST(BatchAdjustment, AllInstructionSetsAgree) {
-    const std::string chosen = stepdiag::replay_target();
+    const std::string chosen = stepdiag::instruction_set();
     const Workshop shop = with_psd();
     const Lanes lanes = in_lanes({shop.sample(0), shop.sample(1)});
     const BatchEvaluator evaluator = shop.evaluator();
     const Lanes expected = evaluate(evaluator, lanes);
     const auto u = values(evaluator.of_pattern());
-    for (const std::string& target : stepdiag::replay_targets()) {
-        stepdiag::choose_replay_target(target);
+    for (const std::string& target : stepdiag::instruction_sets()) {
+        stepdiag::choose_instruction_set(target);
         const Lanes found = evaluate(shop.evaluator(), lanes);
         for (std::size_t e = 0; e < u.size(); ++e)  // the number of steps may differ
             EXPECT_NEAR(found(e, 1), expected(e, 1), converged * u[e].standard_uncertainty) << target;
     }
-    stepdiag::choose_replay_target(chosen);
+    stepdiag::choose_instruction_set(chosen);
 }
 
 TEST(BatchAdjustment, RefusesWhatTheAdjustmentRefuses) {

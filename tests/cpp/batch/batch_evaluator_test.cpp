@@ -8,7 +8,7 @@
 
 #include "batch/batch_runs.hpp"
 #include "refuses.hpp"
-#include "stepdiag/optics/replay.hpp"
+#include "stepdiag/core/instruction_set.hpp"
 
 namespace stepdiag {
 namespace {
@@ -205,11 +205,11 @@ TEST(Batch, RefusesWhatTheEvaluationRefuses) {
 
 class EveryInstructionSet : public testing::TestWithParam<std::string> {
 protected:
-    void SetUp() override { choose_replay_target(GetParam()); }
-    void TearDown() override { choose_replay_target(best_); }
-    const std::string best_ = replay_target();
+    void SetUp() override { choose_instruction_set(GetParam()); }
+    void TearDown() override { choose_instruction_set(best_); }
+    const std::string best_ = instruction_set();
 };
-INSTANTIATE_TEST_SUITE_P(Batch, EveryInstructionSet, testing::ValuesIn(replay_targets()),
+INSTANTIATE_TEST_SUITE_P(Batch, EveryInstructionSet, testing::ValuesIn(instruction_sets()),
                          [](const auto& each) { return each.param; });
 
 TEST_P(EveryInstructionSet, GivesTheSameValues) {

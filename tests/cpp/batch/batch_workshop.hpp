@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "stepdiag/core/random_blocks.hpp"
 #include "stepdiag/batch/batch_evaluator.hpp"
+#include "stepdiag/core/random_blocks.hpp"
 #include "stepdiag/simulation/simulate.hpp"
 
 namespace batch_tests {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "stepdiag/optics/replay.hpp"
+#include "stepdiag/core/instruction_set.hpp"
 
 namespace stepdiag {
 namespace {
@@ -14,17 +14,17 @@ constexpr RandomStream stream = RandomStream::virtual_calibration;
 
 class ForEveryInstructionSet : public testing::TestWithParam<std::string> {
 protected:
-    void SetUp() override { choose_replay_target(GetParam()); }
-    void TearDown() override { choose_replay_target(best_); }
-    const std::string best_ = replay_target();
+    void SetUp() override { choose_instruction_set(GetParam()); }
+    void TearDown() override { choose_instruction_set(best_); }
+    const std::string best_ = instruction_set();
 };
-INSTANTIATE_TEST_SUITE_P(RandomLanes, ForEveryInstructionSet, testing::ValuesIn(replay_targets()),
+INSTANTIATE_TEST_SUITE_P(RandomBlocks, ForEveryInstructionSet, testing::ValuesIn(instruction_sets()),
                          [](const auto& each) { return each.param; });
 
 TEST_P(ForEveryInstructionSet, GivesTheBitsOfUniformPair) {
     // Across the carry of the 32-bit words of sample and seed.
     for (const std::uint64_t first : {std::uint64_t(0), (std::uint64_t(1) << 32) - 16, std::uint64_t(0) - 48}) {
-        const RandomLanes lanes{0x123456789abcdef0, stream, first, 48, 0xfffffffe, 7};
+        const RandomBlocks lanes{0x123456789abcdef0, stream, first, 48, 0xfffffffe, 7};
         std::vector<double> out(2 * 3 * lanes.lanes);
         fill_uniform(lanes, 3, out.data());
         for (std::uint32_t item = 0; item < 3; ++item)
@@ -39,7 +39,7 @@ TEST_P(ForEveryInstructionSet, GivesTheBitsOfUniformPair) {
 }
 
 TEST_P(ForEveryInstructionSet, GivesNormalPairToRounding) {
-    const RandomLanes lanes{5, stream, 1'000'000, 2000, 3};
+    const RandomBlocks lanes{5, stream, 1'000'000, 2000, 3};
     constexpr std::size_t items = 250;
     std::vector<double> out(2 * items * lanes.lanes);
     fill_normal(lanes, items, out.data());
@@ -57,7 +57,7 @@ TEST_P(ForEveryInstructionSet, GivesNormalPairToRounding) {
 }
 
 TEST_P(ForEveryInstructionSet, ALaneDependsOnItsSampleAlone) {
-    const RandomLanes many{5, stream, 64, 256, 11, 2}, few{5, stream, 96, 16, 12, 2};
+    const RandomBlocks many{5, stream, 64, 256, 11, 2}, few{5, stream, 96, 16, 12, 2};
     std::vector<double> all(2 * 3 * many.lanes), some(2 * few.lanes);
     fill_normal(many, 3, all.data());
     fill_normal(few, 1, some.data());

@@ -99,7 +99,7 @@ Station station(int point, const char* line = "ppp", int run = 0) {
 
 }  // namespace
 
-TEST(Measurement, VisitApproachesItsPointsInTheDirectionOfItsOwnTravel) {
+TEST(Measurement, PassApproachesItsPointsInTheDirectionOfItsOwnTravel) {
     using stepdiag::Approach;
     constexpr Approach plus = Approach::positive, minus = Approach::negative;
     const auto expect = [](const char* line, stepdiag::Direction direction, stepdiag::Approaches expected) {

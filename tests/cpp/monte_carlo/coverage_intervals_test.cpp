@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "stepdiag/core/random.hpp"
 #include "monte_carlo/moment_tree.hpp"
+#include "stepdiag/core/random.hpp"
 
 using namespace stepdiag;
 

@@ -5,9 +5,9 @@
 #include <limits>
 
 #include "refuses.hpp"
-#include "stepdiag/optics/replay.hpp"
-#include "stepdiag/monte_carlo/function_model.hpp"
+#include "stepdiag/core/instruction_set.hpp"
 #include "stepdiag/monte_carlo/adaptive_procedure.hpp"
+#include "stepdiag/monte_carlo/function_model.hpp"
 #include "stepdiag/monte_carlo/monte_carlo.hpp"
 
 using namespace stepdiag;
@@ -92,16 +92,16 @@ TEST(SameBits, ForRangesComputedByOneThreadEach) {
 
 TEST(SameBits, AreThoseOfOneInstructionSetAndOthersAreRefused) {
     const FunctionModel model = curved();
-    const std::vector<std::string> targets = replay_targets();
+    const std::vector<std::string> targets = instruction_sets();
     const Bins bins = make_bins(model, options);
     const MonteCarloResult fastest = run_leaves(model, bins, 0, leaves).result();
     EXPECT_EQ(fastest.target, targets.front());
     for (std::size_t i = 1; i < targets.size(); ++i) {
-        choose_replay_target(targets[i]);
+        choose_instruction_set(targets[i]);
         EXPECT_THROW(run_leaves(model, bins, 0, 1), InvalidArgument);
         const Bins its_bins = make_bins(model, options);
         const MonteCarloResult result = run_leaves(model, its_bins, 0, leaves).result();
-        choose_replay_target(targets.front());
+        choose_instruction_set(targets.front());
         EXPECT_EQ(result.target, targets[i]);
         expect_refused([&] { check_same_run(bins, its_bins); }, "expected instruction set " + targets.front());
         // The same samples to rounding: a few of them may fall into the bin beside.

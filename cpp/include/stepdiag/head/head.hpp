@@ -11,12 +11,12 @@
 #include <string>
 #include <vector>
 
+#include "stepdiag/core/air.hpp"
 #include "stepdiag/head/design.hpp"
 #include "stepdiag/head/head_layout.hpp"
 #include "stepdiag/head/traced_head.hpp"
 #include "stepdiag/measurement/head_calibration.hpp"
 #include "stepdiag/measurement/reading.hpp"
-#include "stepdiag/core/air.hpp"
 #include "stepdiag/optics/medium.hpp"
 
 namespace stepdiag {

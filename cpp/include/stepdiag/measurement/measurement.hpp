@@ -14,8 +14,7 @@
 
 namespace stepdiag {
 
-// A backward run visits a line's points in reverse order, with head and mirror as they are.
-// One row: where and in which visit it was read. (run, line, point) is the key.
+// One row: where and in which pass it was read. (run, line, point) is the key.
 struct Station {
     int run = 0;
     Line line;

@@ -33,7 +33,7 @@ public:
     // What the bits of a sample depend on, beside the model itself: results record them, and only what agrees in them
     // is merged.
     virtual std::uint64_t seed() const = 0;
-    virtual std::string target() const = 0;  // the instruction set: replay_target()
+    virtual std::string target() const = 0;  // the instruction set: instruction_set()
 
     // One a thread: holds what a thread writes to. Outlives no model.
     class Worker {

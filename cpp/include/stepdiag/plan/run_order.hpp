@@ -8,6 +8,7 @@
 
 namespace stepdiag {
 
+// A backward run passes a line's points in reverse order, with head and mirror as they are.
 enum class Direction { forward, backward };
 
 // How the axes come to each point of a pass, its first included: in the direction of the pass's own travel, because a

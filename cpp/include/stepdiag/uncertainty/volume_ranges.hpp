@@ -1,5 +1,5 @@
-// How far the deviations of a machine range over its volume, V_XYZ and its like (ISO 230-1:2012, clause 3), and along its
-// body diagonals, E_D (ISO 230-6).
+// How far the deviations of a machine range over its volume, V_XYZ and its like (ISO 230-1:2012, clause 3), and along
+// its body diagonals, E_D (ISO 230-6).
 #pragma once
 
 #include <Eigen/Core>
