@@ -11,8 +11,6 @@
 
 namespace stepdiag {
 
-inline constexpr std::size_t lane_group = lane_group;
-
 struct alignas(64) SimdRow {
     double value[lane_group];
 
