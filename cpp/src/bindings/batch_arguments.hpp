@@ -15,6 +15,4 @@ BatchOptions to_batch_options(const std::string& method, const ReadingUncertaint
                               const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line,
                               bool reversal, bool rotations, const std::optional<Smoothness>& smoothness);
 
-void bind_batch(py::module_& m);  // after bind_adjustment and bind_calibration
-
 }  // namespace stepdiag::bindings

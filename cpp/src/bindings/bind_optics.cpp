@@ -55,7 +55,7 @@ const Medium glass{1.5};  // stands in until the wavelength is known
 
 }  // namespace
 
-void bind_body(py::module_& m) {
+void bind_optics(py::module_& m) {
     const auto position = py::arg("position") = zeros(3);
     const auto rotation = py::arg("rotation") = zeros(3);
     const auto reflectance = py::arg("reflectance") = 0.0;
