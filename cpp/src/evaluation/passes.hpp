@@ -1,5 +1,5 @@
-// A run as the linear evaluations see it: each measured line is a pass to its points, each reading reduced to a length
-// and two tilts that the parameters enter linearly. Internal: not installed.
+// A run as the linear evaluations see it: passes along lines, each reading reduced to a length and two tilts that the
+// parameters enter linearly. Internal: not installed.
 #pragma once
 
 #include <Eigen/Core>

@@ -12,7 +12,7 @@
 namespace stepdiag {
 namespace {
 
-// Their paths go about 2.5 standard deviations to each side of the nominal ones, and must have as much room again.
+// Their paths lie about 2.5 standard deviations to each side of the nominal ones, and must have as much room again.
 constexpr std::uint64_t route_samples = 32;
 constexpr double beyond_the_pilot = 1.0;
 
@@ -89,7 +89,7 @@ TracedHead traced_at(const RunModel& model, const Head& head, const Eigen::Vecto
     return TracedHead(*moved.design, moved.pose_errors, model.environment(head, shared), mirror);
 }
 
-// The segments on this path that the mirror poses have.
+// The segments of the rays that take this path at the mirror poses.
 void add_segments(const TracedHead& traced, const BeamPath& path, const std::vector<MirrorPose>& mirrors,
                   std::vector<std::vector<Segment>>& segments) {
     for (const MirrorPose& mirror : mirrors) {

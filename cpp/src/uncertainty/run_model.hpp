@@ -42,7 +42,7 @@ enum : int {
 };
 }
 
-// The input `input` adds to the number `field`.
+// The input `input` adds to the number in the field `field`.
 struct Deviating {
     int field;
     int input;

@@ -1,5 +1,5 @@
-// One sample of a virtual run the general way, reading by reading: what simulate() does with the sample's own head,
-// set-ups and air at the sample's own tool poses. The fast way in lanes (simd_sampler) is checked against it, and falls
+// One sample of a virtual run, reading by reading: what simulate() does with the sample's own head, set-ups and air at
+// the sample's own tool poses. This is the definition: simd_sampler, which is faster, is checked against it and falls
 // back on it.
 #pragma once
 

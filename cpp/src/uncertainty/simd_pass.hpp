@@ -68,7 +68,7 @@ struct ToolPose {
     double position[3];
 };
 
-// What is common to the ways of reading a pass.
+// What is common to both ways of reading a pass.
 struct SimdPass {
     const ToolPose* poses;
     const SimdRow* displaced = nullptr;  // six rows a pose: shift, rotation vector; none: the same poses in all lanes

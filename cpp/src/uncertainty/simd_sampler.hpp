@@ -1,4 +1,4 @@
-// The fast path: the readings of `lane_group` samples at once, one a lane, every pose by replay (simd_pass).
+// The readings of `lane_group` samples at once, one a lane of SIMD vectors, every pose by replay (simd_pass).
 #pragma once
 
 #include <map>
@@ -13,7 +13,7 @@ namespace stepdiag {
 
 class SimdSampler {
 public:
-    // None where a head has to be read the general path (record_paths), or all poses are to be traced.
+    // None where a head needs the scalar sampler (record_paths), or all poses are to be traced.
     static std::unique_ptr<const SimdSampler> make(const RunModel& model);
 
     // What a thread writes to.
@@ -43,7 +43,7 @@ public:
 
     // Readings without noise: [(row * channels + channel) * lane_group + lane]. `deviations`: [input * lane_group +
     // lane]. `first_sample`: of the displacements of the tool that are drawn; none: none are. `followed` becomes 0 for
-    // lanes that have to be read the general path.
+    // lanes that need the scalar sampler.
     void trace(const double* deviations, std::optional<std::uint64_t> first_sample, Scratch& scratch, double* readings,
                std::uint8_t* followed) const;
     // Adds the reading noise.

@@ -72,7 +72,7 @@ struct VirtualCalibrations::State {
 
     const RunModel model;
     const ScalarSampler general;
-    const std::unique_ptr<const SimdSampler> in_lanes;  // none: all samples go the general way
+    const std::unique_ptr<const SimdSampler> in_lanes;  // none: all samples are read one by one
     const Measurement nominal;
     const BatchEvaluator evaluator;
     const std::vector<DerivedOutput> derived;
@@ -84,7 +84,7 @@ namespace {
 
 constexpr std::size_t lanes = lane_group;  // at a time: readings of all rows stay in the cache
 
-// Far above rounding, far below what another way would do: 1e-9 mm and 1e-13 of the path (as traced_head), 1e-12 rad.
+// Far above rounding, far below what another path would do: 1e-9 mm and 1e-13 of the path (as traced_head), 1e-12 rad.
 double rounding(const std::string& channel, double value) {
     return channel == "alpha" || channel == "beta" ? 1e-12 : 1e-9 + 2e-13 * std::abs(value);
 }
