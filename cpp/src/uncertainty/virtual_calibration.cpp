@@ -55,9 +55,9 @@ Eigen::VectorXd drawn_inputs(const UncertainInputs& inputs, std::uint64_t seed, 
 struct VirtualCalibrations::State {
     State(const VirtualRun& run, const BatchOptions& evaluation, std::uint64_t seed, std::vector<DerivedOutput> given)
         : model(run, seed),
-          general(model),
-          in_lanes(SimdSampler::make(model)),
-          nominal(measurement_of(model, general.readings(model.draws.expectations(), std::nullopt))),
+          scalar(model),
+          simd(SimdSampler::make(model)),
+          nominal(measurement_of(model, scalar.readings(model.draws.expectations(), std::nullopt))),
           evaluator(nominal, run.plan, run.machine.chain(), run.machine.tool(), run.calibration, evaluation),
           derived(std::move(given)) {
         for (const CalibrationEntry& entry : evaluator.entries())
@@ -71,8 +71,8 @@ struct VirtualCalibrations::State {
     }
 
     const RunModel model;
-    const ScalarSampler general;
-    const std::unique_ptr<const SimdSampler> in_lanes;  // none: all samples are read one by one
+    const ScalarSampler scalar;
+    const std::unique_ptr<const SimdSampler> simd;  // none: all samples are read one by one
     const Measurement nominal;
     const BatchEvaluator evaluator;
     const std::vector<DerivedOutput> derived;
@@ -99,7 +99,7 @@ public:
           worker_(state.evaluator),
           readings_(state.model.rows.size() * state.model.channels.size()),
           deviations_(state.model.run.inputs.inputs.size() * lanes) {
-        if (state.in_lanes) scratch_.emplace(*state.in_lanes);
+        if (state.simd) scratch_.emplace(*state.simd);
     }
 
     void evaluate(const SampleBlock& block) override {
@@ -123,13 +123,13 @@ public:
 private:
     void read(std::optional<std::uint64_t> first_sample) {
         std::array<std::uint8_t, lanes> followed{};
-        if (state_.in_lanes) {
-            state_.in_lanes->trace(deviations_.data(), first_sample, *scratch_, readings_.front().value,
+        if (state_.simd) {
+            state_.simd->trace(deviations_.data(), first_sample, *scratch_, readings_.front().value,
                                    followed.data());
             if (first_sample) {
                 for (std::size_t lane = 0; lane < lanes; ++lane)
                     if (followed[lane]) verify(*first_sample, lane);
-                state_.in_lanes->add_noise(*first_sample, *scratch_, readings_.front().value);
+                state_.simd->add_noise(*first_sample, *scratch_, readings_.front().value);
             }
         }
         std::uint64_t replayed = 0;
@@ -148,7 +148,7 @@ private:
     // A sample that cannot be (air out of its equation's range) has lost all readings.
     Eigen::VectorXd read_scalar(std::size_t lane, std::optional<std::uint64_t> sample) const {
         try {
-            return state_.general.readings(deviations(lane), sample);
+            return state_.scalar.readings(deviations(lane), sample);
         } catch (const InvalidArgument&) {
             return Eigen::VectorXd::Constant(Eigen::Index(readings_.size()), std::numeric_limits<double>::quiet_NaN());
         }
@@ -171,7 +171,7 @@ private:
             const RunPass& pass = model.passes[v];
             const std::size_t row =
                 std::size_t(pass.planned.first_row) + std::size_t(uniform(std::uint32_t(v + 1)) * double(pass.rows));
-            const Eigen::MatrixXd traced = state_.general.trace(deviations(lane), sample, pass, {row});
+            const Eigen::MatrixXd traced = state_.scalar.trace(deviations(lane), sample, pass, {row});
             for (std::size_t c = 0; c < channels; ++c) {
                 const double found = readings_[row * channels + c].value[lane];
                 const double expected = traced(0, Eigen::Index(c));
@@ -219,7 +219,7 @@ std::string VirtualCalibrations::target() const { return instruction_set(); }
 std::unique_ptr<SampleModel::Worker> VirtualCalibrations::worker() const { return std::make_unique<Lanes>(*state_); }
 const BatchEvaluator& VirtualCalibrations::evaluator() const { return state_->evaluator; }
 const Measurement& VirtualCalibrations::nominal() const { return state_->nominal; }
-bool VirtualCalibrations::is_in_lanes() const { return state_->in_lanes != nullptr; }
+bool VirtualCalibrations::is_in_lanes() const { return state_->simd != nullptr; }
 SampleCount VirtualCalibrations::count() const {
     return {state_->replayed.load(), state_->traced.load(), state_->verified.load()};
 }
@@ -241,7 +241,7 @@ Eigen::MatrixXd VirtualCalibrations::evaluate_at(const Eigen::MatrixXd& deviatio
 }
 
 Eigen::VectorXd VirtualCalibrations::readings(std::uint64_t sample) const {
-    return state_->general.readings(state_->model.draws.inputs(sample), sample);
+    return state_->scalar.readings(state_->model.draws.inputs(sample), sample);
 }
 
 const VirtualRun& VirtualCalibrations::run() const { return state_->model.run; }
