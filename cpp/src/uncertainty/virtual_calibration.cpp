@@ -124,8 +124,7 @@ private:
     void read(std::optional<std::uint64_t> first_sample) {
         std::array<std::uint8_t, lanes> followed{};
         if (state_.simd) {
-            state_.simd->trace(deviations_.data(), first_sample, *scratch_, readings_.front().value,
-                                   followed.data());
+            state_.simd->trace(deviations_.data(), first_sample, *scratch_, readings_.front().value, followed.data());
             if (first_sample) {
                 for (std::size_t lane = 0; lane < lanes; ++lane)
                     if (followed[lane]) verify(*first_sample, lane);

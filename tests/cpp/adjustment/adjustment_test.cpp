@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "refuses.hpp"
 #include "stepdiag/simulation/simulate.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "batch/batch_workshop.hpp"
-#include "refuses.hpp"
 #include "stepdiag/core/instruction_set.hpp"
+#include "support/batch_workshop.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "batch/batch_runs.hpp"
-#include "refuses.hpp"
 #include "stepdiag/core/instruction_set.hpp"
+#include "support/batch_runs.hpp"
+#include "support/refuses.hpp"
 
 namespace stepdiag {
 namespace {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "batch/batch_workshop.hpp"
+#include "support/batch_workshop.hpp"
 
 namespace {
 

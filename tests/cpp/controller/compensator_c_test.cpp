@@ -3,8 +3,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "controller/random_machine.hpp"
 #include "stepdiag/controller/compensator.h"
+#include "support/random_machine.hpp"
 
 extern "C" const char* stepdiag_c11_failure(const char* path, const char* chain);
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "refuses.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
-#include "refuses.hpp"
 #include "stepdiag/core/random.hpp"
 #include "stepdiag/core/units.hpp"
+#include "support/refuses.hpp"
 
 using namespace stepdiag;
 

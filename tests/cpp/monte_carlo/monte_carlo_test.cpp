@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
-#include "refuses.hpp"
 #include "stepdiag/core/units.hpp"
 #include "stepdiag/monte_carlo/function_model.hpp"
+#include "support/refuses.hpp"
 
 using namespace stepdiag;
 

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <limits>
 
-#include "refuses.hpp"
 #include "stepdiag/core/instruction_set.hpp"
 #include "stepdiag/monte_carlo/adaptive_procedure.hpp"
 #include "stepdiag/monte_carlo/function_model.hpp"
 #include "stepdiag/monte_carlo/monte_carlo.hpp"
+#include "support/refuses.hpp"
 
 using namespace stepdiag;
 

@@ -4,9 +4,9 @@
 
 #include <string>
 
-#include "optics/recorded_route.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/core/instruction_set.hpp"
+#include "support/recorded_route.hpp"
 
 namespace {
 

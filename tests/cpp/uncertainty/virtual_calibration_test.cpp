@@ -4,10 +4,10 @@
 
 #include <cmath>
 
-#include "refuses.hpp"
 #include "stepdiag/core/instruction_set.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
-#include "uncertainty/virtual_runs.hpp"
+#include "support/refuses.hpp"
+#include "support/virtual_runs.hpp"
 
 namespace {
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "head/head_designs.hpp"
 #include "stepdiag/uncertainty/virtual_calibration.hpp"
+#include "support/head_designs.hpp"
 
 namespace stepdiag::test {
 
