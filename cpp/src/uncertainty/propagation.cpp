@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "batch/batch_method.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/uncertainty/derived.hpp"
 #include "uncertainty/contributions.hpp"
@@ -188,9 +189,7 @@ void add_products(const VirtualCalibrations& calibrations, const InputEffects& e
 
 MatrixXd gain_of(const VirtualCalibrations& calibrations) {
     const Index entries = Index(calibrations.evaluator().entries().size());
-    Index channels = 0;
-    for (const Channel& channel : calibrations.nominal().channels())
-        if (channel.name != "time" && channel.name != "temperature") ++channels;
+    const Index channels = Index(signal_channels(calibrations.nominal()).size());
     if (entries * channels > largest_gain / std::max<Index>(Index(calibrations.nominal().size()), 1))
         throw InvalidArgument("propagation: expected at most " + std::to_string(largest_gain) +
                               " sensitivities to readings, got more by far too many steps; the Monte Carlo method "
