@@ -27,6 +27,7 @@ from stepdiag._core import (
     Environment,
     ErrorAtPoint,
     ErrorMap,
+    FitReason,
     GaussianMode,
     Head,
     HeadBeam,
@@ -42,6 +43,7 @@ from stepdiag._core import (
     Noise,
     Outlier,
     Plan,
+    PlausibleLimits,
     Propagation,
     RangeModel,
     ReadingUncertainty,
@@ -79,6 +81,7 @@ from stepdiag._core import (
     trace_beams,
     volumetric_accuracy,
     with_covariance,
+    Verdict,
 )
 from stepdiag.comparison import Deviation, largest_deviations
 from stepdiag.data_files import read_calibration, read_measurement, write_calibration, write_measurement
@@ -113,6 +116,7 @@ __all__ = [
     "Environment",
     "ErrorAtPoint",
     "ErrorMap",
+    "FitReason",
     "GaussianMode",
     "Head",
     "HeadBeam",
@@ -128,6 +132,7 @@ __all__ = [
     "Noise",
     "Outlier",
     "Plan",
+    "PlausibleLimits",
     "Propagation",
     "RangeModel",
     "ReadingUncertainty",
@@ -141,6 +146,7 @@ __all__ = [
     "SpotSensor",
     "Validation",
     "VolumetricAccuracy",
+    "Verdict",
     "__version__",
     "adjust",
     "adjust_scenario",

@@ -51,7 +51,7 @@ def test_odd_map_of_a_scenario_is_used_as_given_with_a_warning(
     Path("scenario.toml").write_text(of_map("truth.csv"))
     assert run("simulate", "scenario.toml", "-o", "out.csv") == 0
     said = capsys.readouterr().err
-    assert said.startswith(f"stepdiag: warning: truth.csv: {warning}")
+    assert said.startswith(f"warning: truth.csv: {warning}")
     assert said.count("\n") == 1
     assert run("check", "scenario.toml") == 0
     assert f"scenario.toml: warning: truth.csv: {warning}" in capsys.readouterr().out
