@@ -123,7 +123,5 @@ def test_scheduler_of_a_network_without_tls_has_a_warning(
 
     monkeypatch.setattr(distributed, "Client", answers_nobody)
     assert main(["uncertainty", "scenario.toml", "-n", "30000", "-o", "there.nc", "--scheduler", address]) == 2
-    expected = (
-        f"stepdiag: warning: {address}: anybody who can reach a scheduler without TLS can run code on its workers"
-    )
+    expected = f"warning: {address}: anybody who can reach a scheduler without TLS can run code on its workers"
     assert (expected in capsys.readouterr().err) == warned
