@@ -55,6 +55,7 @@ from stepdiag._core import (
     Smoothness,
     SpotSensor,
     Validation,
+    Verdict,
     VolumetricAccuracy,
     __version__,
     adjust,
@@ -81,7 +82,6 @@ from stepdiag._core import (
     trace_beams,
     volumetric_accuracy,
     with_covariance,
-    Verdict,
 )
 from stepdiag.comparison import Deviation, largest_deviations
 from stepdiag.data_files import read_calibration, read_measurement, write_calibration, write_measurement
@@ -145,8 +145,8 @@ __all__ = [
     "Smoothness",
     "SpotSensor",
     "Validation",
-    "VolumetricAccuracy",
     "Verdict",
+    "VolumetricAccuracy",
     "__version__",
     "adjust",
     "adjust_scenario",

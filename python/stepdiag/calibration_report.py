@@ -16,7 +16,8 @@ FUNCTIONAL_POINT_FORMAT: Final = "stepdiag functional point 1"
 
 
 def calibration_report(calibration: Calibration) -> Iterator[str]:
-    """Verdict of the fit, method, machine, the largest values and uncertainties of each kind, and to which point straightness refers."""
+    """Verdict of the fit, method, machine, the largest values and uncertainties of each kind, and to which point
+    straightness refers."""
     yield fit_row(calibration)
     yield f"method: {calibration.method or 'not known'}, date: {calibration.date or 'not known'}"
     volume, tool = (

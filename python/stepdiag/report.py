@@ -24,15 +24,15 @@ def in_report_units(kind: str, value: float) -> float:
 
 
 def evaluation_report(result: Calibration | Adjustment, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
-    """The verdict of the fit, lost readings, largest standard uncertainties and what is not determined; of an adjustment
-    also which readings were left out, and how head and mirror were set up."""
+    """The verdict of the fit, lost readings, largest standard uncertainties and what is not determined; of an
+    adjustment also which readings were left out, and how head and mirror were set up."""
     if isinstance(result, Calibration):
         return _published(result, measurement, scenario)
     return _adjusted(result, measurement, scenario)
 
 
 def _published(calibration: Calibration, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
-    yield f"fit: unchecked: the method {calibration.method} does not test it; -m adjustment does, with the same readings"
+    yield f"fit: unchecked: the method {calibration.method} does not test it; -m adjustment does"
     yield from _what_was_done(calibration, measurement, scenario)
     yield from uncertainty_rows(calibration)
     yield from undetermined_rows(calibration)

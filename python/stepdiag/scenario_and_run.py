@@ -32,7 +32,7 @@ def adjust_run(scenario_file: Path, run_file: Path) -> tuple[list[str], str | No
 
 def _said(scenario: Scenario, run: Measurement, adjustment: Adjustment) -> Iterator[str]:
     incomplete, missing = lost_readings(run, scenario.plan, scenario.signals)
-    yield f"{len(run)} rows, {incomplete} of them without a complete reading, {missing} points of the plan without a row"
+    yield f"{len(run)} rows, {incomplete} without a complete reading; {missing} points of the plan without a row"
     yield from verdict_rows(adjustment)
 
 

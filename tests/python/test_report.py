@@ -104,9 +104,9 @@ def test_scale_lines_have_a_word_on_their_cosine_error(tmp_path: Path, capsys: p
 
 def test_smoothness_in_force_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = simulated(tmp_path, NOISY)
-    said = report(tmp_path, capsys, NOISY + "[smoothness]\nrotation_urad = 2.0\n", run)
+    said = report(tmp_path, capsys, NOISY + "[smoothness]\nrotation_urad = 100.0\n", run)
     (row,) = [line for line in said.splitlines() if line.startswith("smoothed")]
-    assert "EAX 2 µrad" in row
+    assert "EAX 100 µrad" in row
     assert "EXX" not in row
 
 
