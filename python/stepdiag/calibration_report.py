@@ -8,6 +8,7 @@ import numpy as np
 from stepdiag._core import Calibration
 from stepdiag.comparison import KINDS, kind_of
 from stepdiag.comparison_report import decimal
+from stepdiag.fit_text import fit_row
 from stepdiag.functional_point import functional_point_straightness
 from stepdiag.report import UNIT, in_report_units, reversal_rows, undetermined_rows
 
@@ -15,7 +16,9 @@ FUNCTIONAL_POINT_FORMAT: Final = "stepdiag functional point 1"
 
 
 def calibration_report(calibration: Calibration) -> Iterator[str]:
-    """Method, machine, the largest values and uncertainties of each kind, and to which point straightness refers."""
+    """Verdict of the fit, method, machine, the largest values and uncertainties of each kind, and to which point
+    straightness refers."""
+    yield fit_row(calibration)
     yield f"method: {calibration.method or 'not known'}, date: {calibration.date or 'not known'}"
     volume, tool = (
         " x ".join(f"{edge:g}" for edge in calibration.volume),

@@ -16,7 +16,7 @@ from stepdiag.cli_evaluate import evaluate, observe
 from stepdiag.cli_export import export
 from stepdiag.cli_head import head
 from stepdiag.cli_nc import nc
-from stepdiag.cli_options import PATH, InOrder, Writes, out_file, tell
+from stepdiag.cli_options import NOT_TO_BE_TRUSTED, PATH, InOrder, Writes, out_file, tell
 from stepdiag.cli_plan import plan
 from stepdiag.cli_study import study
 from stepdiag.cli_uncertainty import uncertainty
@@ -70,7 +70,8 @@ def simulate(scenario: Path, output: Output, overwrite: bool) -> None:
     """Simulate the run that SCENARIO (TOML) describes.
 
     The virtual machine moves through the plan with its errors, and the head reads the mirror at every point.
-    Lost readings are empty fields, in netCDF missing values.
+    Lost readings are empty fields, in netCDF missing values. A measurement that is there already is kept, unless told
+    to overwrite it.
     """
     from stepdiag.data_files import write_measurement
     from stepdiag.map_warnings import scenario_warnings
@@ -100,7 +101,7 @@ def demo(output: Output | None, controller: str | None) -> None:
     """Simulate and evaluate the machine of the method's paper, and draw its Figure 5.
 
     Writes scenarios, truth, runs, calibrations, a table and the figure; go on from them with simulate and
-    evaluate.
+    evaluate. Written again, they are replaced, unless a scenario was changed.
 
     With --controller linuxcnc the loop is closed: LinuxCNC runs the measuring program on a virtual machine, the run
     is evaluated, LinuxCNC compensates with the calibration, and is measured again (docs/loop.md).
@@ -134,11 +135,15 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
 
     Knows scenarios, heads and studies (TOML), measurements and calibrations (CSV or netCDF), error maps (CSV)
     and raw readings (JSON lines). A
-    scenario is checked together with the error map that it names. Exit code 2 if any file is not sound.
+    scenario is checked together with the error map that it names. With one scenario among the files, each measurement
+    is adjusted with it: do its lines, points and distances belong to that plan, and what is the verdict of the fit?
+
+    Exit code 2 if any file is not sound or two do not belong together, 3 if a fit is rejected.
     """
     from stepdiag.kinds import examine
 
-    sound = True
+    sound, untrusted = True, False
+    found: dict[str, list[Path]] = {}
     for file in files:
         try:
             finding = examine(file)
@@ -149,8 +154,27 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
         click.echo(f"{file}: {finding.kind}: {finding.summary}")
         for warning in finding.warnings:
             click.echo(f"{file}: warning: {warning}")
+        found.setdefault(finding.kind, []).append(file)
+        untrusted = untrusted or finding.fit == "rejected"
+    if len(found.get("scenario", [])) == 1:
+        from stepdiag.scenario_and_run import adjust_run
+
+        (scenario,) = found["scenario"]
+        for run in found.get("measurement", []):
+            try:
+                said, fit = adjust_run(scenario, run)
+            except InvalidArgument as error:
+                sound = False
+                _complain(str(error))
+                continue
+            for line in said:
+                click.echo(f"{run} with {scenario}: {line}")
+            untrusted = untrusted or fit == "rejected"
     if not sound:
         context.exit(2)
+    if untrusted:
+        tell("warning", "a fit is rejected: do not use what comes of it")
+        context.exit(NOT_TO_BE_TRUSTED)
 
 
 @cli.command(short_help=SHORT["init"], epilog="\b\nExample: stepdiag init -o machine")
@@ -215,7 +239,8 @@ def _complain(message: str) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs the command line and returns the exit code: 2 for a caller's mistake, 1 for ours, 130 when interrupted."""
+    """Runs the command line and returns the exit code: 0 done, 1 our mistake, 2 a caller's, 3 done but not to be
+    trusted, 130 interrupted."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without µ still gets the rest of the line

@@ -30,6 +30,7 @@ from stepdiag.export import (
     tool_of,
     words,
 )
+from stepdiag.fit_text import fit_row
 from stepdiag.piecewise import best_subset
 
 MOST_ROWS: Final = 256  # EMCMOT_COMP_SIZE; LinuxCNC 2.9 complains about more, and starts without the rest
@@ -123,6 +124,7 @@ def _what_the_files_are(
     calibration: Calibration, at: FloatArray, tool: FloatArray, origin: FloatArray, missing: list[str]
 ) -> list[str]:
     return [
+        fit_row(calibration),
         f"chain {calibration.chain}, volume {words(calibration.volume)} mm, home at {words(origin)} mm in the "
         "controller's coordinates",
         f"corrected: the positioning error of each axis along its line through {words(at)} mm from home, for a tool "

@@ -30,6 +30,7 @@ from stepdiag.export import (
     tool_of,
     words,
 )
+from stepdiag.fit_text import fit_row
 
 GRID_FORMAT: Final = "stepdiag error grid 1"
 DEFAULT_NODES: Final = (11, 11, 11)
@@ -53,6 +54,7 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
 
     leading = {
         "format": GRID_FORMAT,
+        "fit": calibration.fit or "",
         "chain": calibration.chain.name,
         "volume_mm": lengths(calibration.volume),
         "tool_mm": lengths(tool),
@@ -68,7 +70,7 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
     }
     text = "".join(f"# {key}={value}\n" for key, value in leading.items() if value)
     text += ",".join(_header(bool(options.orientation))) + "\n" + "".join(_rows(axes, origin, values))
-    return Export({output: text}, _report(leading, axes, error, loss, place, missing))
+    return Export({output: text}, [fit_row(calibration), *_report(leading, axes, error, loss, place, missing)])
 
 
 def _axes(volume: FloatArray, options: ExportOptions) -> list[FloatArray]:

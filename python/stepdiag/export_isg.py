@@ -35,6 +35,7 @@ from stepdiag.export import (
     tool_of,
     words,
 )
+from stepdiag.fit_text import fit_row
 from stepdiag.piecewise import best_subset
 
 UNTRIED: Final = "written from the manual (ISG FCT-C26, Beckhoff TF5280), not tried on a controller"
@@ -69,6 +70,7 @@ def isg(calibration: Calibration, output: Path, options: ExportOptions) -> Expor
     angles = ", ".join(f"{name} = {angle * 1e6:.6g} µrad" for name, angle in errors.squareness.items())
     where = "as parameters" if apart else "in the straightnesses: EXY - C0Y y, EXZ + B0Z z, EYZ - A0Z z"
     lines = [
+        fit_row(calibration),
         UNTRIED,
         f"chain {calibration.chain}, volume {words(calibration.volume)} mm, home at {words(origin)} mm in the "
         f"controller's coordinates, direction of approach {kind}",

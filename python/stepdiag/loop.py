@@ -54,7 +54,7 @@ class Outcome:
     agreement: dict[str, Agreement]  # with noise: by kind of points
 
 
-def claim_loop(folder: Path) -> Path:
+def claim_loop(folder: Path, steps: int = STEPS) -> Path:
     """The folder, if nothing would be lost in it but what an earlier loop wrote. Raises InvalidArgument."""
     scenarios = {}
     files: dict[str, outputs.Kind | str] = {
@@ -66,7 +66,7 @@ def claim_loop(folder: Path) -> Path:
         files[f"{case.name}/program.ngc"] = outputs.PROGRAM
         files[f"{case.name}/calibration.csv"] = outputs.CALIBRATION
         for run, seed in ((case.name, 1), (f"{case.name}-again", 2)):
-            scenarios[f"{run}/scenario.toml"] = scenario_text(case, seed=seed)
+            scenarios[f"{run}/scenario.toml"] = scenario_text(case, steps, seed)
             files[f"{run}/run.csv"] = outputs.MEASUREMENT
             files[f"{run}/run.raw.jsonl"] = outputs.RAW
             files[f"{run}/points.ngc"] = outputs.PROGRAM

@@ -16,7 +16,7 @@ from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.files import check_input, read_text
 from stepdiag.key_errors import models_of, show
-from stepdiag.scenario_adjustment import setup_priors, smoothness_of
+from stepdiag.scenario_adjustment import plausible_limits, setup_priors, smoothness_of
 from stepdiag.scenario_heads import DescribedHead, actual_heads, heads_by_line, nominal_heads, of_run, signals_of
 from stepdiag.scenario_keys import TABLES_BY_NAME, PlanSection, RandomSection, ScenarioKeys
 from stepdiag.scenario_setup import environments, misalignments, noise_of, weights
@@ -46,6 +46,7 @@ class Scenario:
     setup: _core.SetupPriors
     setup_by_line: Mapping[str, _core.SetupPriors]
     smoothness: _core.Smoothness | None
+    plausible: _core.PlausibleLimits
     uncertain: _core.UncertainInputs
 
     @property
@@ -118,6 +119,7 @@ def evaluate_scenario(
         method=method,
         uncertainty=scenario.uncertainty,
         full_covariance=full_covariance,
+        plausible=scenario.plausible,
     )
 
 
@@ -142,6 +144,7 @@ def adjust_scenario(
         smoothness=scenario.smoothness,
         outlier_probability=keys.outlier_probability,
         full_covariance=full_covariance,
+        plausible=scenario.plausible,
     )
 
 
@@ -221,6 +224,7 @@ def build_scenario(keys: ScenarioKeys, path: Path) -> Scenario:
         setup=setup,
         setup_by_line=MappingProxyType(setup_by_line),
         smoothness=smoothness_of(keys.smoothness, path),
+        plausible=plausible_limits(keys.plausible),
         uncertain=uncertain_inputs(keys, described, heads, path),
     )
 

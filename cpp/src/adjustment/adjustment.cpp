@@ -8,6 +8,7 @@
 #include "adjustment/adjustment_result.hpp"
 #include "adjustment/outlier_search.hpp"
 #include "adjustment/smoothness.hpp"
+#include "adjustment/verdict.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/core/units.hpp"
 
@@ -30,20 +31,6 @@ void check_options(const AdjustmentOptions& options, const Plan& plan) {
 std::array<double, function_count> smoothness_at_start(const AdjustmentOptions& options) {
     if (!options.smoothness || options.smoothness->cross_validated) return {};
     return given_deviations(*options.smoothness);
-}
-
-// No machine is off by a hundredth of its travel: then it is not the machine that the readings tell of.
-void refuse_absurd(const Calibration& calibration) {
-    for (int i = 0; i < function_count; ++i) {
-        const FunctionId id = FunctionId::at(i);
-        if (!calibration.functions[i] || id.is_rotation()) continue;
-        for (const double value : calibration.functions[i]->value)
-            if (std::abs(value) > 1e-2 * calibration.volume[index(id.axis)])
-                throw InvalidArgument(
-                    "adjustment: " + id.name() + " comes out as " + std::to_string(value) +
-                    " mm, more than a hundredth of the travel; expected distances in mm that grow along "
-                    "the line, half of the way to the mirror and back");
-    }
 }
 
 std::vector<std::string> describe(const Observability& observability, const Eigen::VectorXd& x,
@@ -78,9 +65,11 @@ std::vector<std::size_t> Adjustment::outliers() const {
 Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
                   const HeadCalibrations& heads, const AdjustmentOptions& options) {
     check_options(options, plan);
+    check(options.plausible);
     AdjustmentProblem problem(measurement, plan, chain, tool, heads, options);
     if (problem.readings().empty())
         throw InvalidArgument("adjustment: nothing can be determined: the run has no readings that count");
+    refuse_foreign_distances(measurement, plan);
     GaussNewton solver(problem, smoothness_at_start(options));
     AdjustmentTables tables(problem);
     const Observability observability(solver, tables);
@@ -91,7 +80,13 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     Adjustment result{
         {"", chain, {}, {}, {}, {}, {}, {}, {}}, {}, {}, 0.0, 0, 1.0, 0, {}, smoothness_at_start(options)};
     OutlierSearch outliers(problem, solver, options);
-    result.iterations = outliers.solve_without_gross(observability.determined(), x);
+    try {
+        result.iterations = outliers.solve_without_gross(observability.determined(), x);
+    } catch (const InvalidArgument& error) {
+        const std::string far = far_reading(measurement, plan);
+        if (far.empty()) throw;
+        throw InvalidArgument("adjustment: " + far);
+    }
     if (options.outlier_probability > 0.0) outliers.run(observability.determined(), x);
     if (options.smoothness && options.smoothness->cross_validated) {
         result.smoothness = cross_validate(solver, x, options);
@@ -107,7 +102,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
         throw InvalidArgument(
             "adjustment: nothing can be determined. " +
             (result.calibration.undetermined.empty() ? std::string() : result.calibration.undetermined.front()));
-    refuse_absurd(result.calibration);
+    refuse_implausible(result.calibration, measurement, plan, options.plausible);
     if (options.full_covariance) result.calibration.covariance = full_covariance(problem, forms, solver.factor());
     result.setup = setup_estimates(problem, known, x, inverse);
     result.residuals = outliers.residuals();
@@ -119,6 +114,9 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     if (result.degrees_of_freedom > 0)
         result.chi_square_probability =
             Eigen::numext::igammac(0.5 * result.degrees_of_freedom, 0.5 * result.weighted_square_sum);
+    result.verdict = judge(result, measurement);
+    result.calibration.fit = result.verdict.fit;
+    if (result.degrees_of_freedom > 0) result.calibration.variance_factor = result.variance_factor();
     return result;
 }
 

@@ -24,7 +24,8 @@ LengthKind length_kind(const BatchPattern& pattern) {
 }
 
 Calibration evaluate(const BatchPattern& p) {
-    const EvaluationOptions options{p.options.uncertainty};
+    // No calibration to be used, but the point at which maps are linear: samples may lie anywhere.
+    const EvaluationOptions options{p.options.uncertainty, false, PlausibleLimits::none()};
     return is_enhanced(p) ? evaluate_enhanced(p.measurement, p.plan, p.chain, p.tool, p.heads, options)
                           : evaluate_conventional(p.measurement, p.plan, p.chain, p.tool, p.heads, options);
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/text_file.hpp"
 #include "machine/table_header.hpp"
 #include "stepdiag/core/error.hpp"
 
@@ -112,6 +113,8 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
                     {"tool_mm", format_lengths(calibration.tool)}};
     table.header["straightness_reference"] = straightness_reference(calibration.chain, calibration.tool);
     if (!calibration.date.empty()) table.header["date"] = calibration.date;
+    if (calibration.fit) table.header["fit"] = name(*calibration.fit);
+    if (calibration.variance_factor) table.header["variance_factor"] = format_decimal(*calibration.variance_factor, 0);
     if (!slopes.empty()) table.header["undetermined_slopes"] = join(slopes, " ");
     if (!constants.empty()) table.header["undetermined_reversal_constants"] = join(constants, " ");
     if (!calibration.undetermined.empty())
@@ -138,6 +141,12 @@ Calibration read_calibration(const std::string& path) {
                             split(optional_value("undetermined"), sentence_break),
                             {}};
     calibration.date = optional_value("date");
+    calibration.fit = fit_of(table.header, path);
+    if (const std::string factor = optional_value("variance_factor"); !factor.empty()) {
+        calibration.variance_factor = parse_decimal(factor, 0);
+        if (!calibration.variance_factor || *calibration.variance_factor < 0.0)
+            throw InvalidArgument(path + ": variance_factor: expected a number of at least 0, got \"" + factor + "\"");
+    }
     const auto slopes = functions_listed(table, "undetermined_slopes", path);
     const auto constants = functions_listed(table, "undetermined_reversal_constants", path);
     for (int i = 0; i < function_count; ++i) {

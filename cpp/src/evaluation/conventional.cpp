@@ -76,6 +76,9 @@ Calibration evaluate_conventional(const Measurement& measurement, const Plan& pl
                                   const EvaluationOptions& options) {
     if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
     const auto passes = collect_passes(measurement, plan, heads, options.uncertainty, LengthKind::distance);
+    check(options.plausible);
+    refuse_foreign_distances(measurement, plan);
+    if (const std::string far = far_reading(measurement, plan); !far.empty()) throw InvalidArgument(far);
     const std::vector<bool> usable = body_diagonals(passes);
     const auto diagonals = std::count(usable.begin(), usable.end(), true);
     if (diagonals < 3)
@@ -85,6 +88,7 @@ Calibration evaluate_conventional(const Measurement& measurement, const Plan& pl
     const ConventionalMap map(passes, plan, usable);
     Calibration calibration{"conventional", chain, plan.volume(), tool, {}, {}, {}, {}};
     evaluate_linear(map, passes, plan, options.full_covariance, calibration);
+    calibration.fit = Fit::unchecked;
     for (const Axis axis : all_axes)
         if (const AxisSystem& system = map.lengths(axis); !system.gap.empty())
             calibration.undetermined.push_back(
@@ -94,6 +98,7 @@ Calibration evaluate_conventional(const Measurement& measurement, const Plan& pl
     if (!is_anything_determined(calibration))
         throw InvalidArgument("conventional evaluation: nothing can be determined. " +
                               calibration.undetermined.front());
+    refuse_implausible(calibration, measurement, plan, options.plausible);
     calibration.undetermined.push_back("rotations: the conventional evaluation uses distances only");
     return calibration;
 }

@@ -235,11 +235,16 @@ Calibration evaluate_enhanced(const Measurement& measurement, const Plan& plan, 
                               const EvaluationOptions& options) {
     if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
     const auto passes = collect_passes(measurement, plan, heads, options.uncertainty, LengthKind::lever_arm_corrected);
+    check(options.plausible);
+    refuse_foreign_distances(measurement, plan);
+    if (const std::string far = far_reading(measurement, plan); !far.empty()) throw InvalidArgument(far);
     const EnhancedMap map(passes, plan, chain, tool);
     Calibration calibration{"enhanced", chain, plan.volume(), tool, {}, {}, explain(map, plan), {}};
     evaluate_linear(map, passes, plan, options.full_covariance, calibration);
+    calibration.fit = Fit::unchecked;
     if (!is_anything_determined(calibration))
         throw InvalidArgument("enhanced evaluation: nothing can be determined. " + calibration.undetermined.front());
+    refuse_implausible(calibration, measurement, plan, options.plausible);
     return calibration;
 }
 

@@ -57,6 +57,25 @@ TEST(CompensatorC, WhatIsNotCompensatedIsCounted) {
     stepdiag_compensator_free(compensator);
 }
 
+TEST(CompensatorC, ARejectedFitIsRefusedUnlessAccepted) {
+    ParameterTable table = random_table();
+    table.header["fit"] = "rejected";
+    const std::string path = ::testing::TempDir() + "rejected.csv";
+    write_parameter_table(table, path);
+    char message[300];
+    EXPECT_EQ(stepdiag_compensator_load(path.c_str(), "wX'bYZt", nullptr, message, sizeof message), nullptr);
+    EXPECT_NE(std::strstr(message, "fit=rejected"), nullptr) << message;
+    stepdiag_options options = stepdiag_default_options();
+    options.accept_rejected = 1;
+    stepdiag_compensator* compensator = stepdiag_compensator_load(path.c_str(), "wX'bYZt", &options, nullptr, 0);
+    EXPECT_STREQ(stepdiag_fit(compensator), "rejected");
+    stepdiag_compensator_free(compensator);
+
+    const Loaded without;
+    EXPECT_STREQ(stepdiag_fit(without.compensator), "");
+    EXPECT_STREQ(stepdiag_fit(nullptr), "");
+}
+
 TEST(CompensatorC, TheAnswerMayReplaceTheQuestion) {
     const Loaded loaded;
     double p[3] = {100.0, 200.0, 300.0}, separate[3];

@@ -74,6 +74,7 @@ struct AdjustmentOptions {
     // is. No more than one in fifty, or ten: where more do not fit, it is the model that does not, and all stay.
     double outlier_probability = 0.01;
     bool full_covariance = false;
+    PlausibleLimits plausible = {};
 };
 
 // One set-up unknown, as it was found.
@@ -102,8 +103,35 @@ struct ReadingResidual {
     bool used() const { return outlier == 0; }
 };
 
+// Why a fit is not accepted.
+enum class FitFinding {
+    no_redundancy,  // nothing controls the readings
+    noise_factor,   // root of the variance factor: the misfit in terms of the stated uncertainties
+    misfit,         // probability of a misfit as large as this one
+    no_misfit,      // probability of a misfit as small as this one
+    uneven_misfit,  // root of the variance factor of one line or one channel, where it differs from that of the others
+    prior,          // distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2)
+};
+std::string name(FitFinding finding);  // "no_redundancy", ...
+
+struct FitReason {
+    FitFinding finding;
+    double value;
+    double limit;
+    std::string line = {};     // of an uneven misfit or a prior
+    std::string channel = {};  // of an uneven misfit: "distance", ...; of a prior: the set-up quantity
+    int component = 0;         // of a prior
+};
+
+// Whether the readings of an adjustment agree with each other, with their uncertainties and with the priors. It does
+// not see what the parameters absorb: a wrong wavelength, chain or tool.
+struct Verdict {
+    Fit fit = Fit::unchecked;
+    std::vector<FitReason> reasons = {};
+};
+
 struct Adjustment {
-    Calibration calibration;
+    Calibration calibration;  // carries fit and variance factor
     std::vector<SetupEstimate> setup;
     std::vector<ReadingResidual> residuals;
     double weighted_square_sum;  // of residuals and priors
@@ -112,13 +140,15 @@ struct Adjustment {
     int iterations;                 // steps from zero
     std::vector<std::string> combinations;               // what is known of unknowns that are not determined one by one
     std::array<double, function_count> smoothness = {};  // deviations of second differences in force; 0: none
+    Verdict verdict = {};
 
     double variance_factor() const;             // weighted_square_sum/degrees_of_freedom; 1 without freedom
     std::vector<std::size_t> outliers() const;  // into `residuals`, by their number
 };
 
 // Throws InvalidArgument for readings that do not belong to the plan, channels that do not fit the head, a free drift
-// without times, options that make no sense, or where nothing at all can be determined.
+// without times, options that make no sense, where nothing at all can be determined, or for a result that is not
+// plausible.
 Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
                   const HeadCalibrations& heads, const AdjustmentOptions& options = {});
 
