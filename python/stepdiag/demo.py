@@ -59,7 +59,15 @@ CASES: Final = (
     Case("1a", "kinematic errors only"),
     Case("1b", "reflector misaligned by 100, 300 µrad", (REFLECTOR,)),
     Case("1c", "laser misaligned by 700, 1000 µrad", (LASER,)),
-    Case("1d", "laser as in 1c, the mirror follows it", (LASER, LASER.replace("laser", "reflector"))),
+    Case(
+        "1d",
+        "laser as in 1c, the mirror follows it",
+        (
+            *(LASER, LASER.replace("laser", "reflector")),
+            # What the conventional evaluation makes of it is beyond what a machine can be, and is shown.
+            *("", "[plausible]", "positioning_um_per_m = 2000.0"),
+        ),
+    ),
     Case(
         "3",
         "as 1b and 1c, PSD displaced by 1.5, 2 mm",
