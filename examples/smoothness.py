@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 import stepdiag as sd
-from stepdiag.comparison import kind_of
+from stepdiag.parameters import kind_of
 
 VOLUME = (800.0, 600.0, 500.0)  # mm
 STEPS = 50
