@@ -3,9 +3,9 @@
 python examples/variants.py
 """
 
-from stepdiag.planning.observation import extents, observe
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.parameters import in_report_units
+from stepdiag.planning.observation import extents, observe
 from stepdiag.scenario.description import parse_scenario
 
 SCENARIO = """

@@ -80,14 +80,21 @@ from stepdiag._core import (
     volumetric_accuracy,
     with_covariance,
 )
+from stepdiag.calibration.comparison import Comparison, Difference, compare_calibrations
+from stepdiag.calibration.functional_point import functional_point_straightness
 from stepdiag.calibration.largest_by_kind import Deviation, largest_deviations
 from stepdiag.io.data_files import read_calibration, read_measurement, write_calibration, write_measurement
-from stepdiag.calibration.functional_point import functional_point_straightness
-from stepdiag.calibration.comparison import Comparison, Difference, compare_calibrations
 
 if TYPE_CHECKING:
     from stepdiag.head.description import parse_head_design, read_head_design, shipped_head
-    from stepdiag.scenario.description import (Scenario, adjust_scenario, evaluate_scenario, parse_scenario, read_scenario, simulate_scenario)
+    from stepdiag.scenario.description import (
+        Scenario,
+        adjust_scenario,
+        evaluate_scenario,
+        parse_scenario,
+        read_scenario,
+        simulate_scenario,
+    )
 
 __all__ = [
     "Adjustment",
@@ -178,15 +185,15 @@ __all__ = [
 
 # Where to find what has to do with our TOML files.
 _LATER = {
-    "Scenario": "scenario",
-    "adjust_scenario": "scenario",
-    "evaluate_scenario": "scenario",
-    "parse_scenario": "scenario",
-    "read_scenario": "scenario",
-    "simulate_scenario": "scenario",
-    "parse_head_design": "head_description",
-    "read_head_design": "head_description",
-    "shipped_head": "head_description",
+    "Scenario": "scenario.description",
+    "adjust_scenario": "scenario.description",
+    "evaluate_scenario": "scenario.description",
+    "parse_scenario": "scenario.description",
+    "read_scenario": "scenario.description",
+    "simulate_scenario": "scenario.description",
+    "parse_head_design": "head.description",
+    "read_head_design": "head.description",
+    "shipped_head": "head.description",
 }
 
 

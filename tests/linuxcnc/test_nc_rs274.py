@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from stepdiag.program.gcode import Trigger
 from stepdiag.program.measuring_program import measuring_program
 from stepdiag.program.options import Options
-from stepdiag.program.gcode import Trigger
 from stepdiag.scenario.description import Scenario, parse_scenario
 from stepdiag.scenario.order_of_run import visits_of
 

@@ -2,49 +2,22 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Literal
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.visit_loop import Acquisition, Resume
-from stepdiag.acquisition.reading_plan import channels_of, check_axes, described_plan, digest_of
-from stepdiag.acquisition.triggers import Operator, Silent, Trigger
-from stepdiag.io.data_files import write_measurement
-from stepdiag.io.whole_files import check_output
 from stepdiag.acquisition.ids3010 import Ids3010, InstrumentError, parse_source
+from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.raw_file import RawContent, RawFile, check_new
 from stepdiag.acquisition.raw_records import Header
-from stepdiag.acquisition.run_from_raw import Zero, measurement_of
+from stepdiag.acquisition.reading_plan import channels_of, check_axes, described_plan, digest_of
+from stepdiag.acquisition.run_from_raw import measurement_of
+from stepdiag.acquisition.triggers import Operator, Silent, Trigger
+from stepdiag.acquisition.visit_loop import Acquisition, Resume
+from stepdiag.io.data_files import write_measurement
+from stepdiag.io.whole_files import check_output
 from stepdiag.scenario.description import Scenario
-from stepdiag.acquisition.settling import Settling
-
-
-@dataclass(frozen=True)
-class AcquireOptions:
-    """How an acquisition reads. Times in seconds."""
-
-    axes: tuple[int, ...] | None = None  # of the instrument, from 1, one for each channel; none: 1, 2, ...
-    sign: Literal[1, -1] = 1  # -1: its positions fall where the distance grows
-    settling: Settling = field(default_factory=Settling)
-    zero: Zero = "none"
-    uncertainties: bool = False
-    start: Literal["auto", "never"] = "auto"  # the instrument's measurement, at every set-up
-    start_timeout: float = 90.0
-    timeout: float = 2.0  # of one request
-    attempts: int = 3  # of a request that only asks
-    wait_timeout: float = 3600.0  # for a reading to be wanted
-
-    def __post_init__(self) -> None:
-        if self.sign not in (1, -1):
-            raise InvalidArgument(f"sign: expected 1 or -1, got {self.sign!r}")
-        if self.attempts < 1:
-            raise InvalidArgument(f"attempts: expected at least 1, got {self.attempts}")
-        for name in ("start_timeout", "timeout", "wait_timeout"):
-            seconds = getattr(self, name)
-            if not 0.0 < seconds < 1e7:
-                raise InvalidArgument(f"{name}: expected seconds above 0, got {seconds!r}")
 
 
 @dataclass(frozen=True)

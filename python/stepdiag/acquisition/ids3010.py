@@ -12,8 +12,8 @@ from typing import Any, Final, Self
 from urllib.parse import urlsplit
 
 from stepdiag._core import InvalidArgument
-from stepdiag.io.whole_files import reason
 from stepdiag.acquisition.ids3010_messages import JsonStream, encoded, shown
+from stepdiag.io.whole_files import reason
 
 PORT: Final = 9090
 AXES: Final = 3

@@ -13,8 +13,8 @@ from types import TracebackType
 from typing import Self
 
 from stepdiag._core import InvalidArgument
-from stepdiag.io.whole_files import check_output, read_bytes, reason
 from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, parse_record
+from stepdiag.io.whole_files import check_output, read_bytes, reason
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from typing import Annotated, Literal, Self
 from pydantic import AwareDatetime, Field, TypeAdapter, ValidationError, model_validator
 
 from stepdiag._core import InvalidArgument
-from stepdiag.config.key_types import Section, Triple
 from stepdiag.acquisition.settling import Kind
+from stepdiag.config.key_types import Section, Triple
 
 Picometres = Annotated[int, Field(gt=-(2**63), lt=2**63)]
 Count = Annotated[int, Field(ge=0, le=10**9)]

@@ -7,10 +7,10 @@ from typing import Literal
 import numpy as np
 
 from stepdiag._core import InvalidArgument, Measurement
-from stepdiag.io.data_files import write_measurement
 from stepdiag.acquisition.raw_file import RawContent, read_raw
 from stepdiag.acquisition.raw_records import RawReading, Visited
 from stepdiag.config.toml_text import located
+from stepdiag.io.data_files import write_measurement
 
 PICOMETRES = 10**9  # in a millimetre
 

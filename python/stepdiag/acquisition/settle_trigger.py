@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Final
 
-from stepdiag.acquisition.triggers import Context, Stopped, of_start, point_text
 from stepdiag.acquisition.settling import Reading, Settling
+from stepdiag.acquisition.triggers import Context, Stopped, of_start, point_text
 from stepdiag.scenario.order_of_run import Visit
 
 # mm. A rest counts as the next point within this share of the plan's shortest step, as the last one within BACK after

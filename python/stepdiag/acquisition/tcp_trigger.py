@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import Final
 
 from stepdiag._core import InvalidArgument
+from stepdiag.acquisition.settling import Reading
 from stepdiag.acquisition.triggers import Context, Stopped, of_start, point_text
 from stepdiag.io.whole_files import reason
-from stepdiag.acquisition.settling import Reading
 from stepdiag.scenario.order_of_run import Visit
 
 

@@ -12,11 +12,11 @@ from types import TracebackType
 from typing import Any, Self
 
 from stepdiag._core import InvalidArgument, __version__
-from stepdiag.io.whole_files import reason
 from stepdiag.acquisition.ids3010 import AXES, INTERFACES, RUNNING, TWIN
 from stepdiag.acquisition.ids3010_messages import JsonStream, encoded
-from stepdiag.scenario.description import Scenario, read_scenario
 from stepdiag.acquisition.twin_instrument import NOT_MEASURING, TEXTS, WRONG_AXIS, TwinBehaviour, TwinInstrument
+from stepdiag.io.whole_files import reason
+from stepdiag.scenario.description import Scenario, read_scenario
 from stepdiag.scenario.order_of_run import visits_of
 
 Params = Sequence[Any]

@@ -11,8 +11,8 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.reading_plan import channels_of, described_plan, digest_of
 from stepdiag.acquisition.ids3010 import AXES, IDLE, RUNNING
+from stepdiag.acquisition.reading_plan import channels_of, described_plan, digest_of
 from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.order_of_run import visits_of

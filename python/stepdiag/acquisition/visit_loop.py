@@ -2,20 +2,18 @@
 
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from stepdiag._core import __version__
-from stepdiag.acquisition.reading_plan import placement
-from stepdiag.acquisition.triggers import Context, Operator, Trigger, point_text
 from stepdiag.acquisition.ids3010 import RUNNING, STARTING, TWIN, Ids3010, InstrumentError, Sample
+from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.raw_file import RawContent, RawFile
 from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, Session, Value
-from stepdiag.scenario.description import Scenario
+from stepdiag.acquisition.reading_plan import placement
 from stepdiag.acquisition.settling import Reading, take_reading
+from stepdiag.acquisition.triggers import Context, Operator, Trigger, point_text
+from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.order_of_run import Visit, visits_of
-
-if TYPE_CHECKING:
-    from stepdiag.acquisition.options import AcquireOptions
 
 Resume = Literal["point", "line", "set-up"]
 

@@ -1,14 +1,11 @@
-"""How far a calibration is from a known truth, kind by kind."""
+"""The largest values of a calibration, kind by kind: how far it is from a known truth, and how uncertain."""
 
 from dataclasses import dataclass
-from typing import Final, Literal
 
 import numpy as np
 
 from stepdiag._core import Calibration, ErrorMap
-
-Kind = Literal["positioning", "straightness", "angle", "squareness"]
-KINDS: Final[tuple[Kind, ...]] = ("positioning", "straightness", "angle", "squareness")
+from stepdiag.parameters import KINDS, Kind, kind_of
 
 
 @dataclass(frozen=True)
@@ -18,20 +15,6 @@ class Deviation:
     value: float
     parameter: str
     position: float | None  # mm; none for a squareness
-
-
-def kind_of(parameter: str) -> Kind:
-    """The kind of a parameter by its name, EXX ... ECZ or C0Y, B0Z, A0Z."""
-    if parameter[0] != "E":
-        return "squareness"
-    if parameter[1] in "ABC":
-        return "angle"
-    return "positioning" if parameter[1] == parameter[2] else "straightness"
-
-
-def units_of(parameter: str) -> str:
-    """The native unit of a parameter."""
-    return "rad" if kind_of(parameter) in ("angle", "squareness") else "mm"
 
 
 def largest_deviations(calibration: Calibration, truth: ErrorMap) -> dict[Kind, Deviation]:
@@ -53,4 +36,21 @@ def largest_deviations(calibration: Calibration, truth: ErrorMap) -> dict[Kind, 
         note(name, float(difference[worst]), float(position[worst]))
     for name, (angle, _) in calibration.squareness.items():
         note(name, angle - truth.squareness.get(name, 0.0), None)
+    return {kind: largest[kind] for kind in KINDS if kind in largest}
+
+
+def largest_uncertainties(calibration: Calibration) -> dict[Kind, tuple[float, str]]:
+    """The largest standard uncertainty of each kind, mm or rad, and the parameter and place that has it."""
+    largest: dict[Kind, tuple[float, str]] = {}
+
+    def note(name: str, uncertainty: float, where: str) -> None:
+        kind = kind_of(name)
+        if np.isfinite(uncertainty) and uncertainty > largest.get(kind, (-1.0, ""))[0]:
+            largest[kind] = uncertainty, f"{name}{where}"
+
+    for name, (position, _, uncertainty) in calibration.functions.items():
+        worst = int(np.argmax(uncertainty))
+        note(name, float(uncertainty[worst]), f" at {position[worst]:g} mm")
+    for name, (_, angle_uncertainty) in calibration.squareness.items():
+        note(name, angle_uncertainty, "")
     return {kind: largest[kind] for kind in KINDS if kind in largest}

@@ -12,8 +12,8 @@ from stepdiag.cli.options import PATH, keep_apart, keep_map, out_file, tell
 
 if TYPE_CHECKING:
     from stepdiag.acquisition.options import AcquireOptions
-    from stepdiag.acquisition.visit_loop import Resume
     from stepdiag.acquisition.triggers import Trigger
+    from stepdiag.acquisition.visit_loop import Resume
 
 SECONDS = click.FloatRange(min=0.0, min_open=True)
 
@@ -179,9 +179,9 @@ def _resume(given: dict[str, Any]) -> "Resume | None":
 
 
 def _trigger(text: str) -> "Trigger":
-    from stepdiag.acquisition.triggers import KeyTrigger
     from stepdiag.acquisition.settle_trigger import SettleTrigger
     from stepdiag.acquisition.tcp_trigger import TcpTrigger
+    from stepdiag.acquisition.triggers import KeyTrigger
 
     simple: dict[str, Callable[[], Trigger]] = {"key": KeyTrigger, "settle": SettleTrigger}
     if text in simple:

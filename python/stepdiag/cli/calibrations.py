@@ -24,9 +24,9 @@ def report(calibration: Path, output: Path | None) -> None:
     frames. For an axis that carries the workpiece, or with a tool offset, the functional point's differs; a netCDF file
     has it too.
     """
-    from stepdiag.report.calibration import calibration_report, functional_point_csv
     from stepdiag.io.data_files import read_calibration
     from stepdiag.io.whole_files import check_input, check_output, write_whole
+    from stepdiag.report.calibration import calibration_report, functional_point_csv
 
     if output is not None:
         check_output(output)
@@ -59,10 +59,10 @@ def compare(a: Path, b: Path, output: Path | None, limit: float) -> None:
     compared (Bonferroni). Where nodes differ, the longer table is interpolated. Of functions whose slope is not
     determined in both, the shapes are compared.
     """
-    from stepdiag.report.comparison import comparison_report
+    from stepdiag.calibration.comparison import compare_calibrations
     from stepdiag.io.data_files import read_calibration
     from stepdiag.io.whole_files import check_input, check_output
-    from stepdiag.calibration.comparison import compare_calibrations
+    from stepdiag.report.comparison import comparison_report
 
     if output is not None:
         check_output(output)

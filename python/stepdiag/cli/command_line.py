@@ -72,8 +72,8 @@ def simulate(scenario: Path, output: Path) -> None:
     """
     from stepdiag.io.data_files import write_measurement
     from stepdiag.io.whole_files import check_output
-    from stepdiag.scenario.map_warnings import scenario_warnings
     from stepdiag.scenario.description import read_scenario, simulate_scenario
+    from stepdiag.scenario.map_warnings import scenario_warnings
 
     check_output(output)
     keep_apart(output, scenario)
@@ -114,9 +114,8 @@ def demo(folder: Path | None, controller: str | None) -> None:
     if controller is None:
         lines = run_demo(folder or Path("demo"), progress=progress)
     else:
+        from stepdiag.demo.loop import controller_of, run_loop
         from stepdiag.linuxcnc.processes import LinuxcncError
-        from stepdiag.demo.loop import run_loop
-        from stepdiag.demo.loop import controller_of
 
         try:
             lines = run_loop(folder or Path(f"demo-{controller}"), controller_of(controller), progress=progress)
@@ -171,10 +170,10 @@ def init(folder: Path, scenario: Path | None, head_name: str | None) -> None:
     in the scenario, make a new sheet with --sheet-for. With --head the scenario's head is head.toml, a copy of a
     shipped description, in place of a layout.
     """
-    from stepdiag.io.whole_files import make_folder, read_text, write_whole
-    from stepdiag.head.description import find_shipped_head
-    from stepdiag.scenario.description import parse_scenario, read_scenario, runs_of
     from stepdiag.config.scenario_template import template
+    from stepdiag.head.description import find_shipped_head
+    from stepdiag.io.whole_files import make_folder, read_text, write_whole
+    from stepdiag.scenario.description import parse_scenario, read_scenario, runs_of
     from stepdiag.scenario.planned_readings import empty_sheet
 
     if scenario is not None and head_name is not None:

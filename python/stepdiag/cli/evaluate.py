@@ -40,11 +40,11 @@ def evaluate(
     enhanced      distances, tilts and scale lines, to first order
     conventional  the distances of body diagonals
     """
+    from stepdiag.config.toml_text import located
     from stepdiag.io.data_files import is_netcdf, read_measurement, write_calibration
     from stepdiag.io.whole_files import check_input, check_output
     from stepdiag.report.evaluation import evaluation_report
     from stepdiag.scenario.description import adjust_scenario, evaluate_scenario, read_scenario
-    from stepdiag.config.toml_text import located
 
     check_output(output)
     keep_apart(output, scenario, run)

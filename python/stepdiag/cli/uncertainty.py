@@ -14,8 +14,8 @@ from stepdiag.cli.options import PATH, keep_apart, keep_map, tell
 from stepdiag.cli.workers import chosen_workers, worker_options
 
 if TYPE_CHECKING:
-    from stepdiag.uncertainty.dask_workers import Workers
     from stepdiag.scenario.description import Scenario
+    from stepdiag.uncertainty.dask_workers import Workers
     from stepdiag.uncertainty.result import UncertaintyResult
     from stepdiag.uncertainty.run import Request
 
@@ -149,9 +149,9 @@ def uncertainty(
     """
     from stepdiag.io.data_files import is_netcdf
     from stepdiag.io.whole_files import check_output
-    from stepdiag.scenario.map_warnings import scenario_warnings
-    from stepdiag.scenario.description import read_scenario
     from stepdiag.report.uncertainty import input_rows, opening_rows, result_rows
+    from stepdiag.scenario.description import read_scenario
+    from stepdiag.scenario.map_warnings import scenario_warnings
     from stepdiag.uncertainty.run import Request
 
     wanted = Request(

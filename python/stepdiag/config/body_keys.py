@@ -4,7 +4,7 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import Field
 
-from stepdiag.config.key_types import (POSITIVE_LENGTH, SHARE, THREE_LENGTHS, PositiveLength, Section, Share, Triple, key)
+from stepdiag.config.key_types import POSITIVE_LENGTH, SHARE, THREE_LENGTHS, PositiveLength, Section, Share, Triple, key
 
 LARGEST_INDEX: Final = 5.0  # no glass has more
 MOST_CORNERS: Final = 10_000  # of one body; a head of a thousand faces works, a file of a million is none

@@ -9,7 +9,23 @@ from typing import Annotated, ClassVar, Final, Literal
 from pydantic import Field
 
 from stepdiag.config.body_keys import AnyBody, Placed
-from stepdiag.config.key_types import (AMPLITUDE, DEVIATION, POSITIVE, POSITIVE_LENGTH, READING_MODEL, SHARE, Amplitude, Length, Positive, PositiveLength, ReadingModel, Section, Share, key, tables)
+from stepdiag.config.key_types import (
+    AMPLITUDE,
+    DEVIATION,
+    POSITIVE,
+    POSITIVE_LENGTH,
+    READING_MODEL,
+    SHARE,
+    Amplitude,
+    Length,
+    Positive,
+    PositiveLength,
+    ReadingModel,
+    Section,
+    Share,
+    key,
+    tables,
+)
 
 # Of a row or a column, and of a frame, which takes eight bytes for each while it is read.
 FEWEST_PIXELS: Final = 4

@@ -1,5 +1,8 @@
-"""Markdown made from the keys of our TOML files, for docs/scenario.md and docs/head.md."""
+"""Markdown made from the keys of our TOML files, for docs/scenario.md and docs/head.md.
 
+`python -m stepdiag.config.key_reference scenario` prints the tables of the first, with `head` those of the second."""
+
+import sys
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -96,3 +99,11 @@ def _default(field: FieldInfo) -> str:
     if field.is_required():
         return "**required**"
     return "-" if field.default is None else f"`{show_full(field.default)}`"
+
+
+if __name__ == "__main__":
+    from stepdiag.config.head_keys import HeadFile
+    from stepdiag.config.scenario_keys import ScenarioKeys
+
+    roots: dict[str, type[Section]] = {"scenario": ScenarioKeys, "head": HeadFile}
+    print(key_table(roots[sys.argv[1]]))

@@ -4,11 +4,6 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-MICROMETRE: Final = 1e-3  # mm
-NANOMETRE: Final = 1e-6  # mm
-MILLIRADIAN: Final = 1e-3  # rad
-MICRORADIAN: Final = 1e-6  # rad
-
 # Beyond a tenth of a radian no set-up is meant, and beyond a kilometre no length.
 LARGEST_ANGLE: Final = 99_999.0  # µrad
 LARGEST_LENGTH: Final = 1e6  # mm

@@ -4,7 +4,25 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from stepdiag.config.key_types import (POSITIVE, POSITIVE_LENGTH, READING_MODEL, SHARE, THREE_ANGLES, THREE_LENGTHS, AngleTriple, Length, Pair, Positive, PositiveLength, ReadingModel, Section, Share, Triple, key, tables)
+from stepdiag.config.key_types import (
+    POSITIVE,
+    POSITIVE_LENGTH,
+    READING_MODEL,
+    SHARE,
+    THREE_ANGLES,
+    THREE_LENGTHS,
+    AngleTriple,
+    Length,
+    Pair,
+    Positive,
+    PositiveLength,
+    ReadingModel,
+    Section,
+    Share,
+    Triple,
+    key,
+    tables,
+)
 
 
 class PoseErrorKeys(Section):

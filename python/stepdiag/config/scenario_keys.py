@@ -11,9 +11,28 @@ from pydantic import Field
 from stepdiag._core import Plan, largest_repeat_count
 from stepdiag.config.adjustment_keys import AdjustmentSection, SmoothnessSection
 from stepdiag.config.key_errors import BY_HEAD, BY_LINE
+from stepdiag.config.key_types import (
+    AMPLITUDE,
+    ANGLES,
+    DEVIATION,
+    LARGEST_LENGTH,
+    POSITIVE,
+    SEED,
+    THREE_LENGTHS,
+    Amplitude,
+    Angle,
+    AnglePair,
+    Length,
+    Pair,
+    Positive,
+    Section,
+    Seed,
+    Triple,
+    key,
+    tables,
+)
 from stepdiag.config.plan_by_time_keys import PlanByTimeSection
 from stepdiag.config.scenario_head_keys import EnvironmentSection, HeadSection, LineKeys
-from stepdiag.config.key_types import (AMPLITUDE, ANGLES, DEVIATION, LARGEST_LENGTH, POSITIVE, SEED, THREE_LENGTHS, Amplitude, Angle, AnglePair, Length, Pair, Positive, Section, Seed, Triple, key, tables)
 from stepdiag.config.uncertainty_keys import UncertaintySection
 
 # Limits that the core checks as well; here they keep numbers inside the integer types behind the bindings.

@@ -1,6 +1,4 @@
-"""The commented new scenario, made from the scenario's keys.
-
-`python -m stepdiag.scenario_text` prints the table of keys in docs/scenario.md."""
+"""The commented new scenario, made from the scenario's keys."""
 
 import textwrap
 from typing import Any, Final
@@ -8,7 +6,7 @@ from typing import Any, Final
 from pydantic.fields import FieldInfo
 
 from stepdiag.config.key_errors import expectation
-from stepdiag.config.key_reference import Part, key_table, keys, paragraphs, sections, show_full
+from stepdiag.config.key_reference import Part, keys, paragraphs, sections, show_full
 from stepdiag.config.scenario_keys import ScenarioKeys
 
 # Keys that a new scenario has although they are not required. Without scale lines the slopes of the positioning errors
@@ -50,7 +48,3 @@ def _example(field: FieldInfo) -> Any:
 def _comment(text: str) -> list[str]:
     plain = text.replace("**", "").replace("`", "")
     return [f"# {line}" for paragraph in plain.split("\n\n") for line in textwrap.wrap(paragraph, 110)]
-
-
-if __name__ == "__main__":
-    print(key_table(ScenarioKeys))

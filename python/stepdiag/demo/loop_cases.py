@@ -28,7 +28,7 @@ RADIUS: Final = DISTANCE_NOISE / TILT_NOISE / math.sqrt(1.5)
 
 
 @dataclass(frozen=True)
-class Case:
+class LoopCase:
     """A machine and how it is measured; folders and tables call it by its name."""
 
     name: str
@@ -42,9 +42,9 @@ class Case:
         return "truth_screw.csv" if self.screw else "truth.csv"
 
 
-CLEAN: Final = Case("clean", "no noise, mirror and laser out of true")
-SCREW: Final = Case("screw", "the same with a screw error of 10 mm pitch and 3 µm", screw=True)
-NOISE: Final = Case("noise", "as clean, with noise of 0.1 µm and 1 µrad", noise=True)
+CLEAN: Final = LoopCase("clean", "no noise, mirror and laser out of true")
+SCREW: Final = LoopCase("screw", "the same with a screw error of 10 mm pitch and 3 µm", screw=True)
+NOISE: Final = LoopCase("noise", "as clean, with noise of 0.1 µm and 1 µrad", noise=True)
 CASES: Final = (CLEAN, SCREW, NOISE)
 
 
@@ -53,14 +53,14 @@ def finer(steps: int) -> int:
     return -(-FINER * STEPS // steps)
 
 
-def write_truth(case: Case, folder: Path, steps: int = STEPS) -> None:
+def write_truth(case: LoopCase, folder: Path, steps: int = STEPS) -> None:
     """The errors of a case's machine, with nodes at those of the plan and at least FINER times as many."""
     screw = {"screw_pitch": SCREW_PITCH, "screw_amplitude": SCREW_AMPLITUDE} if case.screw else {}
     truth = _core.random_error_map(VOLUME, seed=SEED, intervals=steps * finer(steps), **screw)
     truth.write(folder / case.truth, chain=_core.Chain(CHAIN), volume=VOLUME, tool=TOOL)
 
 
-def write_scenario(case: Case, folder: Path, steps: int = STEPS, seed: int = 1) -> Path:
+def write_scenario(case: LoopCase, folder: Path, steps: int = STEPS, seed: int = 1) -> Path:
     """The scenario of a case; `seed` is that of its noise. The truth lies in the folder above."""
     make_folder(folder)
     path = folder / "scenario.toml"
@@ -68,7 +68,7 @@ def write_scenario(case: Case, folder: Path, steps: int = STEPS, seed: int = 1) 
     return path
 
 
-def scenario_text(case: Case, steps: int = STEPS, seed: int = 1) -> str:
+def scenario_text(case: LoopCase, steps: int = STEPS, seed: int = 1) -> str:
     """What there is to know of a case, as a scenario file."""
     beams = [
         [round(RADIUS * math.cos(angle), 4), round(RADIUS * math.sin(angle), 4)]

@@ -7,10 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from stepdiag.style import own_style, save
 from stepdiag.demo.loop_outcome import LoopOutcome
 from stepdiag.demo.loop_points import Agreement, FloatArray
 from stepdiag.demo.loop_report import UM, WORDS, left_along
+from stepdiag.style import own_style, save
 
 SHOWN: Final = 100.0  # mm of X in the screw's panel
 DASHES: Final = {"nodes": "-", "random": "--"}

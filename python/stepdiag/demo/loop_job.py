@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag import _core
-from stepdiag.demo.loop_cases import CHAIN
 from stepdiag.acquisition.run_from_raw import PICOMETRES
-from stepdiag.scenario.description import Scenario
 from stepdiag.acquisition.twin_instrument import TwinInstrument
+from stepdiag.demo.loop_cases import CHAIN
+from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.order_of_run import visits_of
 
 FloatArray = npt.NDArray[np.float64]
@@ -70,12 +70,3 @@ class Calculated:
         if job.table is None:
             return targets
         return _core.Compensator(job.table, CHAIN).command(targets)
-
-
-def controller_of(name: str) -> Controller:
-    """By the name that the command line knows it by."""
-    if name == "calculated":
-        return Calculated()
-    from stepdiag.demo.loop_linuxcnc import Linuxcnc
-
-    return Linuxcnc()

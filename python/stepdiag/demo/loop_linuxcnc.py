@@ -19,18 +19,18 @@ import numpy as np
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.acquire import acquire
 from stepdiag.acquisition.options import AcquireOptions
-from stepdiag.acquisition.triggers import Context, Silent
-from stepdiag.linuxcnc.processes import LinuxcncError
-from stepdiag.linuxcnc.session import LinuxcncSession
-from stepdiag.demo.loop_cases import CHAIN
-from stepdiag.demo.loop_job import PATIENCE, FloatArray, Job, Say
-from stepdiag.program.gcode import HANDSHAKE, Writer
 from stepdiag.acquisition.settling import Settling
 from stepdiag.acquisition.tcp_trigger import TcpTrigger
+from stepdiag.acquisition.triggers import Context, Silent
 from stepdiag.acquisition.twin import Twin
+from stepdiag.demo.loop_cases import CHAIN
+from stepdiag.demo.loop_job import PATIENCE, FloatArray, Job, Say
+from stepdiag.linuxcnc.processes import LinuxcncError
+from stepdiag.linuxcnc.session import LinuxcncSession
+from stepdiag.program.gcode import HANDSHAKE, Writer
 from stepdiag.scenario.order_of_run import Visit, visits_of
 
-BRIDGE: Final = Path(__file__).resolve().parents[2] / "controllers" / "linuxcnc" / "stepdiag_bridge.py"
+BRIDGE: Final = Path(__file__).resolve().parents[3] / "controllers" / "linuxcnc" / "stepdiag_bridge.py"
 # The twin is at rest when it is asked, and exact: two values that agree, and one to take.
 SETTLING: Final = Settling(count=2, limit_um=0.001, average=1, interval=0.0)
 # Faster than any machine, to wait for nothing: mm/s and mm/s^2.

@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from stepdiag import _core
-from stepdiag.demo.paper_report import alias_of
-from stepdiag.demo.loop_outcome import LoopOutcome, whole_grid
 from stepdiag.demo.loop_cases import CHAIN, DISTANCE_NOISE, RADIUS, SCREW_AMPLITUDE, SCREW_PITCH, TILT_NOISE, finer
+from stepdiag.demo.loop_outcome import LoopOutcome, whole_grid
 from stepdiag.demo.loop_points import Agreement, FloatArray, Sizes, errors_at
+from stepdiag.demo.paper_report import alias_of
 from stepdiag.units import MICRO
 
 UM = 1e3  # of a mm

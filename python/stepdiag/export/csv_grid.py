@@ -13,7 +13,20 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
-from stepdiag.export.common import (Export, ExportOptions, FloatArray, common_nodes, compensated_map, inside, lengths, origin_of, require, spread, tool_of, words)
+from stepdiag.export.common import (
+    Export,
+    ExportOptions,
+    FloatArray,
+    common_nodes,
+    compensated_map,
+    inside,
+    lengths,
+    origin_of,
+    require,
+    spread,
+    tool_of,
+    words,
+)
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 
 GRID_FORMAT: Final = "stepdiag error grid 1"

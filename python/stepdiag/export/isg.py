@@ -19,9 +19,21 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, Chain, ErrorMap, InvalidArgument, Machine
-from stepdiag.export.common import (Export, ExportOptions, FloatArray, common_nodes, compensated_map, inside, origin_of, require, spread, tool_of, words)
-from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
+from stepdiag.export.common import (
+    Export,
+    ExportOptions,
+    FloatArray,
+    common_nodes,
+    compensated_map,
+    inside,
+    origin_of,
+    require,
+    spread,
+    tool_of,
+    words,
+)
 from stepdiag.export.fewest_nodes import best_subset
+from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 
 UNTRIED: Final = "written from the manual (ISG FCT-C26, Beckhoff TF5280), not tried on a controller"
 MOST_ROWS: Final = 5000

@@ -17,9 +17,20 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
-from stepdiag.export.common import (Export, ExportOptions, FloatArray, common_nodes, inside, origin_of, require, spread, tool_of, words)
-from stepdiag.parameters import AXES
+from stepdiag.export.common import (
+    Export,
+    ExportOptions,
+    FloatArray,
+    common_nodes,
+    inside,
+    origin_of,
+    require,
+    spread,
+    tool_of,
+    words,
+)
 from stepdiag.export.fewest_nodes import best_subset
+from stepdiag.parameters import AXES
 
 MOST_ROWS: Final = 256  # EMCMOT_COMP_SIZE; LinuxCNC 2.9 complains about more, and starts without the rest
 COMPANION: Final = "compensation.ini"

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from stepdiag.style import own_style, save
-from stepdiag.planning.plan_by_time import FAMILIES, Family, Outcome, complete
 from stepdiag.parameters import REPORT_UNIT, in_report_units
+from stepdiag.planning.plan_by_time import FAMILIES, Family, Outcome, complete
+from stepdiag.style import own_style, save
 
 # After Okabe and Ito: told apart with any colour vision; then again from the first, with another line.
 COLOURS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")

@@ -5,7 +5,16 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from stepdiag import _core
-from stepdiag.head.trace import (Arrival, Limits, angle_to_z, arrivals, detectors, meets_mirror, tilt_limits, travel_limits)
+from stepdiag.head.trace import (
+    Arrival,
+    Limits,
+    angle_to_z,
+    arrivals,
+    detectors,
+    meets_mirror,
+    tilt_limits,
+    travel_limits,
+)
 
 MICRO = 1e6
 SQUARE = 1e-9  # rad: what rounding leaves

@@ -13,16 +13,37 @@ from typing import Any, Final
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.config.body_keys import (BodyKeys, CornerCubeKeys, CubeSplitterKeys, GlassKeys, MirrorKeys, Placed, PlateKeys, PolyhedronKeys, RightAnglePrismKeys, ScreenKeys, WedgeKeys)
-from stepdiag.io.whole_files import read_text
-from stepdiag.config.head_keys import (INTERFEROMETER_KEYS, MOST_PIXELS_OF_A_FRAME, SPOT_KEYS, BeamKeys, CameraKeys, HeadFile, LateralEffectKeys, SensorKeys)
+from stepdiag.config.body_keys import (
+    BodyKeys,
+    CornerCubeKeys,
+    CubeSplitterKeys,
+    GlassKeys,
+    MirrorKeys,
+    Placed,
+    PlateKeys,
+    PolyhedronKeys,
+    RightAnglePrismKeys,
+    ScreenKeys,
+    WedgeKeys,
+)
+from stepdiag.config.head_keys import (
+    INTERFEROMETER_KEYS,
+    MOST_PIXELS_OF_A_FRAME,
+    SPOT_KEYS,
+    BeamKeys,
+    CameraKeys,
+    HeadFile,
+    LateralEffectKeys,
+    SensorKeys,
+)
 from stepdiag.config.key_errors import show, suggest
-from stepdiag.units import MICROMETRE, MILLIRADIAN, NANOMETRE
 from stepdiag.config.toml_text import check_keys, located, parse_toml
+from stepdiag.io.whole_files import read_text
+from stepdiag.units import MICROMETRE, MILLIRADIAN, NANOMETRE
 
 PPM: Final = 1e-6
 ROOM: Final = 100.0  # mm between a head that is looked at by itself and its mirror
-FOLDER: Final = Path(str(resource_files("stepdiag") / "heads"))
+FOLDER: Final = Path(str(resource_files("stepdiag.head") / "shipped"))
 
 
 def shipped_heads() -> list[str]:

@@ -13,8 +13,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stepdiag import _core
-from stepdiag.style import own_style, save
 from stepdiag.head.trace import arrivals, detectors
+from stepdiag.style import own_style, save
 
 FloatArray = npt.NDArray[np.float64]
 Box = tuple[FloatArray, FloatArray]  # lowest and highest corner

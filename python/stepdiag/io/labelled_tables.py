@@ -7,8 +7,8 @@ import numpy as np
 import xarray as xr
 
 from stepdiag._core import Calibration, Measurement
-from stepdiag.parameters import units_of
 from stepdiag.calibration.functional_point import functional_point_straightness
+from stepdiag.parameters import units_of
 
 _COMPONENT = {
     "X": "displacement along X",

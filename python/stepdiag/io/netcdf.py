@@ -1,6 +1,6 @@
 """netCDF files (netCDF-4): written whole or not at all, read with every doubt said.
 
-What a measurement or a calibration looks like in one: tables.py, netcdf_read.py, docs/files.md.
+What a measurement or a calibration looks like in one: labelled_tables.py, netcdf_read.py, docs/files.md.
 """
 
 import struct

@@ -10,10 +10,10 @@ from typing import Any, Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Measurement
-from stepdiag.parameters import units_of
-from stepdiag.io.netcdf import NetcdfFile, open_dataset
-from stepdiag.io.labelled_tables import channel_units
 from stepdiag.config.toml_text import located
+from stepdiag.io.labelled_tables import channel_units
+from stepdiag.io.netcdf import NetcdfFile, open_dataset
+from stepdiag.parameters import units_of
 
 MEASUREMENT_FORMAT: Final = "stepdiag measurement 1"
 CALIBRATION_FORMAT: Final = "stepdiag calibration 1"

@@ -5,9 +5,9 @@ from typing import Final
 
 from stepdiag._core import Adjustment, Calibration, Measurement
 from stepdiag.io.adjustment_table import adjustment_table
+from stepdiag.io.labelled_tables import calibration_table, measurement_table
 from stepdiag.io.netcdf import write_dataset
 from stepdiag.io.netcdf_read import CALIBRATION_FORMAT, MEASUREMENT_FORMAT
-from stepdiag.io.labelled_tables import calibration_table, measurement_table
 
 _OF_MEASUREMENT: Final = {
     "format": MEASUREMENT_FORMAT,

@@ -1,4 +1,4 @@
-"""The files of a simulated three-axis machine for LinuxCNC: what a session (linuxcnc_session.py) starts."""
+"""The files of a simulated three-axis machine for LinuxCNC: what a session (session.py) starts."""
 
 import re
 import shutil
@@ -30,7 +30,7 @@ net tool-changed iocontrol.0.tool-change => iocontrol.0.tool-changed
 
 
 @dataclass(frozen=True)
-class Machine:
+class MachineConfiguration:
     """What is simulated. Lengths in mm, speeds in mm/s; the defaults are faster than any machine."""
 
     kinematics: str = "trivkins"  # [KINS]KINEMATICS: module and its arguments
@@ -46,7 +46,7 @@ class Machine:
     ini: Mapping[str, Mapping[str, str | float | int]] = field(default_factory=dict)  # further keys, by section
 
 
-def write_configuration(folder: Path, machine: Machine, display: str) -> Path:
+def write_configuration(folder: Path, machine: MachineConfiguration, display: str) -> Path:
     """Writes the configuration into a folder and returns its INI file."""
     (folder / "machine.hal").write_text(_hal(machine), encoding="utf-8")
     (folder / "tool.tbl").write_text(_tools(machine), encoding="utf-8")
@@ -66,7 +66,7 @@ def copy_configuration(folder: Path, configuration: Path, display: str) -> Path:
     return ini
 
 
-def _hal(machine: Machine) -> str:
+def _hal(machine: MachineConfiguration) -> str:
     loops = [f"net joint-{j} joint.{j}.motor-pos-cmd => joint.{j}.motor-pos-fb" for j in range(3)]
     recorder = []
     if machine.record:
@@ -80,11 +80,11 @@ def _hal(machine: Machine) -> str:
     return HAL + CLOCK + "\n".join([*loops, *recorder, *machine.hal]) + "\n"
 
 
-def _tools(machine: Machine) -> str:
+def _tools(machine: MachineConfiguration) -> str:
     return "".join(f"T{n} P{n} X{x:.9f} Y{y:.9f} Z{z:.9f}\n" for n, (x, y, z) in machine.tools.items())
 
 
-def _ini(machine: Machine, display: str) -> str:
+def _ini(machine: MachineConfiguration, display: str) -> str:
     low, high = machine.limits
     moves = {"MAX_VELOCITY": machine.speed, "MAX_ACCELERATION": machine.acceleration}
     sections: dict[str, dict[str, str | float | int]] = {

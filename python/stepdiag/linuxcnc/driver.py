@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Runs inside LinuxCNC, as its display: makes the machine ready and does what a session (linuxcnc_session.py) asks for,
+"""Runs inside LinuxCNC, as its display: makes the machine ready and does what a session (session.py) asks for,
 one JSON object a line over a Unix socket. LinuxCNC ends when this program ends.
 
 For Debian's own Python, which has LinuxCNC's modules; nothing else of this package is imported here.

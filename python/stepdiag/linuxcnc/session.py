@@ -4,7 +4,7 @@
         session.mdi("G0 X100 Y20")
         print(session.joints(), session.position())
 
-LinuxCNC's own modules for Python belong to Debian's /usr/bin/python3: linuxcnc_driver.py runs there, as LinuxCNC's
+LinuxCNC's own modules for Python belong to Debian's /usr/bin/python3: driver.py runs there, as LinuxCNC's
 display, and does what is asked for over a Unix socket. One LinuxCNC at a time runs on a computer; a lock sees to it.
 """
 
@@ -40,7 +40,7 @@ class LinuxcncSession(LinuxcncRequests):
     configuration: an INI file of one's own instead, used in a copy of its folder; nothing else then counts.
     comp_files: {joint: file}, LinuxCNC's own screw compensation, of type `comp_type`.
     record: pins whose values in every servo period `recorded` returns.
-    hal, ini: further lines and keys. Everything else as in Machine.
+    hal, ini: further lines and keys. Everything else as in MachineConfiguration.
     """
 
     def __init__(
@@ -192,7 +192,7 @@ class LinuxcncSession(LinuxcncRequests):
     def _write_display(self) -> None:
         display = self.folder / "display"
         driver = self.folder / "driver.py"
-        shutil.copyfile(Path(__file__).with_name("linuxcnc_driver.py"), driver)
+        shutil.copyfile(Path(__file__).with_name("driver.py"), driver)
         display.write_text(f'#!/bin/sh\nexec {PYTHON} -P "{driver}" "$@"\n', encoding="utf-8")
         display.chmod(0o755)
 

@@ -7,10 +7,9 @@ import numpy.typing as npt
 
 from stepdiag._core import InvalidArgument, Plan
 from stepdiag.config.plan_by_time_keys import PlanByTimeSection
+from stepdiag.units import MINUTE
 
 FloatArray = npt.NDArray[np.float64]
-
-MINUTE = 60.0  # s
 
 
 @dataclass(frozen=True)

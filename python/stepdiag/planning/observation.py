@@ -5,7 +5,7 @@ scenario's weights and unknowns: uncertainties and rank depend on where is read 
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
@@ -13,21 +13,16 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import Adjustment, Calibration, InvalidArgument
-from stepdiag.parameters import KINDS, Kind
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
-from stepdiag.parameters import REPORT_UNIT, in_report_units
-from stepdiag.report.evaluation import cosine_rows, uncertainty_rows, undetermined_rows
-from stepdiag.scenario.description import Scenario, adjust_scenario, build_scenario, simulate_scenario
+from stepdiag.config.key_types import Section
 from stepdiag.config.scenario_head_keys import EnvironmentSection, HeadKeys
 from stepdiag.config.scenario_keys import MisalignmentSection, NoiseSection, RandomSection, ScenarioKeys
-from stepdiag.scenario.uncertain_inputs import OF_SCALE_LINES
-from stepdiag.config.key_types import Section
-from stepdiag.report.setup_table import setup_rows
-from stepdiag.scenario.planned_readings import lost_readings
 from stepdiag.config.toml_text import located
 from stepdiag.config.uncertainty_keys import UncertaintySection
+from stepdiag.parameters import Kind
+from stepdiag.scenario.description import Scenario, adjust_scenario, build_scenario, simulate_scenario
+from stepdiag.scenario.uncertain_inputs import OF_SCALE_LINES
 
-PARAMETERS: Final = 21
 AnyHead = TypeVar("AnyHead", bound=HeadKeys)
 AnySection = TypeVar("AnySection", bound=Section)
 USUAL_STEPS: Final = (5, 10, 20, 50, 100, 200)
@@ -71,34 +66,6 @@ def _prospect(scenario: Scenario, steps: int) -> Prospect:
     return Prospect(
         steps, mirror, {kind: value for kind, (value, _) in largest_uncertainties(found.calibration).items()}
     )
-
-
-def observation_report(found: Adjustment, run: _core.Measurement, scenario: Scenario) -> Iterator[str]:
-    """What the scenario's own plan determines, with what would help for the rest."""
-    plan, calibration = scenario.plan, found.calibration
-    yield (
-        f"plan: {len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines; {len(run)} points, "
-        f"{', '.join(scenario.signals)}; {found.degrees_of_freedom} readings more than unknowns"
-    )
-    incomplete, _ = lost_readings(run, plan, scenario.signals)
-    if incomplete:
-        yield f"lost: {incomplete} rows without a complete reading, by the beam's way alone"
-    yield "for a perfect machine, head and mirror set up without error:"
-    whole, shapes, parts = extents(calibration, plan)
-    yield f"determined: {'all 21 parameters' if len(whole) == PARAMETERS else ', '.join(whole) or 'none as a whole'}"
-    if shapes:
-        yield f"determined but for a slope: {', '.join(shapes)}"
-    if parts:
-        yield f"determined at some of the positions: {', '.join(parts)}"
-    # All values are 0 here, to rounding.
-    known = [f"{what.partition(' = ')[0]}, ±{what.partition(' +- ')[2]}" for what in found.combinations]
-    yield from undetermined_rows(calibration, known)
-    yield from uncertainty_rows(calibration)
-    rows = list(setup_rows(found.setup, [*plan.lines, *plan.scale_lines], values=False))
-    if rows:
-        yield "set-up, standard uncertainties:"
-        yield from rows
-    yield from cosine_rows(scenario)
 
 
 def extents(calibration: Calibration, plan: _core.Plan) -> tuple[list[str], list[str], list[str]]:
@@ -176,29 +143,3 @@ def growth(found: Sequence[Prospect], kind: Kind) -> float | None:
         return None
     x, y = np.transpose(points)
     return float(np.polyfit(x, y, 1)[0])
-
-
-def prospect_rows(found: Sequence[Prospect]) -> Iterator[str]:
-    """The table, its exponents below it."""
-    yield f"  {'steps':>5}  {'mirror mm':>13}" + "".join(f"{kind:>14}" for kind in KINDS)
-    yield f"  {'':>5}  {'':>13}" + "".join(f"{REPORT_UNIT[kind]:>14}" for kind in KINDS)
-    for p in found:
-        mirror = f"{p.mirror[0]:.1f} x {p.mirror[1]:.1f}"
-        cells = [f"{in_report_units(kind, p.largest[kind]):.3g}" if kind in p.largest else "-" for kind in KINDS]
-        yield f"  {p.steps:5}  {mirror:>13}" + "".join(f"{cell:>14}" for cell in cells)
-    exponents = [growth(found, kind) for kind in KINDS]
-    if any(e is not None for e in exponents):
-        cells = ["-" if e is None else f"{e:.2f}" for e in exponents]
-        yield f"  {'exponent':<20}" + "".join(f"{cell:>14}" for cell in cells)
-    for p in found:
-        if p.trouble:
-            yield f"  {p.steps} steps: {p.trouble}"
-
-
-def prospect_csv(found: Sequence[Prospect]) -> str:
-    """The table as a file; what is not determined is an empty field."""
-    rows = ["steps,mirror_width_mm,mirror_height_mm,u_positioning_um,u_straightness_um,u_angle_urad,u_squareness_urad"]
-    for p in found:
-        cells = [repr(in_report_units(kind, p.largest[kind])) if kind in p.largest else "" for kind in KINDS]
-        rows.append(",".join([str(p.steps), *map(repr, p.mirror), *cells]))
-    return "\n".join(rows) + "\n"

@@ -9,13 +9,13 @@ from typing import Final, Literal
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
+from stepdiag.calibration.largest_by_kind import largest_uncertainties
+from stepdiag.config.toml_text import located
 from stepdiag.parameters import KINDS, Kind, kind_of
 from stepdiag.planning.measuring_time import measuring_time, times_of
-from stepdiag.units import MINUTE
 from stepdiag.planning.observation import extents, with_usual_errors
-from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.scenario.description import Scenario, adjust_scenario, runs_of, simulate_scenario
-from stepdiag.config.toml_text import located
+from stepdiag.units import MINUTE
 
 Family = Literal["length", "angle", "squareness"]
 FAMILIES: Final[dict[Family, tuple[Kind, ...]]] = {

@@ -7,12 +7,12 @@ import numpy as np
 
 from stepdiag._core import __version__
 from stepdiag.planning.measuring_time import Times
-from stepdiag.units import MINUTE
+from stepdiag.program.gcode import HANDSHAKE, PULSE, Trigger, Writer
 from stepdiag.program.options import Options, writer_of
 from stepdiag.program.path import AXES, Action, Align, Begin, Feed, Rapid, Read, SetUp, Space, Vector
-from stepdiag.program.gcode import HANDSHAKE, PULSE, Trigger, Writer
 from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.order_of_run import Visit
+from stepdiag.units import MINUTE
 
 
 def header(scenario: Scenario, options: Options, space: Space, times: Times, visits: list[Visit]) -> Iterator[str]:

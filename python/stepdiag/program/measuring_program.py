@@ -1,6 +1,6 @@
 """The measuring program of a scenario's plan: G-code that moves the axes through its points and asks for the readings.
 
-Every point stands in the program as numbers, in the order of visits.py. docs/measuring.md says how to run it.
+Every point stands in the program as numbers, in the order of order_of_run.py. docs/measuring.md says how to run it.
 """
 
 from dataclasses import dataclass, field
@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stepdiag.planning.measuring_time import Times, times_of
-from stepdiag.units import MINUTE
 from stepdiag.program.blocks import Body, header, modes
+from stepdiag.program.gcode import Writer, numbered
 from stepdiag.program.options import Options, space_of, trigger_of, writer_of
 from stepdiag.program.path import AXES, Action, Begin, Feed, Rapid, Read, SetUp, Space, actions_of
-from stepdiag.program.gcode import Writer, numbered
 from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.order_of_run import Visit, visits_of
+from stepdiag.units import MINUTE
 
 
 @dataclass(frozen=True)

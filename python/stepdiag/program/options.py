@@ -6,8 +6,8 @@ from typing import Final, get_args
 import numpy as np
 
 from stepdiag._core import InvalidArgument
-from stepdiag.program.path import Space
 from stepdiag.program.gcode import Dialect, DwellWord, Trigger, Writer
+from stepdiag.program.path import Space
 from stepdiag.scenario.description import Scenario
 
 COORDINATES: Final = ("G53", "G54", "G55", "G56", "G57", "G58", "G59")

@@ -6,10 +6,9 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration
-from stepdiag.parameters import KINDS, kind_of
-from stepdiag.report.comparison import decimal
 from stepdiag.calibration.functional_point import functional_point_straightness
-from stepdiag.parameters import REPORT_UNIT, in_report_units
+from stepdiag.parameters import KINDS, REPORT_UNIT, in_report_units, kind_of
+from stepdiag.report.comparison import decimal
 from stepdiag.report.evaluation import reversal_rows, undetermined_rows
 
 FUNCTIONAL_POINT_FORMAT: Final = "stepdiag functional point 1"

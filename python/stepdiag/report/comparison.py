@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from stepdiag._core import Calibration
-from stepdiag.parameters import kind_of, units_of
+from stepdiag.calibration.comparison import Comparison, Difference
 from stepdiag.io.data_files import date_of_today, is_netcdf
 from stepdiag.io.whole_files import write_whole
-from stepdiag.parameters import REPORT_UNIT, in_report_units
-from stepdiag.calibration.comparison import Comparison, Difference
+from stepdiag.parameters import REPORT_UNIT, in_report_units, kind_of, units_of
 
 if TYPE_CHECKING:
     import xarray as xr

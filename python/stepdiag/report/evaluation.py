@@ -6,24 +6,17 @@ from typing import Final
 
 import numpy as np
 
-from stepdiag._core import Adjustment, Calibration, Measurement, Outlier
-from stepdiag.parameters import KINDS, Kind, kind_of
-from stepdiag._core import straightness_reference
-from stepdiag.scenario.description import Scenario
-from stepdiag.scenario.adjustment import scale_line_angle
+from stepdiag._core import Adjustment, Calibration, Measurement, Outlier, straightness_reference
+from stepdiag.calibration.largest_by_kind import largest_uncertainties
+from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.setup_table import setup_rows
+from stepdiag.scenario.adjustment import scale_line_angle
+from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.planned_readings import lost_readings
-
-MICRO = 1e6
-UNIT = {"positioning": "µm", "straightness": "µm", "angle": "µrad", "squareness": "µrad"}
+from stepdiag.units import MICRO
 
 # Of the chi-square test: how often a sound run is rejected.
 SIGNIFICANCE: Final = 0.05
-
-
-def in_report_units(kind: str, value: float) -> float:
-    """mm to µm, rad to µrad."""
-    return value * (1e3 if UNIT[kind] == "µm" else MICRO)
 
 
 def evaluation_report(result: Calibration | Adjustment, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
@@ -122,7 +115,8 @@ def smoothness_rows(deviations: Mapping[str, float]) -> Iterator[str]:
     """Which functions were smoothed, and how much."""
     if deviations:
         said = (
-            f"{name} {in_report_units(kind_of(name), d):.3g} {UNIT[kind_of(name)]}" for name, d in deviations.items()
+            f"{name} {in_report_units(kind_of(name), d):.3g} {REPORT_UNIT[kind_of(name)]}"
+            for name, d in deviations.items()
         )
         yield f"smoothed, standard deviation of second differences: {', '.join(said)}"
 
@@ -160,31 +154,14 @@ def reversal_rows(calibration: Calibration) -> Iterator[str]:
     for kind in KINDS:
         if kind in largest:
             error, uncertainty_of_it, where = largest[kind]
-            u = "not known"  # as of a calibration that was read from CSV
+            unit, u = REPORT_UNIT[kind], "not known"  # as of a calibration that was read from CSV
             if not math.isnan(uncertainty_of_it):
-                u = f"{in_report_units(kind, uncertainty_of_it):.2g} {UNIT[kind]}"
-            yield f"  {kind:<13}{in_report_units(kind, error):9.3g} {UNIT[kind]:<5} ({where}; standard uncertainty {u})"
+                u = f"{in_report_units(kind, uncertainty_of_it):.2g} {unit}"
+            yield f"  {kind:<13}{in_report_units(kind, error):9.3g} {unit:<5} ({where}; standard uncertainty {u})"
 
 
 def uncertainty_rows(calibration: Calibration) -> Iterator[str]:
     """The largest standard uncertainty of each kind, and where it is."""
     yield "largest standard uncertainties:"
     for kind, (uncertainty, where) in largest_uncertainties(calibration).items():
-        yield f"  {kind:<13}{in_report_units(kind, uncertainty):9.3g} {UNIT[kind]:<5} ({where})"
-
-
-def largest_uncertainties(calibration: Calibration) -> dict[Kind, tuple[float, str]]:
-    """The largest standard uncertainty of each kind, mm or rad, and the parameter and place that has it."""
-    largest: dict[Kind, tuple[float, str]] = {}
-
-    def note(name: str, uncertainty: float, where: str) -> None:
-        kind = kind_of(name)
-        if np.isfinite(uncertainty) and uncertainty > largest.get(kind, (-1.0, ""))[0]:
-            largest[kind] = uncertainty, f"{name}{where}"
-
-    for name, (position, _, uncertainty) in calibration.functions.items():
-        worst = int(np.argmax(uncertainty))
-        note(name, float(uncertainty[worst]), f" at {position[worst]:g} mm")
-    for name, (_, angle_uncertainty) in calibration.squareness.items():
-        note(name, angle_uncertainty, "")
-    return {kind: largest[kind] for kind in KINDS if kind in largest}
+        yield f"  {kind:<13}{in_report_units(kind, uncertainty):9.3g} {REPORT_UNIT[kind]:<5} ({where})"

@@ -66,8 +66,8 @@ def _head_of(text: str) -> tuple[list[str], str]:
 
 def _toml(path: Path) -> Finding:
     """A head or a study where nothing but such a file has its sections, else a scenario."""
-    from stepdiag.io.whole_files import read_text
     from stepdiag.config.toml_text import parse_toml
+    from stepdiag.io.whole_files import read_text
 
     content = parse_toml(read_text(path), str(path))
     if "study" in content:
@@ -91,8 +91,8 @@ def _study(path: Path) -> Finding:
 
 
 def _scenario(path: Path) -> Finding:
-    from stepdiag.scenario.map_warnings import scenario_warnings
     from stepdiag.scenario.description import read_scenario
+    from stepdiag.scenario.map_warnings import scenario_warnings
 
     scenario = read_scenario(path)
     plan = scenario.plan

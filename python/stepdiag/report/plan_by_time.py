@@ -3,9 +3,8 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from stepdiag.parameters import KINDS, Kind
+from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units
 from stepdiag.planning.plan_by_time import Choice, Family, Outcome, choose, complete, front
-from stepdiag.parameters import REPORT_UNIT, in_report_units
 
 FAR: Final = 2.0  # times the time that there is: how far the table goes on
 

@@ -5,8 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 from stepdiag._core import SetupEstimate
-
-HOUR: Final = 3600.0  # s
+from stepdiag.units import HOUR
 
 # Of each quantity: its unit in reports, that unit in native ones, and what its components are called.
 UNITS: Final[Mapping[str, tuple[str, float]]] = {

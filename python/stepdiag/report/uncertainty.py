@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from stepdiag import _core
 from stepdiag.scenario.uncertain_inputs import key_units
-from stepdiag.uncertainty.result import FloatArray, UncertaintyResult, label
+from stepdiag.uncertainty.result import FloatArray, UncertaintyResult, label, volume_units
 from stepdiag.units import report_value
 
 # Of a budget: groups that make less than this of a variance are added up.
@@ -79,9 +79,7 @@ def _propagation_table(result: UncertaintyResult) -> Iterator[str]:
     rows = []
     for family, members, worst in _worst(result, u):
         unit = result.outputs[worst].unit
-        median, largest, wide = (
-            report_value(unit, x)[0] for x in (np.median(u[members]), u[worst], expanded[worst])
-        )
+        median, largest, wide = (report_value(unit, x)[0] for x in (np.median(u[members]), u[worst], expanded[worst]))
         name = report_value(unit, 0.0)[1]
         degrees = "inf" if not freedom[worst] < 1e6 else f"{freedom[worst]:.3g}"
         rows.append(
@@ -210,11 +208,6 @@ def _derived_table(result: UncertaintyResult) -> Iterator[str]:
             cells = [show(other.value[k]), show(other.standard_uncertainty[k]), show(expanded[k])]
         rows.append([label(output), *cells])
     yield from _table(heading, rows)
-
-
-def volume_units(name: str) -> str:
-    """The native unit of one of the ranges over the volume."""
-    return "rad" if name in ("V_A", "V_B", "V_C") else "mm"
 
 
 def _volume_table(result: UncertaintyResult) -> Iterator[str]:

@@ -9,8 +9,8 @@ from stepdiag._core import InvalidArgument
 from stepdiag.config.adjustment_keys import AdjustmentKeys, AdjustmentSection, SmoothnessSection
 from stepdiag.config.key_errors import show
 from stepdiag.config.scenario_keys import ScenarioKeys
-from stepdiag.units import MICROMETRE, MICRORADIAN
 from stepdiag.config.toml_text import located
+from stepdiag.units import MICROMETRE, MICRORADIAN
 
 HOUR: Final = 3600.0  # s
 

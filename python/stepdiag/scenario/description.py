@@ -14,16 +14,16 @@ from typing import Any, Literal
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.io.whole_files import check_input, read_text
 from stepdiag.config.key_errors import models_of, show
+from stepdiag.config.scenario_keys import TABLES_BY_NAME, PlanSection, RandomSection, ScenarioKeys
+from stepdiag.config.toml_text import check_keys, located, parse_toml
+from stepdiag.io.whole_files import check_input, read_text
 from stepdiag.scenario.adjustment import setup_priors, smoothness_of
 from stepdiag.scenario.heads import DescribedHead, actual_heads, heads_by_line, nominal_heads, of_run, signals_of
-from stepdiag.config.scenario_keys import TABLES_BY_NAME, PlanSection, RandomSection, ScenarioKeys
+from stepdiag.scenario.planned_readings import only
 from stepdiag.scenario.setup import environments, misalignments, noise_of, weights
 from stepdiag.scenario.uncertain_inputs import uncertain_inputs
 from stepdiag.units import MICROMETRE, MICRORADIAN
-from stepdiag.scenario.planned_readings import only
-from stepdiag.config.toml_text import check_keys, located, parse_toml
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,12 +8,12 @@ from typing import Any
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.head.description import components, find_head, read_head_design
 from stepdiag.config.key_errors import expectation, show, suggest
 from stepdiag.config.scenario_head_keys import DESCRIPTION_KEYS, LAYOUT_KEYS, HeadKeys, PoseErrorKeys
 from stepdiag.config.scenario_keys import ScenarioKeys
-from stepdiag.units import MICRORADIAN
 from stepdiag.config.toml_text import located
+from stepdiag.head.description import components, find_head, read_head_design
+from stepdiag.units import MICRORADIAN
 
 Shift = tuple[float, float, float]
 

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from stepdiag._core import InvalidArgument
-from stepdiag.io.whole_files import read_bytes
-from stepdiag.head.description import find_head, shipped_heads
-from stepdiag.scenario.description import Scenario, scenario_of
 from stepdiag.config.toml_text import located
+from stepdiag.head.description import find_head, shipped_heads
+from stepdiag.io.whole_files import read_bytes
+from stepdiag.scenario.description import Scenario, scenario_of
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,8 @@ from stepdiag._core import InvalidArgument
 from stepdiag.config.key_errors import BY_LINE, show, suggest
 from stepdiag.config.scenario_head_keys import AirKeys, EnvironmentSection
 from stepdiag.config.scenario_keys import SECTIONS_BY_LINE, MisalignmentKeys, NoiseSection, ScenarioKeys
-from stepdiag.units import MICROMETRE, MICRORADIAN
 from stepdiag.config.toml_text import located
-
-PERCENT = 0.01
-HECTOPASCAL = 100.0  # Pa
-HOUR = 3600.0  # s
+from stepdiag.units import HECTOPASCAL, HOUR, MICROMETRE, MICRORADIAN, PERCENT
 
 
 def misalignments(keys: ScenarioKeys, heads: Mapping[str, _core.Head], path: Path) -> dict[str, _core.Misalignment]:

@@ -10,15 +10,14 @@ import numpy as np
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.config.distribution_keys import StatedDistribution
-from stepdiag.head.description import components
 from stepdiag.config.key_errors import show, suggest
-from stepdiag.scenario.heads import DescribedHead
 from stepdiag.config.scenario_keys import ScenarioKeys
-from stepdiag.scenario.setup import weights
-from stepdiag.units import HECTOPASCAL, HOUR, PERCENT
-from stepdiag.units import MICROMETRE, MICRORADIAN
 from stepdiag.config.toml_text import located
 from stepdiag.config.uncertainty_keys import SetupUncertaintyKeys, UncertaintySection
+from stepdiag.head.description import components
+from stepdiag.scenario.heads import DescribedHead
+from stepdiag.scenario.setup import weights
+from stepdiag.units import HECTOPASCAL, HOUR, MICROMETRE, MICRORADIAN, PERCENT
 
 PPM: Final = 1e-6
 

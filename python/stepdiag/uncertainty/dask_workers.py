@@ -1,9 +1,9 @@
 """Monte Carlo runs on the workers of Dask distributed: of another computer's scheduler, or processes of this one.
 
-A task is a pure function of a recipe, the bytes of the bins and a range of leaves; it gives the bytes of the statistics
-of these leaves. They are merged by the numbers of the leaves, so neither who computed what, nor how leaves were shared
-out, nor a worker that is lost on the way (others do its tasks again) changes a bit of the result. Bits do depend on the
-instruction set: workers that use another one than this program take no part.
+A task is a pure function of the source of a model, the bytes of the bins and a range of leaves; it gives the bytes of
+the statistics of these leaves. They are merged by the numbers of the leaves, so neither who computed what, nor how
+leaves were shared out, nor a worker that is lost on the way (others do its tasks again) changes a bit of the result.
+Bits do depend on the instruction set: workers that use another one than this program take no part.
 
 Dask is imported when it is used: it is an optional dependency.
 """
@@ -18,8 +18,8 @@ from typing import Any, Final
 
 from stepdiag import _core
 from stepdiag._core import Bins, InvalidArgument, PartialStatistics
-from stepdiag.uncertainty.monte_carlo import Executor, LeafRange
 from stepdiag.uncertainty.model_source import ModelSource, model_of
+from stepdiag.uncertainty.monte_carlo import Executor, LeafRange
 
 TASKS_A_THREAD: Final = 2  # under way: one that is computed, one that waits
 CONNECT_SECONDS: Final = 10.0
@@ -60,8 +60,8 @@ def perform(machine: Machine, function: Callable[..., Any], arguments: Sequence[
     return function(*arguments) if this_machine() == machine else Refusal(this_machine())
 
 
-def compute_leaves(recipe: ModelSource, bins: bytes, first: int, end: int) -> bytes:
-    return _core.run_leaves(model_of(recipe), _bins_of(bins), first, end - first, threads=1).to_bytes()
+def compute_leaves(source: ModelSource, bins: bytes, first: int, end: int) -> bytes:
+    return _core.run_leaves(model_of(source), _bins_of(bins), first, end - first, threads=1).to_bytes()
 
 
 @lru_cache(maxsize=2)
@@ -91,12 +91,12 @@ class Workers:
     def address(self) -> str:
         return str(self._client.scheduler.address)
 
-    def executor(self, recipe: ModelSource) -> Executor:
+    def executor(self, source: ModelSource) -> Executor:
         """For run_monte_carlo: each range of leaves is a task."""
 
         def compute(bins: Bins, ranges: Iterable[LeafRange]) -> Iterator[PartialStatistics]:
             content = bins.to_bytes()
-            for _, part in self.compute(compute_leaves, ((recipe, content, *leaves) for leaves in ranges)):
+            for _, part in self.compute(compute_leaves, ((source, content, *leaves) for leaves in ranges)):
                 yield PartialStatistics.from_bytes(part)
 
         return compute
@@ -183,7 +183,7 @@ def workers_of(
             dashboard_address=None,
             memory_limit=0,  # what a run takes is known beforehand, and Dask would stop workers
             silence_logs=logging.CRITICAL,
-            preload=["stepdiag.dask_preload"],
+            preload=["stepdiag.uncertainty.dask_preload"],
         ) as cluster,
         distributed.Client(cluster, set_as_default=False) as client,
     ):

@@ -1,18 +1,18 @@
-"""The recipe of a scenario's virtual calibrations."""
+"""The virtual calibrations of a scenario as a plain value, from which any process makes the same model."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 from stepdiag._core import SampleModel
+from stepdiag.config.toml_text import parse_toml
 from stepdiag.io.whole_files import read_text
 from stepdiag.scenario.packed import PackedScenario, pack_scenario, unpacked
-from stepdiag.config.toml_text import parse_toml
 from stepdiag.uncertainty.run import Request, model_for
 
 
 @dataclass(frozen=True)
-class CalibrationRecipe:
-    """See recipe.py. Make it with `calibration_recipe`."""
+class PackedCalibrations:
+    """A ModelSource. Make it with `pack_calibrations`."""
 
     packed: PackedScenario
     request: Request
@@ -22,9 +22,9 @@ class CalibrationRecipe:
             return model_for(scenario, self.request)[0]
 
 
-def calibration_recipe(path: Path, request: Request) -> CalibrationRecipe:
+def pack_calibrations(path: Path, request: Request) -> PackedCalibrations:
     """Of the scenario in a file. Of the request only what the model depends on: the same model for any number of
     samples. Raises InvalidArgument for a file that cannot be read."""
     content = parse_toml(read_text(path), str(path))
     usual = Request(method=request.method, seed=request.seed, points=tuple(request.points))
-    return CalibrationRecipe(pack_scenario(content, path), usual)
+    return PackedCalibrations(pack_scenario(content, path), usual)

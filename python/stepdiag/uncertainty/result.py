@@ -1,7 +1,7 @@
 """What an uncertainty evaluation found: outputs with their propagation and their Monte Carlo result, side by side."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -9,14 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag._core import InvalidArgument
-from stepdiag.parameters import KINDS, kind_of
 from stepdiag.config.key_errors import suggest
+from stepdiag.parameters import KINDS, kind_of
 from stepdiag.scenario.description import Scenario
 
 FloatArray = npt.NDArray[np.float64]
 
 FAMILIES: Final = (*KINDS, "derived")
-REPORT_UNITS: Final[Mapping[str, tuple[str, float]]] = {"mm": ("µm", 1e3), "rad": ("µrad", 1e6), "1": ("", 1.0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +59,6 @@ def label(output: Any) -> str:
     return str(output.name) if math.isnan(output.position) else f"{output.name} at {output.position:g} mm"
 
 
-def in_report_units(unit: str, value: float) -> tuple[float, str]:
-    """mm as µm, rad as µrad."""
-    name, factor = REPORT_UNITS.get(unit, (unit, 1.0))
-    return value * factor, name
-
-
 def find_output(outputs: Sequence[Any], text: str, option: str) -> int:
     """The output that a user means by "C0Y", "EXX@400" or the label of a derived quantity; of a function without a
     position that at its last node. Raises InvalidArgument."""
@@ -87,3 +80,8 @@ def find_output(outputs: Sequence[Any], text: str, option: str) -> int:
         hint = "it has no position" if math.isnan(nodes) else f"the nearest node is at {nodes:g} mm"
         raise InvalidArgument(f"{option}: {text!r}: no node of {name}; {hint}")
     return nearest
+
+
+def volume_units(name: str) -> str:
+    """The native unit of one of the ranges over the volume."""
+    return "rad" if name in ("V_A", "V_B", "V_C") else "mm"

@@ -7,9 +7,9 @@ from typing import Final
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.uncertainty.monte_carlo import Executor, run_monte_carlo
-from stepdiag.scenario.description import Scenario
 from stepdiag.config.toml_text import located
+from stepdiag.scenario.description import Scenario
+from stepdiag.uncertainty.monte_carlo import Executor, run_monte_carlo
 from stepdiag.uncertainty.result import UncertaintyResult, find_output
 from stepdiag.uncertainty.virtual_calibrations import Method, virtual_calibrations
 

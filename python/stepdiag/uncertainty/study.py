@@ -13,9 +13,9 @@ from pathlib import Path
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.uncertainty.dask_workers import Workers
 from stepdiag.io.whole_files import check_output, read_text, reason
 from stepdiag.scenario.packed import pack_scenario
+from stepdiag.uncertainty.dask_workers import Workers
 from stepdiag.uncertainty.study_cell import CellJob, CellResult, compute_cell
 from stepdiag.uncertainty.study_keys import Cell, Study
 

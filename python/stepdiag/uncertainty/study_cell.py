@@ -12,9 +12,9 @@ from stepdiag import _core
 from stepdiag._core import InvalidArgument, ReplayMismatch
 from stepdiag.parameters import kind_of
 from stepdiag.scenario.packed import PackedScenario, unpacked
-from stepdiag.uncertainty.study_keys import Method
 from stepdiag.uncertainty.result import FloatArray, UncertaintyResult
 from stepdiag.uncertainty.run import Request, evaluate_uncertainty
+from stepdiag.uncertainty.study_keys import Method
 
 # What is kept of each parameter and family, by the largest and the median of its values (of absolute ones).
 FIGURES: Final[Mapping[str, str]] = {

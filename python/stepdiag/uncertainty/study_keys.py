@@ -25,11 +25,11 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field
 
 from stepdiag._core import InvalidArgument
-from stepdiag.io.whole_files import read_text
 from stepdiag.config.key_errors import show, suggest
-from stepdiag.scenario.description import Scenario, scenario_of
 from stepdiag.config.key_types import SEED, Section, Seed, key
 from stepdiag.config.toml_text import check_keys, located, parse_toml
+from stepdiag.io.whole_files import read_text
+from stepdiag.scenario.description import Scenario, scenario_of
 
 Method = Literal["enhanced", "conventional", "adjustment", "one_step"]
 

@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from stepdiag.parameters import KINDS
-from stepdiag.io.data_files import date_of_today
 from stepdiag.config.key_errors import show
+from stepdiag.io.data_files import date_of_today
 from stepdiag.io.netcdf import write_dataset
+from stepdiag.parameters import KINDS
 from stepdiag.uncertainty.study_cell import FIGURES, SUMMARIES, CellResult
 from stepdiag.uncertainty.study_keys import Study
 

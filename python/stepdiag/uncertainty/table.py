@@ -7,8 +7,7 @@ from typing import Any, Final
 import numpy as np
 import xarray as xr
 
-from stepdiag.uncertainty.result import volume_units
-from stepdiag.uncertainty.result import FloatArray, UncertaintyResult, label
+from stepdiag.uncertainty.result import FloatArray, UncertaintyResult, label, volume_units
 
 UNCERTAINTY_FORMAT: Final = "stepdiag uncertainty 1"
 

@@ -5,10 +5,10 @@ from typing import Any, Final, Literal
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
+from stepdiag.config.toml_text import located
 from stepdiag.scenario.description import Scenario, runs_of
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.uncertain_inputs import STATE_OF_AIR
-from stepdiag.config.toml_text import located
 
 Method = Literal["conventional", "enhanced", "adjustment", "one_step"]
 METHODS: Final = ("adjustment", "enhanced", "conventional", "one_step")

@@ -8,11 +8,11 @@ import numpy as np
 
 from stepdiag._core import InvalidArgument
 from stepdiag.io.data_files import date_of_today, is_netcdf
-from stepdiag.io.whole_files import write_whole
 from stepdiag.io.netcdf import write_dataset
+from stepdiag.io.whole_files import write_whole
 from stepdiag.uncertainty.result import UncertaintyResult
-from stepdiag.units import report_value
 from stepdiag.uncertainty.table import ABOUT, UNCERTAINTY_FORMAT, attributes_of, columns_of, uncertainty_table
+from stepdiag.units import report_value
 
 
 def write_uncertainty(result: UncertaintyResult, path: Path) -> None:

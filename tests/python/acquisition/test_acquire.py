@@ -9,16 +9,16 @@ from acquiring import BEAMS, IDEAL, LINES, SMALL, Listener, acquire_through, fas
 
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.options import AcquireOptions
-from stepdiag.acquisition.triggers import KeyTrigger
-from stepdiag.io.data_files import read_measurement
 from stepdiag.acquisition.raw_file import read_raw
 from stepdiag.acquisition.raw_records import Value
 from stepdiag.acquisition.run_from_raw import measurement_of
-from stepdiag.scenario.description import evaluate_scenario, parse_scenario, simulate_scenario
 from stepdiag.acquisition.settling import Settling
 from stepdiag.acquisition.tcp_trigger import TcpTrigger
+from stepdiag.acquisition.triggers import KeyTrigger
 from stepdiag.acquisition.twin import Twin
 from stepdiag.acquisition.twin_instrument import TwinBehaviour
+from stepdiag.io.data_files import read_measurement
+from stepdiag.scenario.description import evaluate_scenario, parse_scenario, simulate_scenario
 
 
 def to_picometres(values: np.ndarray) -> np.ndarray:

@@ -18,14 +18,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.triggers import Stopped
-from stepdiag.io.data_files import read_measurement
-from stepdiag.report.file_check import examine
 from stepdiag.acquisition.raw_file import RawFile, read_raw
 from stepdiag.acquisition.run_from_raw import measurement_of
-from stepdiag.scenario.description import Scenario
 from stepdiag.acquisition.tcp_trigger import TcpTrigger
+from stepdiag.acquisition.triggers import Stopped
 from stepdiag.acquisition.twin import Twin
+from stepdiag.io.data_files import read_measurement
+from stepdiag.report.file_check import examine
+from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.order_of_run import Visit
 
 CHANNELS = ("d1", "d2", "d3")

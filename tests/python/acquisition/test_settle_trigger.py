@@ -13,17 +13,17 @@ from acquiring import SMALL, Listener, fast, points_of, scenario
 
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.acquire import acquire
-from stepdiag.acquisition.triggers import Context
-from stepdiag.io.data_files import read_measurement
 from stepdiag.acquisition.ids3010 import Sample
-from stepdiag.program.options import Options, space_of
-from stepdiag.program.path import Align, Feed, Read, actions_of
 from stepdiag.acquisition.raw_file import read_raw
-from stepdiag.scenario.description import simulate_scenario
 from stepdiag.acquisition.settle_trigger import SettleTrigger
 from stepdiag.acquisition.settling import Reading, Settling, take_reading
+from stepdiag.acquisition.triggers import Context
 from stepdiag.acquisition.twin import Twin
 from stepdiag.acquisition.twin_instrument import TwinBehaviour
+from stepdiag.io.data_files import read_measurement
+from stepdiag.program.options import Options, space_of
+from stepdiag.program.path import Align, Feed, Read, actions_of
+from stepdiag.scenario.description import simulate_scenario
 from stepdiag.scenario.order_of_run import Visit, visits_of
 
 MILLIMETRE = 10**9  # pm

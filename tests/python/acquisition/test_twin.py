@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from stepdiag._core import InvalidArgument, VirtualReadout
 from stepdiag.acquisition.ids3010 import Ids3010, InstrumentError
-from stepdiag.scenario.description import Scenario, simulate_scenario
 from stepdiag.acquisition.twin import Twin
 from stepdiag.acquisition.twin_instrument import TwinBehaviour
+from stepdiag.scenario.description import Scenario, simulate_scenario
 from stepdiag.scenario.order_of_run import visits_of
 
 

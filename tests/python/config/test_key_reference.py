@@ -6,10 +6,10 @@ import pytest
 
 from stepdiag.config.head_keys import HeadFile
 from stepdiag.config.key_reference import key_table, keys, sections
-from stepdiag.scenario.description import parse_scenario
+from stepdiag.config.key_types import Section
 from stepdiag.config.scenario_keys import ScenarioKeys
 from stepdiag.config.scenario_template import template
-from stepdiag.config.key_types import Section
+from stepdiag.scenario.description import parse_scenario
 
 DOCS = Path(__file__).parents[2] / "docs"
 

@@ -7,9 +7,9 @@ import pytest
 
 from stepdiag import Machine, read_calibration, read_measurement
 from stepdiag.cli import main
-from stepdiag.demo.loop_outcome import LoopOutcome, repetitions, run_case, whole_grid
 from stepdiag.demo.loop_cases import CLEAN, NOISE, RADIUS, SCREW, LoopCase
 from stepdiag.demo.loop_job import Calculated
+from stepdiag.demo.loop_outcome import LoopOutcome, repetitions, run_case, whole_grid
 from stepdiag.demo.loop_points import Sizes, agreement, grid_nodes, random_points
 from stepdiag.demo.loop_recheck import along_beam
 from stepdiag.demo.loop_report import report_lines

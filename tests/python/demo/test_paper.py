@@ -9,7 +9,16 @@ import pytest
 import stepdiag as sd
 from stepdiag.cli import main
 from stepdiag.demo.paper import run_demo
-from stepdiag.demo.paper_cases import (CASES, LASER_OFFSET, POSITIONING, PSD_DISTANCE, SCREW_AMPLITUDE, Result, run_case, write_truths)
+from stepdiag.demo.paper_cases import (
+    CASES,
+    LASER_OFFSET,
+    POSITIONING,
+    PSD_DISTANCE,
+    SCREW_AMPLITUDE,
+    Result,
+    run_case,
+    write_truths,
+)
 from stepdiag.demo.paper_report import alias_of, between_nodes, traced_differences
 
 

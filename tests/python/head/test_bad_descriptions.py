@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 import tomlkit
-from small_scenario import SCENARIO
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag.head.description import find_head, parse_head_design, read_head_design

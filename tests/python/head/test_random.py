@@ -11,8 +11,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from reference_optics import MP, Component, Description, half_path, read_description, spot, tilted_mirror
-from small_heads import read
 from shipped_heads import SHIPPED, Shipped
+from small_heads import read
 
 import stepdiag as sd
 

@@ -22,8 +22,7 @@ from reference_optics import (
     spot,
     tilted_mirror,
 )
-from simulated_runs import with_reversal
-from simulated_runs import table_of
+from simulated_runs import table_of, with_reversal
 from truth import DIAGONALS, VOLUME, Setup
 
 import stepdiag as sd

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from stepdiag.uncertainty import monte_carlo
 from stepdiag._core import Distribution, FunctionModel, StatisticsOptions
+from stepdiag.uncertainty import monte_carlo
 
 Array = npt.NDArray[np.float64]
 STANDARD = Distribution(spread=1.0)

@@ -1,4 +1,4 @@
-"""Recipes of models that take no time, and that worker processes can import."""
+"""Sources of models that take no time, and that worker processes can import."""
 
 import time
 from dataclasses import dataclass

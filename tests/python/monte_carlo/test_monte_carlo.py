@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from jcgm import STANDARD, UNIFORM, calibration_line, gauge_block, logarithm, sum_of_four
 
-from stepdiag.uncertainty import monte_carlo
 from stepdiag._core import (
     Bins,
     Distribution,
@@ -32,6 +31,7 @@ from stepdiag._core import (
     random_error_map,
     run_leaves,
 )
+from stepdiag.uncertainty import monte_carlo
 from stepdiag.uncertainty.monte_carlo import LeafRange, plan_ranges, run_monte_carlo
 
 UNIFORM_TILT = Distribution("rectangular", spread=1e-4)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import reference
 from reference_optics import MP, Plane, mirror_in_sensor_frame
-from small_heads import APERTURE, OFFSETS, SpotHead, read, three_beams, window
 from simulated_runs import table_of
+from small_heads import APERTURE, OFFSETS, SpotHead, read, three_beams, window
 from truth import CHAIN, VOLUME, Setup
 
 import stepdiag as sd

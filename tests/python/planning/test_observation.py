@@ -8,10 +8,10 @@ import pytest
 from small_scenario import SCENARIO
 
 import stepdiag as sd
+from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.cli import main
 from stepdiag.planning.observation import extents, growth, observe, prospects, without_errors
 from stepdiag.report.observation import prospect_csv
-from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.scenario.description import parse_scenario
 
 VOLUME = SCENARIO.replace("x_mm = 80.0", "x_mm = 800.0").replace("y_mm = 60.0", "y_mm = 600.0")

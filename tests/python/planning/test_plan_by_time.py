@@ -9,12 +9,12 @@ import pytest
 from small_scenario import SCENARIO
 
 import stepdiag as sd
+from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.cli import main
+from stepdiag.figures.plan_by_time import draw_plans
 from stepdiag.planning.measuring_time import Times, measuring_time, times_of
 from stepdiag.planning.plan_by_time import Candidate, Outcome, candidates, choose, complete, front, outcome, outcomes
-from stepdiag.figures.plan_by_time import draw_plans
 from stepdiag.report.plan_by_time import advice, left_out_rows, plan_csv, plan_rows
-from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.scenario.description import parse_scenario
 
 FEW = """

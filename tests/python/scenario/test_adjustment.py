@@ -8,8 +8,8 @@ import pytest
 from small_scenario import SCENARIO
 
 import stepdiag as sd
-from stepdiag.scenario.description import Scenario, parse_scenario
 from stepdiag.scenario.adjustment import QUANTITIES, SCALE_LINE_ANGLE, native
+from stepdiag.scenario.description import Scenario, parse_scenario
 
 PSD = SCENARIO.replace('"ideal"', '"psd"\npsd_distance_mm = 50.0')
 BEAMS = SCENARIO.replace('"ideal"', '"multi_beam"\nbeam_offsets_mm = [[0, 0], [20, 0], [0, 20]]')

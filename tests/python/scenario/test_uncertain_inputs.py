@@ -13,9 +13,9 @@ from small_scenario import SCENARIO
 import stepdiag as sd
 from stepdiag import _core
 from stepdiag.config.distribution_keys import WIDTHS
+from stepdiag.config.uncertainty_keys import SetupUncertaintyKeys, UncertaintySection
 from stepdiag.scenario.description import parse_scenario
 from stepdiag.scenario.uncertain_inputs import OF_ALL, OF_COMPONENT, OF_NOISE, OF_SETUP, kind_of_channel
-from stepdiag.config.uncertainty_keys import SetupUncertaintyKeys, UncertaintySection
 
 TIMED = SCENARIO.replace("[plan]", "[plan]\nseconds_per_reading = 2.0")
 PSD = TIMED.replace('"ideal"', '"psd"\npsd_distance_mm = 50.0')

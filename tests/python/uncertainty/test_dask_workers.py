@@ -11,9 +11,9 @@ from small_models import Sums
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument, PartialStatistics, StatisticsOptions
-from stepdiag.uncertainty.dask_workers import (Machine, Workers, WorkersLost, check_scheduler, this_machine, workers_of)
-from stepdiag.uncertainty.monte_carlo import run_monte_carlo
+from stepdiag.uncertainty.dask_workers import Machine, Workers, WorkersLost, check_scheduler, this_machine, workers_of
 from stepdiag.uncertainty.model_source import KEPT, model_of
+from stepdiag.uncertainty.monte_carlo import run_monte_carlo
 
 pytest.importorskip("distributed", reason="Dask distributed is an optional dependency")
 
@@ -60,11 +60,11 @@ def test_worker_killed_on_the_way_changes_nothing(three: Workers) -> None:
 
 
 def test_adaptive_run_takes_the_blocks_that_it_takes_here(three: Workers) -> None:
-    recipe = Sums(seed=6)
+    source = Sums(seed=6)
     options = StatisticsOptions(digits=1)
     here, there = (
-        run_monte_carlo(recipe.model(), samples=1_000_000, adaptive=True, options=options, threads=1, executor=executor)
-        for executor in (None, three.executor(recipe))
+        run_monte_carlo(source.model(), samples=1_000_000, adaptive=True, options=options, threads=1, executor=executor)
+        for executor in (None, three.executor(source))
     )
     assert there.samples == here.samples < 1_000_000
     for name in ("mean", "standard_uncertainty", "symmetric", "shortest"):
@@ -72,11 +72,11 @@ def test_adaptive_run_takes_the_blocks_that_it_takes_here(three: Workers) -> Non
 
 
 def test_worker_of_another_machine_takes_no_part(three: Workers, warnings: list[str]) -> None:
-    recipe = Sums(seed=7)
-    here = run_monte_carlo(recipe.model(), samples=200_000, options=OPTIONS, threads=1)
+    source = Sums(seed=7)
+    here = run_monte_carlo(source.model(), samples=200_000, options=OPTIONS, threads=1)
     odd = sorted(three._client.run(os.getpid))[0]
     three._client.run(pretend, "another set", workers=[odd])
-    there = run_monte_carlo(recipe.model(), samples=200_000, options=OPTIONS, executor=three.executor(recipe))
+    there = run_monte_carlo(source.model(), samples=200_000, options=OPTIONS, executor=three.executor(source))
     assert warnings == [
         f"worker {odd} takes no part: it has stepdiag {_core.__version__} with another set, this "
         f"program {this_machine()}"
@@ -84,16 +84,16 @@ def test_worker_of_another_machine_takes_no_part(three: Workers, warnings: list[
     np.testing.assert_array_equal(there.covariance, here.covariance)
     three._client.run(pretend, "another set")
     with pytest.raises(WorkersLost, match=f"no worker has {this_machine()}, as this program does"):
-        run_monte_carlo(recipe.model(), samples=20_000, executor=three.executor(recipe))
+        run_monte_carlo(source.model(), samples=20_000, executor=three.executor(source))
     three._client.run(pretend, this_machine().instruction_set)
 
 
 def pretend(instruction_set: str) -> None:
     """Of a worker: that it had this one."""
-    import stepdiag.dask_workers
+    import stepdiag.uncertainty.dask_workers
 
     machine = Machine(_core.__version__, instruction_set)
-    stepdiag.dask_workers.this_machine = lambda: machine
+    stepdiag.uncertainty.dask_workers.this_machine = lambda: machine
 
 
 def test_errors_of_a_task_come_home_as_they_are(three: Workers) -> None:
@@ -106,11 +106,11 @@ def refuse(message: str) -> None:
 
 
 # --- without workers -------------------------------------------------------------------------------------------------
-def test_models_of_the_last_recipes_are_kept() -> None:
-    recipes = [Sums(seed=k) for k in range(KEPT + 1)]
-    models = [model_of(recipe) for recipe in recipes]
-    assert model_of(recipes[-1]) is models[-1]
-    assert model_of(recipes[0]) is not models[0]
+def test_models_of_the_last_sources_are_kept() -> None:
+    sources = [Sums(seed=k) for k in range(KEPT + 1)]
+    models = [model_of(source) for source in sources]
+    assert model_of(sources[-1]) is models[-1]
+    assert model_of(sources[0]) is not models[0]
 
 
 @pytest.mark.parametrize("address", ["", "host:8786", "http://host:8786", "tcp://host", "tcp://:1", "tcp://host:70000"])
@@ -120,7 +120,7 @@ def test_address_that_is_none_is_refused(address: str) -> None:
 
 
 def test_scheduler_that_does_not_answer_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stepdiag.dask_workers.CONNECT_SECONDS", 0.5)
+    monkeypatch.setattr("stepdiag.uncertainty.dask_workers.CONNECT_SECONDS", 0.5)
     # Port 9 is "discard": nobody listens there any more.
     expected = r"^--scheduler: tcp://127.0.0.1:9: no scheduler answers"
     with pytest.raises(InvalidArgument, match=expected), workers_of("tcp://127.0.0.1:9"):

@@ -12,15 +12,15 @@ from small_scenario import SCENARIO
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.cli import main
-from stepdiag.uncertainty.dask_workers import workers_of
-from stepdiag.scenario.packed import pack_scenario, unpacked
+from stepdiag.config.toml_text import parse_toml
 from stepdiag.scenario.description import read_scenario, simulate_scenario
+from stepdiag.scenario.packed import pack_scenario, unpacked
+from stepdiag.uncertainty.dask_workers import workers_of
+from stepdiag.uncertainty.run import Request, evaluate_uncertainty
 from stepdiag.uncertainty.study import FinishedCells, run_study, tasks_of
 from stepdiag.uncertainty.study_cell import CellResult, compute_cell
 from stepdiag.uncertainty.study_keys import read_study
 from stepdiag.uncertainty.study_table import study_table
-from stepdiag.config.toml_text import parse_toml
-from stepdiag.uncertainty.run import Request, evaluate_uncertainty
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SMALL = """

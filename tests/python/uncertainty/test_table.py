@@ -16,8 +16,8 @@ from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag.io.netcdf import open_dataset
-from stepdiag.scenario.description import parse_scenario
 from stepdiag.report.uncertainty import result_rows
+from stepdiag.scenario.description import parse_scenario
 from stepdiag.uncertainty.result import UncertaintyResult, find_output, label
 from stepdiag.uncertainty.table import uncertainty_table
 from stepdiag.uncertainty.write import write_uncertainty
