@@ -75,7 +75,7 @@ def scenarios() -> list[bytes]:
 
 
 def heads() -> list[bytes]:
-    return [path.read_bytes() for path in sorted((ROOT / "python/stepdiag/heads").glob("*.toml"))]
+    return [path.read_bytes() for path in sorted((ROOT / "python/stepdiag/head/shipped").glob("*.toml"))]
 
 
 READERS = {

@@ -6,15 +6,11 @@ calibration.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.append(str(Path(__file__).parents[1] / "python"))
-
 from exported import CHAINS, TOOL, VOLUME, calibration_of, export, machine_of, points_in, random_calibration
 
 import stepdiag as sd

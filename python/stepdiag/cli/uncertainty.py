@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from stepdiag.scenario.description import Scenario
     from stepdiag.uncertainty.dask_workers import Workers
     from stepdiag.uncertainty.result import UncertaintyResult
-    from stepdiag.uncertainty.run import Request
+    from stepdiag.uncertainty.run import UncertaintyRequest
 
 Point = tuple[tuple[float, float, float], tuple[float, float, float] | None]
 
@@ -152,9 +152,9 @@ def uncertainty(
     from stepdiag.report.uncertainty import input_rows, opening_rows, result_rows
     from stepdiag.scenario.description import read_scenario
     from stepdiag.scenario.map_warnings import scenario_warnings
-    from stepdiag.uncertainty.run import Request
+    from stepdiag.uncertainty.run import UncertaintyRequest
 
-    wanted = Request(
+    wanted = UncertaintyRequest(
         method=method,
         samples=samples,
         adaptive=adaptive,
@@ -202,7 +202,7 @@ def uncertainty(
         click.echo(line)
 
 
-def _evaluate(scenario: "Scenario", wanted: "Request", workers: "Workers | None") -> "UncertaintyResult":
+def _evaluate(scenario: "Scenario", wanted: "UncertaintyRequest", workers: "Workers | None") -> "UncertaintyResult":
     """With a progress bar; an interrupted run says how to go on."""
     from stepdiag.uncertainty.packed_calibrations import pack_calibrations
     from stepdiag.uncertainty.run import evaluate_uncertainty

@@ -7,7 +7,7 @@ import numpy as np
 
 from stepdiag._core import Calibration
 from stepdiag.calibration.functional_point import functional_point_straightness
-from stepdiag.parameters import KINDS, REPORT_UNIT, in_report_units, kind_of
+from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.comparison import decimal
 from stepdiag.report.evaluation import reversal_rows, undetermined_rows
 
@@ -36,7 +36,7 @@ def calibration_report(calibration: Calibration) -> Iterator[str]:
     yield from undetermined_rows(calibration)
 
 
-def _values(calibration: Calibration, kind: str) -> Iterator[tuple[float, float, str]]:
+def _values(calibration: Calibration, kind: Kind) -> Iterator[tuple[float, float, str]]:
     """Value, standard uncertainty and place of every value of a kind."""
     for name, (position, value, uncertainty) in calibration.functions.items():
         if kind_of(name) == kind:
@@ -48,7 +48,7 @@ def _values(calibration: Calibration, kind: str) -> Iterator[tuple[float, float,
             yield angle, u, name
 
 
-def _largest(kind: str, numbers: list[tuple[float, str]]) -> str:
+def _largest(kind: Kind, numbers: list[tuple[float, str]]) -> str:
     known = [(number, place) for number, place in numbers if not np.isnan(number)]
     if not known:
         return "not known"

@@ -22,7 +22,7 @@ MOST_SAMPLES: Final = 10_000_000
 
 
 @dataclass(frozen=True)
-class Request:
+class UncertaintyRequest:
     """What is asked for. `points`: commanded positions, each with a tool offset of its own or None (mm)."""
 
     method: Method = "adjustment"
@@ -66,7 +66,7 @@ class Request:
                 raise InvalidArgument(f"--joint: expected {expected}, such as C0Y,B0Z, got {','.join(names)!r}")
 
 
-def model_for(scenario: Scenario, request: Request) -> tuple[_core.VirtualCalibrations, int]:
+def model_for(scenario: Scenario, request: UncertaintyRequest) -> tuple[_core.VirtualCalibrations, int]:
     """The errors at the points asked for stand behind the calibration's own values; and how many those are."""
     model = virtual_calibrations(scenario, method=request.method, seed=request.seed)
     derived = [d for point, tool in request.points for d in _core.derived_at_point(model.calibration, point, tool=tool)]
@@ -77,7 +77,7 @@ def model_for(scenario: Scenario, request: Request) -> tuple[_core.VirtualCalibr
 
 
 def evaluate_uncertainty(
-    scenario: Scenario, request: Request, progress: Progress | None = None, executor: Executor | None = None
+    scenario: Scenario, request: UncertaintyRequest, progress: Progress | None = None, executor: Executor | None = None
 ) -> UncertaintyResult:
     """Propagates, and draws if samples are asked for, by the executor where there is one. `progress(done, total)` is
     told of samples; what it raises ends the run, which then leaves its checkpoint. Raises InvalidArgument for what
@@ -119,7 +119,7 @@ def evaluate_uncertainty(
 
 
 def _volume(
-    calibration: _core.Calibration, propagation: _core.Propagation, entries: int, request: Request
+    calibration: _core.Calibration, propagation: _core.Propagation, entries: int, request: UncertaintyRequest
 ) -> _core.VolumetricAccuracy:
     """Of the calibration with the covariance that was propagated to it."""
     covariance = propagation.covariance

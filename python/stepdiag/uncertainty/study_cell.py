@@ -13,7 +13,7 @@ from stepdiag._core import InvalidArgument, ReplayMismatch
 from stepdiag.parameters import kind_of
 from stepdiag.scenario.packed import PackedScenario, unpacked
 from stepdiag.uncertainty.result import FloatArray, UncertaintyResult
-from stepdiag.uncertainty.run import Request, evaluate_uncertainty
+from stepdiag.uncertainty.run import UncertaintyRequest, evaluate_uncertainty
 from stepdiag.uncertainty.study_keys import Method
 
 # What is kept of each parameter and family, by the largest and the median of its values (of absolute ones).
@@ -72,7 +72,7 @@ def compute_cell(job: CellJob, *, threads: int = 0) -> CellResult:
     instruction_set = _core.instruction_set()
     try:
         with unpacked(job.packed) as scenario:
-            wanted = Request(
+            wanted = UncertaintyRequest(
                 method=job.method,
                 samples=job.samples or None,
                 digits=job.digits,

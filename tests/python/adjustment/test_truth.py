@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import pytest
 import reference
 from adjusted import adjust, distance_from, error_map, is_complete
 from dense_adjustment import Knowledge
+from places import RUNS
 from reference_files import read_error_table, read_scenario
 from virtual_runs import (
     DIAGONALS,
@@ -23,8 +23,6 @@ from virtual_runs import (
 )
 
 import stepdiag as sd
-
-RUNS = Path(__file__).parents[1] / "data" / "runs"
 
 # The figures of the project, mm and rad. Readings near 1 m are rounded to 1e-13 mm, and steps add up as a random walk.
 # Tilts from differences of beams: 1e-13 mm over 20 mm and 50 steps.

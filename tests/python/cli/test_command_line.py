@@ -13,13 +13,13 @@ from typing import Any
 import pytest
 import tomlkit
 import xarray as xr
+from places import RUNS
 from small_scenario import SCENARIO, of_map
 
 import stepdiag as sd
 from stepdiag.cli import main
 from stepdiag.io.data_files import write_calibration
 
-RUNS = Path(__file__).parents[1] / "data" / "runs"
 CASES = sorted(path.name for path in RUNS.iterdir() if path.is_dir())
 
 
@@ -203,7 +203,7 @@ def test_interruption_gives_130(here: Path, monkeypatch: pytest.MonkeyPatch) -> 
     def interrupted(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("stepdiag.scenario.read_scenario", interrupted)
+    monkeypatch.setattr("stepdiag.scenario.description.read_scenario", interrupted)
     assert run("simulate", "scenario.toml", "-o", "out.csv") == 130
     assert not Path("out.csv").exists()
 

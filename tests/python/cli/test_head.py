@@ -236,7 +236,7 @@ def test_replay_that_differs_from_its_trace_is_told_in_one_line(
         raise sd.ReplayMismatch("line ppp, point 3: replay and trace differ")
 
     run("init", "-o", "machine", "--head", "three_beams")
-    monkeypatch.setattr("stepdiag.scenario.simulate_scenario", differs)
+    monkeypatch.setattr("stepdiag.scenario.description.simulate_scenario", differs)
     capsys.readouterr()
     assert run("simulate", "machine/scenario.toml", "-o", "run.csv") == 1
     assert capsys.readouterr().err.startswith("stepdiag: error: line ppp, point 3: replay and trace differ; nothing")

@@ -13,7 +13,7 @@ from small_scenario import SCENARIO
 import stepdiag as sd
 from stepdiag.cli import main
 from stepdiag.cli.uncertainty import Bar
-from stepdiag.uncertainty.run import Request, evaluate_uncertainty
+from stepdiag.uncertainty.run import UncertaintyRequest, evaluate_uncertainty
 
 UNCERTAIN = """[uncertainty]
 distance_um = 0.1
@@ -142,7 +142,7 @@ def test_every_method_is_drawn_and_propagated(folder: Path, method: Any, capsys:
 
 def test_python_gives_what_the_command_gives(folder: Path) -> None:
     assert run("-n", SAMPLES, "-o", "u.nc") == 0
-    found = evaluate_uncertainty(sd.read_scenario("scenario.toml"), Request(samples=14_000))
+    found = evaluate_uncertainty(sd.read_scenario("scenario.toml"), UncertaintyRequest(samples=14_000))
     with xr.open_dataset("u.nc") as table:
         rows = [k for k, output in enumerate(found.outputs) if output.name == "EXX"]
         assert found.monte_carlo is not None

@@ -1,8 +1,7 @@
 """The text made from the keys of scenarios and heads: the reference pages and the commented template."""
 
-from pathlib import Path
-
 import pytest
+from places import DOCS
 
 from stepdiag.config.head_keys import HeadFile
 from stepdiag.config.key_reference import key_table, keys, sections
@@ -10,8 +9,6 @@ from stepdiag.config.key_types import Section
 from stepdiag.config.scenario_keys import ScenarioKeys
 from stepdiag.config.scenario_template import template
 from stepdiag.scenario.description import parse_scenario
-
-DOCS = Path(__file__).parents[2] / "docs"
 
 # Of two things that exclude each other the template can have one; these are the other ones.
 OTHERS = ("layout", "psd_distance_mm", "beam_offsets_mm", "wavelength_nm", "aperture_mm", "errors", "head")

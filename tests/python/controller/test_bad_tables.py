@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 from error_tables import COLUMNS, leading_lines
+from places import DATA
 from refusal import refused
 
 import stepdiag as sd
 
-FOLDER = Path(__file__).parents[1] / "data" / "bad_tables"
+FOLDER = DATA / "bad_tables"
 CHAIN = "[w X' b Y Z t]"
 REASONS = dict(line.split(": ", 1) for line in (FOLDER / "refusals.txt").read_text("utf-8").splitlines())
 VOLUME = (800.0, 600.0, 500.0)

@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 from compensator_oracle import Oracle
 from error_tables import COLUMNS, NAMES, VOLUME, RandomTable, all_chains, leading_lines
+from places import RUNS
 from refusal import refused
 
 import stepdiag as sd
 from stepdiag.cli import main
-
-RUNS = Path(__file__).parents[1] / "data" / "runs"
 
 
 def written(path: Path, text: str, **newline: Any) -> Path:

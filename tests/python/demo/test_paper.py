@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import ROOT
 
 import stepdiag as sd
 from stepdiag.cli import main
@@ -205,7 +206,7 @@ def table_of_report(report: str) -> dict[tuple[str, str], list[str]]:
 
 
 def test_readme_has_the_numbers_of_the_demo(demo: Path) -> None:
-    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
     table = table_of_report((demo / "report.txt").read_text(encoding="utf-8"))
     rows = re.findall(r"^\|.*\((\d\w?)(?:, \w+)?\) \| (.+) \|$", readme, re.MULTILINE)
     assert [panel for panel, _ in rows] == ["1a", "1b", "1c", "1d", "3a"]

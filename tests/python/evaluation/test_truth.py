@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from itertools import permutations
-from pathlib import Path
 
 import numpy as np
 import pytest
 import reference_files
+from places import RUNS
 from truth import (
     DIAGONALS,
     MICROMETRE,
@@ -22,7 +22,6 @@ from truth import (
 
 import stepdiag as sd
 
-RUNS = Path(__file__).parents[1] / "data" / "runs"
 SEEDS = [1, 2, 3]
 
 # The linear evaluation leaves terms of second order. Products of the machine's angles: 60 urad x 60 urad x 1 m = 4 nm,

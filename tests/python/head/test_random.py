@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from places import SHIPPED_HEADS
 from reference_optics import MP, Component, Description, half_path, read_description, spot, tilted_mirror
 from shipped_heads import SHIPPED, Shipped
 from small_heads import read
 
 import stepdiag as sd
 
-HEADS = Path(sd.__file__).parent / "heads"
 AIR = sd.Environment(1.00027)
 
 
@@ -89,7 +88,7 @@ def test_shipped_heads_far_out_of_place_hold_against_forty_digits(
     shipped: Shipped, seed: int, tilt: tuple[float, float], distance: float
 ) -> None:
     """A third of a millimetre and milliradians: nothing is to first order."""
-    path = HEADS / f"{shipped.file}.toml"
+    path = SHIPPED_HEADS / f"{shipped.file}.toml"
     random = np.random.default_rng(seed)
     errors = {
         name: (tuple(random.uniform(-0.3, 0.3, 3)), tuple(random.uniform(-2e-3, 2e-3, 3)))

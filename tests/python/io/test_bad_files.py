@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from places import RUNS
 from truth import Setup
 
 import stepdiag as sd
 
-RUNS = Path(__file__).parents[1] / "data" / "runs"
 MEASUREMENT = "line,point,x_mm,y_mm,z_mm,distance_mm,alpha_urad,beta_urad\n"
 TABLE = "parameter,position_mm,value,unit,standard_uncertainty\n"
 HEADER = "# chain=[w X' b Y Z t]\n# volume_mm=800 600 500\n# tool_mm=0 0 0\n"

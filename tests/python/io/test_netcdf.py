@@ -242,7 +242,7 @@ def test_write_that_fails_half_way_leaves_the_old_file(tmp_path: Path) -> None:
     sd.write_measurement(simulate(1), tmp_path / "run.csv")
     (tmp_path / "run.nc").write_text("the old file")
     program = (
-        "import resource, sys, stepdiag as sd, stepdiag.netcdf_write\n"
+        "import resource, sys, stepdiag as sd, stepdiag.io.netcdf_write\n"
         "run = sd.read_measurement(sys.argv[1] + '.csv')\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (10000, 10000))\n"
         "try: sd.write_measurement(run, sys.argv[1] + '.nc')\n"

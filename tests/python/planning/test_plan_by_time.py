@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import ROOT
 from small_scenario import SCENARIO
 
 import stepdiag as sd
@@ -213,7 +214,7 @@ def test_command_says_which_plan_to_take(scenario: str, capsys: pytest.CaptureFi
 
 
 def test_page_has_the_table_of_the_example(capsys: pytest.CaptureFixture[str]) -> None:
-    root = Path(__file__).parents[2]
+    root = ROOT
     assert main(["plan", str(root / "examples" / "scenario.toml")]) == 0
     assert capsys.readouterr().out in (root / "docs" / "study.md").read_text(encoding="utf-8")
 

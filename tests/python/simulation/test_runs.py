@@ -10,20 +10,11 @@ import reference
 import reference_files
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from simulated_runs import LIMIT, errors_of, scenarios, simulated, symmetric, table_of
+from simulated_runs import LIMIT, errors_of, scenarios, simulated, symmetric, table_of, with_reversal
 
 import stepdiag as sd
 
 LAYOUTS = ("ideal", "psd", "multi_beam")
-
-
-def with_reversal(errors: sd.ErrorMap, other: sd.ErrorMap, count: int) -> sd.ErrorMap:
-    """Of the first functions, those approached in - direction are another machine's, which is not 0 at home."""
-    negative = {
-        name: (position, value + 0.1 * value[-1] + 1e-6)
-        for name, (position, value) in list(other.functions.items())[:count]
-    }
-    return sd.ErrorMap(errors.functions, errors.squareness, negative_functions=negative)
 
 
 @st.composite

@@ -11,7 +11,7 @@ import pytest
 from adjusted import error_map
 from reference import commanded_points
 from reference_optics import ciddor, mirror_in_sensor_frame
-from shipped_heads import ASSUMED_AIR, HEADS, SHIPPED, Reference, Shipped
+from shipped_heads import ASSUMED_AIR, SHIPPED, SHIPPED_HEADS, Reference, Shipped
 from uncertain_cases import SEED, distribution
 from virtual_runs import measured, plan_of, random_scenario, random_table
 from virtual_samples import Sample, drawn
@@ -69,7 +69,7 @@ def test_a_sample_of_a_traced_head_holds_against_forty_digits(shipped: Shipped) 
     nominal = {line: {"reflector": (1e-4, -2e-4), "laser": (3e-5, 1e-4)} for line in scenario.lines}
     scenario = replace(scenario, misalignment=nominal)
     table = random_table(rng, volume, 2)
-    design = sd.read_head_design(HEADS / f"{shipped.file}.toml")
+    design = sd.read_head_design(SHIPPED_HEADS / f"{shipped.file}.toml")
     head = sd.Head.from_design(design, standoff=STANDOFF)
     beams = [*shipped.interferometers, *([shipped.laser, "psd", "splitter"] if shipped.laser else [])]
     inputs = _core.UncertainInputs(inputs_of(shipped, scenario.lines, [*beams, "window"]))

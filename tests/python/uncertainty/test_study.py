@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from places import EXAMPLES, SHIPPED_HEADS
 from small_scenario import SCENARIO
 
 from stepdiag import _core
@@ -16,13 +17,12 @@ from stepdiag.config.toml_text import parse_toml
 from stepdiag.scenario.description import read_scenario, simulate_scenario
 from stepdiag.scenario.packed import pack_scenario, unpacked
 from stepdiag.uncertainty.dask_workers import workers_of
-from stepdiag.uncertainty.run import Request, evaluate_uncertainty
+from stepdiag.uncertainty.run import UncertaintyRequest, evaluate_uncertainty
 from stepdiag.uncertainty.study import FinishedCells, run_study, tasks_of
 from stepdiag.uncertainty.study_cell import CellResult, compute_cell
 from stepdiag.uncertainty.study_keys import read_study
 from stepdiag.uncertainty.study_table import study_table
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 SMALL = """
 [study]
 scenario = "scenario.toml"
@@ -110,7 +110,7 @@ def test_mistakes_are_said_before_anything_runs(
 def test_packed_scenario_makes_the_same_run_without_its_files(folder: Path) -> None:
     (folder / "parts").mkdir()
     _core.random_error_map((80.0, 60.0, 50.0), seed=4, intervals=5).write(folder / "parts" / "map.csv")
-    shutil.copy(EXAMPLES.parent / "python/stepdiag/heads/beam_and_psd.toml", folder / "parts" / "own.toml")
+    shutil.copy(SHIPPED_HEADS / "beam_and_psd.toml", folder / "parts" / "own.toml")
     text = SCENARIO.replace("[machine.random]\nseed = 7", 'errors = "parts/map.csv"')
     text = text.replace('layout = "ideal"', 'description = "parts/own.toml"').replace("steps = 5", "steps = 2")
     Path("scenario.toml").write_text(text)
@@ -141,7 +141,7 @@ def test_cell_is_what_uncertainty_says_of_its_scenario(folder: Path) -> None:
         "distance_um = 0.1", "distance_um = 0.2\ntilt_urad = 2.0"
     )
     Path("scenario.toml").write_text(changed)
-    alone = evaluate_uncertainty(read_scenario("scenario.toml"), Request(samples=2000)).monte_carlo
+    alone = evaluate_uncertainty(read_scenario("scenario.toml"), UncertaintyRequest(samples=2000)).monte_carlo
     of = [k for k, output in enumerate(alone.outputs) if output.name == "EXX"]
     assert found.figures["EXX"]["u"] == (max(alone.standard_uncertainty[of]), np.median(alone.standard_uncertainty[of]))
     lengths = alone.shortest[of, 1] - alone.shortest[of, 0]
@@ -206,7 +206,9 @@ def test_interrupted_study_goes_on_to_the_same_table(
     assert main(["study", "study.toml", "-o", "study.nc"]) == 2
     assert "--resume goes on with them, or delete the file" in capsys.readouterr().err
     computed = []
-    monkeypatch.setattr("stepdiag.study.compute_cell", lambda job: computed.append(job) or compute_cell(job))
+    monkeypatch.setattr(
+        "stepdiag.uncertainty.study.compute_cell", lambda job: computed.append(job) or compute_cell(job)
+    )
     assert main(["study", "study.toml", "-o", "study.nc", "--resume"]) == 0
     assert len(computed) == 2
     assert not stopped.path.exists()
@@ -239,7 +241,7 @@ def test_interruption_of_the_command_gives_130_and_says_how_to_go_on(
         done.append(job)
         return compute_cell(job)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("stepdiag.study.compute_cell", interrupted)
+    monkeypatch.setattr("stepdiag.uncertainty.study.compute_cell", interrupted)
     assert main(["study", "study.toml", "-o", "study.nc"]) == 130
     assert "study.nc.cells keeps what is done; the same command with --resume goes on" in capsys.readouterr().err
     assert not Path("study.nc").exists()
