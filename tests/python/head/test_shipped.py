@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from places import SHIPPED_HEADS
 from reference import Scenario
 from reference_optics import (
     MP,
@@ -13,7 +14,7 @@ from reference_optics import (
     mirror_in_sensor_frame,
     read_description,
 )
-from shipped_heads import ASSUMED_AIR, HEADS, SHIPPED, TRUE_AIR, Errors, Reference, Shipped
+from shipped_heads import ASSUMED_AIR, SHIPPED, TRUE_AIR, Errors, Reference, Shipped
 from simulated_runs import table_of, with_reversal
 from truth import DIAGONALS, VOLUME, Setup
 
@@ -41,8 +42,8 @@ def test_signals_of_a_whole_run_hold_against_forty_digits(shipped: Shipped, step
     And backward runs of a machine with reversal errors; a lateral offset, roll and gain in both."""
     setup = Setup(steps, scale_lines=[])
     errors = with_reversal(setup.errors(21), setup.errors(23), 18)  # 20 um, 60 urad
-    pose_errors = errors_of(read_description(HEADS / f"{shipped.file}.toml", shipped.routes), 22)
-    design = sd.read_head_design(HEADS / f"{shipped.file}.toml")
+    pose_errors = errors_of(read_description(SHIPPED_HEADS / f"{shipped.file}.toml", shipped.routes), 22)
+    design = sd.read_head_design(SHIPPED_HEADS / f"{shipped.file}.toml")
     head = sd.Head.from_design(design, standoff=110.0, pose_errors=dict(pose_errors))
     pairs = {
         line: {"reflector": (100e-6 * k, -150e-6 + 50e-6 * k), "laser": (200e-6, -70e-6 * k)}

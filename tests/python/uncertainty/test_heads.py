@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from adjusted import error_map
+from places import SHIPPED_HEADS
 from reference import commanded_points
 from reference_optics import ciddor, mirror_in_sensor_frame
-from shipped_heads import ASSUMED_AIR, SHIPPED, SHIPPED_HEADS, Reference, Shipped
+from shipped_heads import ASSUMED_AIR, SHIPPED, Reference, Shipped
 from uncertain_cases import SEED, distribution
 from virtual_runs import measured, plan_of, random_scenario, random_table
 from virtual_samples import Sample, drawn
