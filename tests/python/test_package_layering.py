@@ -1,6 +1,7 @@
 """Who may import whom: the rooms of the package stepdiag, read from the source of every module."""
 
 import ast
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -132,3 +133,17 @@ def test_room_is_of_a_size_that_one_keeps_in_mind(room: str) -> None:
     own = [module for module in MODULES if room_of(module) == room and module.count(".") > 1]
     assert len(own) <= MOST_OF_A_ROOM, own
     assert not [module for module in own if module.split(".")[-1].startswith(f"{room}_")], "repeats the room's name"
+
+
+def test_messages_of_the_package_name_no_flags() -> None:
+    """Rooms below say `rows`, which the command line turns into --rows (cli/options.py)."""
+    offences = [
+        f"{MODULES[module].relative_to(PYTHON)}:{node.lineno}: {text}"
+        for module in MODULES
+        if room_of(module) != "cli"
+        for raised in ast.walk(ast.parse(MODULES[module].read_text(encoding="utf-8")))
+        if isinstance(raised, ast.Raise)
+        for node in ast.walk(raised)
+        if isinstance(node, ast.Constant) and isinstance(text := node.value, str) and re.search("--[a-z]", text)
+    ]
+    assert not offences, "\n".join(offences)

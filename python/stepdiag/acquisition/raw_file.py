@@ -131,7 +131,7 @@ def check_new(path: Path) -> None:
     check_output(path)
     if path.exists() or path.is_symlink():
         raise InvalidArgument(
-            f"{path}: exists already: --resume goes on with it, another -o (or --raw) begins a new one"
+            f"{path}: exists already: `resume` goes on with it, another `output` (or `raw`) begins a new one"
         )
 
 

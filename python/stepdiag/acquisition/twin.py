@@ -59,7 +59,7 @@ class Twin:
 
     @property
     def source(self) -> str:
-        """What stepdiag acquire --source takes."""
+        """The source that `acquire` takes."""
         host, port = self.address
         return f"ids3010://{host}:{port}"
 

@@ -127,7 +127,7 @@ class Acquisition:
             self._operator.tell(f"{point_text(visit, index)}: {channel} is lost: {why}")
         if any("no beam" in why for why in reading.lost.values()):
             self._operator.tell(
-                "after an interrupted beam this set-up may carry another constant: stop, and --restart-set-up"
+                "after an interrupted beam this set-up may carry another constant: stop, and `restart_set_up`"
             )
 
     def _read(self) -> Sample:
@@ -146,7 +146,7 @@ class Acquisition:
         state = f"{self._instrument.name}: {', '.join(sorted(texts))}"
         if any(self._visits[number - 1].set_up == visit.set_up for number, _ in self.done):
             raise InstrumentError(
-                f"{state}; a measurement started anew would give this set-up another constant: use --restart-set-up"
+                f"{state}; a measurement started anew would give this set-up another constant: use `restart_set_up`"
             )
         if self._options.start == "never":
             raise InstrumentError(f"{state}; expected a running measurement without warnings")

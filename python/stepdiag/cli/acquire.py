@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, keep_apart, keep_map, out_file, tell
+from stepdiag.cli.options import PATH, in_flags, keep_apart, keep_map, out_file, tell
 
 if TYPE_CHECKING:
     from stepdiag.acquisition.options import AcquireOptions
@@ -22,7 +22,7 @@ class _Terminal:
     """The operator, at the terminal."""
 
     def tell(self, text: str) -> None:
-        click.echo(text)
+        click.echo(in_flags(text))
 
     def confirm(self, text: str) -> None:
         click.echo(f"{text}: Enter", nl=False)

@@ -1,5 +1,6 @@
 """What the commands of the command line have in common."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
@@ -10,6 +11,7 @@ from stepdiag._core import InvalidArgument
 
 Command = TypeVar("Command", bound=Callable[..., None])
 PATH = click.Path(path_type=Path)
+SHORT_FLAGS = {"samples": "-n", "output": "-o"}
 
 
 def out_file(meaning: str) -> Callable[[Command], Command]:
@@ -23,9 +25,14 @@ class InOrder(click.Group):
         return list(self.commands)
 
 
+def in_flags(message: str) -> str:
+    """What is said of `rows` and `restart_set_up` in the package is said of --rows and --restart-set-up here."""
+    return re.sub(r"`(\w+)`", lambda name: SHORT_FLAGS.get(name[1], "--" + name[1].replace("_", "-")), message)
+
+
 def tell(what: str, message: str) -> None:
     """One line to standard error."""
-    line = " ".join(message.split())
+    line = " ".join(in_flags(message).split())
     click.echo(f"stepdiag: {what}: {line}", err=True)
 
 

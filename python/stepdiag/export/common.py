@@ -51,7 +51,7 @@ def require(calibration: Calibration, names: Sequence[str], options: ExportOptio
     missing = list(undetermined_of(calibration, names))
     if missing and not options.incomplete:
         raise InvalidArgument(
-            f"not determined by this calibration: {', '.join(missing)}; with --incomplete it is exported as 0"
+            f"not determined by this calibration: {', '.join(missing)}; with `incomplete` it is exported as 0"
         )
     said = [f"NOT COMPENSATED, because not determined: {', '.join(missing)}"] if missing else []
     if held := list(_held(calibration, names)):

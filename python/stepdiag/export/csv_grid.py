@@ -72,13 +72,13 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
 def _axes(volume: FloatArray, options: ExportOptions) -> list[FloatArray]:
     """Positions of the grid from home, both ends of every edge among them."""
     if options.nodes is not None and options.step is not None:
-        raise InvalidArgument("--step: the grid is given by --nodes already")
+        raise InvalidArgument("`step`: the grid is given by `nodes` already")
     counts = options.nodes or DEFAULT_NODES
     if len(counts) != 3 or min(counts) < 2:
-        raise InvalidArgument(f"--nodes: expected three numbers of at least 2, got {words(counts)}")
+        raise InvalidArgument(f"`nodes`: expected three numbers of at least 2, got {words(counts)}")
     if options.step is not None:
         if not options.step > 0.0 or not np.isfinite(options.step):
-            raise InvalidArgument(f"--step: expected a length in mm, got {options.step:g}")
+            raise InvalidArgument(f"`step`: expected a length in mm, got {options.step:g}")
         # Whole steps that rounding has made a little more are still whole.
         intervals = np.ceil(volume / options.step * (1.0 - 1e-12))
         x, y, z = (int(min(n, MOST_POINTS)) + 1 for n in np.maximum(intervals, 1.0))

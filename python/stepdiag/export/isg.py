@@ -45,7 +45,7 @@ def isg(calibration: Calibration, output: Path, options: ExportOptions) -> Expor
     """The file, and the lines of the compensation list that belong to it."""
     rows = MOST_ROWS if options.rows is None else options.rows
     if not 2 <= rows <= MOST_ROWS:
-        raise InvalidArgument(f"--rows: expected 2 to {MOST_ROWS}, got {rows}")
+        raise InvalidArgument(f"`rows`: expected 2 to {MOST_ROWS}, got {rows}")
     missing = require(calibration, [*FUNCTIONS, *SQUARENESSES], options)
     tool, origin = tool_of(calibration, options), origin_of(options)
     approach = options.approach or "mean"

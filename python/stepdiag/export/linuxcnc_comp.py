@@ -40,11 +40,11 @@ def linuxcnc_comp(calibration: Calibration, output: Path, options: ExportOptions
     """The three files, and a companion with the INI lines and what the files cannot say themselves."""
     rows = MOST_ROWS if options.rows is None else options.rows
     if not 2 <= rows <= MOST_ROWS:
-        raise InvalidArgument(f"--rows: expected 2 to {MOST_ROWS}, as LinuxCNC takes, got {rows}")
+        raise InvalidArgument(f"`rows`: expected 2 to {MOST_ROWS}, as LinuxCNC takes, got {rows}")
     at = calibration.volume / 2.0 if options.at is None else np.array(options.at, dtype=float)
     outside = (at < 0.0) | (at > calibration.volume)
     if np.any(outside):
-        raise InvalidArgument(f"--at: expected a point of the volume {words(calibration.volume)} mm, got {words(at)}")
+        raise InvalidArgument(f"`at`: expected a point of the volume {words(calibration.volume)} mm, got {words(at)}")
     tool = tool_of(calibration, options)
     missing = require(calibration, _needed(), options)
     machine = Machine(calibration.chain, calibration.to_error_map(), tool)

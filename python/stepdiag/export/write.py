@@ -74,16 +74,16 @@ def export_calibration(
 def _prepare(calibration: Calibration, to: str, output: Path, options: ExportOptions) -> Export:
     formats = {"linuxcnc-comp": linuxcnc_comp, "linuxcnc-kins": linuxcnc_kins, "isg": isg, "csv-grid": csv_grid}
     if to not in formats:
-        raise InvalidArgument(f"--to: expected one of {', '.join(formats)}, got {to!r}")
+        raise InvalidArgument(f"`to`: expected one of {', '.join(formats)}, got {to!r}")
     taken = {"tool", "origin", "incomplete", *FORMATS[to]}
     for field in fields(options):
         if field.name not in taken and getattr(options, field.name) is not None:
             theirs = " or ".join(name for name, names in FORMATS.items() if field.name in names)
-            raise InvalidArgument(f"--{field.name}: belongs to {theirs}, not to {to}")
+            raise InvalidArgument(f"`{field.name}`: belongs to {theirs}, not to {to}")
     for name in ("tool", "origin", "at"):
         numbers = getattr(options, name)
         if numbers is not None and (len(numbers) != 3 or not np.all(np.isfinite(numbers))):
-            raise InvalidArgument(f"--{name}: expected three lengths in mm, got {numbers}")
+            raise InvalidArgument(f"`{name}`: expected three lengths in mm, got {numbers}")
     if calibration.method == "conventional" and not np.array_equal(tool_of(calibration, options), calibration.tool):
-        raise InvalidArgument("--tool: tables of the method conventional hold for the tool of the measurement only")
+        raise InvalidArgument("`tool`: tables of the method conventional hold for the tool of the measurement only")
     return formats[to](calibration, output, options)

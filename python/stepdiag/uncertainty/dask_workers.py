@@ -195,7 +195,7 @@ def check_scheduler(address: str) -> str:
     kind, separator, rest = address.partition("://")
     host, _, port = rest.rpartition(":")
     if kind not in ("tcp", "tls") or not separator or not host or not port.isdecimal() or int(port) > 65535:
-        raise InvalidArgument(f"--scheduler: expected an address such as tcp://127.0.0.1:8786, got {address!r}")
+        raise InvalidArgument(f"`scheduler`: expected an address such as tcp://127.0.0.1:8786, got {address!r}")
     return address
 
 
@@ -205,7 +205,7 @@ def _connected(distributed: Any, address: str) -> Iterator[Any]:
     try:
         client = distributed.Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise InvalidArgument(f"--scheduler: {address}: no scheduler answers: {error}") from None
+        raise InvalidArgument(f"`scheduler`: {address}: no scheduler answers: {error}") from None
     with client:
         yield client
 
@@ -215,6 +215,6 @@ def _dask() -> Any:
         import distributed
     except ImportError as error:
         raise InvalidArgument(
-            f"--scheduler and --workers need Dask distributed (pip install 'stepdiag[dask]'): {error}"
+            f"`scheduler` and `workers` need Dask distributed (pip install 'stepdiag[dask]'): {error}"
         ) from None
     return distributed

@@ -67,18 +67,18 @@ def find_output(outputs: Sequence[Any], text: str, option: str) -> int:
     if not found:
         known = list(dict.fromkeys(output.name for output in outputs))
         near = suggest(name, known)
-        raise InvalidArgument(f"{option}: {text!r} is no output; {near if len(near) < 300 else near[:297] + '...'}")
+        raise InvalidArgument(f"`{option}`: {text!r} is no output; {near if len(near) < 300 else near[:297] + '...'}")
     if not at:
         return found[-1]
     try:
         position = float(place)
     except ValueError:
-        raise InvalidArgument(f"{option}: expected a position in mm after @, got {text!r}") from None
+        raise InvalidArgument(f"`{option}`: expected a position in mm after @, got {text!r}") from None
     nearest = min(found, key=lambda k: abs(outputs[k].position - position))
     if not abs(outputs[nearest].position - position) <= 1e-6 * max(1.0, abs(position)):
         nodes = outputs[nearest].position
         hint = "it has no position" if math.isnan(nodes) else f"the nearest node is at {nodes:g} mm"
-        raise InvalidArgument(f"{option}: {text!r}: no node of {name}; {hint}")
+        raise InvalidArgument(f"`{option}`: {text!r}: no node of {name}; {hint}")
     return nearest
 
 

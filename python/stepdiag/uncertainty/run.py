@@ -17,7 +17,7 @@ Vector = tuple[float, float, float]
 Progress = Callable[[int, int], None]  # samples done, and how many there will be
 
 LARGEST_JOINT: Final = 3
-# With --adaptive and without -n: of a model that never gets stable.
+# Of an adaptive run without `samples`: of a model that never gets stable.
 MOST_SAMPLES: Final = 10_000_000
 
 
@@ -49,21 +49,21 @@ class UncertaintyRequest:
     def check(self) -> None:
         """Raises InvalidArgument for wishes that do not go together."""
         if not 0.0 < self.coverage < 1.0:
-            raise InvalidArgument(f"--coverage: expected a probability between 0 and 1, got {self.coverage:g}")
+            raise InvalidArgument(f"`coverage`: expected a probability between 0 and 1, got {self.coverage:g}")
         named = {
-            "--compare": self.compare,
-            "--covariance": self.covariance,
-            "--keep": bool(self.keep),
-            "--joint": bool(self.joint),
-            "--resume": self.resume,
+            "compare": self.compare,
+            "covariance": self.covariance,
+            "keep": bool(self.keep),
+            "joint": bool(self.joint),
+            "resume": self.resume,
         }
         for option, given in named.items():
             if given and not self.draws:
-                raise InvalidArgument(f"{option}: goes with the Monte Carlo method: -n or --adaptive")
+                raise InvalidArgument(f"`{option}`: goes with the Monte Carlo method: `samples` or `adaptive`")
         for names in self.joint:
             if not 1 <= len(names) <= LARGEST_JOINT or len(set(names)) < len(names):
                 expected = f"one to {LARGEST_JOINT} different outputs"
-                raise InvalidArgument(f"--joint: expected {expected}, such as C0Y,B0Z, got {','.join(names)!r}")
+                raise InvalidArgument(f"`joint`: expected {expected}, such as C0Y,B0Z, got {','.join(names)!r}")
 
 
 def model_for(scenario: Scenario, request: UncertaintyRequest) -> tuple[_core.VirtualCalibrations, int]:
@@ -83,8 +83,8 @@ def evaluate_uncertainty(
     told of samples; what it raises ends the run, which then leaves its checkpoint. Raises InvalidArgument for what
     cannot be done."""
     model, entries = model_for(scenario, request)
-    kept = [find_output(model.outputs, name, "--keep") for name in request.keep]
-    joint = [[find_output(model.outputs, name, "--joint") for name in names] for names in request.joint]
+    kept = [find_output(model.outputs, name, "keep") for name in request.keep]
+    joint = [[find_output(model.outputs, name, "joint") for name in names] for names in request.joint]
     with located(str(scenario.path)):
         propagation = _core.propagate(model, covariance=request.volume)
         volume = _volume(model.calibration, propagation, entries, request) if request.volume else None

@@ -57,7 +57,7 @@ class FinishedCells:
         check_output(path)
         if path.exists() and not resume:
             raise InvalidArgument(
-                f"{path}: cells of an interrupted study; --resume goes on with them, or delete the file"
+                f"{path}: cells of an interrupted study; `resume` goes on with them, or delete the file"
             )
         self._known = dict(self._read()) if path.exists() else {}
         try:

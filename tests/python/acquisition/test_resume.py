@@ -106,7 +106,7 @@ def test_beam_lost_in_a_break_is_not_read_with_another_constant(tmp_path: Path) 
     with Twin(described) as twin:
         stop_after(described, twin, output, 3)
         twin.instrument.stop()
-        with pytest.raises(OSError, match="would give this set-up another constant: use --restart-set-up"):
+        with pytest.raises(OSError, match="would give this set-up another constant: use `restart_set_up`"):
             acquire_through_to_failure(described, twin, output, 3)
         assert twin.instrument.mode == "system idle"
         assert acquire_through(described, twin, output, resume="set-up").complete
@@ -145,7 +145,7 @@ def test_complete_run_has_nothing_to_go_on_with(tmp_path: Path, whole: Path) -> 
 
 def test_raw_file_is_never_written_over(whole: Path) -> None:
     before = whole.with_suffix(".raw.jsonl").read_bytes()
-    with pytest.raises(InvalidArgument, match=r"whole.raw.jsonl: exists already: --resume goes on with it"):
+    with pytest.raises(InvalidArgument, match=r"whole.raw.jsonl: exists already: `resume` goes on with it"):
         acquiring.acquire(scenario(), "ids3010://127.0.0.1:1", whole, trigger=TcpTrigger())
     assert whole.with_suffix(".raw.jsonl").read_bytes() == before
 

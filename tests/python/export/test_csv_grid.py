@@ -101,9 +101,9 @@ def test_the_mean_lies_between_both_directions(tmp_path: Path) -> None:
 
 def test_grids_that_cannot_be_are_refused(tmp_path: Path) -> None:
     calibration, path = random_calibration(1), tmp_path / "grid.csv"
-    refused(export, calibration, "csv-grid", path, nodes=(1, 2, 2), names="--nodes")
+    refused(export, calibration, "csv-grid", path, nodes=(1, 2, 2), names="`nodes`")
     refused(export, calibration, "csv-grid", path, nodes=(200, 200, 200), names="2,000,000")
-    refused(export, calibration, "csv-grid", path, nodes=(2, 2, 2), step=3.0, names="--step")
+    refused(export, calibration, "csv-grid", path, nodes=(2, 2, 2), step=3.0, names="`step`")
     for step in (0.0, -1.0, float("nan"), float("inf"), 1e-9):
-        refused(export, calibration, "csv-grid", path, step=step, names="--step")
+        refused(export, calibration, "csv-grid", path, step=step, names="`step`")
     assert not list(tmp_path.iterdir())

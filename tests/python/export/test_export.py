@@ -71,7 +71,7 @@ def test_an_option_of_another_format_is_refused(tmp_path: Path, to: str, option:
     if option in FORMATS[to]:
         assert export(calibration, to, path, **{option: value})
     else:
-        refused(export, calibration, to, path, names=f"--{option}", **{option: value})
+        refused(export, calibration, to, path, names=f"`{option}`", **{option: value})
         assert not path.exists()
 
 
@@ -140,7 +140,7 @@ def test_bad_arguments_are_refused_by_name(
 def test_tables_of_the_conventional_method_hold_for_their_tool_only(tmp_path: Path) -> None:
     parts = parts_of(random_calibration(5)) | {"method": "conventional"}
     calibration = sd.Calibration(**parts)
-    refused(export, calibration, "csv-grid", tmp_path / "x", tool=(0.0, 0.0, 0.0), names="--tool")
+    refused(export, calibration, "csv-grid", tmp_path / "x", tool=(0.0, 0.0, 0.0), names="`tool`")
     assert export(calibration, "csv-grid", tmp_path / "x", tool=tuple(calibration.tool))
 
 
@@ -168,7 +168,7 @@ def test_the_kinematics_table_may_be_for_another_tool(tmp_path: Path) -> None:
 def test_an_export_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     old = tmp_path / "grid.csv"
     old.write_text("kept\n")
-    refused(export, random_calibration(1), "csv-grid", old, nodes=(1, 1, 1), names="--nodes")
+    refused(export, random_calibration(1), "csv-grid", old, nodes=(1, 1, 1), names="`nodes`")
     assert old.read_text() == "kept\n"
     comp = tmp_path / "comp"
     (comp / "joint2.comp").mkdir(parents=True)

@@ -113,4 +113,4 @@ def test_what_is_not_determined_is_refused_or_said(tmp_path: Path) -> None:
     file = IsgFile.read(tmp_path / "isg.csv")
     assert not np.any(file.tables["ECZ"][1])
     assert "ECZ, B0Z, A0Z" in file.comments
-    refused(export, lacking, "isg", tmp_path / "isg.csv", incomplete=True, rows=1, names="--rows")
+    refused(export, lacking, "isg", tmp_path / "isg.csv", incomplete=True, rows=1, names="`rows`")

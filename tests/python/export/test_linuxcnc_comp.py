@@ -162,8 +162,8 @@ def test_the_companion_says_what_the_files_cannot(tmp_path: Path) -> None:
 def test_what_a_comp_file_cannot_hold_is_refused(tmp_path: Path) -> None:
     calibration = random_calibration(1)
     for rows in (1, 257):
-        refused(export, calibration, "linuxcnc-comp", tmp_path, rows=rows, names="--rows")
-    refused(export, calibration, "linuxcnc-comp", tmp_path, at=(0.0, 0.0, 51.0), names="--at")
+        refused(export, calibration, "linuxcnc-comp", tmp_path, rows=rows, names="`rows`")
+    refused(export, calibration, "linuxcnc-comp", tmp_path, at=(0.0, 0.0, 51.0), names="`at`")
     steep = calibration_of(one_error("EYY", [0.0, 10.0, 10.1], [0.0, 0.0, -0.2]))
     refused(export, steep, "linuxcnc-comp", tmp_path, names="EYY")
     assert not list(tmp_path.iterdir())

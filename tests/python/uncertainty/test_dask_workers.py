@@ -115,7 +115,7 @@ def test_models_of_the_last_sources_are_kept() -> None:
 
 @pytest.mark.parametrize("address", ["", "host:8786", "http://host:8786", "tcp://host", "tcp://:1", "tcp://host:70000"])
 def test_address_that_is_none_is_refused(address: str) -> None:
-    with pytest.raises(InvalidArgument, match=r"--scheduler: expected an address such as tcp://127.0.0.1:8786, got"):
+    with pytest.raises(InvalidArgument, match=r"`scheduler`: expected an address such as tcp://127.0.0.1:8786, got"):
         check_scheduler(address)
 
 

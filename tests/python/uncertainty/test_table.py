@@ -185,22 +185,22 @@ def test_adaptive_run_that_did_not_end_says_so() -> None:
 @pytest.mark.parametrize(("text", "row"), [("C0Y", 6), ("EXX@40", 1), ("EXX", 2), ("X at (1, 2, 3)", 7)])
 def test_output_is_found_by_name_and_position(text: str, row: int) -> None:
     outputs = made_up().outputs
-    assert find_output(outputs, text, "--keep") == row
+    assert find_output(outputs, text, "keep") == row
     assert label(outputs[1]) == "EXX at 40 mm"
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("EXY", "--keep: 'EXY' is no output; did you mean EXX?"),
-        ("EXX@45", "--keep: 'EXX@45': no node of EXX; the nearest node is at 40 mm"),
-        ("C0Y@1", "--keep: 'C0Y@1': no node of C0Y; it has no position"),
-        ("EXX@end", "--keep: expected a position in mm after @, got 'EXX@end'"),
+        ("EXY", "`keep`: 'EXY' is no output; did you mean EXX?"),
+        ("EXX@45", "`keep`: 'EXX@45': no node of EXX; the nearest node is at 40 mm"),
+        ("C0Y@1", "`keep`: 'C0Y@1': no node of C0Y; it has no position"),
+        ("EXX@end", "`keep`: expected a position in mm after @, got 'EXX@end'"),
     ],
 )
 def test_output_that_is_none_is_refused(text: str, message: str) -> None:
     with pytest.raises(sd.InvalidArgument) as error:
-        find_output(made_up().outputs, text, "--keep")
+        find_output(made_up().outputs, text, "keep")
     assert str(error.value) == message
 
 
