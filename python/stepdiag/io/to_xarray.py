@@ -12,18 +12,14 @@ if TYPE_CHECKING:
 
 
 def calibration_to_xarray(self: Calibration) -> "xarray.Dataset":
-    """
-    The calibration as a labelled table.
-    """
+    """The calibration as a labelled table."""
     from stepdiag.io.labelled_tables import calibration_table
 
     return calibration_table(self)
 
 
 def measurement_to_xarray(self: Measurement) -> "xarray.Dataset":
-    """
-    The run as a labelled table.
-    """
+    """The run as a labelled table."""
     from stepdiag.io.labelled_tables import measurement_table
 
     return measurement_table(self)
