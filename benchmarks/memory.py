@@ -19,7 +19,7 @@ import time
 from million import virtual
 
 from stepdiag._core import StatisticsOptions
-from stepdiag.monte_carlo import run_monte_carlo
+from stepdiag.uncertainty.monte_carlo import run_monte_carlo
 
 
 def measure(samples: int, threads: int, covariance: bool) -> None:

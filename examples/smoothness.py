@@ -5,9 +5,9 @@ python examples/smoothness.py
 
 import numpy as np
 import numpy.typing as npt
+from stepdiag.parameters import kind_of
 
 import stepdiag as sd
-from stepdiag.comparison import kind_of
 
 VOLUME = (800.0, 600.0, 500.0)  # mm
 STEPS = 50

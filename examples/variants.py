@@ -3,9 +3,11 @@
 python examples/variants.py
 """
 
-from stepdiag.observe import extents, observe
-from stepdiag.report import in_report_units, largest_uncertainties
-from stepdiag.scenario import parse_scenario
+from stepdiag.parameters import in_report_units
+
+from stepdiag.calibration.largest_by_kind import largest_uncertainties
+from stepdiag.planning.observation import extents, observe
+from stepdiag.scenario.description import parse_scenario
 
 SCENARIO = """
 [volume]

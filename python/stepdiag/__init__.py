@@ -80,14 +80,14 @@ from stepdiag._core import (
     volumetric_accuracy,
     with_covariance,
 )
-from stepdiag.comparison import Deviation, largest_deviations
-from stepdiag.data_files import read_calibration, read_measurement, write_calibration, write_measurement
-from stepdiag.functional_point import functional_point_straightness
-from stepdiag.side_by_side import Comparison, Difference, compare_calibrations
+from stepdiag.calibration.comparison import Comparison, Difference, compare_calibrations
+from stepdiag.calibration.functional_point import functional_point_straightness
+from stepdiag.calibration.largest_by_kind import Deviation, largest_deviations
+from stepdiag.io.data_files import read_calibration, read_measurement, write_calibration, write_measurement
 
 if TYPE_CHECKING:
-    from stepdiag.head_description import parse_head_design, read_head_design, shipped_head
-    from stepdiag.scenario import (
+    from stepdiag.head.description import parse_head_design, read_head_design, shipped_head
+    from stepdiag.scenario.description import (
         Scenario,
         adjust_scenario,
         evaluate_scenario,

@@ -9,8 +9,8 @@ import time
 
 import pytest
 
-from stepdiag.linuxcnc_processes import PROCESSES, processes
-from stepdiag.linuxcnc_session import LinuxcncError, LinuxcncSession
+from stepdiag.linuxcnc.processes import PROCESSES, processes
+from stepdiag.linuxcnc.session import LinuxcncError, LinuxcncSession
 
 CRASH = """
 from stepdiag.linuxcnc_session import LinuxcncSession
