@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from stepdiag import _core
+from stepdiag import _core, outputs
 from stepdiag.demo.loop_cases import CASES, CHAIN, NOISE, STEPS, LoopCase, scenario_text, write_scenario, write_truth
 from stepdiag.demo.loop_job import PATIENCE, Controller, FloatArray, Job
 from stepdiag.demo.loop_points import Agreement, Sizes, agreement, covariances, errors_at, grid_nodes, random_points
@@ -52,6 +52,25 @@ class Outcome:
     first: Translations  # of the runs before and after compensation
     second: Translations
     agreement: dict[str, Agreement]  # with noise: by kind of points
+
+
+def claim_loop(folder: Path) -> Path:
+    """The folder, if nothing would be lost in it but what an earlier loop wrote. Raises InvalidArgument."""
+    scenarios = {}
+    files: dict[str, outputs.Kind | str] = {
+        **{"report.txt": outputs.REPORT, "points.csv": outputs.POINTS},
+        **{"loop.png": outputs.PNG, "loop.svg": outputs.SVG},
+    }
+    for case in CASES:
+        files[case.truth] = outputs.ERROR_MAP
+        files[f"{case.name}/program.ngc"] = outputs.PROGRAM
+        files[f"{case.name}/calibration.csv"] = outputs.CALIBRATION
+        for run, seed in ((case.name, 1), (f"{case.name}-again", 2)):
+            scenarios[f"{run}/scenario.toml"] = scenario_text(case, seed=seed)
+            files[f"{run}/run.csv"] = outputs.MEASUREMENT
+            files[f"{run}/run.raw.jsonl"] = outputs.RAW
+            files[f"{run}/points.ngc"] = outputs.PROGRAM
+    return outputs.claim_folder(folder, files | scenarios, marks=scenarios)
 
 
 def run_loop(

@@ -14,7 +14,7 @@ import numpy as np
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.units import MICRO
 
-from stepdiag import _core
+from stepdiag import _core, outputs
 from stepdiag.calibration.largest_by_kind import largest_deviations
 from stepdiag.config.key_errors import show
 from stepdiag.io.whole_files import make_folder, write_whole
@@ -90,6 +90,19 @@ class Result:
     truth: _core.ErrorMap
     measurement: _core.Measurement
     calibrations: Mapping[str, _core.Calibration] = field(default_factory=dict)
+
+
+def claim_demo(folder: Path) -> Path:
+    """The folder, if nothing would be lost in it but what an earlier demonstration wrote. Raises InvalidArgument."""
+    scenarios = {f"{case.name}/scenario.toml": scenario_of(case) for case in CASES}
+    files: dict[str, outputs.Kind | str] = {
+        **scenarios,
+        **dict.fromkeys(("truth.csv", "truth_screw.csv"), outputs.ERROR_MAP),
+        **{f"{case.name}/run.csv": outputs.MEASUREMENT for case in CASES},
+        **{f"{case.name}/{method}.csv": outputs.CALIBRATION for case in CASES for method in METHODS},
+        **{"report.txt": outputs.REPORT, "figure.png": outputs.PNG, "figure.svg": outputs.SVG},
+    }
+    return outputs.claim_folder(folder, files, marks=scenarios)
 
 
 def run_demo(folder: Path, progress: Callable[[str], None] = lambda text: None) -> list[str]:

@@ -1,10 +1,11 @@
-"""Which of our files is this, and is it sound?"""
+"""Which of our files is this (`kind_of`, by its first lines), and is it sound (`examine`)?"""
 
 import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -12,6 +13,37 @@ from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.io.data_files import is_netcdf, read_calibration, read_measurement
 from stepdiag.io.whole_files import check_input, read_beginning
+
+CHECKPOINT_BEGINS: Final = "stepdiag checkpoint "
+
+# By the format that a table states.
+_FORMATS: Final = {
+    "measurement": "measurement",
+    "calibration": "calibration",
+    "error map": "error map",
+    "comparison": "comparison",
+    "functional point": "functional point table",
+    "uncertainty": "uncertainty result",
+    "study": "study result",
+    "error grid": "error grid",
+}
+_NUMBER: Final = r"[-+]?[\d.]+(?:e[-+]?\d+)?"
+# What else there is, by how it begins.
+_BEGINNINGS: Final = {
+    "checkpoint": CHECKPOINT_BEGINS,
+    "PNG picture": "\ufffdPNG\r\n\x1a\n",
+    "SVG picture": r"(?:<\?xml[^>]*>\s*)?(?:<!DOCTYPE svg[^>]*>\s*)?<svg\b",
+    "measuring program": r"(?i:%\n)?\((?i:measuring program)\b",
+    "ISG table": "// stepdiag export --to isg\n",
+    "compensation.ini": "# stepdiag export --to linuxcnc-comp\n",
+    "COMP_FILE": rf"(?:{_NUMBER} {_NUMBER} {_NUMBER}\n)+\Z",
+    "study cells": r"(?s:.*\n)?[0-9a-f]{64} \{|\s*[0-9a-f]{1,64} ?\Z",  # or the first half of its first line
+    "table of steps": "steps,mirror_width_mm,",
+    "table of plans": "minutes,lines,scale_lines,",
+    "table of points": "case,points,x_mm,",
+    "report of the demonstration": "Largest remaining errors at the nodes|The closed loop, moved by ",
+}
+_NETCDF: Final = ("\ufffdHDF", "CDF")
 
 
 @dataclass(frozen=True)
@@ -30,29 +62,59 @@ def examine(path: Path) -> Finding:
         return _toml(path)
     if is_netcdf(path):
         return _netcdf(path)
-    comments, header = _head_of(read_beginning(path))
-    leading = dict(re.findall(r"(?m)^#\s*(\w+)\s*=\s*(.*?)\s*$", "\n".join(comments)))
-    columns = {column.strip().strip('"') for column in header.split(",")}
-    if leading.get("format", "").startswith("stepdiag calibration"):
-        return _calibration(path)
-    if leading.get("format", "").startswith("stepdiag error map"):
-        return _error_map(path)
-    if {"parameter", "value"} & columns:
-        return _calibration(path) if "method" in leading else _error_map(path)
-    if header.startswith("{"):
-        return _raw(path)
-    if {"line", "point"} & columns:
-        return _measurement(path)
-    if header.lstrip().startswith("[") or "=" in header:
-        return _toml(path)
+    text = read_beginning(path)
+    _, header = _head_of(text)
+    readers = {
+        "calibration": _calibration,
+        "error map": _error_map,
+        "raw readings": _raw,
+        "measurement": _measurement,
+        "TOML file": _toml,
+    }
+    kind = _kind_of_text(text)
+    if kind in readers:
+        return readers[kind](path)
     if not header.strip():
         raise InvalidArgument(f"{path}: the file is empty, or has only comments")
-    if header.startswith(("\ufffdHDF", "CDF")):
+    if header.startswith(_NETCDF):
         raise InvalidArgument(f"{path}: is a netCDF file; the names of such files must end in .nc")
     raise InvalidArgument(
         f"{path}: expected a scenario or a head (TOML), a measurement, an error map or a calibration (CSV or .nc); "
         f'a CSV file begins with "line,point,..." or "parameter,position_mm,..."'
     )
+
+
+def kind_of(path: Path) -> str | None:
+    """What a file is by how it begins, whatever its name is; None for what is not known. It may be damaged all the
+    same. Raises InvalidArgument where it cannot be read."""
+    text = read_beginning(path)
+    if not text.startswith(_NETCDF):
+        return _kind_of_text(text)
+    from stepdiag.io.netcdf_read import kind_of_netcdf
+
+    try:
+        return _FORMATS.get(kind_of_netcdf(path))
+    except InvalidArgument:
+        return None
+
+
+def _kind_of_text(text: str) -> str | None:
+    comments, header = _head_of(text)
+    leading = dict(re.findall(r"(?m)^#\s*(\w+)\s*=\s*(.*?)\s*$", "\n".join(comments)))
+    columns = {column.strip().strip('"') for column in header.split(",")}
+    for name, kind in _FORMATS.items():
+        if leading.get("format", "").startswith(f"stepdiag {name}"):
+            return kind
+    for kind, beginning in _BEGINNINGS.items():
+        if re.match(beginning, text):
+            return kind
+    if {"parameter", "value"} & columns:
+        return "calibration" if "method" in leading else "error map"
+    if header.startswith("{"):
+        return "raw readings"
+    if {"line", "point"} & columns:
+        return "measurement"
+    return "TOML file" if header.lstrip().startswith("[") or "=" in header else None
 
 
 def _head_of(text: str) -> tuple[list[str], str]:
