@@ -14,7 +14,7 @@ from typing import Self
 
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, parse_record
-from stepdiag.io.whole_files import check_output, read_bytes, reason
+from stepdiag.io.whole_files import check_output, read_bytes, reason, sync_folder
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,7 @@ class RawFile:
         file = cls(path, handle)
         file._lock()
         file.append([header])
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)  # so that the file's name outlasts a power cut too
-        finally:
-            os.close(folder)
+        sync_folder(path.parent)
         return file
 
     @classmethod

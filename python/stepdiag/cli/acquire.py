@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, in_flags, keep_apart, keep_map, out_file, tell
+from stepdiag.cli.options import PATH, Writes, in_flags, out_file, tell
+from stepdiag.io.outputs import MEASUREMENT, RAW, Output
 
 if TYPE_CHECKING:
     from stepdiag.acquisition.options import AcquireOptions
@@ -76,22 +77,21 @@ class _Terminal:
     help="auto: start the instrument's measurement anew at a set-up where it is stopped or warns.",
 )
 @click.option("--uncertainties", is_flag=True, help="Also write the standard deviation of each mean (u_d1_um ...).")
-@click.option("--raw", type=PATH, metavar="FILE", help="Raw file.  [default: beside the output, run.raw.jsonl]")
+@click.option(
+    "--raw", type=Writes(RAW), metavar="FILE", help="Raw file (.jsonl).  [default: beside the output, run.raw.jsonl]"
+)
 @click.option("--resume", is_flag=True, help="Go on with the raw file, at the point where it stopped.")
 @click.option("--restart-line", is_flag=True, help="Go on with it, and read its last line once more.")
 @click.option("--restart-set-up", is_flag=True, help="Go on with it, and read all of its last set-up once more.")
 @click.option("--from-raw", type=PATH, metavar="FILE", help="Only make the output, from this raw file.")
-@out_file("Measurement to write, CSV or netCDF (.nc).")
-def acquire(scenario: Path | None, output: Path, from_raw: Path | None, **given: Any) -> None:
+@out_file("Measurement to write, CSV or netCDF (.nc).", MEASUREMENT)
+def acquire(scenario: Path | None, output: Output, from_raw: Path | None, **given: Any) -> None:
     """Take the readings of SCENARIO's plan from an attocube IDS3010.
 
     At every point waits until the distances have settled, and averages. Says before every set-up where head and
     mirror go. Each value is on the disk, in the raw file, before the next point; the output is made from it after
     every visit and at the end. A beam that is missing is a lost reading, an empty field.
     """
-    from stepdiag.io.whole_files import check_output
-
-    check_output(output)
     if from_raw is not None:
         if scenario is not None or given["source"] is not None:
             raise InvalidArgument("--from-raw: reads no scenario and no --source")
@@ -102,40 +102,43 @@ def acquire(scenario: Path | None, output: Path, from_raw: Path | None, **given:
     _take(scenario, output, given)
 
 
-def _take(scenario: Path, output: Path, given: dict[str, Any]) -> None:
+def _take(scenario: Path, output: Output, given: dict[str, Any]) -> None:
     from stepdiag.acquisition.acquire import acquire, raw_path
     from stepdiag.scenario.description import read_scenario
 
-    raw = given["raw"] or raw_path(output)
-    keep_apart(output, scenario, raw)
-    keep_apart(raw, scenario)
     described = read_scenario(scenario)
-    keep_map(output, described.error_map)
+    raw: Output = given["raw"] or Output(raw_path(output.path), (RAW,))
+    # An output that was not made from the raw file, and a raw file that nobody goes on with, are refused by acquire.
+    path = output.claim(scenario, raw.path, error_map=described.error_map, overwrite=True)
+    raw.claim(scenario, error_map=described.error_map, overwrite=True)
     options, resume = _options(given), _resume(given)
     trigger = _trigger(given["trigger"])
     result = acquire(
         described,
         given["source"],
-        output,
+        path,
         trigger=trigger,
         options=options,
         resume=resume,
-        raw=raw,
+        raw=raw.path,
         operator=_Terminal(),
     )
     click.echo(f"wrote {result.output}: {result.readings} of {result.planned} readings, {result.lost} lost")
 
 
-def _convert(raw: Path, output: Path, options: "AcquireOptions") -> None:
+def _convert(raw: Path, output: Output, options: "AcquireOptions") -> None:
+    from stepdiag.acquisition.acquire import raw_path
     from stepdiag.acquisition.raw_file import read_raw
     from stepdiag.acquisition.run_from_raw import write_run
 
-    keep_apart(output, raw)
+    path = output.claim(raw, overwrite=True)
+    if path.exists() and raw_path(path).resolve() != raw.resolve():
+        raise InvalidArgument(f"{path}: exists, and does not stand beside {raw}: move it away, or name another -o")
     content = read_raw(raw)
     if content.torn is not None:
         tell("warning", content.torn)
-    write_run(raw, output, zero=options.zero, uncertainties=options.uncertainties)
-    click.echo(f"wrote {output}: {len(content.readings())} of {content.planned} readings")
+    write_run(raw, path, zero=options.zero, uncertainties=options.uncertainties)
+    click.echo(f"wrote {path}: {len(content.readings())} of {content.planned} readings")
 
 
 def _options(given: dict[str, Any]) -> "AcquireOptions":

@@ -5,7 +5,8 @@ from pathlib import Path
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, keep_apart
+from stepdiag.cli.options import PATH, Writes
+from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, Output
 
 
 @click.command(epilog="\b\nExample: stepdiag report calibration.nc --functional-point straightness.csv")
@@ -13,11 +14,11 @@ from stepdiag.cli.options import PATH, keep_apart
 @click.option(
     "--functional-point",
     "output",
-    type=PATH,
+    type=Writes(FUNCTIONAL_POINT),
     metavar="FILE",
     help="Straightness of the functional point beside the table's, to write as CSV.",
 )
-def report(calibration: Path, output: Path | None) -> None:
+def report(calibration: Path, output: Output | None) -> None:
     """Tell what a CALIBRATION (CSV or netCDF) says.
 
     Largest values and uncertainties, and the point to which straightness refers: the tables hold that of the axes' own
@@ -25,16 +26,14 @@ def report(calibration: Path, output: Path | None) -> None:
     has it too.
     """
     from stepdiag.io.data_files import read_calibration
-    from stepdiag.io.whole_files import check_input, check_output, write_whole
+    from stepdiag.io.whole_files import check_input, write_whole
     from stepdiag.report.calibration import calibration_report, functional_point_csv
 
-    if output is not None:
-        check_output(output)
-        keep_apart(output, calibration)
+    path = None if output is None else output.claim(calibration)
     check_input(calibration)
     read = read_calibration(calibration)
-    if output is not None:
-        write_whole(output, functional_point_csv(read))
+    if path is not None:
+        write_whole(path, functional_point_csv(read))
     for line in calibration_report(read):
         click.echo(line)
 
@@ -42,7 +41,9 @@ def report(calibration: Path, output: Path | None) -> None:
 @click.command(epilog="\b\nExample: stepdiag compare before.csv after.nc -o differences.csv")
 @click.argument("a", type=PATH)
 @click.argument("b", type=PATH)
-@click.option("-o", "output", type=PATH, metavar="FILE", help="Differences to write, CSV or netCDF (.nc).")
+@click.option(
+    "-o", "output", type=Writes(COMPARISON), metavar="FILE", help="Differences to write, CSV or netCDF (.nc)."
+)
 @click.option(
     "--limit",
     type=float,
@@ -51,7 +52,7 @@ def report(calibration: Path, output: Path | None) -> None:
     metavar="P",
     help="Probability of any false alarm among all values compared, at which a difference counts as significant.",
 )
-def compare(a: Path, b: Path, output: Path | None, limit: float) -> None:
+def compare(a: Path, b: Path, output: Output | None, limit: float) -> None:
     """Set two calibrations A and B (CSV or netCDF) side by side.
 
     For every parameter the largest difference B - A, where it is, its standard uncertainty sqrt(u_A^2 + u_B^2), and
@@ -61,12 +62,10 @@ def compare(a: Path, b: Path, output: Path | None, limit: float) -> None:
     """
     from stepdiag.calibration.comparison import compare_calibrations
     from stepdiag.io.data_files import read_calibration
-    from stepdiag.io.whole_files import check_input, check_output
+    from stepdiag.io.whole_files import check_input
     from stepdiag.report.comparison import comparison_report
 
-    if output is not None:
-        check_output(output)
-        keep_apart(output, a, b)
+    written = None if output is None else output.claim(a, b)
     if not 0.0 < limit < 1.0:
         raise InvalidArgument(f"--limit: expected a probability between 0 and 1, got {limit:g}")
     for path in (a, b):
@@ -76,9 +75,9 @@ def compare(a: Path, b: Path, output: Path | None, limit: float) -> None:
         comparison = compare_calibrations(one, other, limit=limit)
     except InvalidArgument as error:
         raise InvalidArgument(f"{a}, {b}: {error}") from None
-    if output is not None:
+    if written is not None:
         from stepdiag.report.comparison import write_comparison
 
-        write_comparison(comparison, output)
+        write_comparison(comparison, written)
     for line in comparison_report(comparison, str(a), str(b)):
         click.echo(line)

@@ -16,10 +16,11 @@ from stepdiag.cli.evaluate import evaluate, observe
 from stepdiag.cli.export import export
 from stepdiag.cli.head import head
 from stepdiag.cli.nc import nc
-from stepdiag.cli.options import PATH, InOrder, keep_apart, keep_map, out_file, tell
+from stepdiag.cli.options import PATH, InOrder, Writes, out_file, tell
 from stepdiag.cli.plan import plan
 from stepdiag.cli.study import study
 from stepdiag.cli.uncertainty import uncertainty
+from stepdiag.io.outputs import MEASUREMENT, Output
 
 EPILOG = """\b
 See it all at once:
@@ -63,41 +64,39 @@ def cli() -> None:
 
 @cli.command(short_help=SHORT["simulate"], epilog="\b\nExample: stepdiag simulate scenario.toml -o run.csv")
 @click.argument("scenario", type=PATH)
-@out_file("Measurement file to write, CSV or netCDF (.nc).")
-def simulate(scenario: Path, output: Path) -> None:
+@out_file("Measurement file to write, CSV or netCDF (.nc).", MEASUREMENT)
+@click.option("--overwrite", is_flag=True, help="Also where a measurement has this name: it is lost.")
+def simulate(scenario: Path, output: Output, overwrite: bool) -> None:
     """Simulate the run that SCENARIO (TOML) describes.
 
     The virtual machine moves through the plan with its errors, and the head reads the mirror at every point.
     Lost readings are empty fields, in netCDF missing values.
     """
     from stepdiag.io.data_files import write_measurement
-    from stepdiag.io.whole_files import check_output
     from stepdiag.scenario.description import read_scenario, simulate_scenario
     from stepdiag.scenario.map_warnings import scenario_warnings
 
-    check_output(output)
-    keep_apart(output, scenario)
     described = read_scenario(scenario)
-    keep_map(output, described.error_map)
+    path = output.claim(scenario, error_map=described.error_map, overwrite=overwrite)
     for warning in scenario_warnings(described):
         tell("warning", warning)
-    write_measurement(simulate_scenario(described), output)
+    write_measurement(simulate_scenario(described), path)
 
 
 @cli.command(short_help=SHORT["demo"], epilog="\b\nExample: stepdiag demo -o demo")
 @click.option(
     "-o",
-    "folder",
-    type=PATH,
+    "output",
+    type=Writes(),
     metavar="DIR",
-    help="Folder to write.  [default: demo, or demo-linuxcnc]",
+    help="Folder to write, a new one or that of an earlier demo.  [default: demo, or demo-linuxcnc]",
 )
 @click.option(
     "--controller",
     type=click.Choice(["linuxcnc", "calculated"]),
     help="Close the loop in LinuxCNC, or calculate the same without it.",
 )
-def demo(folder: Path | None, controller: str | None) -> None:
+def demo(output: Output | None, controller: str | None) -> None:
     """Simulate and evaluate the machine of the method's paper, and draw its Figure 5.
 
     Writes scenarios, truth, runs, calibrations, a table and the figure; go on from them with simulate and
@@ -106,19 +105,20 @@ def demo(folder: Path | None, controller: str | None) -> None:
     With --controller linuxcnc the loop is closed: LinuxCNC runs the measuring program on a virtual machine, the run
     is evaluated, LinuxCNC compensates with the calibration, and is measured again (docs/loop.md).
     """
-    from stepdiag.demo.paper import run_demo
+    from stepdiag.demo.paper import claim_demo, run_demo
 
     def progress(text: str) -> None:
         click.echo(text, err=True)
 
+    folder = output.path if output else Path("demo" if controller is None else f"demo-{controller}")
     if controller is None:
-        lines = run_demo(folder or Path("demo"), progress=progress)
+        lines = run_demo(claim_demo(folder), progress=progress)
     else:
-        from stepdiag.demo.loop import controller_of, run_loop
+        from stepdiag.demo.loop import claim_loop, controller_of, run_loop
         from stepdiag.linuxcnc.processes import LinuxcncError
 
         try:
-            lines = run_loop(folder or Path(f"demo-{controller}"), controller_of(controller), progress=progress)
+            lines = run_loop(claim_loop(folder), controller_of(controller), progress=progress)
         except LinuxcncError as error:
             raise click.ClickException(str(error)) from error
     for line in lines:
@@ -153,7 +153,7 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
 
 
 @cli.command(short_help=SHORT["init"], epilog="\b\nExample: stepdiag init -o machine")
-@click.option("-o", "folder", required=True, type=PATH, metavar="DIR", help="Folder to write.")
+@click.option("-o", "output", required=True, type=Writes(), metavar="DIR", help="Folder to write.")
 @click.option(
     "--sheet-for",
     "scenario",
@@ -162,7 +162,7 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
     help="Write only measurement.csv, for the plan and head of this scenario.",
 )
 @click.option("--head", "head_name", metavar="NAME", help="Begin with a copy of this shipped head (see head list).")
-def init(folder: Path, scenario: Path | None, head_name: str | None) -> None:
+def init(output: Output, scenario: Path | None, head_name: str | None) -> None:
     """Begin with your own machine: a scenario to edit and a sheet to fill in.
 
     Writes scenario.toml, with a comment on every key, and measurement.csv with all commanded points and empty
@@ -188,6 +188,7 @@ def init(folder: Path, scenario: Path | None, head_name: str | None) -> None:
             texts["head.toml"] = read_text(shipped)
         # As it is read in its new folder, where the head's copy is not yet.
         plan = parse_scenario(template(head_name))
+    folder = output.path
     written = [folder / name for name in (*texts, "measurement.csv")]
     for path in written:
         if path.exists() or path.is_symlink():

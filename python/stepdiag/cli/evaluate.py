@@ -6,7 +6,8 @@ from typing import Literal
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, keep_apart, keep_map, out_file
+from stepdiag.cli.options import PATH, Writes, out_file
+from stepdiag.io.outputs import CALIBRATION, OBSERVATION, Output
 
 
 @click.command(epilog="\b\nExample: stepdiag evaluate scenario.toml run.csv -o calibration.csv")
@@ -21,13 +22,13 @@ from stepdiag.cli.options import PATH, keep_apart, keep_map, out_file
     help="What to evaluate with; see above.",
 )
 @click.option("--covariance", is_flag=True, help="Also write the covariance of all values (netCDF only).")
-@out_file("Calibration to write, CSV or netCDF (.nc, which keeps the set-up and the residuals as well).")
+@out_file("Calibration to write, CSV or netCDF (.nc, which keeps the set-up and the residuals as well).", CALIBRATION)
 def evaluate(
     scenario: Path,
     run: Path,
     method: Literal["adjustment", "enhanced", "conventional"],
     covariance: bool,
-    output: Path,
+    output: Output,
 ) -> None:
     """Evaluate the measurement RUN (CSV or netCDF), made by SCENARIO's plan and head.
 
@@ -42,17 +43,15 @@ def evaluate(
     """
     from stepdiag.config.toml_text import located
     from stepdiag.io.data_files import is_netcdf, read_measurement, write_calibration
-    from stepdiag.io.whole_files import check_input, check_output
+    from stepdiag.io.whole_files import check_input
     from stepdiag.report.evaluation import evaluation_report
     from stepdiag.scenario.description import adjust_scenario, evaluate_scenario, read_scenario
 
-    check_output(output)
-    keep_apart(output, scenario, run)
     check_input(run)
-    if covariance and not is_netcdf(output):
-        raise InvalidArgument(f"--covariance: expected an output named .nc, for CSV keeps none; got {output}")
+    if covariance and not is_netcdf(output.path):
+        raise InvalidArgument(f"--covariance: expected an output named .nc, for CSV keeps none; got {output.path}")
     plan = read_scenario(scenario)
-    keep_map(output, plan.error_map)
+    path = output.claim(scenario, run, error_map=plan.error_map)
     measurement = read_measurement(run)
     with located(str(run)):
         result = (
@@ -60,7 +59,7 @@ def evaluate(
             if method == "adjustment"
             else evaluate_scenario(plan, measurement, method=method, full_covariance=covariance)
         )
-    write_calibration(result, output, measurement=measurement)
+    write_calibration(result, path, measurement=measurement)
     for line in evaluation_report(result, measurement, plan):
         click.echo(line)
 
@@ -88,25 +87,21 @@ def _step_counts(context: click.Context, option: click.Parameter, text: str | No
     callback=_step_counts,
     help="Numbers of steps per axis for the table, beside the scenario's own.  [default: 5,10,20,50,100,200]",
 )
-@click.option("-o", "output", type=PATH, metavar="FILE", help="Also write the table (CSV).")
-def observe(scenario: Path, steps: tuple[int, ...] | None, output: Path | None) -> None:
+@click.option("-o", "output", type=Writes(OBSERVATION), metavar="FILE", help="Also write the table (CSV).")
+def observe(scenario: Path, steps: tuple[int, ...] | None, output: Output | None) -> None:
     """Tell what SCENARIO's plan and head can determine, and how well, before anyone measures.
 
     Adjusts an error-free run with the scenario's uncertainties and unknowns. Says which of the 21 parameters
     and of the set-up's unknowns the readings determine, with which standard uncertainty, what is missing for the
     others, and how the largest uncertainties grow with the number of steps.
     """
-    from stepdiag.io.whole_files import check_output, write_whole
+    from stepdiag.io.whole_files import write_whole
     from stepdiag.planning.observation import USUAL_STEPS, observe, prospects
     from stepdiag.report.observation import observation_report, prospect_csv, prospect_rows
     from stepdiag.scenario.description import read_scenario
 
-    if output is not None:
-        check_output(output)
-        keep_apart(output, scenario)
     plan = read_scenario(scenario)
-    if output is not None:
-        keep_map(output, plan.error_map)
+    path = None if output is None else output.claim(scenario, error_map=plan.error_map)
     run, found = observe(plan)
     for line in observation_report(found, run, plan):
         click.echo(line)
@@ -114,5 +109,5 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: Path | None) 
     click.echo("largest standard uncertainties by the number of steps, and the mirror that they take:")
     for line in prospect_rows(table):
         click.echo(line)
-    if output is not None:
-        write_whole(output, prospect_csv(table))
+    if path is not None:
+        write_whole(path, prospect_csv(table))

@@ -5,10 +5,13 @@ from typing import Any
 
 import click
 
-from stepdiag.cli.options import PATH, keep_apart
+from stepdiag.cli.options import PATH, Writes
+from stepdiag.io.outputs import COMP_FILE, COMP_LINES, GRID, ISG_TABLE, KINEMATICS_TABLE, Output, claim_folder
 
 # Those of stepdiag.export.FORMATS, which needs not be imported to show a help text; a test compares.
 FORMATS = ("linuxcnc-comp", "linuxcnc-kins", "isg", "csv-grid")
+KINDS = {"linuxcnc-kins": KINEMATICS_TABLE, "isg": ISG_TABLE, "csv-grid": GRID}
+FOLDER = {"compensation.ini": COMP_LINES} | {f"joint{n}.comp": COMP_FILE for n in range(3)}  # of linuxcnc-comp
 MM = "<X Y Z>"
 
 
@@ -21,7 +24,12 @@ MM = "<X Y Z>"
 @click.argument("calibration", type=PATH)
 @click.option("--to", "to", required=True, type=click.Choice(FORMATS), help="Format.")
 @click.option(
-    "-o", "output", required=True, type=PATH, metavar="OUT", help="File to write; of linuxcnc-comp the folder."
+    "-o",
+    "output",
+    required=True,
+    type=Writes(*KINDS.values()),
+    metavar="OUT",
+    help="File to write (.csv); of linuxcnc-comp the folder.",
 )
 @click.option("--tool", type=float, nargs=3, metavar=MM, help="Tool offset, mm.  [default: the calibration's]")
 @click.option(
@@ -51,7 +59,7 @@ MM = "<X Y Z>"
 )
 @click.option("--step", type=float, metavar="MM", help="Largest spacing of the grid, in place of --nodes (csv-grid).")
 @click.option("--orientation", is_flag=True, default=None, help="Rotations of the tool too (csv-grid).")
-def export(calibration: Path, to: str, output: Path, **options: Any) -> None:
+def export(calibration: Path, to: str, output: Output, **options: Any) -> None:
     """Write a CALIBRATION (CSV or netCDF) for a controller.
 
     \b
@@ -67,7 +75,10 @@ def export(calibration: Path, to: str, output: Path, **options: Any) -> None:
     from stepdiag.export.write import export_calibration, read_what_is_exported
     from stepdiag.io.whole_files import check_input
 
-    keep_apart(output, calibration)
+    if to in KINDS:
+        path = Output(output.path, (KINDS[to],)).claim(calibration)
+    else:
+        path = claim_folder(output.path, FOLDER, marks=["compensation.ini"])
     check_input(calibration)
-    for line in export_calibration(read_what_is_exported(calibration), to, output, ExportOptions(**options)):
+    for line in export_calibration(read_what_is_exported(calibration), to, path, ExportOptions(**options)):
         click.echo(line)

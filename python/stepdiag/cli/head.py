@@ -9,6 +9,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import InOrder, out_file
+from stepdiag.io.outputs import PNG, SVG, Output
 
 if TYPE_CHECKING:
     from stepdiag import _core
@@ -53,24 +54,21 @@ def list_heads() -> None:
 
 @head.command(short_help="Draw a head.", epilog="\b\nExample: stepdiag head show beam_and_psd -o head.png")
 @HEAD
-@out_file("Figure to write, .png or .svg.")
+@out_file("Figure to write, .png or .svg.", PNG, SVG)
 @click.option("--distance", type=float, metavar="MM", help=f"Of the mirror.  [default: {DISTANCES[1]:g}]")
 @MIRROR
-def show(name: str, output: Path, distance: float | None, mirror: tuple[float, float] | None) -> None:
+def show(name: str, output: Output, distance: float | None, mirror: tuple[float, float] | None) -> None:
     """Draw bodies, beams and detectors of HEAD from two sides.
 
     Light that comes to its detector is a full line; what goes elsewhere is dashed, the paler the weaker.
     """
-    from stepdiag.io.whole_files import check_output, write_whole
+    from stepdiag.io.whole_files import write_whole
 
-    suffix = output.suffix.lower().removeprefix(".")
-    if suffix not in ("png", "svg"):
-        raise InvalidArgument(f"{output}: expected a name that ends in .png or .svg")
-    check_output(output)
+    path = output.claim(Path(name))
     made, distances = _prepare(name, mirror, () if distance is None else (distance,), DISTANCES[1:2])
     from stepdiag.head.drawing import draw_head
 
-    write_whole(output, draw_head(made, distances[0], suffix))
+    write_whole(path, draw_head(made, distances[0], path.suffix.lower().removeprefix(".")))
 
 
 @head.command(

@@ -5,14 +5,15 @@ from typing import Any
 
 import click
 
-from stepdiag.cli.options import PATH, keep_apart, keep_map, out_file, tell
+from stepdiag.cli.options import PATH, out_file, tell
+from stepdiag.io.outputs import PROGRAM, Output
 
 _AXES = ("X", "Y", "Z")
 
 
 @click.command(epilog="\b\nExample: stepdiag nc scenario.toml -o run.ngc --dialect linuxcnc")
 @click.argument("scenario", type=PATH)
-@out_file("Program to write.")
+@out_file("Program to write, such as run.ngc (not .nc, which is netCDF here).", PROGRAM)
 @click.option(
     "--dialect",
     type=click.Choice(["linuxcnc", "iso"]),
@@ -59,7 +60,7 @@ _AXES = ("X", "Y", "Z")
 @click.option("--decimals", type=int, metavar="N", help="Of a millimetre.  [default: 6 for linuxcnc, 4 for iso]")
 @click.option("--align/--no-align", default=None, help="Stop at a line's first point to align the beam.  [default: do]")
 @click.option("--line-numbers", is_flag=True, default=None, help="Number the blocks (iso).")
-def nc(scenario: Path, output: Path, **given: Any) -> None:
+def nc(scenario: Path, output: Output, **given: Any) -> None:
     """Write the measuring program of SCENARIO: G-code for the machine's controller.
 
     The axes go through the plan's points in its order, with feed and times of [plan_by_time], wait at each, and ask
@@ -68,21 +69,19 @@ def nc(scenario: Path, output: Path, **given: Any) -> None:
     Positions are those of the axes, counted from home, without tool length. Every visit of a line begins with an
     overrun, so that all axes come to all points from the side that the plan says.
     """
-    from stepdiag.io.whole_files import check_output, write_whole
+    from stepdiag.io.whole_files import write_whole
     from stepdiag.program.measuring_program import measuring_program
     from stepdiag.program.options import Options
     from stepdiag.scenario.description import read_scenario
 
-    check_output(output)
-    keep_apart(output, scenario)
     described = read_scenario(scenario)
-    keep_map(output, described.error_map)
+    path = output.claim(scenario, error_map=described.error_map)
     program = measuring_program(
         described, Options(**{name: value for name, value in given.items() if value is not None})
     )
-    write_whole(output, program.text)
+    write_whole(path, program.text)
     for text in program.unapproached:
         tell("warning", text)
     for line in program.summary:
         click.echo(line)
-    click.echo(f"wrote {output}")
+    click.echo(f"wrote {path}")

@@ -3,19 +3,35 @@
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import click
+from click.shell_completion import CompletionItem
 
-from stepdiag._core import InvalidArgument
+from stepdiag.io.outputs import FileKind, Output
 
 Command = TypeVar("Command", bound=Callable[..., None])
-PATH = click.Path(path_type=Path)
+PATH = click.Path(path_type=Path)  # of what a command reads; what it writes is of the type Writes
 SHORT_FLAGS = {"samples": "-n", "output": "-o"}
 
 
-def out_file(meaning: str) -> Callable[[Command], Command]:
-    return click.option("-o", "output", required=True, type=PATH, metavar="FILE", help=meaning)
+class Writes(click.ParamType):  # type: ignore[type-arg]  # click 8.1 takes none
+    """A file to write, of one of these kinds, or a folder. Its value is an Output, which a command has to claim."""
+
+    name = "path"
+
+    def __init__(self, *kinds: FileKind) -> None:
+        self.kinds = kinds
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Output:
+        return value if isinstance(value, Output) else Output(Path(value), self.kinds)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        return [CompletionItem(incomplete, type="file")]
+
+
+def out_file(meaning: str, *kinds: FileKind) -> Callable[[Command], Command]:
+    return click.option("-o", "output", required=True, type=Writes(*kinds), metavar="FILE", help=meaning)
 
 
 class InOrder(click.Group):
@@ -34,21 +50,3 @@ def tell(what: str, message: str) -> None:
     """One line to standard error."""
     line = " ".join(in_flags(message).split())
     click.echo(f"stepdiag: {what}: {line}", err=True)
-
-
-def keep_apart(output: Path, *inputs: Path) -> None:
-    """Raises InvalidArgument where a command would write over what it reads."""
-    for path in inputs:
-        if _same_file(output, path):
-            raise InvalidArgument(f"{output}: is also an input; give the output another name")
-
-
-def keep_map(output: Path, error_map: Path | None) -> None:
-    """Raises InvalidArgument where a command would write over the scenario's error map."""
-    # By name too: a result that fills the place of a missing map would be taken for the machine's errors.
-    if error_map is not None and (output.resolve() == error_map.resolve() or _same_file(output, error_map)):
-        raise InvalidArgument(f"{output}: is the scenario's machine.errors; give the output another name")
-
-
-def _same_file(one: Path, other: Path) -> bool:
-    return one.exists() and other.exists() and one.samefile(other)

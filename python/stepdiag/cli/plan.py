@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 import click
 
-from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, keep_apart, keep_map
+from stepdiag.cli.options import PATH, Writes
+from stepdiag.io.outputs import PLANS, PNG, SVG, Output
 
 Family = Literal["length", "angle", "squareness"]
 
@@ -48,8 +48,14 @@ _POSITIVE = _Positive(min=0.0, min_open=True, max=1e9)
     show_default=True,
     help="Whose largest standard uncertainty is to be small; length: positioning errors and straightnesses.",
 )
-@click.option("-o", "output", type=PATH, metavar="FILE", help="Also draw the curve (.png, .svg), or write all (.csv).")
-def plan(scenario: Path, minutes: float | None, spacing: float | None, family: Family, output: Path | None) -> None:
+@click.option(
+    "-o",
+    "output",
+    type=Writes(PNG, SVG, PLANS),
+    metavar="FILE",
+    help="Also draw the curve (.png, .svg), or write all (.csv).",
+)
+def plan(scenario: Path, minutes: float | None, spacing: float | None, family: Family, output: Output | None) -> None:
     """Tell which plan to measure in the time that there is.
 
     Takes head, uncertainties and unknowns of SCENARIO, and the times of its section [plan_by_time]. For numbers
@@ -59,20 +65,13 @@ def plan(scenario: Path, minutes: float | None, spacing: float | None, family: F
     The table has the plans that no other beats in time, in distance between nodes, and in uncertainty (see --for).
     More steps resolve more, take longer, and make each value less certain: it is a sum over more steps.
     """
-    from stepdiag.io.whole_files import check_output, write_whole
+    from stepdiag.io.whole_files import write_whole
     from stepdiag.planning.plan_by_time import choose, outcomes, own_spacing
     from stepdiag.report.plan_by_time import advice, left_out_rows, plan_csv, plan_rows
     from stepdiag.scenario.description import read_scenario
 
-    suffix = "" if output is None else output.suffix.lower().lstrip(".")
-    if output is not None:
-        if suffix not in ("png", "svg", "csv"):
-            raise InvalidArgument(f"{output}: expected a name that ends in .png, .svg or .csv")
-        check_output(output)
-        keep_apart(output, scenario)
     described = read_scenario(scenario)
-    if output is not None:
-        keep_map(output, described.error_map)
+    path = None if output is None else output.claim(scenario, error_map=described.error_map)
     available = described.keys.plan_by_time.minutes if minutes is None else minutes
     near = own_spacing(described) if spacing is None else spacing
     with click.progressbar(length=1, label="plans", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
@@ -88,9 +87,10 @@ def plan(scenario: Path, minutes: float | None, spacing: float | None, family: F
         click.echo(line)
     for line in [*left_out_rows(found), *advice(found, available, near, family)]:
         click.echo(line)
-    if output is not None and suffix == "csv":
-        write_whole(output, plan_csv(found))
-    elif output is not None:
+    suffix = "" if path is None else path.suffix.lower().lstrip(".")
+    if path is not None and suffix == "csv":
+        write_whole(path, plan_csv(found))
+    elif path is not None:
         from stepdiag.figures.plan_by_time import draw_plans
 
-        write_whole(output, draw_plans(found, choice.taken, available, suffix))
+        write_whole(path, draw_plans(found, choice.taken, available, suffix))

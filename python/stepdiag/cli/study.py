@@ -5,17 +5,17 @@ from pathlib import Path
 
 import click
 
-from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, keep_apart, keep_map, out_file, tell
+from stepdiag.cli.options import PATH, out_file, tell
 from stepdiag.cli.workers import chosen_workers, worker_options
+from stepdiag.io.outputs import STUDY, Output
 
 
 @click.command(epilog="\b\nExample: stepdiag study study.toml -o study.nc --workers 2")
 @click.argument("file", type=PATH, metavar="STUDY")
-@out_file("Result to write, netCDF (.nc).")
+@out_file("Result to write, netCDF (.nc).", STUDY)
 @click.option("--resume", is_flag=True, help="Go on with what an interrupted study has done.")
 @worker_options
-def study(file: Path, output: Path, resume: bool, scheduler: str | None, workers: int | None) -> None:
+def study(file: Path, output: Output, resume: bool, scheduler: str | None, workers: int | None) -> None:
     """Vary keys of a scenario over a grid, each cell with its virtual calibrations.
 
     STUDY (TOML) names the scenario, the keys and their values, methods and the number of samples; see docs/study.md.
@@ -24,21 +24,14 @@ def study(file: Path, output: Path, resume: bool, scheduler: str | None, workers
 
     Finished cells are kept in a file beside the result until it is written.
     """
-    from stepdiag.io.data_files import is_netcdf
-    from stepdiag.io.whole_files import check_output
     from stepdiag.uncertainty.study import FinishedCells, run_study
     from stepdiag.uncertainty.study_keys import read_study
     from stepdiag.uncertainty.study_table import write_study
 
-    if not is_netcdf(output):
-        raise InvalidArgument(f"{output}: expected a name that ends in .nc")
-    check_output(output)
-    keep_apart(output, file)
     wanted = read_study(file)
-    keep_apart(output, wanted.scenario)
-    errors = wanted.content["machine"].get("errors")
-    keep_map(output, None if errors is None else wanted.scenario.parent / errors)
-    finished = FinishedCells(Path(f"{output}.cells"), resume)
+    maps = {str(cell.content["machine"]["errors"]) for cell in wanted.cells() if "errors" in cell.content["machine"]}
+    path = output.claim(file, wanted.scenario, *(wanted.scenario.parent / name for name in maps))
+    finished = FinishedCells(Path(f"{path}.cells"), resume)
     try:
         with (
             chosen_workers(scheduler, workers) as chosen,
@@ -50,7 +43,7 @@ def study(file: Path, output: Path, resume: bool, scheduler: str | None, workers
                 bar.update(done - bar.pos)
 
             results = run_study(wanted, finished, workers=chosen, progress=show)
-        write_study(wanted, results, output)
+        write_study(wanted, results, path)
     except BaseException:
         finished.close()
         if finished.path.stat().st_size == 0:
@@ -60,6 +53,6 @@ def study(file: Path, output: Path, resume: bool, scheduler: str | None, workers
         raise
     finished.remove()
     failures = [result.failure for result in results.values() if result.failure]
-    click.echo(f"wrote {output}: {len(results)} cells of {' x '.join(map(str, wanted.shape))}")
+    click.echo(f"wrote {path}: {len(results)} cells of {' x '.join(map(str, wanted.shape))}")
     for failure in dict.fromkeys(failures):
         click.echo(f"no result in {failures.count(failure)} cells: {failure}")

@@ -4,14 +4,17 @@ import math
 import re
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, keep_apart, keep_map, tell
+from stepdiag.cli.options import PATH, Writes, tell
 from stepdiag.cli.workers import chosen_workers, worker_options
+from stepdiag.io.outputs import CHECKPOINT, UNCERTAINTY, Output
 
 if TYPE_CHECKING:
     from stepdiag.scenario.description import Scenario
@@ -105,13 +108,16 @@ def _points(context: click.Context, option: click.Parameter, texts: tuple[str, .
 @click.option("--volume", is_flag=True, help="Also the volumetric accuracy V_XYZ (ISO 230-1) and the body diagonals.")
 @click.option(
     "--checkpoint",
-    type=PATH,
+    type=Writes(CHECKPOINT),
     metavar="FILE",
-    help="What is done, every ten seconds and at the end; by default only of a run that was interrupted, beside -o.",
+    help="What is done (.checkpoint), every ten seconds and at the end; by default only of a run that was interrupted, "
+    "beside -o. One that is there already is never overwritten: --resume, or remove it.",
 )
 @click.option("--resume", is_flag=True, help="Go on from the checkpoint, to the same bits.")
 @click.option("--inputs", "list_inputs", is_flag=True, help="Only list the uncertain inputs by name.")
-@click.option("-o", "output", type=PATH, metavar="FILE", help="Result to write, netCDF (.nc) or CSV (.csv).")
+@click.option(
+    "-o", "output", type=Writes(UNCERTAINTY), metavar="FILE", help="Result to write, netCDF (.nc) or CSV (.csv)."
+)
 @worker_options
 def uncertainty(
     scenario: Path,
@@ -128,10 +134,10 @@ def uncertainty(
     compare: bool,
     points: list[Point],
     volume: bool,
-    checkpoint: Path | None,
+    checkpoint: Output | None,
     resume: bool,
     list_inputs: bool,
-    output: Path | None,
+    output: Output | None,
     scheduler: str | None,
     workers: int | None,
 ) -> None:
@@ -148,12 +154,12 @@ def uncertainty(
     one_step      the adjustment's first step from the solution without deviations
     """
     from stepdiag.io.data_files import is_netcdf
-    from stepdiag.io.whole_files import check_output
     from stepdiag.report.uncertainty import input_rows, opening_rows, result_rows
     from stepdiag.scenario.description import read_scenario
     from stepdiag.scenario.map_warnings import scenario_warnings
     from stepdiag.uncertainty.run import UncertaintyRequest
 
+    kept = checkpoint or Output(Path(f"{output.path if output else scenario.stem}.checkpoint"), (CHECKPOINT,))
     wanted = UncertaintyRequest(
         method=method,
         samples=samples,
@@ -168,55 +174,63 @@ def uncertainty(
         compare=compare,
         points=tuple(points),
         volume=volume,
-        checkpoint=checkpoint or Path(f"{output or scenario.stem}.checkpoint"),
+        checkpoint=kept.path,
         resume=resume,
     )
     wanted.check()
-    if output is not None:
-        if output.suffix.lower() not in (".nc", ".csv"):
-            raise InvalidArgument(f"{output}: expected a name that ends in .nc or .csv")
-        check_output(output)
-        keep_apart(output, scenario)
     if (scheduler is not None or workers is not None) and not wanted.draws:
         raise InvalidArgument("--scheduler and --workers: go with the Monte Carlo method: -n or --adaptive")
-    if (covariance or keep) and (output is None or not is_netcdf(output)):
+    if checkpoint is not None and not wanted.draws:
+        raise InvalidArgument("--checkpoint: goes with the Monte Carlo method: -n or --adaptive")
+    if (covariance or keep) and (output is None or not is_netcdf(output.path)):
         raise InvalidArgument(f"{'--covariance' if covariance else '--keep'}: expected -o with a name that ends in .nc")
     described = read_scenario(scenario)
-    if output is not None:
-        keep_map(output, described.error_map)
+    path = None if output is None else output.claim(scenario, error_map=described.error_map)
     if list_inputs:
         for line in input_rows(described.uncertain):
             click.echo(line)
         return
+    if wanted.draws:
+        others = [scenario] if path is None else [scenario, path]
+        kept.claim(*others, error_map=described.error_map, overwrite=resume)
     for warning in scenario_warnings(described):
         tell("warning", warning)
-    with chosen_workers(scheduler, workers) as chosen:
+    with _kept(wanted, KeyboardInterrupt), chosen_workers(scheduler, workers) as chosen:
         result = _evaluate(described, wanted, chosen)
-    if checkpoint is None and wanted.checkpoint is not None:  # one that was named can go on to more samples
-        wanted.checkpoint.unlink(missing_ok=True)
-    if output is not None:
-        from stepdiag.uncertainty.write import write_uncertainty
+    with _kept(wanted, BaseException):
+        if path is not None:
+            from stepdiag.uncertainty.write import write_uncertainty
 
-        write_uncertainty(result, output)
-    for line in (*opening_rows(result), *result_rows(result)):
-        click.echo(line)
+            write_uncertainty(result, path)
+        for line in (*opening_rows(result), *result_rows(result)):
+            click.echo(line)
+    if wanted.draws and checkpoint is None:  # one that was named can go on to more samples
+        kept.path.unlink(missing_ok=True)
+
+
+@contextmanager
+def _kept(wanted: "UncertaintyRequest", errors: type[BaseException]) -> Iterator[None]:
+    """Says how to go on where one of these errors ends the block."""
+    try:
+        yield
+    except errors as error:
+        if wanted.draws and wanted.checkpoint is not None and wanted.checkpoint.exists():
+            tell("interrupted", f"{wanted.checkpoint} keeps what is done; the same command with --resume goes on")
+        elif isinstance(error, KeyboardInterrupt):
+            tell("interrupted", "nothing was kept")
+        if isinstance(error, KeyboardInterrupt):
+            raise click.Abort from None
+        raise
 
 
 def _evaluate(scenario: "Scenario", wanted: "UncertaintyRequest", workers: "Workers | None") -> "UncertaintyResult":
-    """With a progress bar; an interrupted run says how to go on."""
+    """With a progress bar."""
     from stepdiag.uncertainty.packed_calibrations import pack_calibrations
     from stepdiag.uncertainty.run import evaluate_uncertainty
 
     executor = workers.executor(pack_calibrations(scenario.path, wanted)) if workers is not None else None
-    try:
-        with Bar() as bar:
-            return evaluate_uncertainty(scenario, wanted, bar.show, executor)
-    except KeyboardInterrupt:
-        if wanted.draws and wanted.checkpoint is not None and wanted.checkpoint.exists():
-            tell("interrupted", f"{wanted.checkpoint} keeps what is done; the same command with --resume goes on")
-        else:
-            tell("interrupted", "nothing was kept")
-        raise click.Abort from None
+    with Bar() as bar:
+        return evaluate_uncertainty(scenario, wanted, bar.show, executor)
 
 
 class Bar:

@@ -8,17 +8,37 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from stepdiag.demo.loop_cases import CASES, STEPS, LoopCase
+from stepdiag.demo.loop_cases import CASES, STEPS, LoopCase, scenario_text
 from stepdiag.demo.loop_figure import draw_loop
 from stepdiag.demo.loop_job import Calculated, Controller
 from stepdiag.demo.loop_linuxcnc import Linuxcnc
 from stepdiag.demo.loop_outcome import LoopOutcome, Progress, repetitions, run_case
 from stepdiag.demo.loop_report import point_table, report_lines
+from stepdiag.io import outputs
 from stepdiag.io.whole_files import make_folder, write_whole
 
 NODES: Final = 100  # nodes of the plan's grid that the controller goes to; all of them are calculated
 COUNT: Final = 1000  # random points
 SEEDS: Final = 40  # repetitions of the noisy case, by calculation
+
+
+def claim_loop(folder: Path) -> Path:
+    """The folder, if nothing would be lost in it but what an earlier loop wrote. Raises InvalidArgument."""
+    scenarios = {}
+    files: dict[str, outputs.FileKind | str] = {
+        **{"report.txt": outputs.REPORT, "points.csv": outputs.POINTS},
+        **{"loop.png": outputs.PNG, "loop.svg": outputs.SVG},
+    }
+    for case in CASES:
+        files[case.truth] = outputs.ERROR_MAP
+        files[f"{case.name}/program.ngc"] = outputs.PROGRAM
+        files[f"{case.name}/calibration.csv"] = outputs.CALIBRATION
+        for run, seed in ((case.name, 1), (f"{case.name}-again", 2)):
+            scenarios[f"{run}/scenario.toml"] = scenario_text(case, seed=seed)
+            files[f"{run}/run.csv"] = outputs.MEASUREMENT
+            files[f"{run}/run.raw.jsonl"] = outputs.RAW
+            files[f"{run}/points.ngc"] = outputs.PROGRAM
+    return outputs.claim_folder(folder, files | scenarios, marks=scenarios)
 
 
 def run_loop(

@@ -97,7 +97,7 @@ class Linuxcnc:
         path = job.run.with_name("points.ngc")
         writer = Writer("linuxcnc", 12, "G53")
         number = _points_visit(job).number
-        lines = ["G21 G90 G94 G17 G40 G49 G80 G61.1"]
+        lines = ["(Measuring program of the loop's points)", "G21 G90 G94 G17 G40 G49 G80 G61.1"]
         lines += [line.format(timeout=f"{PATIENCE:g}") for line in HANDSHAKE]
         for index, point in enumerate(job.points):
             lines.append(writer.move("G0", dict(zip("XYZ", map(float, point), strict=True))))

@@ -3,10 +3,24 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from stepdiag.demo.paper_cases import CASES, run_case, write_truths
+from stepdiag.demo.paper_cases import CASES, METHODS, run_case, scenario_of, write_truths
 from stepdiag.demo.paper_figure import draw_figure
 from stepdiag.demo.paper_report import error_table, screw_note, traced_note, trend_note
+from stepdiag.io import outputs
 from stepdiag.io.whole_files import make_folder, write_whole
+
+
+def claim_demo(folder: Path) -> Path:
+    """The folder, if nothing would be lost in it but what an earlier demonstration wrote. Raises InvalidArgument."""
+    scenarios = {f"{case.name}/scenario.toml": scenario_of(case) for case in CASES}
+    files: dict[str, outputs.FileKind | str] = {
+        **scenarios,
+        **dict.fromkeys(("truth.csv", "truth_screw.csv"), outputs.ERROR_MAP),
+        **{f"{case.name}/run.csv": outputs.MEASUREMENT for case in CASES},
+        **{f"{case.name}/{method}.csv": outputs.CALIBRATION for case in CASES for method in METHODS},
+        **{"report.txt": outputs.REPORT, "figure.png": outputs.PNG, "figure.svg": outputs.SVG},
+    }
+    return outputs.claim_folder(folder, files, marks=scenarios)
 
 
 def run_demo(folder: Path, progress: Callable[[str], None] = lambda text: None) -> list[str]:

@@ -25,11 +25,12 @@ _SQUARENESS = re.compile(r"C0Y|B0Z|A0Z")
 
 
 def kind_of_netcdf(path: Path) -> str:
-    """ "measurement" or "calibration", by format or by variables. Raises InvalidArgument for other files."""
+    """ "measurement", "calibration", "uncertainty" or what else a format of ours says; of files without one the first
+    or the second, by variables. Raises InvalidArgument for other files."""
     with open_dataset(path) as file:
-        given = file.text("format", "")
-        if given in (MEASUREMENT_FORMAT, CALIBRATION_FORMAT):
-            return given.split()[1]
+        ours = re.fullmatch(r"stepdiag (.+) \d+", file.text("format", ""))
+        if ours is not None:
+            return ours[1]
         if {"line", "point"} & set(file.names):
             return "measurement"
         if any(_FUNCTION.fullmatch(name) or _SQUARENESS.fullmatch(name) for name in file.names):

@@ -69,7 +69,7 @@ def check_input(path: Path) -> None:
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Writes a file as a whole: `path` is the old file or the whole new one."""
+    """Writes a file as a whole: `path` is the old file or the whole new one, on the disk when this returns."""
     with whole_file(path) as temporary:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
@@ -88,11 +88,21 @@ def whole_file(path: Path) -> Iterator[Path]:
         os.fchmod(handle, target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~_umask())
         os.fsync(handle)
         os.replace(temporary, target)
+        sync_folder(target.parent)
     except BaseException as error:
         Path(temporary).unlink(missing_ok=True)
         if isinstance(error, OSError):
             raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
         raise
+    finally:
+        os.close(handle)
+
+
+def sync_folder(folder: Path) -> None:
+    """So that the name of a new file outlasts a power cut, as its content does after fsync."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
     finally:
         os.close(handle)
 

@@ -1,7 +1,6 @@
 """Which of our files is this, and is it sound?"""
 
 import math
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.io.data_files import is_netcdf, read_calibration, read_measurement
+from stepdiag.io.file_kind import NETCDF_BEGINS, head_of, kind_of_text
 from stepdiag.io.whole_files import check_input, read_beginning
 
 
@@ -30,38 +30,26 @@ def examine(path: Path) -> Finding:
         return _toml(path)
     if is_netcdf(path):
         return _netcdf(path)
-    comments, header = _head_of(read_beginning(path))
-    leading = dict(re.findall(r"(?m)^#\s*(\w+)\s*=\s*(.*?)\s*$", "\n".join(comments)))
-    columns = {column.strip().strip('"') for column in header.split(",")}
-    if leading.get("format", "").startswith("stepdiag calibration"):
-        return _calibration(path)
-    if leading.get("format", "").startswith("stepdiag error map"):
-        return _error_map(path)
-    if {"parameter", "value"} & columns:
-        return _calibration(path) if "method" in leading else _error_map(path)
-    if header.startswith("{"):
-        return _raw(path)
-    if {"line", "point"} & columns:
-        return _measurement(path)
-    if header.lstrip().startswith("[") or "=" in header:
-        return _toml(path)
+    text = read_beginning(path)
+    _, header = head_of(text)
+    readers = {
+        "calibration": _calibration,
+        "error map": _error_map,
+        "raw readings": _raw,
+        "measurement": _measurement,
+        "TOML file": _toml,
+    }
+    kind = kind_of_text(text)
+    if kind in readers:
+        return readers[kind](path)
     if not header.strip():
         raise InvalidArgument(f"{path}: the file is empty, or has only comments")
-    if header.startswith(("\ufffdHDF", "CDF")):
+    if header.startswith(NETCDF_BEGINS):
         raise InvalidArgument(f"{path}: is a netCDF file; the names of such files must end in .nc")
     raise InvalidArgument(
         f"{path}: expected a scenario or a head (TOML), a measurement, an error map or a calibration (CSV or .nc); "
         f'a CSV file begins with "line,point,..." or "parameter,position_mm,..."'
     )
-
-
-def _head_of(text: str) -> tuple[list[str], str]:
-    comments: list[str] = []
-    for line in text.splitlines():
-        if line.strip() and not line.startswith("#"):
-            return comments, line
-        comments.append(line)
-    return comments, ""
 
 
 def _toml(path: Path) -> Finding:

@@ -24,6 +24,8 @@ from stepdiag._core import (
     make_bins,
     run_ranges,
 )
+from stepdiag.io.file_kind import CHECKPOINT_BEGINS
+from stepdiag.io.outputs import CHECKPOINT, claim
 from stepdiag.io.whole_files import check_output, read_bytes, write_whole
 
 LeafRange = tuple[int, int]  # half-open
@@ -31,7 +33,7 @@ Progress = Callable[[int, int], object]  # samples done, and how many there are 
 
 SECONDS_BETWEEN_CHECKPOINTS = 10.0
 LEAVES_OF_A_TASK = 5  # of an executor
-MAGIC = b"stepdiag checkpoint 1\n"
+MAGIC = f"{CHECKPOINT_BEGINS}1\n".encode()
 
 
 class Executor(Protocol):
@@ -54,16 +56,19 @@ def run_monte_carlo(
     executor: Executor | None = None,
 ) -> MonteCarloResult:
     """Draws `samples`, rounded up to whole leaves of 2,000; adaptive: whole blocks until all outputs are stable, and at
-    most about that many (result.stability tells). checkpoint: a file that is written every ten seconds, where the run
-    ends, and where an exception (Ctrl-C) ends it, which goes on then (an old one is replaced); resume: goes on from
-    there, also to more samples than before. Raises InvalidArgument, also for a checkpoint of another run."""
+    most about that many (result.stability tells). checkpoint: a new file that is written every ten seconds, where the
+    run ends, and where an exception (Ctrl-C) ends it, which goes on then; resume: goes on from there, also to more
+    samples than before. Raises InvalidArgument, also for a checkpoint of another run, and without `resume` for any file
+    that the checkpoint would replace."""
     if samples < 1:
         raise InvalidArgument(f"samples: expected 1 or more, got {samples}")
     if resume and checkpoint is None:
         raise InvalidArgument("resume: expected a checkpoint to go on from")
     saved = read_bytes(checkpoint) if resume and checkpoint else None  # before the work
-    if checkpoint:
+    if checkpoint and resume:
         check_output(checkpoint)
+    elif checkpoint:
+        claim(checkpoint, CHECKPOINT)
     bins = make_bins(model, StatisticsOptions() if options is None else options, threads)
     run = (_AdaptiveRun if adaptive else _FixedRun)(bins, samples, checkpoint, progress)
     if saved is not None:

@@ -13,7 +13,8 @@ from pathlib import Path
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.io.whole_files import check_output, read_text, reason
+from stepdiag.io.outputs import CELLS, claim
+from stepdiag.io.whole_files import read_text, reason, sync_folder
 from stepdiag.scenario.packed import pack_scenario
 from stepdiag.uncertainty.dask_workers import Workers
 from stepdiag.uncertainty.study_cell import CellJob, CellResult, compute_cell
@@ -54,16 +55,13 @@ class FinishedCells:
 
     def __init__(self, path: Path, resume: bool) -> None:
         self.path = path
-        check_output(path)
-        if path.exists() and not resume:
-            raise InvalidArgument(
-                f"{path}: cells of an interrupted study; `resume` goes on with them, or delete the file"
-            )
+        claim(path, CELLS, overwrite=resume)
         self._known = dict(self._read()) if path.exists() else {}
         try:
             self._file = open(path, "a", encoding="utf-8")  # noqa: SIM115 (open as long as this object)
         except OSError as error:
             raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
+        sync_folder(path.parent)
         if self._file.tell() > 0:
             self._file.write("\n")  # behind what may be half a line
 

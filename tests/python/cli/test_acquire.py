@@ -110,7 +110,8 @@ def test_run_is_made_from_the_raw_file_alone(folder: Path, capsys: pytest.Captur
             ["scenario.toml", "--source", "ids3010://h", "--resume", "--restart-line"],
             "expected one of --resume, --restart-line and --restart-set-up",
         ),
-        (["scenario.toml", "--source", "ids3010://h", "--raw", "run.csv"], "run.csv: expected different names"),
+        (["scenario.toml", "--source", "ids3010://h", "--raw", "run.csv"], "run.csv: is also an input"),
+        (["scenario.toml", "--source", "ids3010://h", "--raw", "raw.csv"], "expected a name that ends in .jsonl"),
         (["scenario.toml", "--source", "ids3010://h", "--raw", "scenario.toml"], "is also an input"),
     ],
 )

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +16,8 @@ from small_scenario import SCENARIO
 import stepdiag as sd
 from stepdiag.cli import main
 from stepdiag.cli.uncertainty import Bar
+from stepdiag.io import whole_files as files
+from stepdiag.uncertainty import write as uncertainty_write
 from stepdiag.uncertainty.run import UncertaintyRequest, evaluate_uncertainty
 
 UNCERTAIN = """[uncertainty]
@@ -156,10 +161,6 @@ def test_interrupted_run_goes_on_to_the_same_bytes(
     assert run("-n", SAMPLES, "-o", "whole.nc") == 0
     capsys.readouterr()
 
-    def interrupt(self: Bar, done: int, total: int) -> None:
-        if done > 0:
-            raise KeyboardInterrupt
-
     with monkeypatch.context() as patched:
         patched.setattr(Bar, "show", interrupt)
         assert run("-n", SAMPLES, "-o", "u.nc") == 130
@@ -173,6 +174,87 @@ def test_interrupted_run_goes_on_to_the_same_bytes(
     assert not Path("u.nc.checkpoint").exists(), "of no more use"
 
 
+def interrupt(self: Bar, done: int, total: int) -> None:
+    """In place of Bar.show."""
+    if done > 0:
+        raise KeyboardInterrupt
+
+
+def test_checkpoint_of_an_interrupted_run_is_not_overwritten_by_another(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with monkeypatch.context() as patched:
+        patched.setattr(Bar, "show", interrupt)
+        assert run("-n", SAMPLES) == 130
+    kept = Path("scenario.checkpoint").read_bytes()
+    capsys.readouterr()
+    assert run("-n", SAMPLES, "--seed", "1") == 2
+    assert (
+        "scenario.checkpoint: is the checkpoint of an earlier run: --resume goes on with it" in capsys.readouterr().err
+    )
+    assert run() == 0, "a propagation draws nothing"
+    assert Path("scenario.checkpoint").read_bytes() == kept
+    assert run("-n", SAMPLES, "--resume") == 0
+    assert not Path("scenario.checkpoint").exists()
+
+
+def disk_full(*_: Any) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def ctrl_c(*_: Any) -> None:
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("ending", ["nc", "csv"])
+@pytest.mark.parametrize(
+    ("failure", "status", "said"), [(disk_full, 2, "No space left on device"), (ctrl_c, 130, "interrupted")]
+)
+@pytest.mark.parametrize("where", ["fsync", "replace", "sync_folder"])
+def test_result_that_cannot_be_written_leaves_the_checkpoint(
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    where: str,
+    failure: Callable[..., None],
+    status: int,
+    said: str,
+    ending: str,
+) -> None:
+    assert run("-n", SAMPLES, "-o", f"whole.{ending}") == 0
+    with monkeypatch.context() as patched:
+
+        def write(*arguments: Any) -> None:
+            patched.setattr(files.os if where != "sync_folder" else files, where, failure)
+            written(*arguments)
+
+        written = uncertainty_write.write_uncertainty
+        patched.setattr(uncertainty_write, "write_uncertainty", write)
+        assert run("-n", SAMPLES, "-o", f"u.{ending}") == status
+    told = capsys.readouterr().err
+    assert said in told
+    assert f"u.{ending}.checkpoint keeps what is done; the same command with --resume goes on" in told
+    assert run("-n", SAMPLES, "-o", f"u.{ending}", "--resume") == 0
+    assert Path(f"u.{ending}").read_bytes() == Path(f"whole.{ending}").read_bytes()
+    assert {path.name for path in folder.iterdir()} == {"scenario.toml", f"whole.{ending}", f"u.{ending}"}
+
+
+def test_result_is_on_the_disk_before_the_checkpoint_goes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    events: list[tuple[str, str]] = []
+
+    def synced(to: Callable[[Path], None] = files.sync_folder) -> Callable[[Path], None]:
+        return lambda path: (to(path), events.append(("synced", ",".join(sorted(p.name for p in path.iterdir())))))[0]
+
+    def unlinked(path: Path, missing_ok: bool = False, to: Any = Path.unlink) -> None:
+        to(path, missing_ok=missing_ok)
+        events.append(("removed", path.name))
+
+    monkeypatch.setattr(files, "sync_folder", synced())
+    monkeypatch.setattr(Path, "unlink", unlinked)
+    assert run("-n", SAMPLES, "-o", "u.csv") == 0
+    assert events[-2:] == [("synced", "scenario.toml,u.csv,u.csv.checkpoint"), ("removed", "u.csv.checkpoint")]
+
+
 # --- what is refused -------------------------------------------------------------------------------------------------
 REFUSED = [
     (["-n", "many"], "expected a whole number such as 100000 or 1e6, got 'many'"),
@@ -181,6 +263,7 @@ REFUSED = [
     (["--compare"], "--compare: goes with the Monte Carlo method: -n or --adaptive"),
     (["--keep", "C0Y", "-o", "u.nc"], "--keep: goes with the Monte Carlo method"),
     (["--resume"], "--resume: goes with the Monte Carlo method"),
+    (["--checkpoint", "u.checkpoint"], "--checkpoint: goes with the Monte Carlo method"),
     (["-n", "1e4", "--keep", "C0Y"], "--keep: expected -o with a name that ends in .nc"),
     (["-n", "1e4", "--covariance", "-o", "u.csv"], "--covariance: expected -o with a name that ends in .nc"),
     (["-n", "1e4", "--keep", "C0Z", "-o", "u.nc"], "--keep: 'C0Z' is no output; did you mean"),
@@ -210,19 +293,15 @@ def test_mistake_is_told_in_one_line(
 def test_checkpoint_of_another_run_is_refused(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupt(self: Bar, done: int, total: int) -> None:
-        if done > 0:
-            raise KeyboardInterrupt
-
     with monkeypatch.context() as patched:
         patched.setattr(Bar, "show", interrupt)
-        assert run("-n", SAMPLES, "--checkpoint", "c") == 130
+        assert run("-n", SAMPLES, "--checkpoint", "c.checkpoint") == 130
     capsys.readouterr()
-    assert run("-n", SAMPLES, "--checkpoint", "c", "--resume", "--seed", "1") == 2
+    assert run("-n", SAMPLES, "--checkpoint", "c.checkpoint", "--resume", "--seed", "1") == 2
     assert "seed" in capsys.readouterr().err
     Path("scenario.toml").write_text((SCENARIO + UNCERTAIN).replace("reflector_urad = 100.0", "reflector_urad = 101.0"))
-    assert run("-n", SAMPLES, "--checkpoint", "c", "--resume") == 2
-    assert capsys.readouterr().err.startswith("stepdiag: error: c")
+    assert run("-n", SAMPLES, "--checkpoint", "c.checkpoint", "--resume") == 2
+    assert capsys.readouterr().err.startswith("stepdiag: error: c.checkpoint: ")
 
 
 def test_scenario_that_no_machine_can_run_is_refused_by_its_key(

@@ -120,13 +120,13 @@ def test_what_an_error_map_lacks_is_0(
         (["calibration.csv", "--to", "isg"], "-o"),
         (["calibration.csv", "--to", "isg", "-o", "calibration.csv"], "is also an input"),
         (["calibration.csv", "--to", "isg", "-o", "nowhere/x"], "nowhere"),
-        (["missing.csv", "--to", "isg", "-o", "x"], "missing.csv"),
-        (["calibration.csv", "--to", "isg", "-o", "x", "--tool", "1", "2"], "--tool"),
-        (["calibration.csv", "--to", "isg", "-o", "x", "--tool", "1", "2", "nan"], "--tool"),
-        (["calibration.csv", "--to", "csv-grid", "-o", "x", "--origin", "inf", "2", "3"], "--origin"),
+        (["missing.csv", "--to", "isg", "-o", "x.csv"], "missing.csv"),
+        (["calibration.csv", "--to", "isg", "-o", "x.csv", "--tool", "1", "2"], "--tool"),
+        (["calibration.csv", "--to", "isg", "-o", "x.csv", "--tool", "1", "2", "nan"], "--tool"),
+        (["calibration.csv", "--to", "csv-grid", "-o", "x.csv", "--origin", "inf", "2", "3"], "--origin"),
         (["calibration.csv", "--to", "linuxcnc-comp", "-o", "calibration.csv"], "calibration.csv"),
         (["calibration.csv", "--to", "linuxcnc-comp", "-o", "x", "--at", "900", "0", "0"], "--at"),
-        (["calibration.csv", "--to", "csv-grid", "-o", "x", "--nodes", "2", "2", "2", "--step", "1"], "--step"),
+        (["calibration.csv", "--to", "csv-grid", "-o", "x.csv", "--nodes", "2", "2", "2", "--step", "1"], "--step"),
     ],
 )
 def test_bad_arguments_are_refused_by_name(

@@ -242,6 +242,22 @@ def test_a_checkpoint_that_is_none_is_refused(tmp_path: Path) -> None:
         run_monte_carlo(curved(), samples=20_000, resume=True)
 
 
+@pytest.mark.parametrize(
+    "content", [b"stepdiag checkpoint 1\n...", b"line,point,x_mm,y_mm,z_mm,distance_mm\n", b"mine\n"]
+)
+def test_a_checkpoint_replaces_nothing_that_is_there(content: bytes, tmp_path: Path) -> None:
+    checkpoint = tmp_path / "run.checkpoint"
+    checkpoint.write_bytes(content)
+    expected = (
+        "is the checkpoint of an earlier run: `resume`" if b"check" in content else "is not replaced by a checkpoint"
+    )
+    with pytest.raises(InvalidArgument, match=f"run.checkpoint: .*{expected}"):
+        run_monte_carlo(curved(), samples=20_000, checkpoint=checkpoint)
+    assert checkpoint.read_bytes() == content
+    checkpoint.write_bytes(b"")  # nothing to lose
+    run_monte_carlo(curved(), samples=20_000, checkpoint=checkpoint)
+
+
 def test_checkpoints_are_written_while_a_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(monte_carlo, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
     checkpoint = tmp_path / "run.checkpoint"
