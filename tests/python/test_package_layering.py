@@ -147,3 +147,16 @@ def test_messages_of_the_package_name_no_flags() -> None:
         if isinstance(node, ast.Constant) and isinstance(text := node.value, str) and re.search("--[a-z]", text)
     ]
     assert not offences, "\n".join(offences)
+
+
+def test_classes_of_one_name_are_one_class() -> None:
+    """Nor has the package a class that is called as one of the extension's."""
+    stub = (PYTHON / "stepdiag" / "_core.pyi").read_text(encoding="utf-8")
+    named = [("_core", name) for name in re.findall(r"^class (\w+)", stub, re.MULTILINE)]
+    for module, file in MODULES.items():
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        named += [
+            (module, node.name) for node in ast.walk(tree) if isinstance(node, ast.ClassDef) and node.name[0] != "_"
+        ]
+    names = [name for _, name in named]
+    assert not [(module, name) for module, name in named if names.count(name) > 1]

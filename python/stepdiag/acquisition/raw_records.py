@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AwareDatetime, Field, TypeAdapter, ValidationError, model_validator
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.settling import Kind
+from stepdiag.acquisition.settling import ValueKind
 from stepdiag.config.key_types import Section, Triple
 
 Picometres = Annotated[int, Field(gt=-(2**63), lt=2**63)]
@@ -85,7 +85,7 @@ class Value(Point):
 
     record: Literal["value"] = "value"
     time: AwareDatetime
-    kind: Kind
+    kind: ValueKind
     pm: list[Picometres | None]
 
 

@@ -50,15 +50,15 @@ class Settling:
         return self.limit_um * PICOMETRES_PER_MICROMETRE
 
 
-Kind = Literal["settling", "average", "lost"]
+ValueKind = Literal["settling", "average", "lost"]
 
 
 @dataclass(frozen=True)
-class Value:
+class TakenValue:
     """One value of every axis, as the instrument gave it."""
 
     time: datetime
-    kind: Kind
+    kind: ValueKind
     pm: tuple[int | None, ...]
 
 
@@ -67,7 +67,7 @@ class Reading:
     """What was read at a point: every value, their mean and standard deviation (None where lost), and why it was."""
 
     axes: int
-    values: list[Value] = field(default_factory=list)
+    values: list[TakenValue] = field(default_factory=list)
     lost: dict[int, str] = field(default_factory=dict)  # by place of the axis
 
     @property
@@ -145,13 +145,13 @@ class _Taking:
             self._centre = {i: float(_mean(_column(self._window, i))) for i in self._live}
         return True
 
-    def _note(self, kind: Kind, sample: Sample) -> None:
-        self._reading.values.append(Value(datetime.now(UTC), kind, sample.pm))
+    def _note(self, kind: ValueKind, sample: Sample) -> None:
+        self._reading.values.append(TakenValue(datetime.now(UTC), kind, sample.pm))
 
     def _start_again(self) -> None:
         """What was averaged so far was not at rest."""
         values = self._reading.values
-        values[:] = [Value(v.time, "settling" if v.kind == "average" else v.kind, v.pm) for v in values]
+        values[:] = [TakenValue(v.time, "settling" if v.kind == "average" else v.kind, v.pm) for v in values]
         self._window.clear()
         self._centre = None
         self._averaged = 0

@@ -6,7 +6,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import PATH, Writes
-from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, Output
+from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, OutputFile
 
 
 @click.command(epilog="\b\nExample: stepdiag report calibration.nc --functional-point straightness.csv")
@@ -18,7 +18,7 @@ from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, Output
     metavar="FILE",
     help="Straightness of the functional point beside the table's, to write as CSV.",
 )
-def report(calibration: Path, output: Output | None) -> None:
+def report(calibration: Path, output: OutputFile | None) -> None:
     """Tell what a CALIBRATION (CSV or netCDF) says.
 
     Largest values and uncertainties, and the point to which straightness refers: the tables hold that of the axes' own
@@ -52,7 +52,7 @@ def report(calibration: Path, output: Output | None) -> None:
     metavar="P",
     help="Probability of any false alarm among all values compared, at which a difference counts as significant.",
 )
-def compare(a: Path, b: Path, output: Output | None, limit: float) -> None:
+def compare(a: Path, b: Path, output: OutputFile | None, limit: float) -> None:
     """Set two calibrations A and B (CSV or netCDF) side by side.
 
     For every parameter the largest difference B - A, where it is, its standard uncertainty sqrt(u_A^2 + u_B^2), and

@@ -7,7 +7,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import PATH, Writes, out_file
-from stepdiag.io.outputs import CALIBRATION, OBSERVATION, Output
+from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
 
 
 @click.command(epilog="\b\nExample: stepdiag evaluate scenario.toml run.csv -o calibration.csv")
@@ -28,7 +28,7 @@ def evaluate(
     run: Path,
     method: Literal["adjustment", "enhanced", "conventional"],
     covariance: bool,
-    output: Output,
+    output: OutputFile,
 ) -> None:
     """Evaluate the measurement RUN (CSV or netCDF), made by SCENARIO's plan and head.
 
@@ -88,7 +88,7 @@ def _step_counts(context: click.Context, option: click.Parameter, text: str | No
     help="Numbers of steps per axis for the table, beside the scenario's own.  [default: 5,10,20,50,100,200]",
 )
 @click.option("-o", "output", type=Writes(OBSERVATION), metavar="FILE", help="Also write the table (CSV).")
-def observe(scenario: Path, steps: tuple[int, ...] | None, output: Output | None) -> None:
+def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | None) -> None:
     """Tell what SCENARIO's plan and head can determine, and how well, before anyone measures.
 
     Adjusts an error-free run with the scenario's uncertainties and unknowns. Says which of the 21 parameters

@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from stepdiag.cli.options import PATH, Writes
-from stepdiag.io.outputs import COMP_FILE, COMP_LINES, GRID, ISG_TABLE, KINEMATICS_TABLE, Output, claim_folder
+from stepdiag.io.outputs import COMP_FILE, COMP_LINES, GRID, ISG_TABLE, KINEMATICS_TABLE, OutputFile, claim_folder
 
 # Those of stepdiag.export.FORMATS, which needs not be imported to show a help text; a test compares.
 FORMATS = ("linuxcnc-comp", "linuxcnc-kins", "isg", "csv-grid")
@@ -59,7 +59,7 @@ MM = "<X Y Z>"
 )
 @click.option("--step", type=float, metavar="MM", help="Largest spacing of the grid, in place of --nodes (csv-grid).")
 @click.option("--orientation", is_flag=True, default=None, help="Rotations of the tool too (csv-grid).")
-def export(calibration: Path, to: str, output: Output, **options: Any) -> None:
+def export(calibration: Path, to: str, output: OutputFile, **options: Any) -> None:
     """Write a CALIBRATION (CSV or netCDF) for a controller.
 
     \b
@@ -76,7 +76,7 @@ def export(calibration: Path, to: str, output: Output, **options: Any) -> None:
     from stepdiag.io.whole_files import check_input
 
     if to in KINDS:
-        path = Output(output.path, (KINDS[to],)).claim(calibration)
+        path = OutputFile(output.path, (KINDS[to],)).claim(calibration)
     else:
         path = claim_folder(output.path, FOLDER, marks=["compensation.ini"])
     check_input(calibration)

@@ -6,7 +6,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import PATH, Writes, tell
-from stepdiag.io.outputs import Output
+from stepdiag.io.outputs import OutputFile
 
 
 @click.command(epilog="\b\nExample: stepdiag check scenario.toml run.csv")
@@ -46,7 +46,7 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
     help="Write only measurement.csv, for the plan and head of this scenario.",
 )
 @click.option("--head", "head_name", metavar="NAME", help="Begin with a copy of this shipped head (see head list).")
-def init(output: Output, scenario: Path | None, head_name: str | None) -> None:
+def init(output: OutputFile, scenario: Path | None, head_name: str | None) -> None:
     """Begin with your own machine: a scenario to edit and a sheet to fill in.
 
     Writes scenario.toml, with a comment on every key, and measurement.csv with all commanded points and empty

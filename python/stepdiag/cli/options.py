@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
-from stepdiag.io.outputs import FileKind, Output
+from stepdiag.io.outputs import FileKind, OutputFile
 
 Command = TypeVar("Command", bound=Callable[..., None])
 PATH = click.Path(path_type=Path)  # of what a command reads; what it writes is of the type Writes
@@ -16,15 +16,15 @@ SHORT_FLAGS = {"samples": "-n", "output": "-o"}
 
 
 class Writes(click.ParamType):  # type: ignore[type-arg]  # click 8.1 takes none
-    """A file to write, of one of these kinds, or a folder. Its value is an Output, which a command has to claim."""
+    """A file to write, of one of these kinds, or a folder. Its value is an OutputFile, which a command has to claim."""
 
     name = "path"
 
     def __init__(self, *kinds: FileKind) -> None:
         self.kinds = kinds
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Output:
-        return value if isinstance(value, Output) else Output(Path(value), self.kinds)
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> OutputFile:
+        return value if isinstance(value, OutputFile) else OutputFile(Path(value), self.kinds)
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         return [CompletionItem(incomplete, type="file")]

@@ -5,14 +5,14 @@ from pathlib import Path
 import click
 
 from stepdiag.cli.options import PATH, Writes, out_file, tell
-from stepdiag.io.outputs import MEASUREMENT, Output
+from stepdiag.io.outputs import MEASUREMENT, OutputFile
 
 
 @click.command(epilog="\b\nExample: stepdiag simulate scenario.toml -o run.csv")
 @click.argument("scenario", type=PATH)
 @out_file("Measurement file to write, CSV or netCDF (.nc).", MEASUREMENT)
 @click.option("--overwrite", is_flag=True, help="Also where a measurement has this name: it is lost.")
-def simulate(scenario: Path, output: Output, overwrite: bool) -> None:
+def simulate(scenario: Path, output: OutputFile, overwrite: bool) -> None:
     """Simulate the run that SCENARIO (TOML) describes.
 
     The virtual machine moves through the plan with its errors, and the head reads the mirror at every point.
@@ -42,7 +42,7 @@ def simulate(scenario: Path, output: Output, overwrite: bool) -> None:
     type=click.Choice(["linuxcnc", "calculated"]),
     help="Close the loop in LinuxCNC, or calculate the same without it.",
 )
-def demo(output: Output | None, controller: str | None) -> None:
+def demo(output: OutputFile | None, controller: str | None) -> None:
     """Simulate and evaluate the machine of the method's paper, and draw its Figure 5.
 
     Writes scenarios, truth, runs, calibrations, a table and the figure; go on from them with simulate and

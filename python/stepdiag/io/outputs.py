@@ -61,7 +61,7 @@ POINTS: Final = FileKind("table of points")
 
 
 @dataclass(frozen=True)
-class Output:
+class OutputFile:
     """A file that a command is to write, as its user named it: of one of these kinds, by its ending."""
 
     path: Path

@@ -33,7 +33,7 @@ class WorkersLost(ConnectionError):
 
 
 @dataclass(frozen=True)
-class Machine:
+class Platform:
     """What bits depend on beside the task: our version, and the instruction set in use."""
 
     version: str
@@ -47,16 +47,16 @@ class Machine:
 class Refusal:
     """The answer of a worker that is not the machine that a task is for."""
 
-    machine: Machine
+    machine: Platform
 
 
-def this_machine() -> Machine:
-    return Machine(_core.__version__, _core.instruction_set())
+def this_machine() -> Platform:
+    return Platform(_core.__version__, _core.instruction_set())
 
 
 # --- tasks: what workers do ------------------------------------------------------------------------------------------
 # One thread each: a worker has as many tasks at a time as it has threads, its share of the computer.
-def perform(machine: Machine, function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
+def perform(machine: Platform, function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
     return function(*arguments) if this_machine() == machine else Refusal(this_machine())
 
 
@@ -144,12 +144,12 @@ class Workers:
         finally:
             futures.clear()  # lets go of what is under way
 
-    def _machines(self) -> dict[str, Machine | Exception]:
+    def _machines(self) -> dict[str, Platform | Exception]:
         """By address; of one that has another stepdiag, or none, the error of asking."""
-        found: dict[str, Machine | Exception] = self._client.run(this_machine, on_error="return")
+        found: dict[str, Platform | Exception] = self._client.run(this_machine, on_error="return")
         return found
 
-    def _choose(self, found: Mapping[str, Machine | Exception]) -> None:
+    def _choose(self, found: Mapping[str, Platform | Exception]) -> None:
         """Keeps to the workers that are what this machine is, and says which are not."""
         self._chosen = sorted(address for address, machine in found.items() if machine == self.machine)
         refused = {address: machine for address, machine in sorted(found.items()) if machine != self.machine}

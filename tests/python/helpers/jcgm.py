@@ -1,5 +1,5 @@
 """Examples of the GUM and its supplements as models for the Monte Carlo method. Run by itself, with a million samples
-each, it prints what comes out beside what is published: `./run python tests/python/jcgm.py`."""
+each, it prints what comes out beside what is published: `./run python tests/python/helpers/jcgm.py`."""
 
 import math
 import time
