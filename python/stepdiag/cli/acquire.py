@@ -9,7 +9,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import PATH, Writes, out_file, tell
-from stepdiag.outputs import MEASUREMENT, RAW, Output
+from stepdiag.io.outputs import MEASUREMENT, RAW, OutputFile
 
 if TYPE_CHECKING:
     from stepdiag.acquisition.options import AcquireOptions
@@ -86,7 +86,7 @@ class _Terminal:
 @click.option("--restart-set-up", is_flag=True, help="Go on with it, and read all of its last set-up once more.")
 @click.option("--from-raw", type=PATH, metavar="FILE", help="Only make the output, from this raw file.")
 @out_file("Measurement to write, CSV or netCDF (.nc).", MEASUREMENT)
-def acquire(scenario: Path | None, output: Output, from_raw: Path | None, **given: Any) -> None:
+def acquire(scenario: Path | None, output: OutputFile, from_raw: Path | None, **given: Any) -> None:
     """Take the readings of SCENARIO's plan from an attocube IDS3010.
 
     At every point waits until the distances have settled, and averages. Says before every set-up where head and
@@ -103,12 +103,12 @@ def acquire(scenario: Path | None, output: Output, from_raw: Path | None, **give
     _take(scenario, output, given)
 
 
-def _take(scenario: Path, output: Output, given: dict[str, Any]) -> None:
+def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
     from stepdiag.acquisition.acquire import acquire, raw_path
     from stepdiag.scenario.description import read_scenario
 
     described = read_scenario(scenario)
-    raw: Output = given["raw"] or Output(raw_path(output.path), (RAW,))
+    raw: OutputFile = given["raw"] or OutputFile(raw_path(output.path), (RAW,))
     # An output that was not made from the raw file, and a raw file that nobody goes on with, are refused by acquire.
     path = output.claim(scenario, raw.path, error_map=described.error_map, overwrite=True)
     raw.claim(scenario, error_map=described.error_map, overwrite=True)
@@ -127,7 +127,7 @@ def _take(scenario: Path, output: Output, given: dict[str, Any]) -> None:
     click.echo(f"wrote {result.output}: {result.readings} of {result.planned} readings, {result.lost} lost")
 
 
-def _convert(raw: Path, output: Output, options: "AcquireOptions") -> None:
+def _convert(raw: Path, output: OutputFile, options: "AcquireOptions") -> None:
     from stepdiag.acquisition.acquire import raw_path
     from stepdiag.acquisition.raw_file import read_raw
     from stepdiag.acquisition.run_from_raw import write_run

@@ -16,11 +16,11 @@ from stepdiag.cli.evaluate import evaluate, observe
 from stepdiag.cli.export import export
 from stepdiag.cli.head import head
 from stepdiag.cli.nc import nc
-from stepdiag.cli.options import PATH, InOrder, Writes, out_file, tell
+from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, InOrder, Writes, out_file, tell
 from stepdiag.cli.plan import plan
 from stepdiag.cli.study import study
 from stepdiag.cli.uncertainty import uncertainty
-from stepdiag.outputs import MEASUREMENT, Output
+from stepdiag.io.outputs import MEASUREMENT, OutputFile
 
 EPILOG = """\b
 See it all at once:
@@ -66,11 +66,12 @@ def cli() -> None:
 @click.argument("scenario", type=PATH)
 @out_file("Measurement file to write, CSV or netCDF (.nc).", MEASUREMENT)
 @click.option("--overwrite", is_flag=True, help="Also where a measurement has this name: it is lost.")
-def simulate(scenario: Path, output: Output, overwrite: bool) -> None:
+def simulate(scenario: Path, output: OutputFile, overwrite: bool) -> None:
     """Simulate the run that SCENARIO (TOML) describes.
 
     The virtual machine moves through the plan with its errors, and the head reads the mirror at every point.
-    Lost readings are empty fields, in netCDF missing values.
+    Lost readings are empty fields, in netCDF missing values. A measurement that is there already is kept, unless told
+    to overwrite it.
     """
     from stepdiag.io.data_files import write_measurement
     from stepdiag.scenario.description import read_scenario, simulate_scenario
@@ -96,18 +97,16 @@ def simulate(scenario: Path, output: Output, overwrite: bool) -> None:
     type=click.Choice(["linuxcnc", "calculated"]),
     help="Close the loop in LinuxCNC, or calculate the same without it.",
 )
-def demo(output: Output | None, controller: str | None) -> None:
+def demo(output: OutputFile | None, controller: str | None) -> None:
     """Simulate and evaluate the machine of the method's paper, and draw its Figure 5.
 
     Writes scenarios, truth, runs, calibrations, a table and the figure; go on from them with simulate and
-    evaluate.
+    evaluate. Written again, they are replaced, unless a scenario was changed.
 
     With --controller linuxcnc the loop is closed: LinuxCNC runs the measuring program on a virtual machine, the run
     is evaluated, LinuxCNC compensates with the calibration, and is measured again (docs/loop.md).
     """
-    from stepdiag.demo.paper import run_demo
-
-    from stepdiag.demo.paper_cases import claim_demo
+    from stepdiag.demo.paper import claim_demo, run_demo
 
     def progress(text: str) -> None:
         click.echo(text, err=True)
@@ -135,11 +134,15 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
 
     Knows scenarios, heads and studies (TOML), measurements and calibrations (CSV or netCDF), error maps (CSV)
     and raw readings (JSON lines). A
-    scenario is checked together with the error map that it names. Exit code 2 if any file is not sound.
+    scenario is checked together with the error map that it names. With one scenario among the files, each measurement
+    is adjusted with it: do its lines, points and distances belong to that plan, and what is the verdict of the fit?
+
+    Exit code 2 if any file is not sound or two do not belong together, 3 if a fit is rejected.
     """
     from stepdiag.report.file_check import examine
 
-    sound = True
+    sound, untrusted = True, False
+    found: dict[str, list[Path]] = {}
     for file in files:
         try:
             finding = examine(file)
@@ -150,8 +153,27 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
         click.echo(f"{file}: {finding.kind}: {finding.summary}")
         for warning in finding.warnings:
             click.echo(f"{file}: warning: {warning}")
+        found.setdefault(finding.kind, []).append(file)
+        untrusted = untrusted or finding.fit == "rejected"
+    if len(found.get("scenario", [])) == 1:
+        from stepdiag.report.scenario_and_run import adjust_run
+
+        (scenario,) = found["scenario"]
+        for run in found.get("measurement", []):
+            try:
+                said, fit = adjust_run(scenario, run)
+            except InvalidArgument as error:
+                sound = False
+                _complain(str(error))
+                continue
+            for line in said:
+                click.echo(f"{run} with {scenario}: {line}")
+            untrusted = untrusted or fit == "rejected"
     if not sound:
         context.exit(2)
+    if untrusted:
+        tell("warning", "a fit is rejected: do not use what comes of it")
+        context.exit(NOT_TO_BE_TRUSTED)
 
 
 @cli.command(short_help=SHORT["init"], epilog="\b\nExample: stepdiag init -o machine")
@@ -164,7 +186,7 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
     help="Write only measurement.csv, for the plan and head of this scenario.",
 )
 @click.option("--head", "head_name", metavar="NAME", help="Begin with a copy of this shipped head (see head list).")
-def init(output: Output, scenario: Path | None, head_name: str | None) -> None:
+def init(output: OutputFile, scenario: Path | None, head_name: str | None) -> None:
     """Begin with your own machine: a scenario to edit and a sheet to fill in.
 
     Writes scenario.toml, with a comment on every key, and measurement.csv with all commanded points and empty
@@ -216,7 +238,8 @@ def _complain(message: str) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs the command line and returns the exit code: 2 for a caller's mistake, 1 for ours, 130 when interrupted."""
+    """Runs the command line and returns the exit code: 0 done, 1 our mistake, 2 a caller's, 3 done but not to be
+    trusted, 130 interrupted."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without µ still gets the rest of the line

@@ -9,7 +9,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import InOrder, out_file
-from stepdiag.outputs import PNG, SVG, Output
+from stepdiag.io.outputs import PNG, SVG, OutputFile
 
 if TYPE_CHECKING:
     from stepdiag import _core
@@ -57,7 +57,7 @@ def list_heads() -> None:
 @out_file("Figure to write, .png or .svg.", PNG, SVG)
 @click.option("--distance", type=float, metavar="MM", help=f"Of the mirror.  [default: {DISTANCES[1]:g}]")
 @MIRROR
-def show(name: str, output: Output, distance: float | None, mirror: tuple[float, float] | None) -> None:
+def show(name: str, output: OutputFile, distance: float | None, mirror: tuple[float, float] | None) -> None:
     """Draw bodies, beams and detectors of HEAD from two sides.
 
     Light that comes to its detector is a full line; what goes elsewhere is dashed, the paler the weaker.

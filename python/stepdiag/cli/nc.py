@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from stepdiag.cli.options import PATH, out_file, tell
-from stepdiag.outputs import PROGRAM, Output
+from stepdiag.io.outputs import PROGRAM, OutputFile
 
 _AXES = ("X", "Y", "Z")
 
@@ -60,7 +60,7 @@ _AXES = ("X", "Y", "Z")
 @click.option("--decimals", type=int, metavar="N", help="Of a millimetre.  [default: 6 for linuxcnc, 4 for iso]")
 @click.option("--align/--no-align", default=None, help="Stop at a line's first point to align the beam.  [default: do]")
 @click.option("--line-numbers", is_flag=True, default=None, help="Number the blocks (iso).")
-def nc(scenario: Path, output: Output, **given: Any) -> None:
+def nc(scenario: Path, output: OutputFile, **given: Any) -> None:
     """Write the measuring program of SCENARIO: G-code for the machine's controller.
 
     The axes go through the plan's points in its order, with feed and times of [plan_by_time], wait at each, and ask

@@ -2,14 +2,15 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
 
-from stepdiag.outputs import Kind, Output
+from stepdiag.io.outputs import FileKind, OutputFile
 
 Command = TypeVar("Command", bound=Callable[..., None])
+NOT_TO_BE_TRUSTED: Final = 3  # exit status: done and written, but not to be used
 PATH = click.Path(path_type=Path)  # of what a command reads; what it writes is of the type Writes
 
 
@@ -18,17 +19,17 @@ class Writes(click.ParamType):  # type: ignore[type-arg]  # click 8.1 takes none
 
     name = "path"
 
-    def __init__(self, *kinds: Kind) -> None:
+    def __init__(self, *kinds: FileKind) -> None:
         self.kinds = kinds
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Output:
-        return value if isinstance(value, Output) else Output(Path(value), self.kinds)
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> OutputFile:
+        return value if isinstance(value, OutputFile) else OutputFile(Path(value), self.kinds)
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         return [CompletionItem(incomplete, type="file")]
 
 
-def out_file(meaning: str, *kinds: Kind) -> Callable[[Command], Command]:
+def out_file(meaning: str, *kinds: FileKind) -> Callable[[Command], Command]:
     return click.option("-o", "output", required=True, type=Writes(*kinds), metavar="FILE", help=meaning)
 
 
@@ -40,6 +41,15 @@ class InOrder(click.Group):
 
 
 def tell(what: str, message: str) -> None:
-    """One line to standard error."""
+    """One line to standard error. A warning begins with "warning:", as scripts that look for one expect."""
     line = " ".join(message.split())
-    click.echo(f"stepdiag: {what}: {line}", err=True)
+    click.echo(f"warning: {line}" if what == "warning" else f"stepdiag: {what}: {line}", err=True)
+
+
+def tell_fit(context: click.Context, path: Path, fit: str | None) -> None:
+    """Warns where the fit of a calibration is not accepted; a rejected one ends the command with status 3."""
+    if fit == "rejected":
+        tell("warning", f"{path}: the fit is rejected: do not use this calibration")
+        context.exit(NOT_TO_BE_TRUSTED)
+    if fit == "doubtful":
+        tell("warning", f"{path}: the fit is doubtful: do not rely on the stated uncertainties")

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import click
 
 from stepdiag.cli.options import PATH, Writes
-from stepdiag.outputs import PLANS, PNG, SVG, Output
+from stepdiag.io.outputs import PLANS, PNG, SVG, OutputFile
 
 Family = Literal["length", "angle", "squareness"]
 
@@ -55,7 +55,9 @@ _POSITIVE = _Positive(min=0.0, min_open=True, max=1e9)
     metavar="FILE",
     help="Also draw the curve (.png, .svg), or write all (.csv).",
 )
-def plan(scenario: Path, minutes: float | None, spacing: float | None, family: Family, output: Output | None) -> None:
+def plan(
+    scenario: Path, minutes: float | None, spacing: float | None, family: Family, output: OutputFile | None
+) -> None:
     """Tell which plan to measure in the time that there is.
 
     Takes head, uncertainties and unknowns of SCENARIO, and the times of its section [plan_by_time]. For numbers

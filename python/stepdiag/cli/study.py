@@ -7,7 +7,7 @@ import click
 
 from stepdiag.cli.options import PATH, out_file, tell
 from stepdiag.cli.workers import chosen_workers, worker_options
-from stepdiag.outputs import STUDY, Output
+from stepdiag.io.outputs import STUDY, OutputFile
 
 
 @click.command(epilog="\b\nExample: stepdiag study study.toml -o study.nc --workers 2")
@@ -15,7 +15,7 @@ from stepdiag.outputs import STUDY, Output
 @out_file("Result to write, netCDF (.nc).", STUDY)
 @click.option("--resume", is_flag=True, help="Go on with what an interrupted study has done.")
 @worker_options
-def study(file: Path, output: Output, resume: bool, scheduler: str | None, workers: int | None) -> None:
+def study(file: Path, output: OutputFile, resume: bool, scheduler: str | None, workers: int | None) -> None:
     """Vary keys of a scenario over a grid, each cell with its virtual calibrations.
 
     STUDY (TOML) names the scenario, the keys and their values, methods and the number of samples; see docs/study.md.

@@ -14,7 +14,7 @@ import click
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import PATH, Writes, tell
 from stepdiag.cli.workers import chosen_workers, worker_options
-from stepdiag.outputs import CHECKPOINT, UNCERTAINTY, Output
+from stepdiag.io.outputs import CHECKPOINT, UNCERTAINTY, OutputFile
 
 if TYPE_CHECKING:
     from stepdiag.scenario.description import Scenario
@@ -134,10 +134,10 @@ def uncertainty(
     compare: bool,
     points: list[Point],
     volume: bool,
-    checkpoint: Output | None,
+    checkpoint: OutputFile | None,
     resume: bool,
     list_inputs: bool,
-    output: Output | None,
+    output: OutputFile | None,
     scheduler: str | None,
     workers: int | None,
 ) -> None:
@@ -159,7 +159,7 @@ def uncertainty(
     from stepdiag.scenario.map_warnings import scenario_warnings
     from stepdiag.uncertainty.run import UncertaintyRequest
 
-    kept = checkpoint or Output(Path(f"{output.path if output else scenario.stem}.checkpoint"), (CHECKPOINT,))
+    kept = checkpoint or OutputFile(Path(f"{output.path if output else scenario.stem}.checkpoint"), (CHECKPOINT,))
     wanted = UncertaintyRequest(
         method=method,
         samples=samples,

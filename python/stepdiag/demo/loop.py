@@ -11,11 +11,12 @@ from typing import Final
 
 import numpy as np
 
-from stepdiag import _core, outputs
+from stepdiag import _core
 from stepdiag.demo.loop_cases import CASES, CHAIN, NOISE, STEPS, LoopCase, scenario_text, write_scenario, write_truth
 from stepdiag.demo.loop_job import PATIENCE, Controller, FloatArray, Job
 from stepdiag.demo.loop_points import Agreement, Sizes, agreement, covariances, errors_at, grid_nodes, random_points
 from stepdiag.demo.loop_recheck import Translations, translations
+from stepdiag.io import outputs
 from stepdiag.io.whole_files import make_folder, write_whole
 from stepdiag.program.measuring_program import measuring_program
 from stepdiag.program.options import Options
@@ -54,7 +55,7 @@ class Outcome:
     agreement: dict[str, Agreement]  # with noise: by kind of points
 
 
-def claim_loop(folder: Path) -> Path:
+def claim_loop(folder: Path, steps: int = STEPS) -> Path:
     """The folder, if nothing would be lost in it but what an earlier loop wrote. Raises InvalidArgument."""
     scenarios = {}
     files: dict[str, outputs.Kind | str] = {
@@ -66,7 +67,7 @@ def claim_loop(folder: Path) -> Path:
         files[f"{case.name}/program.ngc"] = outputs.PROGRAM
         files[f"{case.name}/calibration.csv"] = outputs.CALIBRATION
         for run, seed in ((case.name, 1), (f"{case.name}-again", 2)):
-            scenarios[f"{run}/scenario.toml"] = scenario_text(case, seed=seed)
+            scenarios[f"{run}/scenario.toml"] = scenario_text(case, steps, seed)
             files[f"{run}/run.csv"] = outputs.MEASUREMENT
             files[f"{run}/run.raw.jsonl"] = outputs.RAW
             files[f"{run}/points.ngc"] = outputs.PROGRAM

@@ -14,9 +14,10 @@ import numpy as np
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.units import MICRO
 
-from stepdiag import _core, outputs
+from stepdiag import _core
 from stepdiag.calibration.largest_by_kind import largest_deviations
 from stepdiag.config.key_errors import show
+from stepdiag.io import outputs
 from stepdiag.io.whole_files import make_folder, write_whole
 from stepdiag.scenario.description import Scenario, evaluate_scenario, read_scenario, simulate_scenario
 

@@ -14,6 +14,7 @@ import numpy as np
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
+from stepdiag.calibration.verdict_text import fit_row
 from stepdiag.export.common import (
     Export,
     ExportOptions,
@@ -51,6 +52,7 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
 
     leading = {
         "format": GRID_FORMAT,
+        "fit": calibration.fit or "",
         "chain": calibration.chain.name,
         "volume_mm": lengths(calibration.volume),
         "tool_mm": lengths(tool),
@@ -66,7 +68,7 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
     }
     text = "".join(f"# {key}={value}\n" for key, value in leading.items() if value)
     text += ",".join(_header(bool(options.orientation))) + "\n" + "".join(_rows(axes, origin, values))
-    return Export({output: text}, _report(leading, axes, error, loss, place, missing))
+    return Export({output: text}, [fit_row(calibration), *_report(leading, axes, error, loss, place, missing)])
 
 
 def _axes(volume: FloatArray, options: ExportOptions) -> list[FloatArray]:

@@ -12,6 +12,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Protocol
 
+from stepdiag.io.file_kind import CHECKPOINT_BEGINS
+
 from stepdiag._core import (
     AdaptiveProcedure,
     Bins,
@@ -24,9 +26,8 @@ from stepdiag._core import (
     make_bins,
     run_ranges,
 )
+from stepdiag.io.outputs import CHECKPOINT, claim
 from stepdiag.io.whole_files import check_output, read_bytes, write_whole
-from stepdiag.outputs import CHECKPOINT, claim
-from stepdiag.report.file_check import CHECKPOINT_BEGINS
 
 LeafRange = tuple[int, int]  # half-open
 Progress = Callable[[int, int], object]  # samples done, and how many there are to be (at most, of an adaptive run)

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
+from stepdiag.io.outputs import CELLS, claim
 from stepdiag.io.whole_files import read_text, reason, sync_folder
-from stepdiag.outputs import CELLS, claim
 from stepdiag.scenario.packed import pack_scenario
 from stepdiag.uncertainty.dask_workers import Workers
 from stepdiag.uncertainty.study_cell import CellJob, CellResult, compute_cell

@@ -11,7 +11,7 @@ from small_models import Sums
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument, PartialStatistics, StatisticsOptions
-from stepdiag.uncertainty.dask_workers import Machine, Workers, WorkersLost, check_scheduler, this_machine, workers_of
+from stepdiag.uncertainty.dask_workers import Platform, Workers, WorkersLost, check_scheduler, this_machine, workers_of
 from stepdiag.uncertainty.model_source import KEPT, model_of
 from stepdiag.uncertainty.monte_carlo import run_monte_carlo
 
@@ -92,7 +92,7 @@ def pretend(instruction_set: str) -> None:
     """Of a worker: that it had this one."""
     import stepdiag.dask_workers
 
-    machine = Machine(_core.__version__, instruction_set)
+    machine = Platform(_core.__version__, instruction_set)
     stepdiag.dask_workers.this_machine = lambda: machine
 
 
