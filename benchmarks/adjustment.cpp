@@ -2,7 +2,6 @@
 //   adjusted   from the measurement to the calibration with the variance of every value, residuals and redundancies
 //   solve      of that the unknowns alone: Gauss-Newton from zero to the floor of double precision
 //   variances  of that the variances of all unknowns: factor and inverse on its pattern
-//   follow_up  another noise on the readings of the same plan: the calibration's values again
 //   samples    sets of readings with noise and set-ups of their own, as a Monte Carlo evaluates them: time of each;
 //              beside each adjusted alone; layout ideal or b, set-ups normally distributed with this deviation, urad
 //   one_step   the same by the gain: how much mean and deviation of 2,000 samples are off, in standard uncertainties
@@ -14,11 +13,11 @@
 #include <cmath>
 #include <ctime>
 
+#include "adjustment/gauss_newton.hpp"
 #include "adjustment_run.hpp"
-#include "evaluation/adjustment_solver.hpp"
+#include "stepdiag/batch/batch_evaluator.hpp"
 #include "stepdiag/core/random.hpp"
-#include "stepdiag/core/random_lanes.hpp"
-#include "stepdiag/evaluation/batch.hpp"
+#include "stepdiag/core/random_blocks.hpp"
 
 namespace {
 
@@ -44,7 +43,7 @@ void solve(benchmark::State& state) {
     const auto problem = problem_of(AdjustmentRun(int(state.range(0))));
     for (auto _ : state) {
         Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
-        stepdiag::AdjustmentSolver solver(problem, {});
+        stepdiag::GaussNewton solver(problem, {});
         benchmark::DoNotOptimize(solver.solve(x));
     }
 }
@@ -52,37 +51,12 @@ void solve(benchmark::State& state) {
 void variances(benchmark::State& state) {
     const auto problem = problem_of(AdjustmentRun(int(state.range(0))));
     Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
-    stepdiag::AdjustmentSolver solver(problem, {});
+    stepdiag::GaussNewton solver(problem, {});
     solver.solve(x);
     for (auto _ : state) {
         solver.factorize(x);
         benchmark::DoNotOptimize(solver.factor().selected_inverse().diagonal());
     }
-}
-
-void follow_up(benchmark::State& state) {
-    const AdjustmentRun bench(int(state.range(0)));
-    const auto options = three_quantities();
-    const auto first = bench.run(), second = bench.run({1e-4, 1e-6, 0.0, 7});
-    stepdiag::Adjuster adjuster(first, bench.plan, bench.machine.chain(), bench.machine.tool(),
-                                bench.head.calibration(), options);
-    Eigen::MatrixXd readings(second.channels().size(), second.size());
-    for (Eigen::Index c = 0; c < readings.rows(); ++c)
-        for (Eigen::Index row = 0; row < readings.cols(); ++row) readings(c, row) = *second.channels()[c].value[row];
-    const Eigen::VectorXd values = adjuster.evaluate(readings);
-    Eigen::Index i = 0;
-    double worst = 0.0;
-    const auto calibration = bench.adjust(second, options).calibration;
-    for (const auto& function : calibration.functions)
-        for (std::size_t k = 0; k < function->value.size(); ++k, ++i) {
-            const double uncertainty = std::max(function->standard_uncertainty[k], 1e-9);  // 0 at the ends
-            worst = std::max(worst, std::abs(values[i] - function->value[k]) / uncertainty);
-        }
-    // Derivatives are those of the first run: off by as much as noise changes angles, some 1e-5, and this the more
-    // where unknowns are told apart least.
-    expect_near(worst, 0.0, 1e-2, "follow-up, in standard uncertainties");
-    for (auto _ : state) benchmark::DoNotOptimize(adjuster.evaluate(readings));
-    state.counters["u"] = worst;
 }
 
 // Sets of readings that differ in noise and set-ups, in lanes.
@@ -237,7 +211,6 @@ BENCHMARK_CAPTURE(adjusted, three_quantities, three_quantities())->Apply(steps);
 BENCHMARK_CAPTURE(adjusted, defaults, {})->Arg(50)->Arg(1000)->Unit(benchmark::kMillisecond);
 BENCHMARK(solve)->Arg(50)->Arg(1000)->Unit(benchmark::kMillisecond);
 BENCHMARK(variances)->Arg(50)->Arg(1000)->Unit(benchmark::kMillisecond);
-BENCHMARK(follow_up)->Arg(50)->Arg(1000)->Unit(benchmark::kMillisecond);
 void layouts_and_angles(benchmark::internal::Benchmark* benchmark) {
     benchmark->ArgNames({"layout_b", "urad"})->ArgsProduct({{0, 1}, {100, 1000}})->Unit(benchmark::kMillisecond);
 }

@@ -8,8 +8,8 @@
 
 #include <deque>
 
+#include "adjustment/adjustment_problem.hpp"
 #include "adjustment_run.hpp"
-#include "evaluation/adjustment_problem.hpp"
 
 namespace {
 

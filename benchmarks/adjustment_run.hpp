@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "expect.hpp"
-#include "stepdiag/evaluation/adjustment.hpp"
+#include "stepdiag/adjustment/adjustment.hpp"
 #include "stepdiag/simulation/simulate.hpp"
 
 // Of the set-ups reflector, laser and distance constant free, on scale lines distance constant only.

@@ -15,6 +15,7 @@
 #include <string>
 
 #include "expect.hpp"
+#include "stepdiag/core/instruction_set.hpp"
 #include "stepdiag/core/rotation.hpp"
 #include "stepdiag/measurement/reading.hpp"
 #include "stepdiag/optics/scene.hpp"
@@ -214,15 +215,15 @@ void count(benchmark::State& state, double each_time) {
 }
 
 void replayed(benchmark::State& state, const std::string& target, Varies varies) {
-    const std::string before = stepdiag::replay_target();
-    stepdiag::choose_replay_target(target);
+    const std::string before = stepdiag::instruction_set();
+    stepdiag::choose_instruction_set(target);
     Replay replay(varies);
     replay.check();
     for (auto _ : state) {
         replay.run();
         benchmark::ClobberMemory();
     }
-    stepdiag::choose_replay_target(before);
+    stepdiag::choose_instruction_set(before);
     count(state, poses);
 }
 
@@ -251,7 +252,7 @@ void closed_form(benchmark::State& state) {
 }
 
 const bool registered = [] {
-    for (const std::string& target : stepdiag::replay_targets()) {
+    for (const std::string& target : stepdiag::instruction_sets()) {
         const auto add = [&](const char* what, Varies varies) {
             benchmark::RegisterBenchmark(("replay/" + target + "/" + what).c_str(), replayed, target, varies);
         };

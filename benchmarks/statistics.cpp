@@ -8,7 +8,7 @@
 
 #include "expect.hpp"
 #include "stepdiag/core/random.hpp"
-#include "stepdiag/uncertainty/monte_carlo.hpp"
+#include "stepdiag/monte_carlo/monte_carlo.hpp"
 
 namespace {
 

@@ -12,13 +12,13 @@
 #include <vector>
 
 #include "expect.hpp"
-#include "stepdiag/core/random_lanes.hpp"
+#include "stepdiag/core/random_blocks.hpp"
 #include "stepdiag/core/rotation.hpp"
 #include "stepdiag/core/units.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
-#include "stepdiag/uncertainty/monte_carlo.hpp"
+#include "stepdiag/monte_carlo/monte_carlo.hpp"
 #include "stepdiag/uncertainty/virtual_calibration.hpp"
-#include "uncertainty/lane_run.hpp"
+#include "uncertainty/simd_sampler.hpp"
 
 namespace {
 
@@ -113,7 +113,7 @@ void check(Layout layout) {
             }
         const Calibration calibration = evaluate_enhanced(Measurement(clean.stations(), channels), run.plan,
                                                           run.machine.chain(), run.machine.tool(), run.calibration);
-        // All samples have the weights of the nominal run (batch.hpp).
+        // All samples have the weights of the nominal run (batch_evaluator.hpp).
         constexpr double share = 1e-3;  // of the standard uncertainty
         std::size_t entry = 0;
         for (const auto& f : calibration.functions)
@@ -161,36 +161,36 @@ void with_statistics(benchmark::State& state, Layout layout) {
 struct Parts {
     explicit Parts(Layout layout)
         : model(run_of(layout), seed),
-          lanes(LaneRun::make(model)),
+          lanes(SimdSampler::make(model)),
           scratch(*lanes),
-          deviations(model.run.inputs.inputs.size() * run_lanes),
-          readings(model.rows.size() * model.channels.size() * run_lanes) {
+          deviations(model.run.inputs.inputs.size() * lane_group),
+          readings(model.rows.size() * model.channels.size() * lane_group) {
         check(layout);
-        model.draws.inputs(0, run_lanes, deviations.data());
+        model.draws.inputs(0, lane_group, deviations.data());
     }
 
     const RunModel model;
-    std::unique_ptr<const LaneRun> lanes;
-    LaneRun::Scratch scratch;
+    std::unique_ptr<const SimdSampler> lanes;
+    SimdSampler::Scratch scratch;
     std::vector<double> deviations, readings;
-    std::uint8_t followed[run_lanes];
+    std::uint8_t followed[lane_group];
 };
 
 void part_random_numbers(benchmark::State& state, Layout layout) {
     Parts parts(layout);
-    std::vector<double> numbers((parts.model.rows.size() + 1) * run_lanes);
+    std::vector<double> numbers((parts.model.rows.size() + 1) * lane_group);
     std::uint64_t first = 0;
     for (auto _ : state) {
-        parts.model.draws.inputs(first, run_lanes, parts.deviations.data());
+        parts.model.draws.inputs(first, lane_group, parts.deviations.data());
         for (std::size_t e = 0; e < parts.model.run.inputs.noise.size(); ++e)
             for (std::size_t row = 0; row < parts.model.rows.size(); row += 32) {
                 const std::size_t rows = std::min<std::size_t>(32, parts.model.rows.size() - row);
-                parts.model.draws.standard_noise(e, first, run_lanes, row, rows, numbers.data());
+                parts.model.draws.standard_noise(e, first, lane_group, row, rows, numbers.data());
             }
-        first += run_lanes;
+        first += lane_group;
         benchmark::ClobberMemory();
     }
-    count(state, double(run_lanes));
+    count(state, double(lane_group));
 }
 
 void part_trace(benchmark::State& state, Layout layout) {
@@ -200,7 +200,7 @@ void part_trace(benchmark::State& state, Layout layout) {
         benchmark::ClobberMemory();
     }
     expect_near(parts.followed[0], 1.0, 0.0, "followed");
-    count(state, double(run_lanes));
+    count(state, double(lane_group));
 }
 
 // Random numbers once more, and their addition.
@@ -211,10 +211,10 @@ void part_noise(benchmark::State& state, Layout layout) {
     std::uint64_t first = 0;
     for (auto _ : state) {
         parts.lanes->add_noise(first, parts.scratch, parts.readings.data());
-        first += run_lanes;
+        first += lane_group;
         benchmark::ClobberMemory();
     }
-    count(state, double(run_lanes));
+    count(state, double(lane_group));
 }
 
 // Reduction to distance and tilts, and the linear map.
@@ -223,12 +223,12 @@ void part_evaluation(benchmark::State& state, Layout layout) {
     parts.lanes->trace(parts.deviations.data(), 0, parts.scratch, parts.readings.data(), parts.followed);
     const BatchEvaluator& evaluator = model_of(layout).evaluator();
     BatchEvaluator::Worker worker(evaluator);
-    std::vector<double> values(evaluator.entries().size() * run_lanes);
+    std::vector<double> values(evaluator.entries().size() * lane_group);
     for (auto _ : state) {
-        worker.evaluate(parts.readings.data(), run_lanes, values.data(), run_lanes);
+        worker.evaluate(parts.readings.data(), lane_group, values.data(), lane_group);
         benchmark::ClobberMemory();
     }
-    count(state, double(run_lanes));
+    count(state, double(lane_group));
 }
 
 const bool registered = [] {

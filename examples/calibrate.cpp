@@ -2,7 +2,7 @@
 #include <cstdio>
 #include <stepdiag/core/error.hpp>
 #include <stepdiag/core/units.hpp>
-#include <stepdiag/evaluation/adjustment.hpp>
+#include <stepdiag/adjustment/adjustment.hpp>
 #include <stepdiag/machine/machine.hpp>
 
 int main(int count, char** arguments) try {

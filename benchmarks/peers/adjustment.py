@@ -241,7 +241,7 @@ class Row(NamedTuple):
 
 
 def own_rows(build: Path) -> list[Row]:
-    found = run_benchmark(build / "bench_adjustment", "defaults|follow_up|exponent|/(100|200|500)$")
+    found = run_benchmark(build / "bench_adjustment", "defaults|exponent|/(100|200|500)$")
 
     def ms(name: str) -> list[float | None]:
         return [float(found[f"{name}/{steps}"]["cpu_time"]) for steps in (50, 1000)]

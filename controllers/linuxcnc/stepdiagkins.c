@@ -38,6 +38,8 @@ static char* largest_tool = "1000";
 RTAPI_MP_STRING(largest_tool, "longer tools are not taken from the pins, mm");
 static char* approach = "mean";
 RTAPI_MP_STRING(approach, "of a table with reversal: mean, positive or negative");
+static char* accept_rejected = "0";
+RTAPI_MP_STRING(accept_rejected, "1: takes a calibration whose fit was rejected");
 static char* ramp = "1";
 RTAPI_MP_STRING(ramp, "duration of a change of enable or tool, s");
 static char* coordinates = "XYZ";

@@ -65,6 +65,7 @@ static int read_arguments(void) {
     static const char* const outsides[] = {"hold", "linear", "refuse"};
     static const char* const approaches[] = {"mean", "positive", "negative"};
     static const char* const lengths[] = {"mm", "inch", NULL};
+    static const char* const switches[] = {"0", "1", NULL};
     char spelled[64], reason[900];
     double seconds;
     int inch;
@@ -74,7 +75,9 @@ static int read_arguments(void) {
         read_numbers("largest_correction", largest_correction, &options.largest_correction, 1) ||
         read_numbers("largest_tool", largest_tool, &options.largest_tool, 1) ||
         read_numbers("ramp", ramp, &seconds, 1) || read_choice("outside", outside, outsides, &options.outside) ||
-        read_choice("approach", approach, approaches, &options.approach) || read_choice("units", units, lengths, &inch))
+        read_choice("approach", approach, approaches, &options.approach) ||
+        read_choice("accept_rejected", accept_rejected, switches, &options.accept_rejected) ||
+        read_choice("units", units, lengths, &inch))
         return -1;
     if (!(seconds >= 0.0 && seconds <= 60.0)) {
         COMPLAIN("ramp: expected 0 to 60 s, got \"%s\"\n", ramp);
@@ -89,6 +92,9 @@ static int read_arguments(void) {
         COMPLAIN("%s\n", reason);
         return -1;
     }
+    const char* const fit = stepdiag_fit(compensator);
+    if (*fit && strcmp(fit, "accepted") != 0)
+        rtapi_print_msg(RTAPI_MSG_WARN, "stepdiagkins: warning: %s: fit=%s, not accepted\n", table, fit);
     stepdiag_calibration_tool(compensator, own_tool);
     mm_per_unit = inch ? 25.4 : 1.0;
     ramp_ns = seconds * 1e9;

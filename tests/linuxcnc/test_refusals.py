@@ -54,6 +54,7 @@ BAD = {
     "wrong unit": (replaced(r",um,", ",mm,"), "unit"),
     "positions not ascending": (unsorted, "EXX"),
     "an unknown parameter": (replaced(r"^EXX,", "EXQ,"), "EXQ"),
+    "a rejected fit": (replaced(r"^# chain=", "# fit=rejected\n# chain="), "fit=rejected"),
 }
 
 

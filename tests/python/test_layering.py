@@ -14,11 +14,14 @@ BELOW: dict[str, set[str]] = {
     "machine": {"core"},
     "plan": {"core"},
     "optics": {"core"},
+    "monte_carlo": {"core"},
     "measurement": {"plan"},
     "head": {"optics", "measurement"},
     "simulation": {"machine", "plan", "head", "measurement"},
     "evaluation": {"machine", "plan", "measurement"},
-    "uncertainty": {"simulation", "evaluation"},
+    "adjustment": {"evaluation"},
+    "batch": {"adjustment"},
+    "uncertainty": {"simulation", "batch", "monte_carlo"},
     "controller": {"machine"},
 }
 

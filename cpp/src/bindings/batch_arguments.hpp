@@ -6,7 +6,7 @@
 #include <string>
 
 #include "bindings.hpp"
-#include "stepdiag/evaluation/batch.hpp"
+#include "stepdiag/batch/batch_evaluator.hpp"
 
 namespace stepdiag::bindings {
 
@@ -14,7 +14,5 @@ EvaluationMethod to_evaluation_method(const std::string& text);  // "conventiona
 BatchOptions to_batch_options(const std::string& method, const ReadingUncertainty& uncertainty, const Priors& setup,
                               const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line,
                               bool reversal, bool rotations, const std::optional<Smoothness>& smoothness);
-
-void bind_batch(py::module_& m);  // after bind_adjustment and bind_calibration
 
 }  // namespace stepdiag::bindings

@@ -136,6 +136,29 @@ void bind_result(py::module_& m) {
             "False: fitted as badly as the outlier of this number, and no other reading tells which of them is "
             "wrong; the other was left out because the error functions are smoother without it.");
 
+    py::class_<FitReason>(m, "FitReason", "Why a fit is not accepted.")
+        .def_property_readonly(
+            "finding", [](const FitReason& r) { return name(r.finding); },
+            "\"no_redundancy\"; \"noise_factor\": root of the variance factor; \"misfit\", \"no_misfit\": probability "
+            "of "
+            "one so large, or so small; \"uneven_misfit\": noise factor of one line or channel, and as the limit that "
+            "of "
+            "the others; \"prior\": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2).")
+        .def_readonly("value", &FitReason::value)
+        .def_readonly("limit", &FitReason::limit)
+        .def_readonly("line", &FitReason::line, "Of an uneven misfit or a prior; else empty.")
+        .def_readonly("channel", &FitReason::channel,
+                      "Of an uneven misfit; of a prior the set-up quantity; else empty.")
+        .def_readonly("component", &FitReason::component, "Of a prior: as of SetupEstimate.");
+    py::class_<Verdict>(
+        m, "Verdict",
+        "Whether the readings of an adjustment agree with each other, with their uncertainties and with "
+        "the priors. It does not see what the parameters absorb: a wrong wavelength, chain or tool.")
+        .def_property_readonly(
+            "fit", [](const Verdict& v) { return name(v.fit); },
+            "\"accepted\", \"doubtful\", \"rejected\" or \"unchecked\".")
+        .def_readonly("reasons", &Verdict::reasons);
+
     using Result = AdjustmentOfRun;
     py::class_<Result>(m, "Adjustment", "What an adjustment found: calibration, set-ups, and how the readings fit.")
         .def_property_readonly("calibration", [](const Result& r) { return r.adjustment.calibration; })
@@ -180,6 +203,7 @@ void bind_result(py::module_& m) {
                                    });
                                    return list;
                                })
+        .def_property_readonly("verdict", [](const Result& r) { return r.adjustment.verdict; })
         .def_property_readonly("weighted_square_sum", [](const Result& r) { return r.adjustment.weighted_square_sum; })
         .def_property_readonly("variance_factor", [](const Result& r) { return r.adjustment.variance_factor(); })
         .def_property_readonly("degrees_of_freedom", [](const Result& r) { return r.adjustment.degrees_of_freedom; })
@@ -207,7 +231,7 @@ AdjustmentOfRun adjust_run(const Measurement& measurement, const Plan& plan, con
                            const Priors& setup, const std::map<std::string, Priors>& setup_by_line,
                            bool one_setup_per_line, bool reversal, bool rotations,
                            const std::optional<Smoothness>& smoothness, double outlier_probability,
-                           bool full_covariance) {
+                           bool full_covariance, const PlausibleLimits& plausible) {
     AdjustmentOptions options;
     options.uncertainty = uncertainty;
     options.setup = setup.value;
@@ -218,6 +242,7 @@ AdjustmentOfRun adjust_run(const Measurement& measurement, const Plan& plan, con
     options.smoothness = smoothness;
     options.outlier_probability = outlier_probability;
     options.full_covariance = full_covariance;
+    options.plausible = plausible;
     const Eigen::Vector3d offset = to_vector3(tool, "tool");
     const Chain kinematics = to_chain(chain);
     const HeadCalibrations heads = to_heads(head, plan).calibration();
@@ -235,7 +260,7 @@ void bind_adjustment(py::module_& m) {
           py::arg("setup") = Priors{}, py::arg("setup_by_line") = std::map<std::string, Priors>{},
           py::arg("one_setup_per_line") = false, py::arg("reversal") = true, py::arg("rotations") = true,
           py::arg("smoothness") = std::nullopt, py::arg("outlier_probability") = 0.01,
-          py::arg("full_covariance") = false,
+          py::arg("full_covariance") = false, py::arg("plausible") = PlausibleLimits{},
           "The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. "
           "setup_by_line replaces the quantities that it names. Raises InvalidArgument.");
 }

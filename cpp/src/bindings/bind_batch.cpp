@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "batch_arguments.hpp"
-#include "stepdiag/core/random_lanes.hpp"
+#include "stepdiag/core/random_blocks.hpp"
 
 namespace stepdiag::bindings {
 namespace {

@@ -60,7 +60,8 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
                              const Names& undetermined_slopes, const Names& undetermined,
                              const std::optional<ArrayLike>& covariance, const Tables& reversal,
                              const Arrays& reversal_negative_uncertainty, const Names& undetermined_reversal_constants,
-                             const std::string& date) {
+                             const std::string& date, const std::optional<std::string>& fit,
+                             const std::optional<double>& variance_factor) {
     Calibration calibration{
         method, to_chain(chain), to_vector3(volume, "volume"), to_vector3(tool, "tool"), {}, {}, undetermined, {}};
     for (const auto& [name, table] : functions)
@@ -89,6 +90,8 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
     if (covariance && calibration.covariance.size() == 0 && is_anything_determined(calibration))
         throw InvalidArgument("covariance: expected one row and column a value, got none");
     calibration.date = date;
+    if (fit) calibration.fit = fit_of({{"fit", *fit}}, "calibration");
+    calibration.variance_factor = variance_factor;
     check(calibration);
     return calibration;
 }
@@ -110,12 +113,18 @@ void bind_calibration(py::module_& m) {
              py::kw_only(), py::arg("undetermined_slopes") = Names{}, py::arg("undetermined") = Names{},
              py::arg("covariance") = std::nullopt, py::arg("reversal") = Tables{},
              py::arg("reversal_negative_uncertainty") = Arrays{}, py::arg("undetermined_reversal_constants") = Names{},
-             py::arg("date") = "",
+             py::arg("date") = "", py::arg("fit") = std::nullopt, py::arg("variance_factor") = std::nullopt,
              "A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: "
              "name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises "
              "InvalidArgument naming the parameter for what is none: nodes that do not "
              "ascend, values that are not finite, a covariance that is not one of these values.")
         .def_readonly("date", &Calibration::date, "When it was evaluated: ISO 8601, UTC; empty where it is not known.")
+        .def_property_readonly(
+            "fit", [](const Calibration& c) { return c.fit ? std::optional(name(*c.fit)) : std::nullopt; },
+            "Verdict of the fit: \"accepted\", \"doubtful\", \"rejected\" (not to be used) or \"unchecked\" (nothing "
+            "controls the readings); None where it is not known.")
+        .def_readonly("variance_factor", &Calibration::variance_factor,
+                      "Of the fit: 1 is expected; None where nothing controls the readings, or it is not known.")
         .def_property_readonly(
             "straightness_reference", [](const Calibration& c) { return straightness_reference(c.chain, c.tool); },
             "One line: to which point the straightnesses refer, and what they are at the functional point.")

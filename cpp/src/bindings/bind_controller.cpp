@@ -42,7 +42,7 @@ Position to_position(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 Compensator make_compensator(const TableLike& table, const ChainLike& chain, const ArrayLike& origin,
                              const std::string& outside, double margin, double largest_correction,
-                             const std::string& approach, double largest_tool) {
+                             const std::string& approach, double largest_tool, bool accept_rejected) {
     CompensatorOptions options;
     options.origin = to_position(to_vector3(origin, "origin"));
     options.outside = one_of<Outside>(
@@ -54,6 +54,7 @@ Compensator make_compensator(const TableLike& table, const ChainLike& chain, con
                                                     {"positive", CompensatedApproach::positive},
                                                     {"negative", CompensatedApproach::negative}});
     options.largest_tool = largest_tool;
+    options.accept_rejected = accept_rejected;
     const std::string name = to_chain(chain).name();
     if (py::isinstance<Calibration>(table))
         return Compensator(to_parameter_table(table.cast<Calibration>()), "calibration", name, options);
@@ -108,12 +109,13 @@ void bind_controller(py::module_& m) {
         .def(py::init(&make_compensator), py::arg("table"), py::arg("chain"), py::kw_only(),
              py::arg("origin") = zeros(3), py::arg("outside") = "hold", py::arg("margin") = CompensatorOptions{}.margin,
              py::arg("largest_correction") = CompensatorOptions{}.largest_correction, py::arg("approach") = "mean",
-             py::arg("largest_tool") = CompensatorOptions{}.largest_tool,
+             py::arg("largest_tool") = CompensatorOptions{}.largest_tool, py::arg("accept_rejected") = false,
              "table: a file, a Calibration or an ErrorMap that carries chain, volume and tool. chain: the "
              "controller's. origin: home in the controller's coordinates. outside the calibrated volume: \"hold\" the "
              "error of its nearest point, go on \"linear\" up to `margin`, or \"refuse\". largest_correction: command "
              "and forward shorten a longer error to this length. approach: \"mean\", \"positive\" or \"negative\", of "
-             "a table with reversal. Raises InvalidArgument for a table or options that a controller should not use.")
+             "a table with reversal. accept_rejected: take a table whose fit was rejected. Raises InvalidArgument for "
+             "a table or options that a controller should not use.")
         .def(
             "error",
             [](const Compensator& c, const ArrayLike& positions, const std::optional<ArrayLike>& tool) {
@@ -165,6 +167,11 @@ void bind_controller(py::module_& m) {
         .def_property_readonly(
             "tool", [](const Compensator& c) { return to_numpy_vector(Eigen::Vector3d(c.tool().data())); },
             "Of the calibration, mm.")
+        .def_property_readonly(
+            "fit",
+            [](const Compensator& c) { return c.fit().empty() ? std::nullopt : std::optional<std::string>(c.fit()); },
+            "Verdict of the table's fit: \"accepted\", \"doubtful\", \"rejected\", \"unchecked\"; None where it has "
+            "none.")
         .def_property_readonly("uncompensated", &Compensator::uncompensated,
                                "What the table does not tell: \"EXX\", \"EYX (slope)\", \"EXX (above 784.0 mm)\" ...");
 }

@@ -1,5 +1,5 @@
 #include "bindings.hpp"
-#include "stepdiag/evaluation/adjustment.hpp"
+#include "stepdiag/adjustment/adjustment.hpp"
 #include "stepdiag/evaluation/conventional.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
 
@@ -8,7 +8,7 @@ namespace {
 
 Calibration evaluate(const Measurement& measurement, const Plan& plan, const HeadLike& head, const ChainLike& chain,
                      const ArrayLike& tool, const std::string& method, const ReadingUncertainty& uncertainty,
-                     bool full_covariance) {
+                     bool full_covariance, const PlausibleLimits& plausible) {
     const auto evaluator = method == "enhanced"       ? &evaluate_enhanced
                            : method == "conventional" ? &evaluate_conventional
                                                       : nullptr;
@@ -19,10 +19,12 @@ Calibration evaluate(const Measurement& measurement, const Plan& plan, const Hea
     const Chain kinematics = to_chain(chain);
     const HeadCalibrations heads = to_heads(head, plan).calibration();
     py::gil_scoped_release release;
-    if (evaluator) return evaluator(measurement, plan, kinematics, offset, heads, {uncertainty, full_covariance});
+    if (evaluator)
+        return evaluator(measurement, plan, kinematics, offset, heads, {uncertainty, full_covariance, plausible});
     AdjustmentOptions options;
     options.uncertainty = uncertainty;
     options.full_covariance = full_covariance;
+    options.plausible = plausible;
     return adjust(measurement, plan, kinematics, offset, heads, options).calibration;
 }
 
@@ -55,6 +57,23 @@ void bind_evaluation(py::module_& m) {
         .def_readonly("distance", &ReadingUncertainty::distance)
         .def_readonly("tilt", &ReadingUncertainty::tilt)
         .def_readonly("spot", &ReadingUncertainty::spot);
+
+    py::class_<PlausibleLimits>(
+        m, "PlausibleLimits",
+        "What a machine can be: positioning errors by the travel of their axis, positioning "
+        "errors and straightnesses (translation, mm), angular errors and squarenesses (rotation, "
+        "rad). A result beyond is an error; inf: no limit.")
+        .def(py::init([](double positioning, double translation, double rotation) {
+                 const PlausibleLimits limits{positioning, translation, rotation};
+                 check(limits);
+                 return limits;
+             }),
+             py::kw_only(), py::arg("positioning") = PlausibleLimits{}.positioning,
+             py::arg("translation") = PlausibleLimits{}.translation, py::arg("rotation") = PlausibleLimits{}.rotation,
+             "Raises InvalidArgument for limits that are not positive.")
+        .def_readonly("positioning", &PlausibleLimits::positioning)
+        .def_readonly("translation", &PlausibleLimits::translation)
+        .def_readonly("rotation", &PlausibleLimits::rotation);
 
     py::class_<Calibration>(
         m, "Calibration",
@@ -151,8 +170,10 @@ void bind_evaluation(py::module_& m) {
     m.def("evaluate", &evaluate, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
           py::arg("tool") = zeros(3), py::kw_only(), py::arg("method") = "adjustment",
           py::arg("uncertainty") = ReadingUncertainty{}, py::arg("full_covariance") = false,
+          py::arg("plausible") = PlausibleLimits{},
           "Calibration from a run. Of the head only its calibration is used, of the machine only chain "
-          "and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan.");
+          "and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan, "
+          "and for a result that is not plausible.");
 }
 
 }  // namespace stepdiag::bindings

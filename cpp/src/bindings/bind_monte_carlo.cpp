@@ -1,10 +1,15 @@
 #include <pybind11/typing.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "bindings.hpp"
-#include "stepdiag/uncertainty/function_model.hpp"
-#include "stepdiag/uncertainty/monte_carlo.hpp"
+#include "stepdiag/core/random_blocks.hpp"
+#include "stepdiag/monte_carlo/adaptive_procedure.hpp"
+#include "stepdiag/monte_carlo/distribution.hpp"
+#include "stepdiag/monte_carlo/function_model.hpp"
+#include "stepdiag/monte_carlo/monte_carlo.hpp"
+#include "stepdiag/monte_carlo/sample_model.hpp"
 
 namespace stepdiag::bindings {
 namespace {
@@ -257,7 +262,94 @@ void bind_runs(py::module_& m) {
 
 }  // namespace
 
+// --- sample models and distributions ---
+
+namespace {
+
+// Whole groups of lanes, of which those asked for are copied.
+DoubleArray evaluate(const SampleModel& model, std::uint64_t first_sample, std::size_t samples) {
+    constexpr std::size_t at_a_time = 64 * lane_group;
+    const std::size_t outputs = model.outputs().size();
+    DoubleArray result({py::ssize_t(outputs), py::ssize_t(samples)});
+    double* const to = result.mutable_data();
+    py::gil_scoped_release release;
+    const auto worker = model.worker();
+    std::vector<double> values;
+    for (std::size_t done = 0; done < samples;) {
+        const std::uint64_t first = first_sample + done, aligned = first - first % lane_group;
+        const std::size_t before = std::size_t(first - aligned);
+        const std::size_t wanted = std::min(samples - done, at_a_time - before);
+        const std::size_t whole = (before + wanted + lane_group - 1) / lane_group * lane_group;
+        values.resize(outputs * whole);
+        worker->evaluate({aligned, whole, values.data()});
+        for (std::size_t i = 0; i < outputs; ++i)
+            std::copy_n(&values[i * whole + before], wanted, to + i * samples + done);
+        done += wanted;
+    }
+    return result;
+}
+
+}  // namespace
+
+static void bind_sample_model(py::module_& m) {
+    py::class_<SampleModel::Output>(m, "Output", "An output of a sample model. Native units.")
+        .def_readonly("name", &SampleModel::Output::name)
+        .def_readonly("position", &SampleModel::Output::position, "mm; NaN where it has none.")
+        .def_readonly("unit", &SampleModel::Output::unit, "\"mm\", \"rad\", \"1\"")
+        .def("__repr__", [](const SampleModel::Output& output) {
+            return "Output(" + output.name + ", " + std::to_string(output.position) + ", " + output.unit + ")";
+        });
+
+    py::class_<SampleModel>(m, "SampleModel",
+                            "A measurement model as the Monte Carlo method sees it (JCGM 101, 5.9): outputs of sample "
+                            "after sample, each a pure function of the seed and the sample's index.")
+        .def_property_readonly("outputs", &SampleModel::outputs)
+        .def_property_readonly("seed", &SampleModel::seed)
+        .def_property_readonly("target", &SampleModel::target,
+                               "The instruction set, for which the bits of a sample are the same.")
+        .def(
+            "evaluate",
+            [](const SampleModel& model, const IntegerLike& first_sample, const IntegerLike& samples) {
+                const auto count = to_integer(samples, "samples", 0, std::int64_t(1) << 32);
+                const auto first = to_integer(first_sample, "first_sample", 0, std::int64_t(1) << 62);
+                return evaluate(model, std::uint64_t(first), std::size_t(count));
+            },
+            py::arg("first_sample"), py::arg("samples"),
+            "Array (outputs, samples); NaN in all outputs of a sample that gave no result. Raises InvalidArgument.");
+}
+
 void bind_monte_carlo(py::module_& m) {
+    bind_sample_model(m);
+    py::class_<Distribution>(
+        m, "Distribution",
+        "A distribution that JCGM 101 (6.4) assigns to an input quantity: \"normal\" (spread: standard deviation), "
+        "\"rectangular\", \"triangular\", \"arcsine\" (half width), \"t\" (scale; degrees_of_freedom), "
+        "\"curvilinear_trapezoid\" (half width, known to plus and minus edge only).")
+        .def(py::init([](const std::string& kind, double spread, double expectation, double degrees_of_freedom,
+                         double edge) {
+                 const Distribution distribution{parse_distribution_kind(kind), expectation, spread, degrees_of_freedom,
+                                                 edge};
+                 check(distribution, kind);
+                 return distribution;
+             }),
+             py::arg("kind") = name(DistributionKind::normal), py::kw_only(), py::arg("spread"),
+             py::arg("expectation") = Distribution{}.expectation,
+             py::arg("degrees_of_freedom") = Distribution{}.degrees_of_freedom, py::arg("edge") = Distribution{}.edge,
+             "degrees_of_freedom of a kind other than t: those of its standard uncertainty (GUM G.4). Raises "
+             "InvalidArgument for a spread below 0, an edge not between 0 and the half width, degrees of freedom not "
+             "above 0 (t: 2).")
+        .def_property_readonly("kind", [](const Distribution& d) { return name(d.kind); })
+        .def_readonly("expectation", &Distribution::expectation)
+        .def_readonly("spread", &Distribution::spread)
+        .def_readonly("degrees_of_freedom", &Distribution::degrees_of_freedom)
+        .def_readonly("edge", &Distribution::edge)
+        .def_property_readonly("standard_uncertainty", &Distribution::standard_uncertainty);
+
+    m.def("normal_quantile", &normal_quantile, py::arg("probability"),
+          "The number that a standard normal number is below with this probability. Raises InvalidArgument.");
+    m.def("t_quantile", &t_quantile, py::arg("probability"), py::arg("degrees_of_freedom"),
+          "The same of Student's t distribution (coverage factors, GUM G.3). Raises InvalidArgument.");
+
     py::class_<FunctionModel, SampleModel>(m, "FunctionModel", "A model given as a function of its inputs.")
         .def(py::init([](const ModelFunction& function, std::vector<Distribution> distributions,
                          const std::vector<std::string>& outputs, const IntegerLike& seed,
@@ -278,5 +370,4 @@ void bind_monte_carlo(py::module_& m) {
     bind_parts(m);
     bind_runs(m);
 }
-
 }  // namespace stepdiag::bindings

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "stepdiag/adjustment/adjustment.hpp"
 #include "stepdiag/core/error.hpp"
-#include "stepdiag/evaluation/adjustment.hpp"
 #include "stepdiag/machine/chain.hpp"
 #include "stepdiag/optics/body.hpp"
 #include "stepdiag/simulation/simulate.hpp"
@@ -75,22 +75,21 @@ inline ArrayLike zeros(int size) {
     return py::reinterpret_borrow<ArrayLike>(py::make_tuple(0.0, 0.0, 0.0)[py::slice(0, size, 1)]);
 }
 
+// In the order of the rooms: signatures name the types that are bound before.
+void bind_core(py::module_& m);
 void bind_machine(py::module_& m);
 void bind_plan(py::module_& m);
 void bind_measurement(py::module_& m);
-void bind_body(py::module_& m);
+void bind_optics(py::module_& m);
 void bind_head(py::module_& m);
-void bind_traced_head(py::module_& m);
 void bind_simulation(py::module_& m);
-void bind_detectors(py::module_& m);
 void bind_evaluation(py::module_& m);
 void bind_adjustment(py::module_& m);
 void bind_calibration(py::module_& m);  // after bind_evaluation
-void bind_uncertain_inputs(py::module_& m);
-void bind_instruction_set(py::module_& m);
-void bind_sample_model(py::module_& m);
-void bind_virtual_calibration(py::module_& m);  // after bind_uncertain_inputs, bind_sample_model, bind_adjustment
-void bind_monte_carlo(py::module_& m);          // after bind_sample_model
+void bind_batch(py::module_& m);        // after bind_calibration
+void bind_monte_carlo(py::module_& m);
+void bind_uncertainty(py::module_& m);
+void bind_controller(py::module_& m);  // after bind_evaluation
 
 }  // namespace stepdiag::bindings
 

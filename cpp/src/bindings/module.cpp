@@ -1,16 +1,10 @@
 // stepdiag._core: the C++ library as Python sees it. Each part checks shapes, releases the interpreter lock and calls.
 #include <limits>
 
-#include "batch_arguments.hpp"
 #include "bindings.hpp"
 #include "stepdiag/version.hpp"
 
 namespace stepdiag::bindings {
-
-void bind_controller(py::module_& m);   // after bind_evaluation
-void bind_derived(py::module_& m);      // before bind_virtual_calibration
-void bind_propagation(py::module_& m);  // after bind_virtual_calibration
-void bind_validation(py::module_& m);   // after bind_propagation, bind_monte_carlo
 
 namespace {
 
@@ -165,24 +159,18 @@ PYBIND11_MODULE(_core, m) {
     m.doc() = "The C++ core of stepdiag. Native units: mm, rad, nm.";
     m.attr("__version__") = stepdiag::version();
     bind_exception(m);
+    bind_core(m);
     bind_machine(m);
     bind_plan(m);
     bind_measurement(m);
+    bind_optics(m);
     bind_head(m);
     bind_simulation(m);
-    bind_detectors(m);
-    bind_traced_head(m);
     bind_evaluation(m);
     bind_adjustment(m);
     bind_calibration(m);
-    bind_controller(m);
     bind_batch(m);
-    bind_uncertain_inputs(m);
-    bind_instruction_set(m);
-    bind_sample_model(m);
-    bind_derived(m);
-    bind_virtual_calibration(m);
-    bind_propagation(m);
     bind_monte_carlo(m);
-    bind_validation(m);
+    bind_uncertainty(m);
+    bind_controller(m);
 }

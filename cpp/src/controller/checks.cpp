@@ -6,6 +6,7 @@
 #include "core/text_file.hpp"
 #include "machine/table_header.hpp"
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/machine/fit.hpp"
 
 namespace stepdiag {
 namespace {
@@ -57,6 +58,15 @@ void check_volume(const Eigen::Vector3d& volume, const CompensatorOptions& optio
 void check_tool(const Eigen::Vector3d& tool, const CompensatorOptions& options, const std::string& name) {
     require(tool.norm() <= options.largest_tool, name + ": tool_mm",
             "a tool no longer than the option largest_tool, " + text(options.largest_tool), tool.norm());
+}
+
+std::string check_fit(const ParameterTable& table, const CompensatorOptions& options, const std::string& name) {
+    const std::optional<Fit> fit = fit_of(table.header, name);
+    if (fit == Fit::rejected && !options.accept_rejected)
+        throw InvalidArgument(name +
+                              ": fit=rejected: the readings of this calibration contradict each other or the "
+                              "scenario; measure again, or take it all the same with accept_rejected");
+    return fit ? stepdiag::name(*fit) : "";
 }
 
 void check_nodes(const ParameterTable& table, const Eigen::Vector3d& volume, const std::string& name) {

@@ -69,7 +69,8 @@ std::unique_ptr<CompensatorTables> make_tables(const ParameterTable& table, cons
         options.margin, options.largest_correction, options.largest_correction * options.largest_correction,
         options.largest_tool * options.largest_tool,
         largest_step_count(std::min(bounds.error, options.largest_correction), bounds.contraction), array(edges),
-        array(tool), stepdiag::fingerprint(own, edges, tool, table), not_told(table, edges, name)});
+        array(tool), stepdiag::fingerprint(own, edges, tool, table), check_fit(table, options, name),
+        not_told(table, edges, name)});
 }
 
 Compensator::Compensator(const ParameterTable& table, const std::string& name, const std::string& chain,
@@ -116,6 +117,7 @@ std::uint64_t Compensator::fingerprint() const noexcept { return tables_->finger
 double Compensator::inverse_bound() const noexcept { return inverse_bound_mm; }
 std::array<double, 3> Compensator::volume() const noexcept { return tables_->volume; }
 std::array<double, 3> Compensator::tool() const noexcept { return tables_->tool; }
+const std::string& Compensator::fit() const noexcept { return tables_->fit; }
 const std::vector<std::string>& Compensator::uncompensated() const noexcept { return tables_->uncompensated; }
 
 }  // namespace stepdiag

@@ -32,7 +32,8 @@ stepdiag::CompensatorOptions options_of(const stepdiag_options& given) {
             given.margin,
             given.largest_correction,
             stepdiag::CompensatedApproach(given.approach),
-            given.largest_tool};
+            given.largest_tool,
+            given.accept_rejected != 0};
 }
 
 stepdiag_compensator* load(const char* path, const char* chain, const stepdiag_options* options) {
@@ -66,7 +67,8 @@ stepdiag_options stepdiag_default_options(void) {
             own.margin,
             own.largest_correction,
             int(own.approach),
-            own.largest_tool};
+            own.largest_tool,
+            own.accept_rejected};
 }
 
 stepdiag_compensator* stepdiag_compensator_load(const char* path, const char* chain, const stepdiag_options* options,
@@ -116,6 +118,10 @@ void stepdiag_calibration_tool(const stepdiag_compensator* compensator, double t
     if (!tool) return;
     const auto own = compensator ? compensator->compensator.tool() : std::array<double, 3>{};
     std::copy(own.begin(), own.end(), tool);
+}
+
+const char* stepdiag_fit(const stepdiag_compensator* compensator) {
+    return compensator ? compensator->compensator.fit().c_str() : "";
 }
 
 const char* stepdiag_uncompensated(const stepdiag_compensator* compensator, size_t index) {

@@ -40,6 +40,7 @@ struct CompensatorTables {
     int step_count;
     std::array<double, 3> volume, tool;
     std::uint64_t fingerprint;
+    std::string fit;
     std::vector<std::string> uncompensated;
 
     // The correction for e. Shortening never takes two vectors farther apart, as clamping never takes two positions: a

@@ -1,4 +1,4 @@
-// A number type of code that is compiled for more than one (lanes-inl.hpp, optics/number.hpp). N has + - * / > <= and,
+// A number type of code that is compiled for more than one (simd-inl.hpp, optics/number.hpp). N has + - * / > <= and,
 // declared before that code is included or in N's own namespace:
 //   mul_add(a, b, c) = a b + c      sub_mul(a, b, c) = c - a b      root(a)      magnitude(a) = |a|      negative(a) =
 //   -a with_sign(a, s) = a >= 0 with the sign of s      both(p, q) of two comparisons      broadcast(Type<N>(), double)

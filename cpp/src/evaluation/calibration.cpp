@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/text_file.hpp"
 #include "machine/table_header.hpp"
 #include "stepdiag/core/error.hpp"
 
@@ -62,6 +63,26 @@ std::string straightness_reference(const Chain& chain, const Eigen::Vector3d& to
            (there.empty() ? "the same" : join(there, ", "));
 }
 
+std::vector<CalibrationEntry> calibration_entries(const Calibration& calibration) {
+    std::vector<CalibrationEntry> entries;
+    for (int i = 0; i < function_count; ++i)
+        if (const auto& function = calibration.functions[i])
+            for (const double position : function->position) entries.push_back({FunctionId::at(i).name(), position});
+    for (const Squareness s : all_squarenesses)
+        if (calibration.squarenesses[static_cast<int>(s)])
+            entries.push_back({name(s), std::numeric_limits<double>::quiet_NaN()});
+    return entries;
+}
+
+Eigen::VectorXd calibration_values(const Calibration& calibration) {
+    std::vector<double> values;
+    for (const auto& function : calibration.functions)
+        if (function) values.insert(values.end(), function->value.begin(), function->value.end());
+    for (const auto& squareness : calibration.squarenesses)
+        if (squareness) values.push_back(squareness->value);
+    return Eigen::Map<const Eigen::VectorXd>(values.data(), Eigen::Index(values.size()));
+}
+
 bool is_anything_determined(const Calibration& calibration) {
     const auto known = [](const auto& parameter) { return parameter.has_value(); };
     return std::any_of(calibration.functions.begin(), calibration.functions.end(), known) ||
@@ -92,6 +113,8 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
                     {"tool_mm", format_lengths(calibration.tool)}};
     table.header["straightness_reference"] = straightness_reference(calibration.chain, calibration.tool);
     if (!calibration.date.empty()) table.header["date"] = calibration.date;
+    if (calibration.fit) table.header["fit"] = name(*calibration.fit);
+    if (calibration.variance_factor) table.header["variance_factor"] = format_decimal(*calibration.variance_factor, 0);
     if (!slopes.empty()) table.header["undetermined_slopes"] = join(slopes, " ");
     if (!constants.empty()) table.header["undetermined_reversal_constants"] = join(constants, " ");
     if (!calibration.undetermined.empty())
@@ -118,6 +141,12 @@ Calibration read_calibration(const std::string& path) {
                             split(optional_value("undetermined"), sentence_break),
                             {}};
     calibration.date = optional_value("date");
+    calibration.fit = fit_of(table.header, path);
+    if (const std::string factor = optional_value("variance_factor"); !factor.empty()) {
+        calibration.variance_factor = parse_decimal(factor, 0);
+        if (!calibration.variance_factor || *calibration.variance_factor < 0.0)
+            throw InvalidArgument(path + ": variance_factor: expected a number of at least 0, got \"" + factor + "\"");
+    }
     const auto slopes = functions_listed(table, "undetermined_slopes", path);
     const auto constants = functions_listed(table, "undetermined_reversal_constants", path);
     for (int i = 0; i < function_count; ++i) {

@@ -95,6 +95,8 @@ void check(const Calibration& calibration) {
     if (!calibration.tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
     check_one_line(calibration.method, "method");
     check_one_line(calibration.date, "date");
+    if (const auto& factor = calibration.variance_factor; factor && !(std::isfinite(*factor) && *factor >= 0.0))
+        throw InvalidArgument("variance_factor: expected a finite number of at least 0");
     for (const std::string& sentence : calibration.undetermined) check_one_line(sentence, "undetermined");
     for (int i = 0; i < function_count; ++i) {
         const std::string name = FunctionId::at(i).name();

@@ -12,11 +12,11 @@ namespace {
 // Distances -> translations, summed from home; the frame is then turned so that EYX, EZX and EZY have no slope.
 class ConventionalMap {
 public:
-    ConventionalMap(const std::vector<Visit>& visits, const Plan& plan, const std::vector<bool>& usable)
-        : visits_(visits),
+    ConventionalMap(const std::vector<Pass>& passes, const Plan& plan, const std::vector<bool>& usable)
+        : passes_(passes),
           volume_(plan.volume()),
           layout_{plan.steps() + 1},
-          systems_(make_length_systems(visits, collect_steps(visits, plan), plan, usable)) {}
+          systems_(make_length_systems(passes, collect_steps(passes, plan), plan, usable)) {}
 
     bool is_determined(FunctionId id) const {
         return !id.is_rotation() && systems_[index(id.axis)].determined[static_cast<int>(id.component)];
@@ -37,7 +37,7 @@ public:
         for (const Axis axis : all_axes) {
             const int a = index(axis);
             const auto functions = functions_of<Number>(out, layout_, axis, Component::X);
-            add_up_steps<Number>(systems_[a], lengths, visits_, readings.only_visit, functions);
+            add_up_steps<Number>(systems_[a], lengths, passes_, readings.only_pass, functions);
             for (int c = 0; c < 3; ++c) {
                 const Number end = functions[c][layout_.nodes - 1];
                 slope[a][c] = end / volume_[a];
@@ -53,38 +53,42 @@ public:
     }
 
 private:
-    const std::vector<Visit>& visits_;
+    const std::vector<Pass>& passes_;
     Eigen::Vector3d volume_;
     ParameterLayout layout_;
     AxisSystems systems_;
 };
 
-std::vector<bool> body_diagonals(const std::vector<Visit>& visits) {
+std::vector<bool> body_diagonals(const std::vector<Pass>& passes) {
     std::vector<bool> are;
-    for (const Visit& visit : visits) are.push_back(visit.line.is_body_diagonal());
+    for (const Pass& pass : passes) are.push_back(pass.line.is_body_diagonal());
     return are;
 }
 
 }  // namespace
 
-LinearProgram conventional_program(const std::vector<Visit>& visits, const Plan& plan) {
-    return write_down(ConventionalMap(visits, plan, body_diagonals(visits)), visits, {plan.steps() + 1});
+LinearProgram conventional_program(const std::vector<Pass>& passes, const Plan& plan) {
+    return write_down(ConventionalMap(passes, plan, body_diagonals(passes)), passes, {plan.steps() + 1});
 }
 
 Calibration evaluate_conventional(const Measurement& measurement, const Plan& plan, const Chain& chain,
                                   const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                                   const EvaluationOptions& options) {
     if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
-    const auto visits = collect_visits(measurement, plan, heads, options.uncertainty, LengthKind::distance);
-    const std::vector<bool> usable = body_diagonals(visits);
+    const auto passes = collect_passes(measurement, plan, heads, options.uncertainty, LengthKind::distance);
+    check(options.plausible);
+    refuse_foreign_distances(measurement, plan);
+    if (const std::string far = far_reading(measurement, plan); !far.empty()) throw InvalidArgument(far);
+    const std::vector<bool> usable = body_diagonals(passes);
     const auto diagonals = std::count(usable.begin(), usable.end(), true);
     if (diagonals < 3)
         throw InvalidArgument("conventional evaluation: expected three or four body diagonals, the measurement has " +
                               std::to_string(diagonals));
 
-    const ConventionalMap map(visits, plan, usable);
+    const ConventionalMap map(passes, plan, usable);
     Calibration calibration{"conventional", chain, plan.volume(), tool, {}, {}, {}, {}};
-    evaluate_linear(map, visits, plan, options.full_covariance, calibration);
+    evaluate_linear(map, passes, plan, options.full_covariance, calibration);
+    calibration.fit = Fit::unchecked;
     for (const Axis axis : all_axes)
         if (const AxisSystem& system = map.lengths(axis); !system.gap.empty())
             calibration.undetermined.push_back(
@@ -94,6 +98,7 @@ Calibration evaluate_conventional(const Measurement& measurement, const Plan& pl
     if (!is_anything_determined(calibration))
         throw InvalidArgument("conventional evaluation: nothing can be determined. " +
                               calibration.undetermined.front());
+    refuse_implausible(calibration, measurement, plan, options.plausible);
     calibration.undetermined.push_back("rotations: the conventional evaluation uses distances only");
     return calibration;
 }

@@ -15,13 +15,13 @@ namespace {
 
 class EnhancedMap {
 public:
-    EnhancedMap(const std::vector<Visit>& visits, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool)
-        : visits_(visits), layout_{plan.steps() + 1} {
-        const auto steps = collect_steps(visits, plan);
-        angles_ = make_angle_systems(visits, steps, plan);
+    EnhancedMap(const std::vector<Pass>& passes, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool)
+        : passes_(passes), layout_{plan.steps() + 1} {
+        const auto steps = collect_steps(passes, plan);
+        angles_ = make_angle_systems(passes, steps, plan);
         find_angular_contributions(chain, tool, plan);
-        lengths_ = make_length_systems(visits, steps, plan, usable_);
-        slopes_ = make_slope_system(visits, plan, lengths_, usable_);
+        lengths_ = make_length_systems(passes, steps, plan, usable_);
+        slopes_ = make_slope_system(passes, plan, lengths_, usable_);
         find_shapes_that_hang_on_laser_angles(plan);
     }
 
@@ -47,7 +47,7 @@ public:
         if (readings.has_tilts) solve_angles(readings, out);
         std::vector<Number> lengths = corrected_lengths(readings, out);
         const std::vector<Number> slopes = slopes_.solve<Number>(lengths);
-        slopes_.correct_for_laser_angles<Number>(slopes, visits_, lengths);
+        slopes_.correct_for_laser_angles<Number>(slopes, passes_, lengths);
         solve_lengths(lengths, slopes, out);
         return out;
     }
@@ -59,18 +59,18 @@ private:
         double coefficient;
     };
 
-    // n . (theta_a x L_a) = theta_a . (L_a x n), for every reading. A visit whose lengths hang on rotations that nobody
+    // n . (theta_a x L_a) = theta_a . (L_a x n), for every reading. A pass whose lengths hang on rotations that nobody
     // knows is not usable.
     void find_angular_contributions(const Chain& chain, const Eigen::Vector3d& tool, const Plan& plan) {
         const double negligible = 1e-12 * (plan.volume().norm() + tool.norm());
-        for (const Visit& visit : visits_) {
+        for (const Pass& pass : passes_) {
             bool usable = true;
-            for (const VisitPoint& point : visit.points) {
+            for (const PassPoint& point : pass.points) {
                 contributions_.emplace_back();
                 for (const Axis axis : all_axes) {
                     const int node = point.plan.node[index(axis)];
                     const Eigen::Vector3d lever =
-                        angular_lever(chain, tool, axis, point.plan.commanded).cross(visit.direction());
+                        angular_lever(chain, tool, axis, point.plan.commanded).cross(pass.direction());
                     for (int c = 0; node > 0 && c < 3; ++c) {
                         if (std::abs(lever[c]) <= negligible) continue;
                         usable = usable && angles_[index(axis)].determined[c];
@@ -90,11 +90,11 @@ private:
         for (Eigen::Index j = 0; j < slopes_.null_space().cols(); ++j) {
             std::vector<Row<1>> slopes, lengths(contributions_.size(), Row<1>::Zero());
             for (const double unknown : slopes_.null_space().col(j)) slopes.push_back(Row<1>(unknown));
-            slopes_.correct_for_laser_angles<Row<1>>(slopes, visits_, lengths);
+            slopes_.correct_for_laser_angles<Row<1>>(slopes, passes_, lengths);
             std::vector<Row<1>> out(layout_.size(), Row<1>::Zero());
             for (const Axis axis : all_axes) {
                 const auto functions = functions_of<Row<1>>(out, layout_, axis, Component::X);
-                add_up_steps<Row<1>>(lengths_[index(axis)], lengths, visits_, -1, functions);
+                add_up_steps<Row<1>>(lengths_[index(axis)], lengths, passes_, -1, functions);
                 for (int c = 0; c < 3; ++c) {
                     take_off_trend<Row<1>>(functions[c], layout_.nodes, functions[c][layout_.nodes - 1]);
                     for (int k = 0; k < layout_.nodes; ++k)
@@ -117,9 +117,9 @@ private:
                 }
                 for (std::size_t s = 0; !intervals[i].is_bridged && s < intervals[i].steps.size(); ++s) {
                     const Step& step = intervals[i].steps[s];
-                    if (readings.only_visit >= 0 && readings.only_visit != step.visit) continue;
+                    if (readings.only_pass >= 0 && readings.only_pass != step.pass) continue;
                     const Number* from =
-                        &readings.values[values_per_reading * (visits_[step.visit].first_reading + step.point)];
+                        &readings.values[values_per_reading * (passes_[step.pass].first_reading + step.point)];
                     const Number* to = from + values_per_reading;
                     const Number alpha = step.sign * (to[1] - from[1]), beta = step.sign * (to[2] - from[2]);
                     const auto& inverse = intervals[i].solution->pseudoinverse;
@@ -151,7 +151,7 @@ private:
                        std::vector<Number>& out) const {
         for (const Axis axis : all_axes) {
             const auto functions = functions_of<Number>(out, layout_, axis, Component::X);
-            add_up_steps<Number>(lengths_[index(axis)], lengths, visits_, -1, functions);
+            add_up_steps<Number>(lengths_[index(axis)], lengths, passes_, -1, functions);
             for (int c = 0; c < 3; ++c) {
                 Number trend = functions[c][layout_.nodes - 1];
                 if (c == index(axis) && slopes_.determines_scale(axis)) trend -= slopes[SlopeSystem::scale(axis)];
@@ -162,12 +162,12 @@ private:
         for (const Squareness s : all_squarenesses) out[layout_.row(s)] = slopes[SlopeSystem::squareness(s)];
     }
 
-    const std::vector<Visit>& visits_;
+    const std::vector<Pass>& passes_;
     ParameterLayout layout_;
     AxisSystems angles_;
     AxisSystems lengths_;
     std::vector<std::vector<AngularContribution>> contributions_;  // by reading
-    std::vector<bool> usable_;                                     // by visit: its lengths
+    std::vector<bool> usable_;                                     // by pass: its lengths
     SlopeSystem slopes_;
     std::array<std::array<bool, 3>, 3> bent_{};  // by axis and component of translation
 };
@@ -225,21 +225,26 @@ std::vector<std::string> explain(const EnhancedMap& map, const Plan& plan) {
 
 }  // namespace
 
-LinearProgram enhanced_program(const std::vector<Visit>& visits, const Plan& plan, const Chain& chain,
+LinearProgram enhanced_program(const std::vector<Pass>& passes, const Plan& plan, const Chain& chain,
                                const Eigen::Vector3d& tool) {
-    return write_down(EnhancedMap(visits, plan, chain, tool), visits, {plan.steps() + 1});
+    return write_down(EnhancedMap(passes, plan, chain, tool), passes, {plan.steps() + 1});
 }
 
 Calibration evaluate_enhanced(const Measurement& measurement, const Plan& plan, const Chain& chain,
                               const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                               const EvaluationOptions& options) {
     if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
-    const auto visits = collect_visits(measurement, plan, heads, options.uncertainty, LengthKind::lever_arm_corrected);
-    const EnhancedMap map(visits, plan, chain, tool);
+    const auto passes = collect_passes(measurement, plan, heads, options.uncertainty, LengthKind::lever_arm_corrected);
+    check(options.plausible);
+    refuse_foreign_distances(measurement, plan);
+    if (const std::string far = far_reading(measurement, plan); !far.empty()) throw InvalidArgument(far);
+    const EnhancedMap map(passes, plan, chain, tool);
     Calibration calibration{"enhanced", chain, plan.volume(), tool, {}, {}, explain(map, plan), {}};
-    evaluate_linear(map, visits, plan, options.full_covariance, calibration);
+    evaluate_linear(map, passes, plan, options.full_covariance, calibration);
+    calibration.fit = Fit::unchecked;
     if (!is_anything_determined(calibration))
         throw InvalidArgument("enhanced evaluation: nothing can be determined. " + calibration.undetermined.front());
+    refuse_implausible(calibration, measurement, plan, options.plausible);
     return calibration;
 }
 

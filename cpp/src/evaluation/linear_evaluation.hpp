@@ -21,12 +21,12 @@ using Row = Eigen::Array<double, Width, 1>;
 constexpr std::size_t largest_covariance = 10'000;  // values: 800 MB
 constexpr int values_per_reading = 3;               // length, alpha, beta
 
-// What a map is applied to: sets of readings, a Row<Width> each value. Where only one visit's readings differ from
+// What a map is applied to: sets of readings, a Row<Width> each value. Where only one pass's readings differ from
 // zero, or no tilt does, a map may skip the rest.
 template <class Number>
 struct ReadingRows {
     std::vector<Number> values;  // values_per_reading a reading
-    int only_visit = -1;         // -1: all
+    int only_pass = -1;          // -1: all
     bool has_tilts = true;
 };
 
@@ -57,44 +57,44 @@ void take_off_trend(Number* function, int nodes, const Number& end) {
     }
 }
 
-inline std::vector<Row<1>> readings_of(const std::vector<Visit>& visits) {
+inline std::vector<Row<1>> readings_of(const std::vector<Pass>& passes) {
     std::vector<Row<1>> values;
-    for (const Visit& visit : visits)
-        for (const VisitPoint& point : visit.points)
+    for (const Pass& pass : passes)
+        for (const PassPoint& point : pass.points)
             for (int c = 0; c < values_per_reading; ++c) values.push_back(Row<1>(point.reading[c]));
     return values;
 }
 
 // One raw channel of one reading.
 struct ChannelShare {
-    int visit;
+    int pass;
     int reading;
     ChannelEffect effect;
 };
 
-inline std::vector<ChannelShare> channel_shares(const std::vector<Visit>& visits) {
-    // Channels that move no tilt come first in each visit, so that whole blocks can skip the angles.
+inline std::vector<ChannelShare> channel_shares(const std::vector<Pass>& passes) {
+    // Channels that move no tilt come first in each pass, so that whole blocks can skip the angles.
     std::vector<ChannelShare> shares;
-    for (std::size_t v = 0; v < visits.size(); ++v)
+    for (std::size_t v = 0; v < passes.size(); ++v)
         for (const bool tilts : {false, true})
-            for (std::size_t k = 0; k < visits[v].points.size(); ++k)
-                for (const ChannelEffect& effect : visits[v].points[k].effects)
+            for (std::size_t k = 0; k < passes[v].points.size(); ++k)
+                for (const ChannelEffect& effect : passes[v].points[k].effects)
                     if ((effect.tail<2>().cwiseAbs().maxCoeff() > 0.0) == tilts && effect.cwiseAbs().maxCoeff() > 0.0)
-                        shares.push_back({int(v), visits[v].first_reading + int(k), effect});
+                        shares.push_back({int(v), passes[v].first_reading + int(k), effect});
     return shares;
 }
 
 // Calls `take(block, columns)` for the parameters' shares of successive raw channels; `block` holds a row a parameter.
 template <int Width, class Map, class Take>
-void for_each_share(const Map& map, const std::vector<Visit>& visits, Take&& take) {
-    const auto shares = channel_shares(visits);
+void for_each_share(const Map& map, const std::vector<Pass>& passes, Take&& take) {
+    const auto shares = channel_shares(passes);
     ReadingRows<Row<Width>> readings;
-    readings.values.assign(readings_of(visits).size(), Row<Width>::Zero());
+    readings.values.assign(readings_of(passes).size(), Row<Width>::Zero());
     for (std::size_t begin = 0; begin < shares.size();) {
         std::size_t end = begin;
-        readings.only_visit = shares[begin].visit;
+        readings.only_pass = shares[begin].pass;
         readings.has_tilts = false;
-        for (; end < shares.size() && end - begin < Width && shares[end].visit == readings.only_visit; ++end) {
+        for (; end < shares.size() && end - begin < Width && shares[end].pass == readings.only_pass; ++end) {
             for (int c = 0; c < values_per_reading; ++c)
                 readings.values[values_per_reading * shares[end].reading + c][end - begin] = shares[end].effect[c];
             readings.has_tilts =
@@ -121,8 +121,8 @@ std::vector<int> determined_rows(const Map& map, const ParameterLayout& layout) 
 
 // The map from the readings' lengths and tilts (values_per_reading each) to the parameters that are determined.
 template <class Map>
-LinearProgram write_down(const Map& map, const std::vector<Visit>& visits, const ParameterLayout& layout) {
-    ProgramBuilder builder(readings_of(visits).size());
+LinearProgram write_down(const Map& map, const std::vector<Pass>& passes, const ParameterLayout& layout) {
+    ProgramBuilder builder(readings_of(passes).size());
     ReadingRows<Traced> readings;
     for (std::size_t i = 0; i < builder.inputs(); ++i) readings.values.emplace_back(builder, int(i));
     std::vector<Traced> parameters = map.template apply<Traced>(readings);
@@ -136,7 +136,7 @@ LinearProgram write_down(const Map& map, const std::vector<Visit>& visits, const
 
 // Fills functions, squarenesses and covariance of the calibration with what `map.is_determined` names.
 template <class Map>
-void evaluate_linear(const Map& map, const std::vector<Visit>& visits, const Plan& plan, bool full_covariance,
+void evaluate_linear(const Map& map, const std::vector<Pass>& passes, const Plan& plan, bool full_covariance,
                      Calibration& calibration) {
     constexpr int width = 8;  // the rows of a step's sum stay in registers
     const ParameterLayout layout{plan.steps() + 1};
@@ -144,11 +144,11 @@ void evaluate_linear(const Map& map, const std::vector<Visit>& visits, const Pla
     if (full_covariance && rows.size() > largest_covariance)
         throw InvalidArgument("full_covariance: expected at most " + std::to_string(largest_covariance) +
                               " values, the calibration has " + std::to_string(rows.size()));
-    const auto values = map.template apply<Row<1>>({readings_of(visits), -1, true});
+    const auto values = map.template apply<Row<1>>({readings_of(passes), -1, true});
     std::vector<Row<width>> variance(layout.size(), Row<width>::Zero());
     Eigen::MatrixXd covariance;
     if (full_covariance) covariance = Eigen::MatrixXd::Zero(Eigen::Index(rows.size()), Eigen::Index(rows.size()));
-    for_each_share<width>(map, visits, [&](const std::vector<Row<width>>& block, int columns) {
+    for_each_share<width>(map, passes, [&](const std::vector<Row<width>>& block, int columns) {
         for (std::size_t i = 0; i < block.size(); ++i) variance[i] += block[i].square();
         if (!full_covariance) return;
         Eigen::MatrixXd shares(rows.size(), columns);
@@ -175,10 +175,10 @@ void evaluate_linear(const Map& map, const std::vector<Visit>& visits, const Pla
 }
 
 // Sums the solved steps of one axis from home: component c goes to out[c][0] = 0 ... out[c][intervals]. With
-// `only_visit` the lengths of all other visits are known to be 0.
+// `only_pass` the lengths of all other passes are known to be 0.
 template <class Number>
-void add_up_steps(const AxisSystem& system, const std::vector<Number>& lengths, const std::vector<Visit>& visits,
-                  int only_visit, const std::array<Number*, 3>& out) {
+void add_up_steps(const AxisSystem& system, const std::vector<Number>& lengths, const std::vector<Pass>& passes,
+                  int only_pass, const std::array<Number*, 3>& out) {
     Number x = Number::Zero(), y = x, z = x;
     out[0][0] = out[1][0] = out[2][0] = x;
     for (std::size_t i = 0; i < system.intervals.size(); ++i) {
@@ -190,8 +190,8 @@ void add_up_steps(const AxisSystem& system, const std::vector<Number>& lengths, 
         }
         for (std::size_t r = 0; !interval.is_bridged && r < interval.steps.size(); ++r) {
             const Step& step = interval.steps[r];
-            if (only_visit >= 0 && only_visit != step.visit) continue;
-            const Number* reading = &lengths[visits[step.visit].first_reading + step.point];
+            if (only_pass >= 0 && only_pass != step.pass) continue;
+            const Number* reading = &lengths[passes[step.pass].first_reading + step.point];
             const Number increment = step.sign * (reading[1] - reading[0]);
             const auto share = interval.solution->pseudoinverse.col(Eigen::Index(r));
             x += share[0] * increment;

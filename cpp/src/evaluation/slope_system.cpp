@@ -10,63 +10,62 @@ namespace {
 // A sum of lengths, by reading.
 using Sum = std::map<int, double>;
 
-void add_step(Sum& sum, const std::vector<Visit>& visits, const Step& step) {
-    const int from = visits[step.visit].first_reading + step.point;
+void add_step(Sum& sum, const std::vector<Pass>& passes, const Step& step) {
+    const int from = passes[step.pass].first_reading + step.point;
     sum[from] -= step.sign;
     sum[from + 1] += step.sign;
 }
 
 // The sum of the increments of one line over the travel of one axis, counted in the axis' direction; empty where it
 // cannot be completed.
-Sum sum_over_travel(const std::vector<Visit>& visits, int visit, const AxisSystem& axis) {
+Sum sum_over_travel(const std::vector<Pass>& passes, int pass, const AxisSystem& axis) {
     Sum sum;
-    const Eigen::RowVector3d direction = visits[visit].direction().transpose();
+    const Eigen::RowVector3d direction = passes[pass].direction().transpose();
     for (const StepSystem& interval : axis.intervals) {
         const auto own = std::find_if(interval.steps.begin(), interval.steps.end(),
-                                      [&](const Step& step) { return step.visit == visit; });
+                                      [&](const Step& step) { return step.pass == pass; });
         if (own != interval.steps.end()) {
-            add_step(sum, visits, *own);
+            add_step(sum, passes, *own);
             continue;
         }
-        const auto predicted = solve_length_along(interval, direction, visits);
+        const auto predicted = solve_length_along(interval, direction, passes);
         if (!predicted) return {};
         for (const ReadingTerm& term : *predicted) sum[term.reading] += term.coefficient;
     }
     return sum;
 }
 
-Sum sum_of_scale_line(const Visit& visit) {
-    if (!visit.points.front().has_length || !visit.points.back().has_length) return {};
-    const auto moved =
-        std::find_if(all_axes.begin(), all_axes.end(), [&](Axis axis) { return visit.line.moves(axis); });
-    const double sign = visit.line.sign(*moved);
-    return {{visit.first_reading, -sign}, {visit.first_reading + int(visit.points.size()) - 1, sign}};
+Sum sum_of_scale_line(const Pass& pass) {
+    if (!pass.points.front().has_length || !pass.points.back().has_length) return {};
+    const auto moved = std::find_if(all_axes.begin(), all_axes.end(), [&](Axis axis) { return pass.line.moves(axis); });
+    const double sign = pass.line.sign(*moved);
+    return {{pass.first_reading, -sign}, {pass.first_reading + int(pass.points.size()) - 1, sign}};
 }
 
 }  // namespace
 
-SlopeSystem make_slope_system(const std::vector<Visit>& visits, const Plan& plan, const AxisSystems& lengths,
+SlopeSystem make_slope_system(const std::vector<Pass>& passes, const Plan& plan, const AxisSystems& lengths,
                               const std::vector<bool>& usable) {
-    std::vector<const Visit*> visit_of_reading;
+    std::vector<const Pass*> pass_of_reading;
     std::vector<double> variance_of_reading;
-    for (const Visit& visit : visits)
-        for (const VisitPoint& point : visit.points) {
-            visit_of_reading.push_back(&visit);
+    for (const Pass& pass : passes)
+        for (const PassPoint& point : pass.points) {
+            pass_of_reading.push_back(&pass);
             variance_of_reading.push_back(point.variance()[0]);
         }
 
     SlopeSystem system;
     std::vector<Eigen::RowVectorXd> equations;
     std::vector<double> uncertainty;
-    const int unknowns = SlopeSystem::laser_angle(int(visits.size()), 0);
-    for (std::size_t v = 0; v < visits.size(); ++v)
+    const int unknowns = SlopeSystem::laser_angle(int(passes.size()), 0);
+    for (std::size_t v = 0; v < passes.size(); ++v)
         for (const Axis axis : all_axes) {
-            if (!usable[v] || !visits[v].line.moves(axis)) continue;
-            const Sum sum = visits[v].is_scale_line ? sum_of_scale_line(visits[v])
-                                                    : sum_over_travel(visits, int(v), lengths[index(axis)]);
+            if (!usable[v] || !passes[v].line.moves(axis)) continue;
+            const Sum sum = passes[v].is_scale_line ? sum_of_scale_line(passes[v])
+                                                    : sum_over_travel(passes, int(v), lengths[index(axis)]);
             if (sum.empty()) continue;
             Eigen::RowVectorXd equation = Eigen::RowVectorXd::Zero(unknowns);
-            const Eigen::Vector3d direction = visits[v].direction();
+            const Eigen::Vector3d direction = passes[v].direction();
             equation[SlopeSystem::scale(axis)] = direction[index(axis)];
             for (const Squareness s : all_squarenesses) {
                 const SquarenessTerm term = squareness_term(s);
@@ -77,9 +76,9 @@ SlopeSystem make_slope_system(const std::vector<Visit>& visits, const Plan& plan
             double variance = 0.0;
             system.sums_.emplace_back();
             for (const auto& [reading, coefficient] : sum) {
-                const Visit& visit = *visit_of_reading[reading];
-                const Eigen::Vector2d lateral = visit.points[reading - visit.first_reading].lateral;
-                const int angles = SlopeSystem::laser_angle(int(&visit - visits.data()), 0);
+                const Pass& pass = *pass_of_reading[reading];
+                const Eigen::Vector2d lateral = pass.points[reading - pass.first_reading].lateral;
+                const int angles = SlopeSystem::laser_angle(int(&pass - passes.data()), 0);
                 equation[angles] -= coefficient * lateral.y();
                 equation[angles + 1] += coefficient * lateral.x();
                 variance += coefficient * coefficient * variance_of_reading[reading];

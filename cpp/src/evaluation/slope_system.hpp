@@ -17,7 +17,7 @@ public:
     static constexpr int first_laser_angle = 6;
     static int scale(Axis axis) { return index(axis); }                      // EXX(X), EYY(Y), EZZ(Z)
     static int squareness(Squareness s) { return 3 + static_cast<int>(s); }  // C0Y, B0Z, A0Z
-    static int laser_angle(int visit, int which) { return first_laser_angle + 2 * visit + which; }
+    static int laser_angle(int pass, int which) { return first_laser_angle + 2 * pass + which; }
 
     bool determines_scale(Axis axis) const { return determined_[scale(axis)]; }
     bool determines(Squareness s) const { return determined_[squareness(s)]; }
@@ -42,19 +42,19 @@ public:
     }
 
     template <class Number>
-    void correct_for_laser_angles(const std::vector<Number>& slopes, const std::vector<Visit>& visits,
+    void correct_for_laser_angles(const std::vector<Number>& slopes, const std::vector<Pass>& passes,
                                   std::vector<Number>& lengths) const {
-        for (std::size_t v = 0; v < visits.size(); ++v)
-            for (std::size_t k = 0; k < visits[v].points.size(); ++k) {
-                const Eigen::Vector2d lateral = visits[v].points[k].lateral;
-                Number& length = lengths[visits[v].first_reading + k];
+        for (std::size_t v = 0; v < passes.size(); ++v)
+            for (std::size_t k = 0; k < passes[v].points.size(); ++k) {
+                const Eigen::Vector2d lateral = passes[v].points[k].lateral;
+                Number& length = lengths[passes[v].first_reading + k];
                 length += lateral.y() * slopes[laser_angle(int(v), 0)] - lateral.x() * slopes[laser_angle(int(v), 1)];
                 settle(length);
             }
     }
 
 private:
-    friend SlopeSystem make_slope_system(const std::vector<Visit>&, const Plan&, const AxisSystems&,
+    friend SlopeSystem make_slope_system(const std::vector<Pass>&, const Plan&, const AxisSystems&,
                                          const std::vector<bool>&);
 
     struct Term {
@@ -69,7 +69,7 @@ private:
 
 // A step that a line has lost is taken from the other lines' solution of it; a sum that cannot be completed makes no
 // equation.
-SlopeSystem make_slope_system(const std::vector<Visit>& visits, const Plan& plan, const AxisSystems& lengths,
+SlopeSystem make_slope_system(const std::vector<Pass>& passes, const Plan& plan, const AxisSystems& lengths,
                               const std::vector<bool>& usable);
 
 }  // namespace stepdiag

@@ -39,18 +39,18 @@ struct Kind {
 };
 constexpr Kind angles{0, 2, 1}, lengths{2, 1, 0};
 
-Equations equations_of(const std::vector<Step>& steps, const std::vector<Visit>& visits, const Kind& kind) {
+Equations equations_of(const std::vector<Step>& steps, const std::vector<Pass>& passes, const Kind& kind) {
     Equations equations(kind.rows_per_step * steps.size(), 3);
     for (std::size_t s = 0; s < steps.size(); ++s)
         for (int r = 0; r < kind.rows_per_step; ++r)
             equations.row(kind.rows_per_step * s + r) =
-                visits[steps[s].visit].frame.col(kind.first_column + r).transpose();
+                passes[steps[s].pass].frame.col(kind.first_column + r).transpose();
     return equations;
 }
 
 // The component of one interval along a direction as a sum of readings; none where they do not determine it.
 std::optional<ReadingSum> solve_along(const StepSystem& interval, const Eigen::RowVector3d& direction,
-                                      const std::vector<Visit>& visits, const Kind& kind) {
+                                      const std::vector<Pass>& passes, const Kind& kind) {
     constexpr double negligible = 1e-9;
     ReadingSum sum;
     if (interval.is_bridged) {
@@ -63,10 +63,10 @@ std::optional<ReadingSum> solve_along(const StepSystem& interval, const Eigen::R
         return sum;
     }
     const Eigen::RowVectorXd weights = direction * interval.solution->pseudoinverse;
-    if ((weights * equations_of(interval.steps, visits, kind) - direction).norm() > negligible) return std::nullopt;
+    if ((weights * equations_of(interval.steps, passes, kind) - direction).norm() > negligible) return std::nullopt;
     for (Eigen::Index row = 0; row < weights.size(); ++row) {
         const Step& step = interval.steps[row / kind.rows_per_step];
-        const int reading = visits[step.visit].first_reading + step.point;
+        const int reading = passes[step.pass].first_reading + step.point;
         const int channel = kind.first_channel + int(row % kind.rows_per_step);
         sum.push_back({reading, channel, -step.sign * weights[row]});
         sum.push_back({reading + 1, channel, step.sign * weights[row]});
@@ -77,12 +77,12 @@ std::optional<ReadingSum> solve_along(const StepSystem& interval, const Eigen::R
 // Builds the systems of all three axes, and bridges gaps: intervals that would be determined if no reading were lost.
 class SystemBuilder {
 public:
-    SystemBuilder(const std::vector<Visit>& visits, const std::array<AxisSteps, 3>& steps, const Plan& plan, Kind kind,
+    SystemBuilder(const std::vector<Pass>& passes, const std::array<AxisSteps, 3>& steps, const Plan& plan, Kind kind,
                   std::vector<std::vector<bool>> has_reading)
-        : visits_(visits), steps_(steps), plan_(plan), kind_(kind), has_reading_(std::move(has_reading)) {
-        for (const Visit& visit : visits) {
+        : passes_(passes), steps_(steps), plan_(plan), kind_(kind), has_reading_(std::move(has_reading)) {
+        for (const Pass& pass : passes) {
             variances_.emplace_back();
-            for (const VisitPoint& point : visit.points) variances_.back().push_back(point.variance());
+            for (const PassPoint& point : pass.points) variances_.back().push_back(point.variance());
         }
     }
 
@@ -112,16 +112,16 @@ private:
         for (std::size_t i = 0; i < steps_[index(axis)].size(); ++i) {
             StepSystem interval;
             for (const Step& step : steps_[index(axis)][i])
-                if (has_reading_[step.visit][step.point] && has_reading_[step.visit][step.point + 1])
+                if (has_reading_[step.pass][step.point] && has_reading_[step.pass][step.point + 1])
                     interval.steps.push_back(step);
             Eigen::VectorXd uncertainty(kind_.rows_per_step * interval.steps.size());
             for (Eigen::Index row = 0; row < uncertainty.size(); ++row)
                 uncertainty[row] =
                     std::sqrt(step_variance(interval.steps[row / kind_.rows_per_step], row % kind_.rows_per_step));
-            interval.solution = solver.solve(equations_of(interval.steps, visits_, kind_), uncertainty);
+            interval.solution = solver.solve(equations_of(interval.steps, passes_, kind_), uncertainty);
             std::copy_n(interval.solution->determined.begin(), 3, interval.determined.begin());
             if (interval.steps.size() < steps_[index(axis)][i].size()) {
-                const Equations complete = equations_of(steps_[index(axis)][i], visits_, kind_);
+                const Equations complete = equations_of(steps_[index(axis)][i], passes_, kind_);
                 const auto possible = complete_solver.solve(complete, Eigen::VectorXd::Ones(complete.rows()));
                 if (possible->rank > interval.solution->rank) gaps_.push_back({index(axis), int(i)});
             }
@@ -131,7 +131,7 @@ private:
 
     double step_variance(const Step& step, Eigen::Index row) const {
         const auto channel = kind_.first_channel + row;
-        return variances_[step.visit][step.point][channel] + variances_[step.visit][step.point + 1][channel];
+        return variances_[step.pass][step.point][channel] + variances_[step.pass][step.point + 1][channel];
     }
 
     // The unknown number of the first component of a gap; none where the interval is no gap.
@@ -145,7 +145,7 @@ private:
         if (gaps_.empty() || gaps_.size() > most_gaps) return;
         std::vector<Bridge> bridges;
         for (std::size_t g = 0; g < gaps_.size(); ++g) add_steps_inside(g, bridges);
-        for (std::size_t v = 0; v < visits_.size(); ++v) add_reaches_over_lost_points(int(v), bridges);
+        for (std::size_t v = 0; v < passes_.size(); ++v) add_reaches_over_lost_points(int(v), bridges);
         Eigen::MatrixXd equations(bridges.size(), 3 * gaps_.size());
         Eigen::VectorXd uncertainty(bridges.size());
         for (std::size_t b = 0; b < bridges.size(); ++b) {
@@ -166,46 +166,46 @@ private:
     // The steps that were read in a gap: they do not suffice, but they count.
     void add_steps_inside(std::size_t gap, std::vector<Bridge>& bridges) const {
         const StepSystem& interval = systems_[gaps_[gap].axis].intervals[gaps_[gap].interval];
-        const Equations equations = equations_of(interval.steps, visits_, kind_);
+        const Equations equations = equations_of(interval.steps, passes_, kind_);
         for (Eigen::Index row = 0; row < equations.rows(); ++row) {
             const Step& step = interval.steps[row / kind_.rows_per_step];
             Bridge bridge{
                 Eigen::RowVectorXd::Zero(3 * gaps_.size()), {}, step_variance(step, row % kind_.rows_per_step)};
             bridge.coefficients.segment<3>(3 * gap) = equations.row(row);
-            add_difference(bridge.right, step.visit, step.point, step.point + 1, int(row % kind_.rows_per_step),
+            add_difference(bridge.right, step.pass, step.point, step.point + 1, int(row % kind_.rows_per_step),
                            step.sign);
             bridges.push_back(std::move(bridge));
         }
     }
 
     // The change from the last reading before lost points to the first one after them is the sum of the steps between.
-    void add_reaches_over_lost_points(int visit, std::vector<Bridge>& bridges) const {
-        if (visits_[visit].is_scale_line) return;
+    void add_reaches_over_lost_points(int pass, std::vector<Bridge>& bridges) const {
+        if (passes_[pass].is_scale_line) return;
         int last = -1;
-        for (int k = 0; k < int(visits_[visit].points.size()); ++k) {
-            if (!has_reading_[visit][k]) continue;
+        for (int k = 0; k < int(passes_[pass].points.size()); ++k) {
+            if (!has_reading_[pass][k]) continue;
             if (last >= 0 && k > last + 1)
-                for (int r = 0; r < kind_.rows_per_step; ++r) add_reach(visit, last, k, r, bridges);
+                for (int r = 0; r < kind_.rows_per_step; ++r) add_reach(pass, last, k, r, bridges);
             last = k;
         }
     }
 
-    void add_reach(int visit, int from, int to, int row, std::vector<Bridge>& bridges) const {
+    void add_reach(int pass, int from, int to, int row, std::vector<Bridge>& bridges) const {
         const auto channel = kind_.first_channel + row;
         Bridge bridge{Eigen::RowVectorXd::Zero(3 * gaps_.size()),
                       {},
-                      variances_[visit][from][channel] + variances_[visit][to][channel]};
-        add_difference(bridge.right, visit, from, to, row, 1.0);
+                      variances_[pass][from][channel] + variances_[pass][to][channel]};
+        add_difference(bridge.right, pass, from, to, row, 1.0);
         for (int k = from; k < to; ++k) {
-            const PlanPoint &start = visits_[visit].points[k].plan, &end = visits_[visit].points[k + 1].plan;
+            const PlanPoint &start = passes_[pass].points[k].plan, &end = passes_[pass].points[k + 1].plan;
             const int axis = index(*end.moved), interval = std::min(start.node[axis], end.node[axis]);
             const double sign = end.node[axis] > start.node[axis] ? 1.0 : -1.0;
-            const Eigen::RowVector3d direction = sign * visits_[visit].frame.col(kind_.first_column + row).transpose();
+            const Eigen::RowVector3d direction = sign * passes_[pass].frame.col(kind_.first_column + row).transpose();
             if (const auto first = unknown(axis, interval)) {
                 bridge.coefficients.segment<3>(*first) += direction;
                 continue;
             }
-            const auto known = solve_along(systems_[axis].intervals[interval], direction, visits_, kind_);
+            const auto known = solve_along(systems_[axis].intervals[interval], direction, passes_, kind_);
             if (!known) return;
             for (const ReadingTerm& term : *known)
                 bridge.right.push_back({term.reading, term.channel, -term.coefficient});
@@ -213,8 +213,8 @@ private:
         if (bridge.coefficients.cwiseAbs().maxCoeff() > 0.0) bridges.push_back(std::move(bridge));
     }
 
-    void add_difference(ReadingSum& sum, int visit, int from, int to, int row, double factor) const {
-        const int first = visits_[visit].first_reading, channel = kind_.first_channel + row;
+    void add_difference(ReadingSum& sum, int pass, int from, int to, int row, double factor) const {
+        const int first = passes_[pass].first_reading, channel = kind_.first_channel + row;
         sum.push_back({first + from, channel, -factor});
         sum.push_back({first + to, channel, factor});
     }
@@ -254,44 +254,44 @@ private:
         return text.str();
     }
 
-    const std::vector<Visit>& visits_;
+    const std::vector<Pass>& passes_;
     const std::array<AxisSteps, 3>& steps_;
     const Plan& plan_;
     Kind kind_;
-    std::vector<std::vector<bool>> has_reading_;  // by visit and point
+    std::vector<std::vector<bool>> has_reading_;  // by pass and point
     std::vector<std::vector<Eigen::Vector3d>> variances_;
     AxisSystems systems_;
     std::vector<Gap> gaps_;
 };
 
 template <class HasReading>
-std::vector<std::vector<bool>> map_points(const std::vector<Visit>& visits, HasReading&& has_reading) {
+std::vector<std::vector<bool>> map_points(const std::vector<Pass>& passes, HasReading&& has_reading) {
     std::vector<std::vector<bool>> result;
-    for (std::size_t v = 0; v < visits.size(); ++v) {
+    for (std::size_t v = 0; v < passes.size(); ++v) {
         result.emplace_back();
-        for (const VisitPoint& point : visits[v].points) result.back().push_back(has_reading(int(v), point));
+        for (const PassPoint& point : passes[v].points) result.back().push_back(has_reading(int(v), point));
     }
     return result;
 }
 
 }  // namespace
 
-AxisSystems make_angle_systems(const std::vector<Visit>& visits, const std::array<AxisSteps, 3>& steps,
+AxisSystems make_angle_systems(const std::vector<Pass>& passes, const std::array<AxisSteps, 3>& steps,
                                const Plan& plan) {
-    return SystemBuilder(visits, steps, plan, angles,
-                         map_points(visits, [](int, const VisitPoint& p) { return p.has_tilt; }))
+    return SystemBuilder(passes, steps, plan, angles,
+                         map_points(passes, [](int, const PassPoint& p) { return p.has_tilt; }))
         .build();
 }
 
-AxisSystems make_length_systems(const std::vector<Visit>& visits, const std::array<AxisSteps, 3>& steps,
+AxisSystems make_length_systems(const std::vector<Pass>& passes, const std::array<AxisSteps, 3>& steps,
                                 const Plan& plan, const std::vector<bool>& usable) {
-    const auto has_length = [&](int visit, const VisitPoint& point) { return usable[visit] && point.has_length; };
-    return SystemBuilder(visits, steps, plan, lengths, map_points(visits, has_length)).build();
+    const auto has_length = [&](int pass, const PassPoint& point) { return usable[pass] && point.has_length; };
+    return SystemBuilder(passes, steps, plan, lengths, map_points(passes, has_length)).build();
 }
 
 std::optional<ReadingSum> solve_length_along(const StepSystem& interval, const Eigen::RowVector3d& direction,
-                                             const std::vector<Visit>& visits) {
-    return solve_along(interval, direction, visits, lengths);
+                                             const std::vector<Pass>& passes) {
+    return solve_along(interval, direction, passes, lengths);
 }
 
 }  // namespace stepdiag

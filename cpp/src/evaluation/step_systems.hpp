@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/visits.hpp"
+#include "evaluation/passes.hpp"
 #include "stepdiag/evaluation/least_squares.hpp"
 
 namespace stepdiag {
@@ -39,15 +39,15 @@ struct AxisSystem {
 using AxisSystems = std::array<AxisSystem, 3>;
 
 // Angles: increments of (alpha, beta) are the first two rows of machine_R_line^T times the increment of theta.
-AxisSystems make_angle_systems(const std::vector<Visit>& visits, const std::array<AxisSteps, 3>& steps,
+AxisSystems make_angle_systems(const std::vector<Pass>& passes, const std::array<AxisSteps, 3>& steps,
                                const Plan& plan);
 
-// Lengths: increments are the line's direction times the increment of delta. Visits that are not `usable` are left out.
-AxisSystems make_length_systems(const std::vector<Visit>& visits, const std::array<AxisSteps, 3>& steps,
+// Lengths: increments are the line's direction times the increment of delta. Passes that are not `usable` are left out.
+AxisSystems make_length_systems(const std::vector<Pass>& passes, const std::array<AxisSteps, 3>& steps,
                                 const Plan& plan, const std::vector<bool>& usable);
 
 // What an interval adds to the length along a direction, as a sum of lengths; none where they do not determine it.
 std::optional<ReadingSum> solve_length_along(const StepSystem& interval, const Eigen::RowVector3d& direction,
-                                             const std::vector<Visit>& visits);
+                                             const std::vector<Pass>& passes);
 
 }  // namespace stepdiag

@@ -45,14 +45,6 @@ std::string row_name(const Station& station, std::size_t row) {
 
 }  // namespace
 
-Approaches approaches(const Line& line, Direction direction) {
-    const int travel = direction == Direction::forward ? 1 : -1;
-    Approaches approaches = all_positive;
-    for (const Axis axis : all_axes)
-        if (line.sign(axis) * travel < 0) approaches[index(axis)] = Approach::negative;
-    return approaches;
-}
-
 Measurement::Measurement(std::vector<Station> stations, std::vector<Channel> channels)
     : stations_(std::move(stations)), channels_(std::move(channels)) {
     if (stations_.empty()) throw InvalidArgument("measurement: expected at least one row");

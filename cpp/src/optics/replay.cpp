@@ -15,7 +15,7 @@
 #include <hwy/foreach_target.h>  // compiles this file once for every instruction set
 
 // Vectors before the physics that is calculated with them:
-#include "core/lanes-inl.hpp"
+#include "core/simd-inl.hpp"
 //
 #include "optics/encounter-inl.hpp"
 #include "optics/prepared_route.hpp"
@@ -97,8 +97,6 @@ void replay_lanes(const std::vector<Encounter>& route, const LaneRays& rays, std
         copy(from_lane(aside.results, lanes < width ? 0 : width - left), left, from_lane(results, lanes - left));
 }
 
-const char* target() { return hwy::TargetName(HWY_TARGET); }
-
 }  // namespace HWY_NAMESPACE
 }  // namespace stepdiag
 HWY_AFTER_NAMESPACE();
@@ -108,33 +106,12 @@ namespace stepdiag {
 namespace {
 
 HWY_EXPORT(replay_lanes);
-HWY_EXPORT(target);
 
 }  // namespace
 
 void replay(const std::vector<Encounter>& route, const LaneRays& rays, std::size_t lanes, double gap,
             const LaneResults& results) {
     if (lanes > 0) HWY_DYNAMIC_DISPATCH(replay_lanes)(route, rays, lanes, gap, results);
-}
-
-std::string replay_target() { return HWY_DYNAMIC_DISPATCH(target)(); }
-
-std::vector<std::string> replay_targets() {
-    std::vector<std::string> names;
-    for (const std::int64_t each : hwy::SupportedAndGeneratedTargets()) names.push_back(hwy::TargetName(each));
-    return names;
-}
-
-void choose_replay_target(const std::string& name) {
-    std::string known;
-    for (const std::int64_t each : hwy::SupportedAndGeneratedTargets()) {
-        if (name == hwy::TargetName(each)) {
-            hwy::GetChosenTarget().Update(each);
-            return;
-        }
-        known += std::string(" ") + hwy::TargetName(each);
-    }
-    throw InvalidArgument("replay target: \"" + name + "\": expected one of" + known);
 }
 
 }  // namespace stepdiag

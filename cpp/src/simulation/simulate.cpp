@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "simulation/visit_readings.hpp"
+#include "simulation/pass_readings.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -34,33 +34,33 @@ Measurement simulate(const Machine& machine, const Plan& plan, const Heads& head
     std::vector<Channel> channels;
     for (const std::string& name : names) channels.push_back({name, {}});
     const double seconds = options.seconds_per_reading.value_or(0.0);
-    for (const PlannedVisit& visit : planned_visits(plan, options)) {
-        const Line& line = visit.line;
+    for (const PlannedPass& pass : planned_passes(plan, options.repeats, options.backward)) {
+        const Line& line = pass.line;
         const Head& head = heads.of(line);
         const Eigen::Vector2d mirror = mirror_size(head, plan);
         const Misalignment misalignment = misalignment_of(options, line);
         check_misalignment(misalignment, head, line);
         const HeadSetup setup =
-            set_up(head, plan.frame(line), plan.points(line, visit.run).front().commanded + machine.tool(), mirror,
+            set_up(head, plan.frame(line), plan.points(line, pass.run).front().commanded + machine.tool(), mirror,
                    misalignment);
         std::vector<Pose> poses;
-        const std::vector<PlanPoint> points = points_of(plan, visit);
+        const std::vector<PlanPoint> points = points_of(plan, pass);
         for (std::size_t k = 0; k < points.size(); ++k) {
-            const std::size_t point = visit.direction == Direction::forward ? k : points.size() - 1 - k;
-            stations.push_back({visit.run, line, int(point), visit.direction, points[k].commanded});
-            poses.push_back(machine.pose(points[k].commanded, approaches(line, visit.direction)));
+            const std::size_t point = pass.direction == Direction::forward ? k : points.size() - 1 - k;
+            stations.push_back({pass.run, line, int(point), pass.direction, points[k].commanded});
+            poses.push_back(machine.pose(points[k].commanded, approaches(line, pass.direction)));
         }
 
         std::vector<SignalRow> rows;
         if (head.design) {
             const auto reader = readers.try_emplace(&head, head, mirror, traced_conditions(head, options)).first;
-            rows = read_traced(reader->second, setup, poses, visit.first_row, count);
+            rows = read_traced(reader->second, setup, poses, pass.first_row, count);
         } else {
             rows = read_defined(head, setup, poses, misalignment, options);
         }
         for (std::size_t k = 0; k < rows.size(); ++k) {
-            const std::uint64_t row = visit.first_row + k;
-            const double elapsed = double(row - visit.setup_row) * seconds;
+            const std::uint64_t row = pass.first_row + k;
+            const double elapsed = double(row - pass.setup_row) * seconds;
             add_setup(rows[k], names, misalignment, elapsed);
             add_noise(rows[k], names, options.noise, row);
             for (std::size_t c = 0; c < channels.size(); ++c) channels[c].value.push_back(rows[k][c]);

@@ -1,6 +1,6 @@
 #include "stepdiag/simulation/virtual_readout.hpp"
 
-#include "simulation/visit_readings.hpp"
+#include "simulation/pass_readings.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {

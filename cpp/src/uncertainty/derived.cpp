@@ -43,25 +43,6 @@ std::string text_of(const Eigen::Vector3d& point) {
 
 }  // namespace
 
-std::vector<CalibrationEntry> calibration_entries(const Calibration& calibration) {
-    std::vector<CalibrationEntry> entries;
-    for (int i = 0; i < function_count; ++i)
-        if (const auto& function = calibration.functions[i])
-            for (const double position : function->position) entries.push_back({FunctionId::at(i).name(), position});
-    for (const Squareness s : all_squarenesses)
-        if (calibration.squarenesses[static_cast<int>(s)]) entries.push_back({name(s), undetermined});
-    return entries;
-}
-
-VectorXd calibration_values(const Calibration& calibration) {
-    std::vector<double> values;
-    for (const auto& function : calibration.functions)
-        if (function) values.insert(values.end(), function->value.begin(), function->value.end());
-    for (const auto& squareness : calibration.squarenesses)
-        if (squareness) values.push_back(squareness->value);
-    return Eigen::Map<const VectorXd>(values.data(), Index(values.size()));
-}
-
 Calibration with_covariance(Calibration calibration, const MatrixXd& covariance) {
     const EntryLayout layout(calibration);
     if (covariance.rows() != layout.size() || covariance.cols() != layout.size())

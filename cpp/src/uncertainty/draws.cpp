@@ -5,7 +5,7 @@
 #include <string>
 
 #include "stepdiag/core/error.hpp"
-#include "stepdiag/core/random_lanes.hpp"
+#include "stepdiag/core/random_blocks.hpp"
 
 namespace stepdiag {
 namespace {

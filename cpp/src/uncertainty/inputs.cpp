@@ -1,9 +1,7 @@
 #include "stepdiag/uncertainty/inputs.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <set>
 
@@ -182,27 +180,6 @@ void check(const UncertainInputs& inputs) {
         check_members(inputs, correlated, taken);
         correlation_factor(correlated.correlation, "correlation");
     }
-}
-
-Eigen::MatrixXd correlation_factor(const Eigen::MatrixXd& correlation, const std::string& name) {
-    // Entries are given with a few digits; what rounding of doubles makes of them is far below.
-    constexpr double rounding = 1e-9;
-    if (correlation.rows() != correlation.cols() || correlation.rows() == 0)
-        throw InvalidArgument(name + ": expected a square matrix, got " + std::to_string(correlation.rows()) + " x " +
-                              std::to_string(correlation.cols()));
-    if (!correlation.allFinite()) throw InvalidArgument(name + ": expected finite numbers");
-    if (!((correlation.diagonal().array() - 1.0).abs() < rounding).all())
-        throw InvalidArgument(name + ": expected 1 on the diagonal");
-    if (!((correlation - correlation.transpose()).array().abs() < rounding).all())
-        throw InvalidArgument(name + ": expected a symmetric matrix");
-
-    const Eigen::LDLT<Eigen::MatrixXd> ldlt(correlation);
-    const Eigen::VectorXd roots = ldlt.vectorD().cwiseMax(0.0).cwiseSqrt();
-    Eigen::MatrixXd factor = Eigen::MatrixXd(ldlt.matrixL()) * roots.asDiagonal();
-    factor = ldlt.transpositionsP().transpose() * factor;
-    if (!((factor * factor.transpose() - correlation).array().abs() < rounding).all())
-        throw InvalidArgument(name + ": expected a positive semidefinite matrix: no numbers are correlated like that");
-    return factor;
 }
 
 }  // namespace stepdiag

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <variant>
 
-#include "simulation/visit_readings.hpp"
+#include "simulation/pass_readings.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -147,8 +147,8 @@ void NoiseEffects::sum_walks(MatrixXd& by_row, bool by_setup) const {
     const auto starts = [&](Index r) {  // a backward run goes on with the set-up of the forward one
         if (r == 0) return true;
         const Station &before = stations[std::size_t(r) - 1], &here = stations[std::size_t(r)];
-        const bool same_visit = before.run == here.run && before.line == here.line;
-        return by_setup && !same_visit && here.direction == Direction::forward;
+        const bool same_pass = before.run == here.run && before.line == here.line;
+        return by_setup && !same_pass && here.direction == Direction::forward;
     };
     // The step to a row acts on it and all that follow, up to where the walk begins anew.
     for (Index r = by_row.cols() - 2; r >= 0; --r)

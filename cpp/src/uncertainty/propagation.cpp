@@ -1,121 +1,20 @@
 #include "stepdiag/uncertainty/propagation.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <set>
+#include <limits>
 
+#include "batch/batch_method.hpp"
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/uncertainty/derived.hpp"
 #include "uncertainty/contributions.hpp"
+#include "uncertainty/noise_effects.hpp"
 
 namespace stepdiag {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-Contributions::Contributions(std::vector<SampleModel::Output> outputs, VectorXd value, bool full_covariance)
-    : full_covariance_(full_covariance) {
-    const Index n = value.size();
-    sum_.outputs = std::move(outputs);
-    sum_.value = std::move(value);
-    variance_ = satterthwaite_ = sum_.between_groups = VectorXd::Zero(n);
-    sum_.first_order = sum_.second_order = MatrixXd::Zero(n, 0);
-    if (full_covariance) sum_.covariance = MatrixXd::Zero(n, n);
-}
-
-VectorXd& Contributions::group_variance(const std::string& group) {
-    const auto found = std::find(groups_.begin(), groups_.end(), group);
-    if (found != groups_.end()) return group_variances_[std::size_t(found - groups_.begin())];
-    groups_.push_back(group);
-    return group_variances_.emplace_back(VectorXd::Zero(variance_.size()));
-}
-
-void Contributions::add_estimate(const VectorXd& variance, double degrees_of_freedom) {
-    satterthwaite_ += variance.cwiseAbs2() / degrees_of_freedom;
-}
-
-void Contributions::add(const std::string& group, const MatrixXd& effect, double degrees_of_freedom) {
-    const VectorXd variance = effect.rowwise().squaredNorm();
-    variance_ += variance;
-    group_variance(group) += variance;
-    add_estimate(variance, degrees_of_freedom);
-    if (full_covariance_) sum_.covariance.selfadjointView<Eigen::Lower>().rankUpdate(effect);
-}
-
-void Contributions::add_covariance(const std::string& group, const MatrixXd& covariance) {
-    variance_ += covariance.diagonal();
-    group_variance(group) += covariance.diagonal();
-    if (full_covariance_) sum_.covariance += covariance;
-}
-
-void Contributions::add_inputs(const std::vector<PropagatedInput>& inputs, const MatrixXd& first_order,
-                               const MatrixXd& second_order, const MatrixXd& correlation) {
-    sum_.inputs = inputs;
-    sum_.first_order = first_order;
-    sum_.second_order = second_order;
-    const bool correlated = correlation.size() > 0;
-    const Index count = Index(inputs.size());
-    std::map<int, std::vector<Index>> pooled;  // by estimate; negative: its own
-    for (Index i = 0; i < count; ++i) {
-        const int estimate = inputs[std::size_t(i)].estimate;
-        pooled[estimate < 0 ? -1 - int(i) : estimate].push_back(i);
-        VectorXd& group = group_variance(inputs[std::size_t(i)].group);
-        group += first_order.col(i).cwiseAbs2();
-        variance_ += first_order.col(i).cwiseAbs2();
-        for (Index j = 0; correlated && j < count; ++j) {
-            if (j == i || correlation(i, j) == 0.0) continue;
-            const VectorXd covariance = correlation(i, j) * first_order.col(i).cwiseProduct(first_order.col(j));
-            const bool together = inputs[std::size_t(i)].group == inputs[std::size_t(j)].group;
-            (together ? group : sum_.between_groups) += covariance;
-            variance_ += covariance;
-            // Welch and Satterthwaite suppose independent estimates; a correlation of known uncertainties does not
-            // matter.
-            if (std::isfinite(inputs[std::size_t(i)].degrees_of_freedom))
-                satterthwaite_ = (covariance.array() != 0.0)
-                                     .select(VectorXd::Constant(variance_.size(), std::nan("")), satterthwaite_);
-        }
-    }
-    for (const auto& [estimate, members] : pooled) {
-        VectorXd variance = VectorXd::Zero(variance_.size());
-        for (const Index i : members) variance += first_order.col(i).cwiseAbs2();
-        add_estimate(variance, inputs[std::size_t(members.front())].degrees_of_freedom);
-    }
-    if (full_covariance_) {
-        const MatrixXd root = correlated ? MatrixXd(first_order * correlation) : first_order;
-        sum_.covariance += root * first_order.transpose();
-    }
-}
-
-Propagation Contributions::result() const {
-    Propagation result = sum_;
-    // Rounding of what cancels between correlated inputs may leave a variance below 0.
-    result.standard_uncertainty = variance_.cwiseMax(0.0).cwiseSqrt();
-    result.degrees_of_freedom =
-        (satterthwaite_.array() == 0.0)
-            .select(std::numeric_limits<double>::infinity(), variance_.array().square() / satterthwaite_.array());
-    result.groups = groups_;
-    result.budget.resize(variance_.size(), Index(groups_.size()));
-    for (std::size_t g = 0; g < groups_.size(); ++g)
-        result.budget.col(Index(g)) = group_variances_[g].cwiseMax(0.0).cwiseSqrt();
-    if (full_covariance_) result.covariance = MatrixXd(sum_.covariance.selfadjointView<Eigen::Lower>());
-    return result;
-}
-
-void check_correlation(const MatrixXd& correlation, Index size, const std::string& what) {
-    const std::string shape = std::to_string(size);
-    if (correlation.rows() != size || correlation.cols() != size)
-        throw InvalidArgument(what + ": expected " + shape + " x " + shape + " numbers, got " +
-                              std::to_string(correlation.rows()) + " x " + std::to_string(correlation.cols()));
-    // Rounded coefficients are welcome: what was printed to nine digits is one.
-    constexpr double rounding = 1e-9;
-    if (!correlation.allFinite() || (correlation - correlation.transpose()).cwiseAbs().maxCoeff() > rounding ||
-        (correlation.diagonal().array() - 1.0).abs().maxCoeff() > rounding)
-        throw InvalidArgument(what + ": expected a symmetric matrix of finite numbers with 1 on its diagonal");
-    const Eigen::LDLT<MatrixXd> factor(correlation);
-    if (factor.vectorD().minCoeff() < -rounding * double(size))
-        throw InvalidArgument(what + ": expected a positive semidefinite matrix");
-}
 
 namespace {
 
@@ -180,6 +79,180 @@ VectorXd Propagation::second_order_uncertainty() const {
     VectorXd variance = standard_uncertainty.cwiseAbs2() + 2.0 * second_order.rowwise().squaredNorm();
     if (knows_products) variance += product_variance;
     return variance.cwiseSqrt();
+}
+
+// --- through virtual calibrations ---
+
+namespace {
+
+constexpr Index largest_gain = 400'000'000;  // numbers: 3.2 GB
+
+// GUM 4.2.3: s/sqrt(n) of n repeated readings, with n - 1 degrees of freedom, where JCGM 101 has a t distribution.
+double gum_uncertainty(const Distribution& d) {
+    return d.kind == DistributionKind::student_t ? d.spread : d.standard_uncertainty();
+}
+
+// Derived outputs below the entries.
+MatrixXd with_derived(const MatrixXd& of_entries, const std::vector<DerivedOutput>& derived) {
+    MatrixXd all(of_entries.rows() + Index(derived.size()), of_entries.cols());
+    all.topRows(of_entries.rows()) = of_entries;
+    for (std::size_t d = 0; d < derived.size(); ++d)
+        all.row(of_entries.rows() + Index(d)) = derived[d].row.transpose() * of_entries;
+    return all;
+}
+
+MatrixXd correlation_of(const UncertainInputs& inputs) {
+    if (inputs.correlations.empty()) return {};
+    const Index count = Index(inputs.inputs.size());
+    MatrixXd correlation = MatrixXd::Identity(count, count);
+    for (const CorrelatedInputs& together : inputs.correlations)
+        for (std::size_t i = 0; i < together.members.size(); ++i)
+            for (std::size_t j = 0; j < together.members.size(); ++j)
+                correlation(together.members[i], together.members[j]) = together.correlation(Index(i), Index(j));
+    return correlation;
+}
+
+// Each input at its expectation and a standard uncertainty to both sides.
+struct InputEffects {
+    std::vector<PropagatedInput> inputs;
+    VectorXd value;  // at the expectations
+    MatrixXd first_order, second_order;
+};
+
+InputEffects input_effects(const VirtualCalibrations& calibrations) {
+    const auto& uncertain = calibrations.run().inputs.inputs;
+    const Index count = Index(uncertain.size());
+    MatrixXd deviations(count, 2 * count + 1);
+    for (Index i = 0; i < count; ++i) deviations.row(i).setConstant(uncertain[std::size_t(i)].distribution.expectation);
+    InputEffects effects;
+    for (Index i = 0; i < count; ++i) {
+        const UncertainInput& input = uncertain[std::size_t(i)];
+        const Distribution& d = input.distribution;
+        const double u = gum_uncertainty(d);
+        deviations(i, 1 + 2 * i) += u;
+        deviations(i, 2 + 2 * i) -= u;
+        effects.inputs.push_back({name(input), budget_group(input), u, d.degrees_of_freedom, -1, d.kind});
+    }
+    const MatrixXd outputs = calibrations.evaluate_at(deviations);
+    effects.value = outputs.col(0);
+    effects.first_order.resize(outputs.rows(), count);
+    effects.second_order.resize(outputs.rows(), count);
+    if (!effects.value.allFinite())
+        throw InvalidArgument("virtual calibrations: without deviations there is no result");
+    for (Index i = 0; i < count; ++i) {
+        const auto up = outputs.col(1 + 2 * i), down = outputs.col(2 + 2 * i);
+        if (!up.allFinite() || !down.allFinite())
+            throw InvalidArgument(effects.inputs[std::size_t(i)].name +
+                                  ": with a deviation of its standard uncertainty there is no result");
+        effects.first_order.col(i) = (up - down) / 2.0;
+        effects.second_order.col(i) = (up - effects.value + (down - effects.value)) / 2.0;
+    }
+    return effects;
+}
+
+// d_ij = (f(+i, +j) + f(-i, -j) - 2 f)/2 - s_i - s_j, s the second order of one input: odd orders cancel.
+void add_products(const VirtualCalibrations& calibrations, const InputEffects& effects, const MatrixXd& correlation,
+                  Propagation& result) {
+    const auto& uncertain = calibrations.run().inputs.inputs;
+    const Index count = Index(uncertain.size());
+    if (count > largest_product_inputs) return;
+    result.knows_products = true;
+    result.strongest_product.assign(std::size_t(effects.value.size()), {});
+    result.product_variance = result.product_shift = VectorXd::Zero(effects.value.size());
+    VectorXd expectation(count);
+    for (Index i = 0; i < count; ++i) expectation[i] = uncertain[std::size_t(i)].distribution.expectation;
+    for (Index i = 0; i + 1 < count; ++i) {
+        const Index others = count - 1 - i;
+        MatrixXd deviations = expectation.replicate(1, 2 * others);
+        for (Index k = 0; k < others; ++k)
+            for (const int side : {0, 1})
+                for (const Index input : {i, i + 1 + k})
+                    deviations(input, 2 * k + side) +=
+                        (side == 0 ? 1.0 : -1.0) * effects.inputs[std::size_t(input)].standard_uncertainty;
+        const MatrixXd outputs = calibrations.evaluate_at(deviations);
+        for (Index k = 0; k < others; ++k) {
+            const Index j = i + 1 + k;
+            const VectorXd product =
+                (outputs.col(2 * k) - effects.value + (outputs.col(2 * k + 1) - effects.value)) / 2.0 -
+                effects.second_order.col(i) - effects.second_order.col(j);
+            result.product_variance += product.cwiseAbs2();
+            if (correlation.size() > 0) result.product_shift += correlation(i, j) * product;
+            for (Index o = 0; o < product.size(); ++o)
+                if (auto& strongest = result.strongest_product[std::size_t(o)];
+                    std::abs(product[o]) > std::abs(strongest.value))
+                    strongest = {i, j, product[o]};
+        }
+    }
+    // A pair that leaves the evaluation without a result leaves nothing to be said.
+    result.knows_products = result.product_variance.allFinite();
+}
+
+MatrixXd gain_of(const VirtualCalibrations& calibrations) {
+    const Index entries = Index(calibrations.evaluator().entries().size());
+    const Index channels = Index(signal_channels(calibrations.nominal()).size());
+    if (entries * channels > largest_gain / std::max<Index>(Index(calibrations.nominal().size()), 1))
+        throw InvalidArgument("propagation: expected at most " + std::to_string(largest_gain) +
+                              " sensitivities to readings, got more by far too many steps; the Monte Carlo method "
+                              "does without them");
+    return with_derived(calibrations.evaluator().gain(), calibrations.derived());
+}
+
+}  // namespace
+
+Propagation propagate(const VirtualCalibrations& calibrations, bool full_covariance) {
+    const UncertainInputs& uncertain = calibrations.run().inputs;
+    InputEffects effects = input_effects(calibrations);
+    struct Part {
+        std::string group;
+        MatrixXd effect;
+        double degrees_of_freedom;
+    };
+    VectorXd value = effects.value;
+    std::vector<Part> parts;
+    const VectorXd by_sensors = sensor_noise(calibrations.run());
+    if (!uncertain.noise.empty() || by_sensors.size() > 0) {
+        const NoiseEffects noises(calibrations, gain_of(calibrations));
+        for (const ReadingNoise& noise : uncertain.noise) {
+            MatrixXd effect = noises.of(noise);
+            value += effect.rowwise().sum() * noise.distribution.expectation;
+            effect *= gum_uncertainty(noise.distribution);
+            parts.push_back({budget_group(noise), std::move(effect), noise.distribution.degrees_of_freedom});
+        }
+        if (by_sensors.size() > 0)
+            parts.push_back(
+                {"noise of sensors", noises.gain() * by_sensors.asDiagonal(), std::numeric_limits<double>::infinity()});
+    }
+    Contributions sum(calibrations.outputs(), value, full_covariance);
+    for (const Part& part : parts) sum.add(part.group, part.effect, part.degrees_of_freedom);
+    const MatrixXd correlation = correlation_of(uncertain);
+    sum.add_inputs(effects.inputs, effects.first_order, effects.second_order, correlation);
+    Propagation result = sum.result();
+    add_products(calibrations, effects, correlation, result);
+    return result;
+}
+
+Propagation propagate(const Calibration& calibration, const VirtualCalibrations& calibrations, bool full_covariance) {
+    const auto entries = calibration_entries(calibration);
+    const auto& expected = calibrations.evaluator().entries();
+    const auto same = [](const CalibrationEntry& a, const CalibrationEntry& b) {
+        return a.parameter == b.parameter && (std::isnan(a.position) || std::abs(a.position - b.position) <= 1e-6);
+    };
+    if (entries.size() != expected.size() || !std::equal(entries.begin(), entries.end(), expected.begin(), same))
+        throw InvalidArgument("calibration: expected the parameters and nodes of the virtual calibrations (" +
+                              std::to_string(expected.size()) + " values), got others (" +
+                              std::to_string(entries.size()) + ")");
+    if (calibration.covariance.size() == 0)
+        throw InvalidArgument("calibration: expected one evaluated with full covariance");
+    const MatrixXd rows =
+        with_derived(MatrixXd::Identity(Index(entries.size()), Index(entries.size())), calibrations.derived());
+    const InputEffects effects = input_effects(calibrations);
+    Contributions sum(calibrations.outputs(), rows * calibration_values(calibration), full_covariance);
+    sum.add_covariance("readings", rows * calibration.covariance * rows.transpose());
+    const MatrixXd correlation = correlation_of(calibrations.run().inputs);
+    sum.add_inputs(effects.inputs, effects.first_order, effects.second_order, correlation);
+    Propagation result = sum.result();
+    add_products(calibrations, effects, correlation, result);
+    return result;
 }
 
 }  // namespace stepdiag

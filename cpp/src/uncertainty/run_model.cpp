@@ -10,19 +10,19 @@ namespace stepdiag {
 namespace {
 
 std::vector<double> numbers_of(const Misalignment& misalignment, std::size_t beams) {
-    std::vector<double> numbers(slot::beam_constant + beams, 0.0);
+    std::vector<double> numbers(field::beam_constant + beams, 0.0);
     for (int k = 0; k < 2; ++k) {
-        numbers[slot::reflector + k] = misalignment.reflector[k];
-        numbers[slot::laser + k] = misalignment.laser[k];
-        numbers[slot::lateral + k] = misalignment.lateral[k];
-        numbers[slot::psd_zero + k] = misalignment.psd_zero[k];
+        numbers[field::reflector + k] = misalignment.reflector[k];
+        numbers[field::laser + k] = misalignment.laser[k];
+        numbers[field::lateral + k] = misalignment.lateral[k];
+        numbers[field::psd_zero + k] = misalignment.psd_zero[k];
     }
-    numbers[slot::roll] = misalignment.roll;
-    numbers[slot::gain] = misalignment.gain;
-    numbers[slot::distance_constant] = misalignment.distance_constant;
-    numbers[slot::drift] = misalignment.drift;
+    numbers[field::roll] = misalignment.roll;
+    numbers[field::gain] = misalignment.gain;
+    numbers[field::distance_constant] = misalignment.distance_constant;
+    numbers[field::drift] = misalignment.drift;
     std::copy(misalignment.beam_constants.begin(), misalignment.beam_constants.end(),
-              numbers.begin() + slot::beam_constant);
+              numbers.begin() + field::beam_constant);
     return numbers;
 }
 
@@ -33,32 +33,32 @@ struct Place {
 };
 std::optional<Place> place_in_line(InputQuantity quantity, int beams) {
     switch (quantity) {
-        case InputQuantity::reflector: return Place{slot::reflector, 2};
-        case InputQuantity::laser: return Place{slot::laser, 2};
-        case InputQuantity::psd_zero: return Place{slot::psd_zero, 2};
-        case InputQuantity::distance_constant: return Place{slot::distance_constant, 1};
-        case InputQuantity::beam_constant: return Place{slot::beam_constant, beams};
-        case InputQuantity::lateral: return Place{slot::lateral, 2};
-        case InputQuantity::roll: return Place{slot::roll, 1};
-        case InputQuantity::gain: return Place{slot::gain, 1};
-        case InputQuantity::drift: return Place{slot::drift, 1};
-        case InputQuantity::scale_length: return Place{slot::scale_length, 1};
-        case InputQuantity::scale_factor: return Place{slot::scale_factor, 1};
+        case InputQuantity::reflector: return Place{field::reflector, 2};
+        case InputQuantity::laser: return Place{field::laser, 2};
+        case InputQuantity::psd_zero: return Place{field::psd_zero, 2};
+        case InputQuantity::distance_constant: return Place{field::distance_constant, 1};
+        case InputQuantity::beam_constant: return Place{field::beam_constant, beams};
+        case InputQuantity::lateral: return Place{field::lateral, 2};
+        case InputQuantity::roll: return Place{field::roll, 1};
+        case InputQuantity::gain: return Place{field::gain, 1};
+        case InputQuantity::drift: return Place{field::drift, 1};
+        case InputQuantity::scale_length: return Place{field::scale_length, 1};
+        case InputQuantity::scale_factor: return Place{field::scale_factor, 1};
         default: return std::nullopt;
     }
 }
 
 std::optional<Place> place_in_shared(InputQuantity quantity, int beams) {
     switch (quantity) {
-        case InputQuantity::psd_distance: return Place{shared_slot::psd_distance, 1};
-        case InputQuantity::beam_offset: return Place{shared_slot::beam_offset, 2 * beams};
-        case InputQuantity::reading_model: return Place{shared_slot::reading_model, 1};
-        case InputQuantity::temperature: return Place{shared_slot::temperature, 1};
-        case InputQuantity::pressure: return Place{shared_slot::pressure, 1};
-        case InputQuantity::humidity: return Place{shared_slot::humidity, 1};
-        case InputQuantity::refractive_index: return Place{shared_slot::refractive_index, 1};
-        case InputQuantity::wavelength: return Place{shared_slot::wavelength, 1};
-        case InputQuantity::machine_drift: return Place{shared_slot::machine_drift, 3};
+        case InputQuantity::psd_distance: return Place{shared_field::psd_distance, 1};
+        case InputQuantity::beam_offset: return Place{shared_field::beam_offset, 2 * beams};
+        case InputQuantity::reading_model: return Place{shared_field::reading_model, 1};
+        case InputQuantity::temperature: return Place{shared_field::temperature, 1};
+        case InputQuantity::pressure: return Place{shared_field::pressure, 1};
+        case InputQuantity::humidity: return Place{shared_field::humidity, 1};
+        case InputQuantity::refractive_index: return Place{shared_field::refractive_index, 1};
+        case InputQuantity::wavelength: return Place{shared_field::wavelength, 1};
+        case InputQuantity::machine_drift: return Place{shared_field::machine_drift, 3};
         default: return std::nullopt;
     }
 }
@@ -78,32 +78,32 @@ void check_component(const std::string& name, int component, int count) {
 
 }  // namespace
 
-bool Slots::is_uncertain(int first, int count) const {
+bool Fields::is_uncertain(int first, int count) const {
     return std::any_of(uncertain.begin(), uncertain.end(),
-                       [&](const Deviating& each) { return each.slot >= first && each.slot < first + count; });
+                       [&](const Deviating& each) { return each.field >= first && each.field < first + count; });
 }
 
-bool Slots::acts(int first, int count) const {
+bool Fields::acts(int first, int count) const {
     return is_uncertain(first, count) ||
            std::any_of(nominal.begin() + first, nominal.begin() + first + count, [](double x) { return x != 0.0; });
 }
 
-std::vector<double> Slots::with(const Eigen::VectorXd& deviations) const {
+std::vector<double> Fields::with(const Eigen::VectorXd& deviations) const {
     std::vector<double> numbers = nominal;
-    for (const Deviating& each : uncertain) numbers[std::size_t(each.slot)] += deviations[each.input];
+    for (const Deviating& each : uncertain) numbers[std::size_t(each.field)] += deviations[each.input];
     return numbers;
 }
 
 Misalignment misalignment_of(const std::vector<double>& n) {
-    return {{n[slot::reflector], n[slot::reflector + 1]},
-            {n[slot::laser], n[slot::laser + 1]},
-            {n[slot::psd_zero], n[slot::psd_zero + 1]},
-            n[slot::distance_constant],
-            {n.begin() + slot::beam_constant, n.end()},
-            {n[slot::lateral], n[slot::lateral + 1]},
-            n[slot::roll],
-            n[slot::gain],
-            n[slot::drift]};
+    return {{n[field::reflector], n[field::reflector + 1]},
+            {n[field::laser], n[field::laser + 1]},
+            {n[field::psd_zero], n[field::psd_zero + 1]},
+            n[field::distance_constant],
+            {n.begin() + field::beam_constant, n.end()},
+            {n[field::lateral], n[field::lateral + 1]},
+            n[field::roll],
+            n[field::gain],
+            n[field::drift]};
 }
 
 RunModel::RunModel(const VirtualRun& given, std::uint64_t seed) : run(given), draws(run.inputs, seed) {
@@ -114,30 +114,30 @@ RunModel::RunModel(const VirtualRun& given, std::uint64_t seed) : run(given), dr
     channels = signal_names(run.heads.head);
     const int beams = run.heads.head.layout == HeadLayout::multi_beam ? int(channels.size()) : 0;
 
-    for (const PlannedVisit& visit : planned_visits(run.plan, run.simulation)) {
-        const Line& line = visit.line;
+    for (const PlannedPass& pass : planned_passes(run.plan, run.simulation.repeats, run.simulation.backward)) {
+        const Line& line = pass.line;
         const Head& head = run.heads.of(line);
         const Misalignment misalignment = stepdiag::misalignment_of(run.simulation, line);
         check_misalignment(misalignment, head, line);
-        if (visits.empty() || visits.back().visit.line.name() != line.name())
+        if (passes.empty() || passes.back().planned.line.name() != line.name())
             lines.push_back({numbers_of(misalignment, std::size_t(beams)), {}});
-        const std::vector<PlanPoint> points = points_of(run.plan, visit);
-        const Eigen::Vector3d first = run.plan.points(line, visit.run).front().commanded;
+        const std::vector<PlanPoint> points = points_of(run.plan, pass);
+        const Eigen::Vector3d first = run.plan.points(line, pass.run).front().commanded;
         const Eigen::Matrix3d frame = run.plan.frame(line);
-        visits.push_back({visit, &head, frame, first + run.machine.tool(), mirror_size(head, run.plan), points.size(),
+        passes.push_back({pass, &head, frame, first + run.machine.tool(), mirror_size(head, run.plan), points.size(),
                           lines.size() - 1});
-        const Eigen::Vector3d last = run.plan.points(line, visit.run).back().commanded;
+        const Eigen::Vector3d last = run.plan.points(line, pass.run).back().commanded;
         for (std::size_t k = 0; k < points.size(); ++k) {
             const Eigen::Vector3d& commanded = points[k].commanded;
             const std::size_t row = rows.size();
-            rows.push_back({double(row - visit.setup_row) * seconds, frame.col(2).dot(commanded - first),
+            rows.push_back({double(row - pass.setup_row) * seconds, frame.col(2).dot(commanded - first),
                             (commanded - last).norm() == 0.0});
-            poses.push_back(run.machine.pose(commanded, approaches(line, visit.direction)));
+            poses.push_back(run.machine.pose(commanded, approaches(line, pass.direction)));
         }
     }
     if (rows.size() > Draws::most_rows)
         throw InvalidArgument("virtual run: expected at most " + std::to_string(Draws::most_rows) + " rows");
-    shared.nominal.assign(shared_slot::beam_offset + 2 * std::size_t(beams), 0.0);
+    shared.nominal.assign(shared_field::beam_offset + 2 * std::size_t(beams), 0.0);
     for (std::size_t i = 0; i < run.inputs.inputs.size(); ++i) add_input(run.inputs.inputs[i], int(i));
     check_noises();
 }
@@ -147,16 +147,16 @@ void RunModel::add_input(const UncertainInput& input, int index) {
     const int beams = run.heads.head.layout == HeadLayout::multi_beam ? int(channels.size()) : 0;
     if (const auto place = place_in_line(input.quantity, beams)) {
         check_component(what, input.component, place->count);
-        const auto visit = std::find_if(visits.begin(), visits.end(),
-                                        [&](const RunVisit& v) { return v.visit.line.name() == input.line; });
-        if (visit == visits.end()) throw InvalidArgument(what + ": line \"" + input.line + "\" is not in the plan");
-        if (input.quantity == InputQuantity::psd_zero && visit->head->layout != HeadLayout::psd)
+        const auto pass = std::find_if(passes.begin(), passes.end(),
+                                       [&](const RunPass& v) { return v.planned.line.name() == input.line; });
+        if (pass == passes.end()) throw InvalidArgument(what + ": line \"" + input.line + "\" is not in the plan");
+        if (input.quantity == InputQuantity::psd_zero && pass->head->layout != HeadLayout::psd)
             throw InvalidArgument(what + ": expected a head of layout psd");
-        if (input.quantity == InputQuantity::gain && visit->head->design && beams > 0)
+        if (input.quantity == InputQuantity::gain && pass->head->design && beams > 0)
             throw InvalidArgument(what +
                                   ": the beams of a traced head stand where its design and its pose errors put "
                                   "them");
-        lines[visit->line].uncertain.push_back({place->first + input.component, index});
+        lines[pass->line].uncertain.push_back({place->first + input.component, index});
         return;
     }
     if (const auto place = place_in_shared(input.quantity, beams)) {
@@ -165,26 +165,26 @@ void RunModel::add_input(const UncertainInput& input, int index) {
             input.quantity == InputQuantity::psd_distance || input.quantity == InputQuantity::beam_offset;
         const bool of_air = input.quantity == InputQuantity::temperature || input.quantity == InputQuantity::pressure ||
                             input.quantity == InputQuantity::humidity;
-        for (const RunVisit& visit : visits) {
-            if (of_closed_head && visit.head->design)
+        for (const RunPass& pass : passes) {
+            if (of_closed_head && pass.head->design)
                 throw InvalidArgument(what +
                                       ": expected a head without a design; components of a design are moved by "
                                       "part_shift and part_rotation");
-            if (input.quantity == InputQuantity::psd_distance && visit.head->layout != HeadLayout::psd)
+            if (input.quantity == InputQuantity::psd_distance && pass.head->layout != HeadLayout::psd)
                 throw InvalidArgument(what + ": expected a head of layout psd");
-            if (of_air && !std::holds_alternative<Air>(true_environment(*visit.head, run.simulation).air))
+            if (of_air && !std::holds_alternative<Air>(true_environment(*pass.head, run.simulation).air))
                 throw InvalidArgument(what + ": expected a state of the air as environment, got a constant index");
         }
         shared.uncertain.push_back({place->first + input.component, index});
         return;
     }
     check_component(what, input.component, 3);
-    const auto has_part = [&](const RunVisit& visit) {
-        if (!visit.head->design) return false;
-        const auto names = component_names(*visit.head->design);
+    const auto has_part = [&](const RunPass& pass) {
+        if (!pass.head->design) return false;
+        const auto names = component_names(*pass.head->design);
         return std::find(names.begin(), names.end(), input.part) != names.end();
     };
-    if (std::none_of(visits.begin(), visits.end(), has_part))
+    if (std::none_of(passes.begin(), passes.end(), has_part))
         throw InvalidArgument(what + ": no head of this run has a component \"" + input.part + "\"");
     const int turned = input.quantity == InputQuantity::part_rotation ? 3 : 0;
     moved_parts.push_back({input.part, turned + input.component, index});
@@ -211,18 +211,18 @@ bool RunModel::has(NoiseQuantity quantity) const {
 
 bool RunModel::moves_poses() const {
     return has(NoiseQuantity::machine_walk) || has(NoiseQuantity::position) || has(NoiseQuantity::orientation) ||
-           shared.is_uncertain(shared_slot::machine_drift, 3);
+           shared.is_uncertain(shared_field::machine_drift, 3);
 }
 
-bool RunModel::has_uncertain_air() const { return shared.is_uncertain(shared_slot::temperature, 4); }
+bool RunModel::has_uncertain_air() const { return shared.is_uncertain(shared_field::temperature, 4); }
 
 Environment RunModel::environment(const Head& head, const std::vector<double>& numbers) const {
     Environment environment = true_environment(head, run.simulation);
-    environment.relative_error += numbers[shared_slot::refractive_index];
+    environment.relative_error += numbers[shared_field::refractive_index];
     if (Air* air = std::get_if<Air>(&environment.air)) {
-        air->temperature += numbers[shared_slot::temperature];
-        air->pressure += numbers[shared_slot::pressure];
-        air->relative_humidity += numbers[shared_slot::humidity];
+        air->temperature += numbers[shared_field::temperature];
+        air->pressure += numbers[shared_field::pressure];
+        air->relative_humidity += numbers[shared_field::humidity];
     }
     return environment;
 }
@@ -234,11 +234,11 @@ Environment RunModel::assumed(const Head& head) const {
 Head RunModel::head(const Head& nominal, const std::vector<double>& numbers, const Eigen::VectorXd& deviations) const {
     Head head = nominal;
     if (!head.design) {
-        head.psd_distance += numbers[shared_slot::psd_distance];
+        head.psd_distance += numbers[shared_field::psd_distance];
         if (head.layout == HeadLayout::multi_beam)
             for (std::size_t i = 0; i < head.beam_offsets.size(); ++i)
-                head.beam_offsets[i] += Eigen::Vector2d(numbers[shared_slot::beam_offset + 2 * i],
-                                                        numbers[shared_slot::beam_offset + 2 * i + 1]);
+                head.beam_offsets[i] += Eigen::Vector2d(numbers[shared_field::beam_offset + 2 * i],
+                                                        numbers[shared_field::beam_offset + 2 * i + 1]);
         return head;
     }
     const std::vector<std::string> names = component_names(*head.design);

@@ -5,19 +5,49 @@
 #include <string>
 #include <vector>
 
-#include "simulation/visit_readings.hpp"
+#include "simulation/pass_readings.hpp"
 #include "stepdiag/uncertainty/virtual_calibration.hpp"
 #include "uncertainty/draws.hpp"
-#include "uncertainty/run_slots.hpp"
 
 namespace stepdiag {
 
-// The input `input` adds to the number `slot`.
+// The numbers of a line's set-up, nominal or with deviations: those of Misalignment, and of its scale.
+namespace field {
+enum : int {
+    reflector = 0,  // a, b
+    laser = 2,      // a, b
+    lateral = 4,    // x, y
+    roll = 6,
+    gain = 7,
+    psd_zero = 8,  // x, y
+    distance_constant = 10,
+    drift = 11,
+    scale_length = 12,
+    scale_factor = 13,
+    beam_constant = 14,  // d1 ... dn
+};
+}
+// The numbers that all lines share.
+namespace shared_field {
+enum : int {
+    reading_model = 0,
+    temperature = 1,
+    pressure = 2,
+    humidity = 3,
+    refractive_index = 4,
+    wavelength = 5,
+    machine_drift = 6,  // x, y, z
+    psd_distance = 9,
+    beam_offset = 10,  // u, v of d1 ... dn
+};
+}
+
+// The input `input` adds to the number in the field `field`.
 struct Deviating {
-    int slot;
+    int field;
     int input;
 };
-struct Slots {
+struct Fields {
     std::vector<double> nominal;
     std::vector<Deviating> uncertain;
 
@@ -39,14 +69,14 @@ struct RunRow {
     bool is_last_point;
 };
 
-struct RunVisit {
-    PlannedVisit visit;
+struct RunPass {
+    PlannedPass planned;
     const Head* head;
     Eigen::Matrix3d frame;
     Eigen::Vector3d first_point;  // commanded, tool offset included
     Eigen::Vector2d mirror;
     std::size_t rows;
-    std::size_t line;  // index of its Slots
+    std::size_t line;  // index of its Fields
 };
 
 struct NoiseTerm {
@@ -64,18 +94,18 @@ struct RunModel {
     const Draws draws;
     double seconds;
     std::vector<std::string> channels;
-    std::vector<RunVisit> visits;
+    std::vector<RunPass> passes;
     std::vector<RunRow> rows;
-    std::vector<Pose> poses;   // nominal tool, by row
-    std::vector<Slots> lines;  // by line of the plan, scale lines last
-    Slots shared;
+    std::vector<Pose> poses;    // nominal tool, by row
+    std::vector<Fields> lines;  // by line of the plan, scale lines last
+    Fields shared;
     std::vector<MovedPart> moved_parts;
 
     bool has(NoiseQuantity quantity) const;
     bool moves_poses() const;  // something displaces the tool by sample
     bool has_uncertain_air() const;
 
-    // Of one head, at these numbers of the shared slots.
+    // Of one head, at these numbers of the shared fields.
     Environment environment(const Head& head, const std::vector<double>& shared_numbers) const;
     Environment assumed(const Head& head) const;
     Head head(const Head& nominal, const std::vector<double>& shared_numbers, const Eigen::VectorXd& deviations) const;

@@ -8,11 +8,12 @@
 #include <sstream>
 
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/core/instruction_set.hpp"
 #include "stepdiag/core/random.hpp"
-#include "stepdiag/core/random_lanes.hpp"
-#include "uncertainty/general_way.hpp"
-#include "uncertainty/lane_run.hpp"
+#include "stepdiag/core/random_blocks.hpp"
 #include "uncertainty/run_model.hpp"
+#include "uncertainty/scalar_sampler.hpp"
+#include "uncertainty/simd_sampler.hpp"
 
 namespace stepdiag {
 namespace {
@@ -21,12 +22,12 @@ Measurement measurement_of(const RunModel& model, const Eigen::VectorXd& reading
     std::vector<Station> stations;
     std::vector<Channel> channels;
     for (const std::string& name : model.channels) channels.push_back({name, {}});
-    for (const RunVisit& visit : model.visits) {
-        const std::vector<PlanPoint> points = points_of(model.run.plan, visit.visit);
-        for (std::size_t k = 0; k < visit.rows; ++k) {
-            const std::size_t point = visit.visit.direction == Direction::forward ? k : visit.rows - 1 - k;
+    for (const RunPass& pass : model.passes) {
+        const std::vector<PlanPoint> points = points_of(model.run.plan, pass.planned);
+        for (std::size_t k = 0; k < pass.rows; ++k) {
+            const std::size_t point = pass.planned.direction == Direction::forward ? k : pass.rows - 1 - k;
             stations.push_back(
-                {visit.visit.run, visit.visit.line, int(point), visit.visit.direction, points[k].commanded});
+                {pass.planned.run, pass.planned.line, int(point), pass.planned.direction, points[k].commanded});
         }
     }
     for (std::size_t r = 0; r < stations.size(); ++r)
@@ -54,9 +55,9 @@ Eigen::VectorXd drawn_inputs(const UncertainInputs& inputs, std::uint64_t seed, 
 struct VirtualCalibrations::State {
     State(const VirtualRun& run, const BatchOptions& evaluation, std::uint64_t seed, std::vector<DerivedOutput> given)
         : model(run, seed),
-          general(model),
-          in_lanes(LaneRun::make(model)),
-          nominal(measurement_of(model, general.readings(model.draws.expectations(), std::nullopt))),
+          scalar(model),
+          simd(SimdSampler::make(model)),
+          nominal(measurement_of(model, scalar.readings(model.draws.expectations(), std::nullopt))),
           evaluator(nominal, run.plan, run.machine.chain(), run.machine.tool(), run.calibration, evaluation),
           derived(std::move(given)) {
         for (const CalibrationEntry& entry : evaluator.entries())
@@ -70,8 +71,8 @@ struct VirtualCalibrations::State {
     }
 
     const RunModel model;
-    const GeneralWay general;
-    const std::unique_ptr<const LaneRun> in_lanes;  // none: all samples go the general way
+    const ScalarSampler scalar;
+    const std::unique_ptr<const SimdSampler> simd;  // none: all samples are read one by one
     const Measurement nominal;
     const BatchEvaluator evaluator;
     const std::vector<DerivedOutput> derived;
@@ -81,9 +82,9 @@ struct VirtualCalibrations::State {
 
 namespace {
 
-constexpr std::size_t lanes = run_lanes;  // at a time: readings of all rows stay in the cache
+constexpr std::size_t lanes = lane_group;  // at a time: readings of all rows stay in the cache
 
-// Far above rounding, far below what another way would do: 1e-9 mm and 1e-13 of the path (as traced_head), 1e-12 rad.
+// Far above rounding, far below what another path would do: 1e-9 mm and 1e-13 of the path (as traced_head), 1e-12 rad.
 double rounding(const std::string& channel, double value) {
     return channel == "alpha" || channel == "beta" ? 1e-12 : 1e-9 + 2e-13 * std::abs(value);
 }
@@ -98,7 +99,7 @@ public:
           worker_(state.evaluator),
           readings_(state.model.rows.size() * state.model.channels.size()),
           deviations_(state.model.run.inputs.inputs.size() * lanes) {
-        if (state.in_lanes) scratch_.emplace(*state.in_lanes);
+        if (state.simd) scratch_.emplace(*state.simd);
     }
 
     void evaluate(const SampleBlock& block) override {
@@ -122,20 +123,19 @@ public:
 private:
     void read(std::optional<std::uint64_t> first_sample) {
         std::array<std::uint8_t, lanes> followed{};
-        if (state_.in_lanes) {
-            state_.in_lanes->trace(deviations_.data(), first_sample, *scratch_, readings_.front().value,
-                                   followed.data());
+        if (state_.simd) {
+            state_.simd->trace(deviations_.data(), first_sample, *scratch_, readings_.front().value, followed.data());
             if (first_sample) {
                 for (std::size_t lane = 0; lane < lanes; ++lane)
                     if (followed[lane]) verify(*first_sample, lane);
-                state_.in_lanes->add_noise(*first_sample, *scratch_, readings_.front().value);
+                state_.simd->add_noise(*first_sample, *scratch_, readings_.front().value);
             }
         }
         std::uint64_t replayed = 0;
         for (std::size_t lane = 0; lane < lanes; ++lane) {
             replayed += followed[lane];
             if (!followed[lane])
-                put(lane, the_general_way(lane, first_sample ? std::optional(*first_sample + lane) : std::nullopt));
+                put(lane, read_scalar(lane, first_sample ? std::optional(*first_sample + lane) : std::nullopt));
         }
         if (first_sample) state_.replayed += replayed, state_.traced += lanes - replayed;
     }
@@ -145,9 +145,9 @@ private:
             deviations_.data() + lane, Eigen::Index(deviations_.size() / lanes), Eigen::InnerStride<>(lanes));
     }
     // A sample that cannot be (air out of its equation's range) has lost all readings.
-    Eigen::VectorXd the_general_way(std::size_t lane, std::optional<std::uint64_t> sample) const {
+    Eigen::VectorXd read_scalar(std::size_t lane, std::optional<std::uint64_t> sample) const {
         try {
-            return state_.general.readings(deviations(lane), sample);
+            return state_.scalar.readings(deviations(lane), sample);
         } catch (const InvalidArgument&) {
             return Eigen::VectorXd::Constant(Eigen::Index(readings_.size()), std::numeric_limits<double>::quiet_NaN());
         }
@@ -156,7 +156,7 @@ private:
         for (Eigen::Index i = 0; i < readings.size(); ++i) readings_[std::size_t(i)].value[lane] = readings[i];
     }
 
-    // Of a share of the samples one reading of each visit is traced again.
+    // Of a share of the samples one reading of each pass is traced again.
     void verify(std::uint64_t first_sample, std::size_t lane) const {
         const RunModel& model = state_.model;
         const std::uint64_t sample = first_sample + lane;
@@ -166,18 +166,18 @@ private:
         if (!(uniform(0) < model.run.simulation.verified_share)) return;
         ++state_.verified;
         const std::size_t channels = model.channels.size();
-        for (std::size_t v = 0; v < model.visits.size(); ++v) {
-            const RunVisit& visit = model.visits[v];
+        for (std::size_t v = 0; v < model.passes.size(); ++v) {
+            const RunPass& pass = model.passes[v];
             const std::size_t row =
-                std::size_t(visit.visit.first_row) + std::size_t(uniform(std::uint32_t(v + 1)) * double(visit.rows));
-            const Eigen::MatrixXd traced = state_.general.trace(deviations(lane), sample, visit, {row});
+                std::size_t(pass.planned.first_row) + std::size_t(uniform(std::uint32_t(v + 1)) * double(pass.rows));
+            const Eigen::MatrixXd traced = state_.scalar.trace(deviations(lane), sample, pass, {row});
             for (std::size_t c = 0; c < channels; ++c) {
                 const double found = readings_[row * channels + c].value[lane];
                 const double expected = traced(0, Eigen::Index(c));
                 if (std::abs(found - expected) <= rounding(model.channels[c], expected)) continue;
                 std::ostringstream text;
                 text.precision(17);
-                text << "virtual calibration: sample " << sample << ", line " << visit.visit.line.name() << ", row "
+                text << "virtual calibration: sample " << sample << ", line " << pass.planned.line.name() << ", row "
                      << row << ": " << model.channels[c] << " is " << found << " by replay and " << expected
                      << " when traced: another face came into its way; with a verified share of 1 every pose is traced "
                         "instead";
@@ -202,8 +202,8 @@ private:
 
     const State& state_;
     BatchEvaluator::Worker worker_;
-    std::optional<LaneRun::Scratch> scratch_;
-    std::vector<LaneRow> readings_;  // by row and channel
+    std::optional<SimdSampler::Scratch> scratch_;
+    std::vector<SimdRow> readings_;  // by row and channel
     std::vector<double> deviations_;
 };
 
@@ -214,11 +214,11 @@ VirtualCalibrations::~VirtualCalibrations() = default;
 
 const std::vector<SampleModel::Output>& VirtualCalibrations::outputs() const { return state_->outputs; }
 std::uint64_t VirtualCalibrations::seed() const { return state_->model.draws.seed(); }
-std::string VirtualCalibrations::target() const { return replay_target(); }
+std::string VirtualCalibrations::target() const { return instruction_set(); }
 std::unique_ptr<SampleModel::Worker> VirtualCalibrations::worker() const { return std::make_unique<Lanes>(*state_); }
 const BatchEvaluator& VirtualCalibrations::evaluator() const { return state_->evaluator; }
 const Measurement& VirtualCalibrations::nominal() const { return state_->nominal; }
-bool VirtualCalibrations::is_in_lanes() const { return state_->in_lanes != nullptr; }
+bool VirtualCalibrations::is_in_lanes() const { return state_->simd != nullptr; }
 SampleCount VirtualCalibrations::count() const {
     return {state_->replayed.load(), state_->traced.load(), state_->verified.load()};
 }
@@ -240,7 +240,7 @@ Eigen::MatrixXd VirtualCalibrations::evaluate_at(const Eigen::MatrixXd& deviatio
 }
 
 Eigen::VectorXd VirtualCalibrations::readings(std::uint64_t sample) const {
-    return state_->general.readings(state_->model.draws.inputs(sample), sample);
+    return state_->scalar.readings(state_->model.draws.inputs(sample), sample);
 }
 
 const VirtualRun& VirtualCalibrations::run() const { return state_->model.run; }

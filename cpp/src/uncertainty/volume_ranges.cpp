@@ -3,13 +3,14 @@
 // so that for given p1 and p2 the extreme over p3 is that of F3 + slope p3: a corner of the convex hull of F3. Along an
 // axis that carries the workpiece F is quadratic between nodes. That of axis 1 is searched exactly, cell by cell where
 // it can matter; axes 2 and 3 on a finer grid, where they carry it too.
+#include "stepdiag/uncertainty/volume_ranges.hpp"
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "uncertainty/derived_parts.hpp"
-#include "uncertainty/extremes.hpp"
 
 namespace stepdiag {
 namespace {
@@ -39,6 +40,42 @@ AxisState between(const AxisTable& table, Index interval, double t) {
                 t * (table.position[std::size_t(interval) + 1] - table.position[std::size_t(interval)]),
             mix(table.delta.col(interval), table.delta.col(interval + 1)),
             mix(table.theta.col(interval), table.theta.col(interval + 1))};
+}
+
+// --- largest values of functions that are linear, or parabolas, between points ---
+
+// The corners of the upper convex hull of the points (x_k, y_k), x ascending.
+class UpperHull {
+public:
+    UpperHull(const std::vector<double>& x, const Eigen::VectorXd& y) {
+        for (std::size_t k = 0; k < x.size(); ++k) {
+            while (x_.size() >= 2 && (y_.back() - y_[y_.size() - 2]) * (x[k] - x_.back()) <=
+                                         (y[Eigen::Index(k)] - y_.back()) * (x_.back() - x_[x_.size() - 2])) {
+                x_.pop_back();
+                y_.pop_back();
+            }
+            x_.push_back(x[k]);
+            y_.push_back(y[Eigen::Index(k)]);
+        }
+    }
+    // The largest y + slope x. `corner`: where it was last time, a good start for a slope that is much the same.
+    double support(double slope, std::size_t& corner) const {
+        const auto rises = [&](std::size_t k) { return y_[k + 1] - y_[k] + slope * (x_[k + 1] - x_[k]) > 0.0; };
+        while (corner + 1 < x_.size() && rises(corner)) ++corner;
+        while (corner > 0 && !rises(corner - 1)) --corner;
+        return y_[corner] + slope * x_[corner];
+    }
+
+private:
+    std::vector<double> x_;
+    std::vector<double> y_;
+};
+
+// The largest value of a parabola between its ends that rises by `sag` above the middle of their chord.
+double top_of_arc(double begin, double end, double sag) {
+    const double slope = (end - begin) / (4.0 * sag);
+    if (!(sag > 0.0 && std::abs(slope) < 1.0)) return std::max(begin, end);
+    return (begin + end) / 2.0 + sag * (1.0 + slope * slope);
 }
 
 }  // namespace

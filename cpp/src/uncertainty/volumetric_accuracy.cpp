@@ -1,4 +1,5 @@
-// Draws of the ranges from the joint normal distribution of a calibration's values.
+#include "stepdiag/uncertainty/volumetric_accuracy.hpp"
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <atomic>

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, Writes
+from stepdiag.cli.options import PATH, Writes, tell_fit
 from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, OutputFile
 
 
@@ -18,7 +18,8 @@ from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, OutputFile
     metavar="FILE",
     help="Straightness of the functional point beside the table's, to write as CSV.",
 )
-def report(calibration: Path, output: OutputFile | None) -> None:
+@click.pass_context
+def report(context: click.Context, calibration: Path, output: OutputFile | None) -> None:
     """Tell what a CALIBRATION (CSV or netCDF) says.
 
     Largest values and uncertainties, and the point to which straightness refers: the tables hold that of the axes' own
@@ -36,6 +37,7 @@ def report(calibration: Path, output: OutputFile | None) -> None:
         write_whole(path, functional_point_csv(read))
     for line in calibration_report(read):
         click.echo(line)
+    tell_fit(context, calibration, read.fit)
 
 
 @click.command(epilog="\b\nExample: stepdiag compare before.csv after.nc -o differences.csv")
@@ -52,7 +54,8 @@ def report(calibration: Path, output: OutputFile | None) -> None:
     metavar="P",
     help="Probability of any false alarm among all values compared, at which a difference counts as significant.",
 )
-def compare(a: Path, b: Path, output: OutputFile | None, limit: float) -> None:
+@click.pass_context
+def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None, limit: float) -> None:
     """Set two calibrations A and B (CSV or netCDF) side by side.
 
     For every parameter the largest difference B - A, where it is, its standard uncertainty sqrt(u_A^2 + u_B^2), and
@@ -81,3 +84,5 @@ def compare(a: Path, b: Path, output: OutputFile | None, limit: float) -> None:
         write_comparison(comparison, written)
     for line in comparison_report(comparison, str(a), str(b)):
         click.echo(line)
+    for path, calibration in ((a, one), (b, other)):
+        tell_fit(context, path, calibration.fit)

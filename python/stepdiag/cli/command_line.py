@@ -72,7 +72,8 @@ def _complain(message: str) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs the command line and returns the exit code: 2 for a caller's mistake, 1 for ours, 130 when interrupted."""
+    """Runs the command line and returns the exit code: 0 done, 1 our mistake, 2 a caller's, 3 done but not to be
+    trusted, 130 interrupted."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without µ still gets the rest of the line

@@ -5,8 +5,8 @@ from typing import Literal
 
 import click
 
-from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, Writes, out_file
+from stepdiag._core import Calibration, InvalidArgument
+from stepdiag.cli.options import PATH, Writes, out_file, tell_fit
 from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
 
 
@@ -23,7 +23,9 @@ from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
 )
 @click.option("--covariance", is_flag=True, help="Also write the covariance of all values (netCDF only).")
 @out_file("Calibration to write, CSV or netCDF (.nc, which keeps the set-up and the residuals as well).", CALIBRATION)
+@click.pass_context
 def evaluate(
+    context: click.Context,
     scenario: Path,
     run: Path,
     method: Literal["adjustment", "enhanced", "conventional"],
@@ -35,6 +37,10 @@ def evaluate(
     Finds the machine's 21 error parameters with their standard uncertainties, and says what the readings do
     not determine. Of the scenario only chain, tool, plan, head, uncertainties and the unknowns of the
     adjustment are used.
+
+    The first line of the report is the verdict of the fit, which the calibration carries as well. A rejected fit ends
+    with a warning and exit code 3: the calibration is written, but not to be used. A result that no machine can have
+    ([plausible] in the scenario) is an error, and nothing is written.
 
     \b
     adjustment    all readings at once and exactly: the machine's errors, and how head and mirror were set up
@@ -62,6 +68,7 @@ def evaluate(
     write_calibration(result, path, measurement=measurement)
     for line in evaluation_report(result, measurement, plan):
         click.echo(line)
+    tell_fit(context, path, (result if isinstance(result, Calibration) else result.calibration).fit)
 
 
 def _step_counts(context: click.Context, option: click.Parameter, text: str | None) -> tuple[int, ...] | None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from stepdiag.cli.options import PATH, Writes
+from stepdiag.cli.options import PATH, Writes, tell, tell_fit
 from stepdiag.io.outputs import COMP_FILE, COMP_LINES, GRID, ISG_TABLE, KINEMATICS_TABLE, OutputFile, claim_folder
 
 # Those of stepdiag.export.FORMATS, which needs not be imported to show a help text; a test compares.
@@ -58,8 +58,10 @@ MM = "<X Y Z>"
     "--nodes", type=int, nargs=3, metavar="<NX NY NZ>", help="Points of the grid (csv-grid).  [default: 11 11 11]"
 )
 @click.option("--step", type=float, metavar="MM", help="Largest spacing of the grid, in place of --nodes (csv-grid).")
+@click.option("--accept-rejected", is_flag=True, help="Export a calibration although its fit was rejected.")
 @click.option("--orientation", is_flag=True, default=None, help="Rotations of the tool too (csv-grid).")
-def export(calibration: Path, to: str, output: OutputFile, **options: Any) -> None:
+@click.pass_context
+def export(context: click.Context, /, calibration: Path, to: str, output: OutputFile, **options: Any) -> None:
     """Write a CALIBRATION (CSV or netCDF) for a controller.
 
     \b
@@ -72,7 +74,7 @@ def export(calibration: Path, to: str, output: OutputFile, **options: Any) -> No
     calibration does not determine is refused unless --incomplete. An error map is taken too: what it lacks is 0.
     """
     from stepdiag.export.common import ExportOptions
-    from stepdiag.export.write import export_calibration, read_what_is_exported
+    from stepdiag.export.write import check_fit, export_calibration, read_what_is_exported
     from stepdiag.io.whole_files import check_input
 
     if to in KINDS:
@@ -80,5 +82,10 @@ def export(calibration: Path, to: str, output: OutputFile, **options: Any) -> No
     else:
         path = claim_folder(output.path, FOLDER, marks=["compensation.ini"])
     check_input(calibration)
-    for line in export_calibration(read_what_is_exported(calibration), to, path, ExportOptions(**options)):
+    read = read_what_is_exported(calibration)
+    check_fit(read, f"{calibration}", options["accept_rejected"])
+    for line in export_calibration(read, to, path, ExportOptions(**options)):
         click.echo(line)
+    if read.fit == "unchecked":
+        tell("warning", f"{calibration}: the fit is unchecked: nothing controlled the readings of this calibration")
+    tell_fit(context, calibration, read.fit)

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, Writes, tell
+from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, tell
 from stepdiag.io.outputs import OutputFile
 
 
@@ -17,11 +17,15 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
 
     Knows scenarios, heads and studies (TOML), measurements and calibrations (CSV or netCDF), error maps (CSV)
     and raw readings (JSON lines). A
-    scenario is checked together with the error map that it names. Exit code 2 if any file is not sound.
+    scenario is checked together with the error map that it names. With one scenario among the files, each measurement
+    is adjusted with it: do its lines, points and distances belong to that plan, and what is the verdict of the fit?
+
+    Exit code 2 if any file is not sound or two do not belong together, 3 if a fit is rejected.
     """
     from stepdiag.report.file_check import examine
 
-    sound = True
+    sound, untrusted = True, False
+    found: dict[str, list[Path]] = {}
     for file in files:
         try:
             finding = examine(file)
@@ -32,8 +36,27 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
         click.echo(f"{file}: {finding.kind}: {finding.summary}")
         for warning in finding.warnings:
             click.echo(f"{file}: warning: {warning}")
+        found.setdefault(finding.kind, []).append(file)
+        untrusted = untrusted or finding.fit == "rejected"
+    if len(found.get("scenario", [])) == 1:
+        from stepdiag.report.scenario_and_run import adjust_run
+
+        (scenario,) = found["scenario"]
+        for run in found.get("measurement", []):
+            try:
+                said, fit = adjust_run(scenario, run)
+            except InvalidArgument as error:
+                sound = False
+                tell("error", str(error))
+                continue
+            for line in said:
+                click.echo(f"{run} with {scenario}: {line}")
+            untrusted = untrusted or fit == "rejected"
     if not sound:
         context.exit(2)
+    if untrusted:
+        tell("warning", "a fit is rejected: do not use what comes of it")
+        context.exit(NOT_TO_BE_TRUSTED)
 
 
 @click.command(epilog="\b\nExample: stepdiag init -o machine")

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
@@ -11,6 +11,7 @@ from click.shell_completion import CompletionItem
 from stepdiag.io.outputs import FileKind, OutputFile
 
 Command = TypeVar("Command", bound=Callable[..., None])
+NOT_TO_BE_TRUSTED: Final = 3  # exit status: done and written, but not to be used
 PATH = click.Path(path_type=Path)  # of what a command reads; what it writes is of the type Writes
 SHORT_FLAGS = {"samples": "-n", "output": "-o"}
 
@@ -47,6 +48,15 @@ def in_flags(message: str) -> str:
 
 
 def tell(what: str, message: str) -> None:
-    """One line to standard error."""
+    """One line to standard error. A warning begins with "warning:", as scripts that look for one expect."""
     line = " ".join(in_flags(message).split())
-    click.echo(f"stepdiag: {what}: {line}", err=True)
+    click.echo(f"warning: {line}" if what == "warning" else f"stepdiag: {what}: {line}", err=True)
+
+
+def tell_fit(context: click.Context, path: Path, fit: str | None) -> None:
+    """Warns where the fit of a calibration is not accepted; a rejected one ends the command with status 3."""
+    if fit == "rejected":
+        tell("warning", f"{path}: the fit is rejected: do not use this calibration")
+        context.exit(NOT_TO_BE_TRUSTED)
+    if fit == "doubtful":
+        tell("warning", f"{path}: the fit is doubtful: do not rely on the stated uncertainties")

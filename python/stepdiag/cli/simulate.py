@@ -16,7 +16,8 @@ def simulate(scenario: Path, output: OutputFile, overwrite: bool) -> None:
     """Simulate the run that SCENARIO (TOML) describes.
 
     The virtual machine moves through the plan with its errors, and the head reads the mirror at every point.
-    Lost readings are empty fields, in netCDF missing values.
+    Lost readings are empty fields, in netCDF missing values. A measurement that is there already is kept, unless told
+    to overwrite it.
     """
     from stepdiag.io.data_files import write_measurement
     from stepdiag.scenario.description import read_scenario, simulate_scenario
@@ -46,7 +47,7 @@ def demo(output: OutputFile | None, controller: str | None) -> None:
     """Simulate and evaluate the machine of the method's paper, and draw its Figure 5.
 
     Writes scenarios, truth, runs, calibrations, a table and the figure; go on from them with simulate and
-    evaluate.
+    evaluate. Written again, they are replaced, unless a scenario was changed.
 
     With --controller linuxcnc the loop is closed: LinuxCNC runs the measuring program on a virtual machine, the run
     is evaluated, LinuxCNC compensates with the calibration, and is measured again (docs/loop.md).

@@ -18,13 +18,13 @@ MOST_WORKERS: Final = 1024
 def worker_options(command: Command) -> Command:
     """--scheduler and --workers; see `chosen_workers`."""
     scheduler = click.option(
-        "--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler, such as tcp://HOST:8786."
+        "--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler, such as tls://HOST:8786."
     )
     workers = click.option(
         "--workers",
         type=click.IntRange(1, MOST_WORKERS),
         metavar="N",
-        help="Compute by N worker processes of this computer (Dask, loopback only).",
+        help="Compute by N worker processes of this computer (Dask, for this run only).",
     )
     return scheduler(workers(command))
 

@@ -180,6 +180,17 @@ class NoiseSection(Section):
     seed: Seed = key(SEED, "Seed of the noise.", 0)
 
 
+class PlausibleSection(Section):
+    """What a machine can be. An evaluation whose result lies beyond these limits, by more than three times its standard
+    uncertainty, ends with an error: the readings are in another unit, of another volume or of another plan."""
+
+    positioning_um_per_m: Positive = key(
+        POSITIVE, "Limit of a positioning error, by the travel of its axis.", 1000.0, 1000.0
+    )
+    translation_um: Positive = key(POSITIVE, "Limit of a positioning error or a straightness.", 2000.0, 2000.0)
+    rotation_urad: Positive = key(POSITIVE, "Limit of an angular error or a squareness.", 5000.0, 5000.0)
+
+
 class ScenarioKeys(Section):
     """The whole file, section by section."""
 
@@ -194,6 +205,7 @@ class ScenarioKeys(Section):
     uncertainty: UncertaintySection = UncertaintySection()
     adjustment: AdjustmentSection = AdjustmentSection()
     smoothness: SmoothnessSection = SmoothnessSection()
+    plausible: PlausibleSection = PlausibleSection()
     plan_by_time: PlanByTimeSection = PlanByTimeSection()
 
 

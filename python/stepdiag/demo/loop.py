@@ -22,7 +22,7 @@ COUNT: Final = 1000  # random points
 SEEDS: Final = 40  # repetitions of the noisy case, by calculation
 
 
-def claim_loop(folder: Path) -> Path:
+def claim_loop(folder: Path, steps: int = STEPS) -> Path:
     """The folder, if nothing would be lost in it but what an earlier loop wrote. Raises InvalidArgument."""
     scenarios = {}
     files: dict[str, outputs.FileKind | str] = {
@@ -34,7 +34,7 @@ def claim_loop(folder: Path) -> Path:
         files[f"{case.name}/program.ngc"] = outputs.PROGRAM
         files[f"{case.name}/calibration.csv"] = outputs.CALIBRATION
         for run, seed in ((case.name, 1), (f"{case.name}-again", 2)):
-            scenarios[f"{run}/scenario.toml"] = scenario_text(case, seed=seed)
+            scenarios[f"{run}/scenario.toml"] = scenario_text(case, steps, seed)
             files[f"{run}/run.csv"] = outputs.MEASUREMENT
             files[f"{run}/run.raw.jsonl"] = outputs.RAW
             files[f"{run}/points.ngc"] = outputs.PROGRAM

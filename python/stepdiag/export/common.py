@@ -34,6 +34,7 @@ class ExportOptions:
     step: float | None = None  # mm, csv-grid: largest spacing
     orientation: bool | None = None  # csv-grid: rotations too
     squareness: Literal["straightness", "parameters"] | None = None  # isg: where squareness is written
+    accept_rejected: bool = False  # takes a calibration whose fit was rejected
 
 
 @dataclass(frozen=True)

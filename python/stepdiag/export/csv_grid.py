@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
+from stepdiag.calibration.verdict_text import fit_row
 from stepdiag.export.common import (
     Export,
     ExportOptions,
@@ -51,6 +52,7 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
 
     leading = {
         "format": GRID_FORMAT,
+        "fit": calibration.fit or "",
         "chain": calibration.chain.name,
         "volume_mm": lengths(calibration.volume),
         "tool_mm": lengths(tool),
@@ -66,7 +68,7 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
     }
     text = "".join(f"# {key}={value}\n" for key, value in leading.items() if value)
     text += ",".join(_header(bool(options.orientation))) + "\n" + "".join(_rows(axes, origin, values))
-    return Export({output: text}, _report(leading, axes, error, loss, place, missing))
+    return Export({output: text}, [fit_row(calibration), *_report(leading, axes, error, loss, place, missing)])
 
 
 def _axes(volume: FloatArray, options: ExportOptions) -> list[FloatArray]:
@@ -86,7 +88,7 @@ def _axes(volume: FloatArray, options: ExportOptions) -> list[FloatArray]:
     points = int(np.prod([float(n) for n in counts]))
     if points > MOST_POINTS:
         raise InvalidArgument(
-            f"--{'nodes' if options.step is None else 'step'}: a grid of {words(counts)} points; "
+            f"`{'nodes' if options.step is None else 'step'}`: a grid of {words(counts)} points; "
             f"at most {MOST_POINTS:,} in all are written"
         )
     return [np.linspace(0.0, float(edge), int(n)) for edge, n in zip(volume, counts, strict=True)]

@@ -19,6 +19,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, Chain, ErrorMap, InvalidArgument, Machine
+from stepdiag.calibration.verdict_text import fit_row
 from stepdiag.export.common import (
     Export,
     ExportOptions,
@@ -67,6 +68,7 @@ def isg(calibration: Calibration, output: Path, options: ExportOptions) -> Expor
     angles = ", ".join(f"{name} = {angle * 1e6:.6g} µrad" for name, angle in errors.squareness.items())
     where = "as parameters" if apart else "in the straightnesses: EXY - C0Y y, EXZ + B0Z z, EYZ - A0Z z"
     lines = [
+        fit_row(calibration),
         UNTRIED,
         f"chain {calibration.chain}, volume {words(calibration.volume)} mm, home at {words(origin)} mm in the "
         f"controller's coordinates, direction of approach {kind}",

@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
+from stepdiag.calibration.verdict_text import fit_row
 from stepdiag.export.common import (
     Export,
     ExportOptions,
@@ -123,6 +124,7 @@ def _what_the_files_are(
     calibration: Calibration, at: FloatArray, tool: FloatArray, origin: FloatArray, missing: list[str]
 ) -> list[str]:
     return [
+        fit_row(calibration),
         f"chain {calibration.chain}, volume {words(calibration.volume)} mm, home at {words(origin)} mm in the "
         "controller's coordinates",
         f"corrected: the positioning error of each axis along its line through {words(at)} mm from home, for a tool "

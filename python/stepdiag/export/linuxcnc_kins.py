@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from stepdiag._core import Calibration, Compensator
+from stepdiag.calibration.verdict_text import fit_row
 from stepdiag.export.common import Export, ExportOptions, FloatArray, origin_of, require, tool_of, words
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 
@@ -19,14 +20,23 @@ def linuxcnc_kins(calibration: Calibration, output: Path, options: ExportOptions
     tool, origin = tool_of(calibration, options), origin_of(options)
     table = _with_tool(calibration, tool)
     # What the module would refuse is refused here.
-    loaded = Compensator(table, calibration.chain, origin=origin, approach=options.approach or "mean")
+    loaded = Compensator(
+        table,
+        calibration.chain,
+        origin=origin,
+        approach=options.approach or "mean",
+        accept_rejected=options.accept_rejected,
+    )
     # INI files do not pass on quotes, and the module knows where the bed is.
     arguments = f"table={output.absolute()} chain={''.join(c for c in calibration.chain.name if c.isalpha())}"
     if origin.any():
         arguments += f" origin={','.join(repr(o) for o in origin.tolist())}"
     if options.approach not in (None, "mean"):
         arguments += f" approach={options.approach}"
+    if calibration.fit == "rejected":
+        arguments += " accept_rejected=1"
     lines = [
+        fit_row(calibration),
         f"chain {calibration.chain}, volume {words(calibration.volume)} mm, tool offset {words(tool)} mm, home at "
         f"{words(origin)} mm in the controller's coordinates",
         "sign: errors, actual - commanded of the tool relative to the workpiece; the module moves the joints by the "
@@ -64,4 +74,6 @@ def _with_tool(calibration: Calibration, tool: FloatArray) -> Calibration:
         reversal_negative_uncertainty={name: table[2] for name, table in calibration.negative_functions.items()},
         undetermined_reversal_constants=calibration.undetermined_reversal_constants,
         date=calibration.date,
+        fit=calibration.fit,
+        variance_factor=calibration.variance_factor,
     )

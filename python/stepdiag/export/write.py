@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, read_error_map
+from stepdiag.calibration.verdict_text import MEANING
 from stepdiag.export.common import Export, ExportOptions, tool_of
 from stepdiag.export.csv_grid import csv_grid
 from stepdiag.export.isg import isg
@@ -21,7 +22,7 @@ from stepdiag.io.data_files import is_netcdf, read_calibration
 from stepdiag.io.whole_files import check_output, make_folder, write_whole
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 
-# Format -> the options that it takes beside `tool`, `origin` and `incomplete`.
+# Format -> the options that it takes beside `tool`, `origin`, `incomplete` and `accept_rejected`.
 FORMATS: Final[Mapping[str, tuple[str, ...]]] = {
     "linuxcnc-comp": ("at", "rows"),
     "linuxcnc-kins": ("approach",),
@@ -49,7 +50,18 @@ def read_what_is_exported(path: Path) -> Calibration:
         reversal=calibration.reversal,
         reversal_negative_uncertainty={name: table[2] for name, table in calibration.negative_functions.items()},
         date=calibration.date,
+        fit=calibration.fit,
+        variance_factor=calibration.variance_factor,
     )
+
+
+def check_fit(calibration: Calibration, name: str, accept_rejected: bool) -> None:
+    """Raises InvalidArgument for a calibration, called `name`, whose fit was rejected, unless that is accepted."""
+    if calibration.fit == "rejected" and not accept_rejected:
+        raise InvalidArgument(
+            f"{name}: fit=rejected: {MEANING['rejected']}; measure again, or export it all the same with "
+            "`accept_rejected`"
+        )
 
 
 def export_calibration(
@@ -59,7 +71,7 @@ def export_calibration(
 
     to: a key of FORMATS. output: a file; of linuxcnc-comp a folder, which is made. Files are written whole or not at
     all. Raises InvalidArgument for an option that the format has no use for, for what the calibration does not
-    determine unless `incomplete`, and for what the format cannot hold.
+    determine unless `incomplete`, for a rejected fit unless `accept_rejected`, and for what the format cannot hold.
     """
     export = _prepare(calibration, to, output, options or ExportOptions())
     if to == "linuxcnc-comp":
@@ -75,7 +87,7 @@ def _prepare(calibration: Calibration, to: str, output: Path, options: ExportOpt
     formats = {"linuxcnc-comp": linuxcnc_comp, "linuxcnc-kins": linuxcnc_kins, "isg": isg, "csv-grid": csv_grid}
     if to not in formats:
         raise InvalidArgument(f"`to`: expected one of {', '.join(formats)}, got {to!r}")
-    taken = {"tool", "origin", "incomplete", *FORMATS[to]}
+    taken = {"tool", "origin", "incomplete", "accept_rejected", *FORMATS[to]}
     for field in fields(options):
         if field.name not in taken and getattr(options, field.name) is not None:
             theirs = " or ".join(name for name, names in FORMATS.items() if field.name in names)
@@ -84,6 +96,7 @@ def _prepare(calibration: Calibration, to: str, output: Path, options: ExportOpt
         numbers = getattr(options, name)
         if numbers is not None and (len(numbers) != 3 or not np.all(np.isfinite(numbers))):
             raise InvalidArgument(f"`{name}`: expected three lengths in mm, got {numbers}")
+    check_fit(calibration, "calibration", options.accept_rejected)
     if calibration.method == "conventional" and not np.array_equal(tool_of(calibration, options), calibration.tool):
         raise InvalidArgument("`tool`: tables of the method conventional hold for the tool of the measurement only")
     return formats[to](calibration, output, options)

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from stepdiag._core import Adjustment, Measurement, Outlier, SetupEstimate
+from stepdiag.calibration.verdict_text import reason_text
 from stepdiag.io.labelled_tables import calibration_table, channel_units
 
 _SETUP_UNITS: Final = {
@@ -26,7 +27,7 @@ def adjustment_table(adjustment: Adjustment, measurement: Measurement | None = N
 
     Along `reading`, the rows of the measurement, lie CHANNEL_residual, CHANNEL_redundancy, CHANNEL_normalised_residual
     and CHANNEL_used; given the measurement, reading_run, reading_line, reading_point and reading_direction label them.
-    Test values are scalars; combinations and the smoothness in force are attributes."""
+    Test values are scalars; combinations, reasons of the fit's verdict and the smoothness in force are attributes."""
     table = calibration_table(adjustment.calibration)
     for name, deviation in adjustment.smoothness.items():
         if name in table:
@@ -38,7 +39,10 @@ def adjustment_table(adjustment: Adjustment, measurement: Measurement | None = N
         variables |= _setup(adjustment.setup)
     if adjustment.outliers:
         variables |= _outliers(adjustment.outliers)
-    return table.assign(variables).assign_attrs(combinations="\n".join(adjustment.combinations))
+    return table.assign(variables).assign_attrs(
+        combinations="\n".join(adjustment.combinations),
+        fit_reasons="\n".join(map(reason_text, adjustment.verdict.reasons)),
+    )
 
 
 def _test_values(adjustment: Adjustment) -> dict[str, Any]:

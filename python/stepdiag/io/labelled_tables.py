@@ -113,10 +113,16 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
         variables[name] = ((), angle, attributes)
         variables[f"{name}_u"] = ((), angle_uncertainty, _uncertainty_of(attributes))
     variables |= _covariance(calibration)
+    verdict: dict[str, Any] = {}
+    if calibration.fit is not None:
+        verdict["fit"] = calibration.fit
+    if calibration.variance_factor is not None:
+        verdict["variance_factor"] = calibration.variance_factor
     return xr.Dataset(
         variables,
         coordinates,
-        {
+        verdict
+        | {
             "title": "calibration of a three-axis machine",
             "method": calibration.method,
             "date": calibration.date,

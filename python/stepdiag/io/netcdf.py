@@ -139,6 +139,16 @@ class NetcdfFile:
             raise self.fail(f"attribute {attribute}", f"expected three numbers, got {_show(value)}")
         return lengths.astype(np.float64)
 
+    def number(self, attribute: str) -> float | None:
+        """A number among the global attributes; None where it is missing."""
+        value = self._dataset.attrs.get(attribute)
+        if value is None:
+            return None
+        number = np.asarray(value)
+        if number.dtype.kind not in "fiu" or number.size != 1:
+            raise self.fail(f"attribute {attribute}", f"expected a number, got {_show(value)}")
+        return float(number.reshape(()))
+
     def _variable(self, name: str, dimensions: Sequence[str] | None = None) -> xr.Variable:
         if name not in self._dataset.variables:
             raise self.fail(name, "the variable is missing")

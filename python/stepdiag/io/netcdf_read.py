@@ -81,6 +81,8 @@ def read_calibration_netcdf(path: Path) -> Calibration:
                 name for name, variable in reversals.items() if not _flag(file, variable, "constant_determined")
             ],
             "date": file.text("date", ""),
+            "fit": file.text("fit", "") or None,
+            "variance_factor": file.number("variance_factor"),
         }
         with located(str(path)):
             calibration = Calibration(**parts)

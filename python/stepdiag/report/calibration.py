@@ -7,6 +7,7 @@ import numpy as np
 
 from stepdiag._core import Calibration
 from stepdiag.calibration.functional_point import functional_point_straightness
+from stepdiag.calibration.verdict_text import fit_row
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.comparison import decimal
 from stepdiag.report.evaluation import reversal_rows, undetermined_rows
@@ -15,7 +16,9 @@ FUNCTIONAL_POINT_FORMAT: Final = "stepdiag functional point 1"
 
 
 def calibration_report(calibration: Calibration) -> Iterator[str]:
-    """Method, machine, the largest values and uncertainties of each kind, and to which point straightness refers."""
+    """Verdict of the fit, method, machine, the largest values and uncertainties of each kind, and to which point
+    straightness refers."""
+    yield fit_row(calibration)
     yield f"method: {calibration.method or 'not known'}, date: {calibration.date or 'not known'}"
     volume, tool = (
         " x ".join(f"{edge:g}" for edge in calibration.volume),

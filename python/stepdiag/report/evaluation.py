@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final
 
 import numpy as np
 
 from stepdiag._core import Adjustment, Calibration, Measurement, Outlier, straightness_reference
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
+from stepdiag.calibration.verdict_text import verdict_rows
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.setup_table import setup_rows
 from stepdiag.scenario.adjustment import scale_line_angle
@@ -15,19 +15,17 @@ from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.planned_readings import lost_readings
 from stepdiag.units import MICRO
 
-# Of the chi-square test: how often a sound run is rejected.
-SIGNIFICANCE: Final = 0.05
-
 
 def evaluation_report(result: Calibration | Adjustment, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
-    """Lost readings, largest standard uncertainties and what is not determined; of an adjustment also how well the
-    readings fit, which were left out, and how head and mirror were set up."""
+    """The verdict of the fit, lost readings, largest standard uncertainties and what is not determined; of an
+    adjustment also which readings were left out, and how head and mirror were set up."""
     if isinstance(result, Calibration):
         return _published(result, measurement, scenario)
     return _adjusted(result, measurement, scenario)
 
 
 def _published(calibration: Calibration, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
+    yield f"fit: unchecked: the method {calibration.method} does not test it; -m adjustment does"
     yield from _what_was_done(calibration, measurement, scenario)
     yield from uncertainty_rows(calibration)
     yield from undetermined_rows(calibration)
@@ -38,8 +36,8 @@ def _published(calibration: Calibration, measurement: Measurement, scenario: Sce
 
 def _adjusted(adjustment: Adjustment, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
     calibration = adjustment.calibration
+    yield from verdict_rows(adjustment)
     yield from _what_was_done(calibration, measurement, scenario)
-    yield _fit(adjustment)
     yield from _left_out(adjustment.outliers)
     yield from uncertainty_rows(calibration)
     yield from reversal_rows(calibration)
@@ -59,24 +57,6 @@ def _what_was_done(calibration: Calibration, measurement: Measurement, scenario:
     incomplete, missing = lost_readings(measurement, scenario.plan, scenario.signals)
     if incomplete or missing:
         yield f"lost: {incomplete} rows without a complete reading, {missing} points of the plan without a row"
-
-
-def _fit(adjustment: Adjustment) -> str:
-    freedom = adjustment.degrees_of_freedom
-    if freedom == 0:
-        return "fit: no reading more than unknowns, so that nothing controls it"
-    probability = adjustment.chi_square_probability
-    verdict = (
-        f"not rejected at {SIGNIFICANCE:.0%}"
-        if probability >= SIGNIFICANCE
-        else f"rejected at {SIGNIFICANCE:.0%}: the readings scatter more than their uncertainties say, or something "
-        "is not as the scenario has it"
-    )
-    factor = adjustment.variance_factor
-    return (
-        f"fit: variance factor {factor:.3g} with {freedom} degrees of freedom; chi-square test {verdict} "
-        f"(probability {probability:.2g})"
-    )
 
 
 def _left_out(outliers: Sequence[Outlier]) -> Iterator[str]:

@@ -21,6 +21,7 @@ class Finding:
     kind: str
     summary: str
     warnings: tuple[str, ...] = ()
+    fit: str | None = None  # of a calibration
 
 
 def examine(path: Path) -> Finding:
@@ -127,7 +128,9 @@ def _calibration(path: Path) -> Finding:
     slopes = calibration.undetermined_slopes
     summary = f"{calibration.method}, {calibration.chain.name}, {count} of 21 parameters"
     summary += f", slopes of {', '.join(slopes)} open" if slopes else " determined"
-    return Finding("calibration", summary, tuple(calibration.undetermined))
+    if calibration.fit is not None:
+        summary += f", fit {calibration.fit}"
+    return Finding("calibration", summary, tuple(calibration.undetermined), calibration.fit)
 
 
 def _warnings(errors: _core.ErrorMap) -> Iterator[str]:

@@ -8,11 +8,12 @@ from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.config.adjustment_keys import AdjustmentKeys, AdjustmentSection, SmoothnessSection
 from stepdiag.config.key_errors import show
-from stepdiag.config.scenario_keys import ScenarioKeys
+from stepdiag.config.scenario_keys import PlausibleSection, ScenarioKeys
 from stepdiag.config.toml_text import located
 from stepdiag.units import MICROMETRE, MICRORADIAN
 
 HOUR: Final = 3600.0  # s
+METRE: Final = 1000.0  # mm
 
 # Of each key: the core's quantity, and its unit in native ones.
 QUANTITIES: Final[Mapping[str, tuple[str, float]]] = {
@@ -80,6 +81,15 @@ def smoothness_of(keys: SmoothnessSection, path: Path) -> _core.Smoothness | Non
             rotation=keys.rotation_urad * MICRORADIAN,
             cross_validated=keys.cross_validated,
         )
+
+
+def plausible_limits(keys: PlausibleSection) -> _core.PlausibleLimits:
+    """What the scenario takes a machine for."""
+    return _core.PlausibleLimits(
+        positioning=keys.positioning_um_per_m * MICROMETRE / METRE,
+        translation=keys.translation_um * MICROMETRE,
+        rotation=keys.rotation_urad * MICRORADIAN,
+    )
 
 
 def scale_line_angle(keys: AdjustmentSection, line: str) -> float:

@@ -18,7 +18,7 @@ from stepdiag.config.key_errors import models_of, show
 from stepdiag.config.scenario_keys import TABLES_BY_NAME, PlanSection, RandomSection, ScenarioKeys
 from stepdiag.config.toml_text import check_keys, located, parse_toml
 from stepdiag.io.whole_files import check_input, read_text
-from stepdiag.scenario.adjustment import setup_priors, smoothness_of
+from stepdiag.scenario.adjustment import plausible_limits, setup_priors, smoothness_of
 from stepdiag.scenario.heads import DescribedHead, actual_heads, heads_by_line, nominal_heads, of_run, signals_of
 from stepdiag.scenario.planned_readings import only
 from stepdiag.scenario.setup import environments, misalignments, noise_of, weights
@@ -46,6 +46,7 @@ class Scenario:
     setup: _core.SetupPriors
     setup_by_line: Mapping[str, _core.SetupPriors]
     smoothness: _core.Smoothness | None
+    plausible: _core.PlausibleLimits
     uncertain: _core.UncertainInputs
 
     @property
@@ -118,6 +119,7 @@ def evaluate_scenario(
         method=method,
         uncertainty=scenario.uncertainty,
         full_covariance=full_covariance,
+        plausible=scenario.plausible,
     )
 
 
@@ -142,6 +144,7 @@ def adjust_scenario(
         smoothness=scenario.smoothness,
         outlier_probability=keys.outlier_probability,
         full_covariance=full_covariance,
+        plausible=scenario.plausible,
     )
 
 
@@ -221,6 +224,7 @@ def build_scenario(keys: ScenarioKeys, path: Path) -> Scenario:
         setup=setup,
         setup_by_line=MappingProxyType(setup_by_line),
         smoothness=smoothness_of(keys.smoothness, path),
+        plausible=plausible_limits(keys.plausible),
         uncertain=uncertain_inputs(keys, described, heads, path),
     )
 

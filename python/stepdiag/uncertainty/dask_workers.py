@@ -8,12 +8,15 @@ Bits do depend on the instruction set: workers that use another one than this pr
 Dask is imported when it is used: it is an optional dependency.
 """
 
+import ipaddress
 import logging
 import os
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 from stepdiag import _core
@@ -24,6 +27,8 @@ from stepdiag.uncertainty.monte_carlo import Executor, LeafRange
 TASKS_A_THREAD: Final = 2  # under way: one that is computed, one that waits
 CONNECT_SECONDS: Final = 10.0
 LOOPBACK: Final = "127.0.0.1"
+PRELOAD: Final = ["stepdiag.uncertainty.dask_preload"]
+CREDENTIALS: Final = "ca-file, client.cert and client.key in Dask's configuration, distributed.comm.tls"
 
 Warn = Callable[[str], None]
 
@@ -166,28 +171,57 @@ class Workers:
 def workers_of(
     scheduler: str | None = None, count: int | None = None, warn: Warn = lambda _: None
 ) -> Iterator[Workers]:
-    """The workers of a scheduler, "tcp://HOST:PORT"; or `count` processes of this computer, which share its threads and
-    listen on the loopback interface only. Raises InvalidArgument where there are none."""
+    """The workers of a scheduler, "tls://HOST:PORT" or "tcp://HOST:PORT"; or `count` processes of this computer, which
+    share its threads and serve nobody but this process. Raises InvalidArgument where there are none."""
     distributed = _dask()
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # a worker that is lost is no news to users
     if scheduler is not None:
-        with _connected(distributed, scheduler) as client:
+        with _connected(distributed, scheduler, warn) as client:
             yield Workers(client, warn)
         return
-    share = max(1, (os.cpu_count() or 1) // (count or 1))
     with (
-        distributed.LocalCluster(
-            n_workers=count,
-            threads_per_worker=share,
-            host=LOOPBACK,
-            dashboard_address=None,
-            memory_limit=0,  # what a run takes is known beforehand, and Dask would stop workers
-            silence_logs=logging.CRITICAL,
-            preload=["stepdiag.uncertainty.dask_preload"],
-        ) as cluster,
+        _local_cluster(distributed, count) as cluster,
         distributed.Client(cluster, set_as_default=False) as client,
     ):
         yield Workers(client, warn)
+
+
+@contextmanager
+def _local_cluster(distributed: Any, count: int | None) -> Iterator[Any]:
+    """Other users of this computer reach its ports, too: every connection needs the credentials, which exist in the
+    memory of these processes only, and nothing is served by HTTP. Dask puts its folder of temporary files first on
+    Python's path, so that this folder is private; by default it belongs to whoever made it first."""
+    from dask import config
+
+    try:
+        credentials = distributed.Security.temporary()
+    except ImportError as error:
+        raise InvalidArgument(f"`workers` needs cryptography (pip install 'stepdiag[dask]'): {error}") from None
+    with TemporaryDirectory(prefix="stepdiag-", ignore_cleanup_errors=True) as folder:
+        options = {
+            "temporary-directory": folder,
+            # Dask's HTTP servers cannot be switched off: they start with nothing to serve, and PRELOAD stops them.
+            "distributed.scheduler.http.routes": [],
+            "distributed.worker.http.routes": [],
+        }
+        try:
+            with (
+                config.set(options),
+                distributed.LocalCluster(
+                    n_workers=count,
+                    threads_per_worker=max(1, (os.cpu_count() or 1) // (count or 1)),
+                    host=LOOPBACK,
+                    security=credentials,
+                    dashboard_address=None,
+                    scheduler_kwargs={"dashboard_address": f"{LOOPBACK}:0", "preload": PRELOAD},  # not port 8787
+                    memory_limit=0,  # what a run takes is known beforehand, and Dask would stop workers
+                    silence_logs=logging.CRITICAL,
+                    preload=PRELOAD,
+                ) as cluster,
+            ):
+                yield cluster
+        finally:
+            sys.path[:] = [entry for entry in sys.path if not entry.startswith(folder)]
 
 
 def check_scheduler(address: str) -> str:
@@ -200,14 +234,44 @@ def check_scheduler(address: str) -> str:
 
 
 @contextmanager
-def _connected(distributed: Any, address: str) -> Iterator[Any]:
+def _connected(distributed: Any, address: str, warn: Warn) -> Iterator[Any]:
     check_scheduler(address)
+    security = _configured_credentials(distributed, address)
+    if not address.startswith("tls:") and not _is_loopback(address):
+        warn(f"{address}: anybody who can reach a scheduler without TLS can run code on its workers and here")
     try:
-        client = distributed.Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
+        client = distributed.Client(address, security=security, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise InvalidArgument(f"`scheduler`: {address}: no scheduler answers: {error}") from None
+        said = str(error) or type(error).__name__
+        raise InvalidArgument(f"`scheduler`: {address}: no scheduler answers: {said}") from None
     with client:
         yield client
+
+
+def _configured_credentials(distributed: Any, address: str) -> Any:
+    """Those of the user, which are complete where the address is one with TLS; all connections then are."""
+    if not address.startswith("tls:"):
+        security = distributed.Security()
+        if security.require_encryption:
+            raise InvalidArgument(f"`scheduler`: expected tls://, which Dask's configuration requires, got {address!r}")
+        return security
+    security = distributed.Security(require_encryption=True)
+    try:
+        complete = security.get_connection_args("client")["ssl_context"] is not None
+        said = ""
+    except OSError as error:  # says neither which file nor where it is named
+        complete, said = False, f": {error}"
+    if not complete:
+        raise InvalidArgument(f"`scheduler`: {address}: expected {CREDENTIALS}; got {security}{said}")
+    return security
+
+
+def _is_loopback(address: str) -> bool:
+    host = address.partition("://")[2].rpartition(":")[0].strip("[]")
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 def _dask() -> Any:

@@ -6,9 +6,9 @@
 #include <map>
 #include <sstream>
 
-#include "refuses.hpp"
 #include "stepdiag/controller/compensator.h"
 #include "stepdiag/controller/compensator.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

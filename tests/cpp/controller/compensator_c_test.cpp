@@ -3,8 +3,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "controller/random_machine.hpp"
 #include "stepdiag/controller/compensator.h"
+#include "support/random_machine.hpp"
 
 extern "C" const char* stepdiag_c11_failure(const char* path, const char* chain);
 
@@ -55,6 +55,25 @@ TEST(CompensatorC, WhatIsNotCompensatedIsCounted) {
     EXPECT_EQ(stepdiag_uncompensated(compensator, 2), nullptr);
     EXPECT_EQ(stepdiag_uncompensated(nullptr, 0), nullptr);
     stepdiag_compensator_free(compensator);
+}
+
+TEST(CompensatorC, ARejectedFitIsRefusedUnlessAccepted) {
+    ParameterTable table = random_table();
+    table.header["fit"] = "rejected";
+    const std::string path = ::testing::TempDir() + "rejected.csv";
+    write_parameter_table(table, path);
+    char message[300];
+    EXPECT_EQ(stepdiag_compensator_load(path.c_str(), "wX'bYZt", nullptr, message, sizeof message), nullptr);
+    EXPECT_NE(std::strstr(message, "fit=rejected"), nullptr) << message;
+    stepdiag_options options = stepdiag_default_options();
+    options.accept_rejected = 1;
+    stepdiag_compensator* compensator = stepdiag_compensator_load(path.c_str(), "wX'bYZt", &options, nullptr, 0);
+    EXPECT_STREQ(stepdiag_fit(compensator), "rejected");
+    stepdiag_compensator_free(compensator);
+
+    const Loaded without;
+    EXPECT_STREQ(stepdiag_fit(without.compensator), "");
+    EXPECT_STREQ(stepdiag_fit(nullptr), "");
 }
 
 TEST(CompensatorC, TheAnswerMayReplaceTheQuestion) {

@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "controller/compensator_tables.hpp"
-#include "controller/random_machine.hpp"
 #include "stepdiag/core/rotation.hpp"
+#include "support/random_machine.hpp"
 
 namespace stepdiag {
 namespace {

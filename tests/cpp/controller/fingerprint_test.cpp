@@ -2,7 +2,7 @@
 
 #include <set>
 
-#include "controller/random_machine.hpp"
+#include "support/random_machine.hpp"
 
 namespace stepdiag {
 namespace {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "controller/random_machine.hpp"
 #include "core/text_file.hpp"
-#include "refuses.hpp"
+#include "support/random_machine.hpp"
+#include "support/refuses.hpp"
 
 namespace stepdiag {
 namespace {

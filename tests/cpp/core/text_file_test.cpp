@@ -11,7 +11,7 @@
 #include <random>
 #include <thread>
 
-#include "refuses.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <limits>
 
-#include "refuses.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

@@ -4,8 +4,8 @@
 #include <functional>
 #include <limits>
 
-#include "refuses.hpp"
 #include "stepdiag/evaluation/calibration.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

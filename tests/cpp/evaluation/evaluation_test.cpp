@@ -4,10 +4,10 @@
 
 #include <cmath>
 
-#include "refuses.hpp"
 #include "stepdiag/evaluation/conventional.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
 #include "stepdiag/simulation/simulate.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "refuses.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

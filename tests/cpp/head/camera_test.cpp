@@ -4,8 +4,8 @@
 #include <limits>
 #include <set>
 
-#include "refuses.hpp"
 #include "stepdiag/head/spot_sensor.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

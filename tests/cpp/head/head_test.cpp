@@ -6,9 +6,9 @@
 #include <limits>
 #include <random>
 
-#include "refuses.hpp"
 #include "stepdiag/core/rotation.hpp"
 #include "stepdiag/plan/line.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

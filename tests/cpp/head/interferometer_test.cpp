@@ -7,8 +7,8 @@
 #include <limits>
 #include <random>
 
-#include "refuses.hpp"
 #include "stepdiag/core/units.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

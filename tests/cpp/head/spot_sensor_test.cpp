@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "head/spot_profile.hpp"
-#include "refuses.hpp"
 #include "stepdiag/core/units.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

@@ -6,13 +6,13 @@
 #include <cmath>
 #include <set>
 
-#include "head/head_designs.hpp"
-#include "refuses.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/head/head.hpp"
 #include "stepdiag/head/nominal_head.hpp"
 #include "stepdiag/head/sensitivity.hpp"
 #include "stepdiag/head/traced_reading.hpp"
+#include "support/head_designs.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

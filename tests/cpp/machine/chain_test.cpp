@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <set>
 
-#include "refuses.hpp"
+#include "support/refuses.hpp"
 
 using stepdiag::Axis;
 using stepdiag::Chain;

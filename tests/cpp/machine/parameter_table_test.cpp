@@ -9,8 +9,8 @@
 #include <limits>
 #include <random>
 
-#include "refuses.hpp"
-#include "spoil.hpp"
+#include "support/refuses.hpp"
+#include "support/spoil.hpp"
 
 namespace {
 

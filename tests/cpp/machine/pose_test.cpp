@@ -4,8 +4,8 @@
 #include <cmath>
 #include <functional>
 
-#include "refuses.hpp"
 #include "stepdiag/machine/machine.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

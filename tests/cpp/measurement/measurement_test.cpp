@@ -9,8 +9,8 @@
 #include <limits>
 #include <random>
 
-#include "refuses.hpp"
-#include "spoil.hpp"
+#include "support/refuses.hpp"
+#include "support/spoil.hpp"
 
 namespace {
 
@@ -99,7 +99,7 @@ Station station(int point, const char* line = "ppp", int run = 0) {
 
 }  // namespace
 
-TEST(Measurement, VisitApproachesItsPointsInTheDirectionOfItsOwnTravel) {
+TEST(Measurement, PassApproachesItsPointsInTheDirectionOfItsOwnTravel) {
     using stepdiag::Approach;
     constexpr Approach plus = Approach::positive, minus = Approach::negative;
     const auto expect = [](const char* line, stepdiag::Direction direction, stepdiag::Approaches expected) {

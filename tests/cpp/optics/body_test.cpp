@@ -5,11 +5,11 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "refuses.hpp"
 #include "stepdiag/core/rotation.hpp"
 #include "stepdiag/core/units.hpp"
 #include "stepdiag/optics/path.hpp"
 #include "stepdiag/optics/ray_tree.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

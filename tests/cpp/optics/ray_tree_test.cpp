@@ -6,9 +6,9 @@
 #include <cmath>
 #include <random>
 
-#include "refuses.hpp"
 #include "stepdiag/core/rotation.hpp"
 #include "stepdiag/core/units.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

@@ -3,9 +3,9 @@
 #include <limits>
 #include <string>
 
-#include "optics/recorded_route.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/optics/replay.hpp"
+#include "support/recorded_route.hpp"
 
 namespace {
 

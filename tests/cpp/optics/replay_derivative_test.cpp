@@ -4,7 +4,7 @@
 
 #include <functional>
 
-#include "optics/recorded_route.hpp"
+#include "support/recorded_route.hpp"
 
 namespace {
 

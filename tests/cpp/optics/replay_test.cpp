@@ -4,8 +4,9 @@
 
 #include <string>
 
-#include "optics/recorded_route.hpp"
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/core/instruction_set.hpp"
+#include "support/recorded_route.hpp"
 
 namespace {
 
@@ -20,9 +21,9 @@ using stepdiag::Surface;
 
 // Another instruction set for as long as this lives.
 struct Target {
-    std::string before = stepdiag::replay_target();
-    explicit Target(const std::string& name) { stepdiag::choose_replay_target(name); }
-    ~Target() { stepdiag::choose_replay_target(before); }
+    std::string before = stepdiag::instruction_set();
+    explicit Target(const std::string& name) { stepdiag::choose_instruction_set(name); }
+    ~Target() { stepdiag::choose_instruction_set(before); }
 };
 
 constexpr double gap = 1e-3;
@@ -83,10 +84,10 @@ TEST(Replay, AllInstructionSetsAgreeToRounding) {
     const Bench bench;
     RayLanes first = fan(bench, 45);
     first.follow(bench.record().route, gap);
-    EXPECT_GE(stepdiag::replay_targets().size(), 1u);
-    for (const std::string& name : stepdiag::replay_targets()) {
+    EXPECT_GE(stepdiag::instruction_sets().size(), 1u);
+    for (const std::string& name : stepdiag::instruction_sets()) {
         const Target target(name);
-        EXPECT_EQ(stepdiag::replay_target(), name);
+        EXPECT_EQ(stepdiag::instruction_set(), name);
         RayLanes lanes = fan(bench, 45);
         lanes.follow(bench.record().route, gap);
         for (std::size_t i = 0; i < lanes.lanes(); ++i) {
@@ -97,12 +98,12 @@ TEST(Replay, AllInstructionSetsAgreeToRounding) {
             }
         }
     }
-    EXPECT_THROW(stepdiag::choose_replay_target("abacus"), stepdiag::InvalidArgument);
+    EXPECT_THROW(stepdiag::choose_instruction_set("abacus"), stepdiag::InvalidArgument);
 }
 
 TEST(Replay, ALaneHasTheSameBitsAnywhere) {
     const Bench bench;
-    for (const std::string& name : stepdiag::replay_targets()) {
+    for (const std::string& name : stepdiag::instruction_sets()) {
         const Target target(name);
         const auto common = bench.record();
         RayLanes all = fan(bench, 41);

@@ -6,9 +6,9 @@
 #include <limits>
 #include <random>
 
-#include "refuses.hpp"
-#include "sphere.hpp"
 #include "stepdiag/core/rotation.hpp"
+#include "support/refuses.hpp"
+#include "support/sphere.hpp"
 
 namespace {
 

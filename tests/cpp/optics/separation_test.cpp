@@ -5,10 +5,10 @@
 #include <cmath>
 #include <random>
 
-#include "refuses.hpp"
-#include "sphere.hpp"
 #include "stepdiag/core/rotation.hpp"
 #include "stepdiag/core/units.hpp"
+#include "support/refuses.hpp"
+#include "support/sphere.hpp"
 
 namespace {
 

@@ -5,7 +5,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "refuses.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

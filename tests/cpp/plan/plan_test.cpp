@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "refuses.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <map>
 
-#include "refuses.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "refuses.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

@@ -5,7 +5,8 @@
 #include <cmath>
 #include <random>
 
-#include "refuses.hpp"
+#include "stepdiag/uncertainty/volumetric_accuracy.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

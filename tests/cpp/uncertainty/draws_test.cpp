@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "stepdiag/core/random_lanes.hpp"
+#include "stepdiag/core/random_blocks.hpp"
 
 namespace {
 

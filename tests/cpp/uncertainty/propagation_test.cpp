@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "refuses.hpp"
 #include "stepdiag/evaluation/least_squares.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

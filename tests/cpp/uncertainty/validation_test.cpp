@@ -5,8 +5,8 @@
 #include <cmath>
 #include <functional>
 
-#include "refuses.hpp"
-#include "stepdiag/uncertainty/function_model.hpp"
+#include "stepdiag/monte_carlo/function_model.hpp"
+#include "support/refuses.hpp"
 
 namespace {
 

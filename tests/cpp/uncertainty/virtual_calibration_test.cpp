@@ -4,10 +4,10 @@
 
 #include <cmath>
 
-#include "refuses.hpp"
+#include "stepdiag/core/instruction_set.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
-#include "stepdiag/optics/replay.hpp"
-#include "uncertainty/virtual_runs.hpp"
+#include "support/refuses.hpp"
+#include "support/virtual_runs.hpp"
 
 namespace {
 
@@ -94,7 +94,7 @@ TEST_P(OfEveryHead, SampleIsASimulationWithTheDrawnSetUpsEvaluated) {
     EXPECT_EQ(model.count().traced, 0u);
 }
 
-TEST_P(OfEveryHead, EveryQuantityInLanesIsThatOfTheGeneralWay) {
+TEST_P(OfEveryHead, EveryQuantityInLanesIsThatOfTheScalarSampler) {
     const Kind kind = GetParam();
     VirtualRun run = run_of(kind);
     run.inputs = everything(kind);
@@ -152,12 +152,12 @@ TEST_P(OfEveryHead, OtherInstructionSetsAgreeToRounding) {
     run.simulation.environment = Environment{Air{}};
     const VirtualCalibrations model(run, {}, seed);
     const Eigen::MatrixXd fastest = outputs_of(model);
-    const std::string before = replay_target();
-    for (const std::string& target : replay_targets()) {
-        choose_replay_target(target);
+    const std::string before = instruction_set();
+    for (const std::string& target : instruction_sets()) {
+        choose_instruction_set(target);
         EXPECT_EQ(model.target(), target);
         const Eigen::MatrixXd found = outputs_of(model);
-        choose_replay_target(before);
+        choose_instruction_set(before);
         EXPECT_LE((found - fastest).cwiseAbs().maxCoeff(), rounding) << target;
     }
 }

@@ -122,7 +122,7 @@ def test_address_that_is_none_is_refused(address: str) -> None:
 def test_scheduler_that_does_not_answer_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("stepdiag.uncertainty.dask_workers.CONNECT_SECONDS", 0.5)
     # Port 9 is "discard": nobody listens there any more.
-    expected = r"^--scheduler: tcp://127.0.0.1:9: no scheduler answers"
+    expected = r"^`scheduler`: tcp://127.0.0.1:9: no scheduler answers"
     with pytest.raises(InvalidArgument, match=expected), workers_of("tcp://127.0.0.1:9"):
         pass
 

@@ -27,6 +27,7 @@ typedef struct {
     double largest_correction;
     int approach; /* enum stepdiag_approach */
     double largest_tool;
+    int accept_rejected; /* 1: takes a table whose fit was rejected */
 } stepdiag_options;
 
 stepdiag_options stepdiag_default_options(void);
@@ -49,6 +50,8 @@ unsigned stepdiag_forward(const stepdiag_compensator* compensator, const double 
 uint64_t stepdiag_fingerprint(const stepdiag_compensator* compensator);
 double stepdiag_inverse_bound(const stepdiag_compensator* compensator);
 void stepdiag_calibration_tool(const stepdiag_compensator* compensator, double tool[3]);
+/* Verdict of the table's fit: "accepted", "doubtful", "rejected" or "unchecked"; "" where the table has none. */
+const char* stepdiag_fit(const stepdiag_compensator* compensator);
 /* What the table does not tell, counted from 0: "EXX", "EYX (slope)", "C0Y". NULL after the last. */
 const char* stepdiag_uncompensated(const stepdiag_compensator* compensator, size_t index);
 

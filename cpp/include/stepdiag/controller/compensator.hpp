@@ -39,6 +39,7 @@ struct CompensatorOptions {
     double largest_correction = 1.0;  // mm: command and forward shorten a longer error vector to this length
     CompensatedApproach approach = CompensatedApproach::mean;
     double largest_tool = 1000.0;  // mm: longer tools are refused; the bound of the inverse holds for all others
+    bool accept_rejected = false;  // takes a table whose fit was rejected
 };
 
 // Flags: 0 is an answer inside the volume.
@@ -64,9 +65,9 @@ struct CompensatedPosition {
 class Compensator {
 public:
     // Reads a calibration or error map. Throws InvalidArgument naming the file, line and key: what the table's reader
-    // refuses; a table without chain, volume_mm or tool_mm, or with another chain than `chain`, the controller's; one
-    // without parameters, or with nodes that cannot be those of its volume; errors so steep that the inverse has no
-    // bound; options that make no sense.
+    // refuses; a table whose fit was rejected, unless accept_rejected; one without chain, volume_mm or tool_mm, or with
+    // another chain than `chain`, the controller's; one without parameters, or with nodes that cannot be those of its
+    // volume; errors so steep that the inverse has no bound; options that make no sense.
     static Compensator load(const std::string& path, const std::string& chain, const CompensatorOptions& options = {});
     // The same of a table in memory; `name` is what messages call it.
     Compensator(const ParameterTable& table, const std::string& name, const std::string& chain,
@@ -93,6 +94,9 @@ public:
     double inverse_bound() const noexcept;
     std::array<double, 3> volume() const noexcept;  // mm
     std::array<double, 3> tool() const noexcept;    // of the calibration, mm
+    // Verdict of the table's fit: "accepted", "doubtful", "rejected" or "unchecked"; empty where the table has none.
+    // Whoever loads a doubtful or unchecked table should be told.
+    const std::string& fit() const noexcept;
     // What the table does not tell and is therefore not compensated: "EXX", "EYX (slope)", "EXX (above 784.0 mm)",
     // "C0Y".
     const std::vector<std::string>& uncompensated() const noexcept;

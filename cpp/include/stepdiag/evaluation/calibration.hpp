@@ -11,6 +11,7 @@
 
 #include "stepdiag/machine/chain.hpp"
 #include "stepdiag/machine/error_map.hpp"
+#include "stepdiag/machine/fit.hpp"
 
 namespace stepdiag {
 
@@ -57,7 +58,21 @@ struct Calibration {
 
     std::array<std::optional<CalibratedReversal>, function_count> reversal = {};  // where backward runs tell it
     std::string date = {};  // of the evaluation: ISO 8601, UTC; empty where it is not known
+
+    // Verdict of the fit; none where it is not known, as in files of earlier versions.
+    std::optional<Fit> fit = {};
+    std::optional<double> variance_factor = {};  // of that fit; none where nothing controls the readings
 };
+
+// A value of a calibration's tables (order of Calibration::covariance).
+struct CalibrationEntry {
+    std::string parameter;  // "EXX", ..., "C0Y"
+    double position;        // mm; NaN for a squareness
+};
+
+// The entries of a calibration in the order of Calibration::covariance, and their values.
+std::vector<CalibrationEntry> calibration_entries(const Calibration& calibration);
+Eigen::VectorXd calibration_values(const Calibration& calibration);
 
 // Throws InvalidArgument naming the parameter where a calibration put together by hand is none: a volume that is not
 // positive, nodes that do not ascend, values that are not finite, uncertainties below 0, a covariance that is no matrix
@@ -73,10 +88,10 @@ bool is_anything_determined(const Calibration& calibration);
 // - direction. A reversal error without its function has no place in a table.
 ParameterTable to_parameter_table(const Calibration& calibration);
 
-// CSV with format, chain, volume_mm, tool_mm, method, date, straightness_reference, undetermined_slopes,
-// undetermined_reversal_constants and undetermined in the leading lines; not kept are the covariance and the
-// uncertainty of a reversal error, which is not that of its two tables. Reading throws InvalidArgument naming file and
-// line, also where chain, volume or tool is missing.
+// CSV with format, chain, volume_mm, tool_mm, method, date, fit, variance_factor, straightness_reference,
+// undetermined_slopes, undetermined_reversal_constants and undetermined in the leading lines; not kept are the
+// covariance and the uncertainty of a reversal error, which is not that of its two tables. Reading throws
+// InvalidArgument naming file and line, also where chain, volume or tool is missing.
 void write_calibration(const Calibration& calibration, const std::string& path);
 Calibration read_calibration(const std::string& path);
 

@@ -19,7 +19,8 @@
 
 namespace stepdiag {
 
-// Throws InvalidArgument for readings that do not belong to the plan, or where nothing at all can be determined.
+// Throws InvalidArgument for readings that do not belong to the plan, where nothing at all can be determined, or for a
+// result that is not plausible. Nothing tests the fit: it is unchecked.
 Calibration evaluate_enhanced(const Measurement& measurement, const Plan& plan, const Chain& chain,
                               const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                               const EvaluationOptions& options = {});

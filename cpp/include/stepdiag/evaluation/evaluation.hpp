@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 
 #include "stepdiag/evaluation/calibration.hpp"
+#include "stepdiag/evaluation/plausibility.hpp"
 #include "stepdiag/measurement/head_calibration.hpp"
 #include "stepdiag/measurement/measurement.hpp"
 #include "stepdiag/plan/plan.hpp"
@@ -20,6 +21,7 @@ struct ReadingUncertainty {
 struct EvaluationOptions {
     ReadingUncertainty uncertainty;
     bool full_covariance = false;  // standard uncertainties are always there
+    PlausibleLimits plausible = {};
 };
 
 }  // namespace stepdiag

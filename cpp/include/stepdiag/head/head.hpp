@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "stepdiag/core/air.hpp"
 #include "stepdiag/head/design.hpp"
 #include "stepdiag/head/head_layout.hpp"
 #include "stepdiag/head/traced_head.hpp"

@@ -6,9 +6,9 @@
 
 #include <Eigen/Core>
 
+#include "stepdiag/core/air.hpp"
 #include "stepdiag/head/design.hpp"
 #include "stepdiag/measurement/head_calibration.hpp"
-#include "stepdiag/optics/medium.hpp"
 
 namespace stepdiag {
 

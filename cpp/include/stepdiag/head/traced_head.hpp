@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "stepdiag/core/air.hpp"
 #include "stepdiag/head/design.hpp"
 #include "stepdiag/optics/ray_tree.hpp"
 #include "stepdiag/optics/replay.hpp"

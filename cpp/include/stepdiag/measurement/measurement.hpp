@@ -10,19 +10,11 @@
 #include <string_view>
 #include <vector>
 
-#include "stepdiag/plan/line.hpp"
+#include "stepdiag/plan/run_order.hpp"
 
 namespace stepdiag {
 
-// A backward run visits a line's points in reverse order, with head and mirror as they are.
-enum class Direction { forward, backward };
-
-// How the axes come to each point of a visit, its first included: in the direction of the visit's own travel, because a
-// measuring program overruns the start and comes back, so that backlash is taken up. An axis that the line does not
-// move stands at home, approached in + direction.
-Approaches approaches(const Line& line, Direction direction);
-
-// One row: where and in which visit it was read. (run, line, point) is the key.
+// One row: where and in which pass it was read. (run, line, point) is the key.
 struct Station {
     int run = 0;
     Line line;

@@ -71,11 +71,4 @@ struct LaneResults {
 void replay(const std::vector<Encounter>& route, const LaneRays& rays, std::size_t lanes, double gap,
             const LaneResults& results);
 
-// Name of the instruction set in use, e.g. "AVX3" (AVX-512); results are the same bits for the same one.
-std::string replay_target();
-// Those that this processor has, fastest first. The fastest is in use until another is chosen, for the whole process,
-// e.g. to get the bits of a lesser processor. Throws InvalidArgument naming those there are.
-std::vector<std::string> replay_targets();
-void choose_replay_target(const std::string& name);
-
 }  // namespace stepdiag

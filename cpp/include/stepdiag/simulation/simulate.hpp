@@ -7,10 +7,10 @@
 #include <optional>
 #include <string>
 
+#include "stepdiag/core/air.hpp"
 #include "stepdiag/head/traced_reading.hpp"
 #include "stepdiag/machine/machine.hpp"
 #include "stepdiag/measurement/measurement.hpp"
-#include "stepdiag/optics/medium.hpp"
 #include "stepdiag/plan/plan.hpp"
 
 namespace stepdiag {

@@ -4,11 +4,10 @@
 // Signs and frames as those of the nominal quantity: Misalignment, PoseError, Environment (CONVENTIONS).
 #pragma once
 
-#include <Eigen/Core>
 #include <string>
 #include <vector>
 
-#include "stepdiag/uncertainty/distribution.hpp"
+#include "stepdiag/monte_carlo/distribution.hpp"
 
 namespace stepdiag {
 
@@ -75,12 +74,6 @@ struct ReadingNoise {
 // "noise of distance", "common noise", "head walk", "machine walk x", "position x", "orientation x".
 std::string name(const ReadingNoise& noise);
 
-// Inputs that are jointly normal: `members` index UncertainInputs::inputs, all of them normal.
-struct CorrelatedInputs {
-    std::vector<int> members;
-    Eigen::MatrixXd correlation;
-};
-
 struct UncertainInputs {
     std::vector<UncertainInput> inputs = {};
     std::vector<ReadingNoise> noise = {};
@@ -91,9 +84,5 @@ struct UncertainInputs {
 // distribution that makes no sense, members that are out of range, not normal or in two correlations, a matrix that is
 // no correlation (size, symmetry, 1 on the diagonal, not positive semidefinite).
 void check(const UncertainInputs& inputs);
-
-// F with F F^T = `correlation`: F times independent standard normal numbers has that correlation. Semidefinite ones are
-// taken too. Throws InvalidArgument, beginning with `name`, for what is no correlation matrix.
-Eigen::MatrixXd correlation_factor(const Eigen::MatrixXd& correlation, const std::string& name);
 
 }  // namespace stepdiag

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdiag/uncertainty/monte_carlo.hpp"
+#include "stepdiag/monte_carlo/monte_carlo.hpp"
 #include "stepdiag/uncertainty/propagation.hpp"
 
 namespace stepdiag {

@@ -23,10 +23,10 @@
 #include <string>
 #include <vector>
 
-#include "stepdiag/evaluation/batch.hpp"
+#include "stepdiag/batch/batch_evaluator.hpp"
+#include "stepdiag/monte_carlo/sample_model.hpp"
 #include "stepdiag/simulation/simulate.hpp"
 #include "stepdiag/uncertainty/inputs.hpp"
-#include "stepdiag/uncertainty/sample_model.hpp"
 
 namespace stepdiag {
 
@@ -52,7 +52,7 @@ struct DerivedOutput {
 struct SampleCount {
     std::uint64_t replayed;  // in lanes
     std::uint64_t traced;    // whole, because a replay did not fit, or no head of this kind can be replayed
-    std::uint64_t verified;  // of those replayed: one reading of each visit traced again
+    std::uint64_t verified;  // of those replayed: one reading of each pass traced again
 };
 
 // Deviations of one sample's inputs (order of UncertainInputs::inputs).

@@ -1,0 +1,155 @@
+// The exact adjustment: all readings of a run, of any lines, explained at once by the machine's errors at the visited
+// nodes and by how head and mirror were set up on each line. Least squares,
+//   sum over readings ((read - model(x))/u)^2 + sum over priors (x_j/u_j)^2 -> minimum,
+// with the exact pose (machine/machine.hpp) and the exact definition of every reading (measurement/reading.hpp), solved
+// by Gauss-Newton to the floor of double precision. Frame choice and signs as in machine/error_map.hpp. Every published
+// variant of the method is this with fewer readings or unknowns. What the readings do not determine is said in words.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stepdiag/evaluation/evaluation.hpp"
+
+namespace stepdiag {
+
+// What is unknown of a line's set-up. Units: rad, mm, 1 (gain), mm/s (drift).
+enum class SetupQuantity {
+    reflector,          // (a, b): mirror normal R_tool F Exp(a, b, 0) z
+    laser,              // (a, b): sensor axes F Exp(a, b, 0)
+    distance_constant,  // what every distance reads too much
+    beam_constants,     // layout multi_beam: what d2 ... dn read too much, against d1
+    psd_zero,           // layout psd: what a centred spot reads
+    lateral,            // the beam's origin beside its nominal place, along local x and y
+    roll,               // of the head about its beam: sensor axes F Exp(a, b, 0) Exp(0, 0, roll)
+    gain,               // tilts read 1 + gain times themselves; layout psd: spots; multi_beam: the beams' offsets
+    drift,              // distances read too much by drift times the time since the set-up's first reading
+};
+inline constexpr int setup_quantity_count = 9;
+std::string name(SetupQuantity quantity);  // "reflector", ...
+
+// How an unknown is taken: infinite: free; 0: fixed at 0; else the standard uncertainty with which it is known to be 0.
+using PriorUncertainty = double;
+inline constexpr PriorUncertainty free_unknown = std::numeric_limits<double>::infinity();
+inline constexpr PriorUncertainty fixed_unknown = 0.0;
+
+// By SetupQuantity; none: the default. Defaults of measured lines: reflector, distance_constant, beam_constants and
+// psd_zero free; laser free, but known to 2000 urad where the constants of the layout's beams are not fixed; lateral
+// known to 1 mm, roll to 20,000 urad, gain to 0.01; drift fixed. A lateral offset, roll or gain acts by the tilts only,
+// which are 0 on a perfect machine: free means known to 1 m, 1 rad, 1, and one whose uncertainty stays above half of
+// that is not determined. Where no tilt tells the laser's angles from the mirror's (lines of a single axis, distances
+// alone) they act at second order only, and the distances get a cosine error of theirs.
+// Defaults of scale lines: reflector fixed, and their tilts and spots then are not used; beams have a constant each;
+// the laser's angles are fixed at 0, and what is given as their standard uncertainty (500 urad) makes the cosine error
+// travel (a^2 + b^2)/2 by which, with a mirror that is square to the beam, their distances read short; roll and gain
+// fixed; the others as on measured lines. What is said of all lines reaches scale lines for distance_constant and
+// lateral only; the rest of a scale line's set-up is said by its own name.
+using SetupPriors = std::array<std::optional<PriorUncertainty>, setup_quantity_count>;
+
+// Standard deviation with which the second difference of neighbouring nodes is known to be 0: real axes are smooth.
+struct Smoothness {
+    double translation = 0.0;  // mm; 0: no such knowledge
+    double rotation = 0.0;     // rad
+    // Finds a deviation for each of the 18 functions by generalised cross-validation, and takes these two as limits
+    // where they are not 0: no function is made smoother than that.
+    bool cross_validated = false;
+};
+
+struct AdjustmentOptions {
+    ReadingUncertainty uncertainty;
+    SetupPriors setup = {};
+    std::map<std::string, SetupPriors> setup_by_line = {};  // replaces the quantities that it names
+    // A set-up serves a run's line and the backward runs that follow it; or, if true, all runs of the line. The time
+    // for many set-ups grows with the third power of their number: 50 runs of seven lines take seconds.
+    bool one_setup_per_line = false;
+    bool reversal = true;   // where there are backward runs: tables of their own for nodes approached in - direction
+    bool rotations = true;  // false: the machine is taken to have no angular errors
+    std::optional<Smoothness> smoothness = {};
+    // Readings that do not fit are left out, the worst first, at this probability of any false alarm in a run; 0: none
+    // is. No more than one in fifty, or ten: where more do not fit, it is the model that does not, and all stay.
+    double outlier_probability = 0.01;
+    bool full_covariance = false;
+    PlausibleLimits plausible = {};
+};
+
+// One set-up unknown, as it was found.
+struct SetupEstimate {
+    int run;  // the first run that has this set-up
+    std::string line;
+    SetupQuantity quantity;
+    int component;                // of angles and offsets: 0, 1; of beams: 1 for d2, ...
+    std::optional<double> value;  // none where it is not determined
+    double standard_uncertainty;
+    PriorUncertainty prior;
+};
+
+// One reading: by row of the measurement and channel.
+struct ReadingResidual {
+    std::size_t row;
+    std::string channel;
+    double residual;    // read - model, native units
+    double redundancy;  // 0: nothing controls this reading; 1: all others know it better
+    double normalised;  // residual/(u sqrt(redundancy)); 0 where nothing controls it
+    int outlier = 0;    // n: left out as the n-th outlier; redundancy and normalised are those of a control reading
+    // n: fitted as badly as the n-th outlier, and no other reading tells which of them is wrong (distances of one point
+    // number on four body diagonals come in such pairs). The one was left out that made the error functions smoother.
+    int suspect = 0;
+
+    bool used() const { return outlier == 0; }
+};
+
+// Why a fit is not accepted.
+enum class FitFinding {
+    no_redundancy,  // nothing controls the readings
+    noise_factor,   // root of the variance factor: the misfit in terms of the stated uncertainties
+    misfit,         // probability of a misfit as large as this one
+    no_misfit,      // probability of a misfit as small as this one
+    uneven_misfit,  // root of the variance factor of one line or one channel, where it differs from that of the others
+    prior,          // distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2)
+};
+std::string name(FitFinding finding);  // "no_redundancy", ...
+
+struct FitReason {
+    FitFinding finding;
+    double value;
+    double limit;
+    std::string line = {};     // of an uneven misfit or a prior
+    std::string channel = {};  // of an uneven misfit: "distance", ...; of a prior: the set-up quantity
+    int component = 0;         // of a prior
+};
+
+// Whether the readings of an adjustment agree with each other, with their uncertainties and with the priors. It does
+// not see what the parameters absorb: a wrong wavelength, chain or tool.
+struct Verdict {
+    Fit fit = Fit::unchecked;
+    std::vector<FitReason> reasons = {};
+};
+
+struct Adjustment {
+    Calibration calibration;  // carries fit and variance factor
+    std::vector<SetupEstimate> setup;
+    std::vector<ReadingResidual> residuals;
+    double weighted_square_sum;  // of residuals and priors
+    int degrees_of_freedom;
+    double chi_square_probability;  // of a larger square sum, if model and uncertainties are right; 1 without freedom
+    int iterations;                 // steps from zero
+    std::vector<std::string> combinations;               // what is known of unknowns that are not determined one by one
+    std::array<double, function_count> smoothness = {};  // deviations of second differences in force; 0: none
+    Verdict verdict = {};
+
+    double variance_factor() const;             // weighted_square_sum/degrees_of_freedom; 1 without freedom
+    std::vector<std::size_t> outliers() const;  // into `residuals`, by their number
+};
+
+// Throws InvalidArgument for readings that do not belong to the plan, channels that do not fit the head, a free drift
+// without times, options that make no sense, where nothing at all can be determined, or for a result that is not
+// plausible.
+Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
+                  const HeadCalibrations& heads, const AdjustmentOptions& options = {});
+
+}  // namespace stepdiag

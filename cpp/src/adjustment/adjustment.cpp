@@ -1,0 +1,123 @@
+#include "stepdiag/adjustment/adjustment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <unsupported/Eigen/SpecialFunctions>
+
+#include "adjustment/adjustment_result.hpp"
+#include "adjustment/outlier_search.hpp"
+#include "adjustment/smoothness.hpp"
+#include "adjustment/verdict.hpp"
+#include "stepdiag/core/error.hpp"
+#include "stepdiag/core/units.hpp"
+
+namespace stepdiag {
+namespace {
+
+void check_options(const AdjustmentOptions& options, const Plan& plan) {
+    if (!(options.outlier_probability >= 0.0 && options.outlier_probability <= 0.5))
+        throw InvalidArgument("adjustment outlier_probability: expected a probability from 0 to 0.5");
+    if (const auto& s = options.smoothness)
+        for (const auto& [key, value] : {std::pair("translation", s->translation), std::pair("rotation", s->rotation)})
+            if (!(value == 0.0 || (value >= 1e-9 && value <= 1e6)))
+                throw InvalidArgument(std::string("smoothness ") + key +
+                                      ": expected 0 or a deviation of 1e-9 to 1e6 mm or rad");
+    for (const auto& entry : options.setup_by_line)
+        if (!plan.contains(Line::parse(entry.first)))
+            throw InvalidArgument("adjustment: line \"" + entry.first + "\" is not in the plan");
+}
+
+std::array<double, function_count> smoothness_at_start(const AdjustmentOptions& options) {
+    if (!options.smoothness || options.smoothness->cross_validated) return {};
+    return given_deviations(*options.smoothness);
+}
+
+std::vector<std::string> describe(const Observability& observability, const Eigen::VectorXd& x,
+                                  const BorderedBand& inverse) {
+    std::vector<std::string> sentences;
+    for (const KnownCombination& combination : observability.combinations()) {
+        std::ostringstream text;
+        text.precision(4);
+        text << combination.text << " = " << combination.form.value(x) / microradian << " +- "
+             << std::sqrt(std::max(0.0, combination.form.variance(inverse))) / microradian
+             << (combination.is_angle ? " urad" : " um/m");
+        sentences.push_back(text.str());
+    }
+    return sentences;
+}
+
+}  // namespace
+
+double Adjustment::variance_factor() const {
+    return degrees_of_freedom > 0 ? weighted_square_sum / degrees_of_freedom : 1.0;
+}
+
+std::vector<std::size_t> Adjustment::outliers() const {
+    std::vector<std::size_t> list;
+    for (std::size_t r = 0; r < residuals.size(); ++r)
+        if (!residuals[r].used()) list.push_back(r);
+    std::stable_sort(list.begin(), list.end(),
+                     [&](std::size_t i, std::size_t j) { return residuals[i].outlier < residuals[j].outlier; });
+    return list;
+}
+
+Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
+                  const HeadCalibrations& heads, const AdjustmentOptions& options) {
+    check_options(options, plan);
+    check(options.plausible);
+    AdjustmentProblem problem(measurement, plan, chain, tool, heads, options);
+    if (problem.readings().empty())
+        throw InvalidArgument("adjustment: nothing can be determined: the run has no readings that count");
+    refuse_foreign_distances(measurement, plan);
+    GaussNewton solver(problem, smoothness_at_start(options));
+    AdjustmentTables tables(problem);
+    const Observability observability(solver, tables);
+    const CalibratedForms forms = choose_forms(tables);
+    solver.assume_usual(observability.determined());
+
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
+    Adjustment result{
+        {"", chain, {}, {}, {}, {}, {}, {}, {}}, {}, {}, 0.0, 0, 1.0, 0, {}, smoothness_at_start(options)};
+    OutlierSearch outliers(problem, solver, options);
+    try {
+        result.iterations = outliers.solve_without_gross(observability.determined(), x);
+    } catch (const InvalidArgument& error) {
+        const std::string far = far_reading(measurement, plan);
+        if (far.empty()) throw;
+        throw InvalidArgument("adjustment: " + far);
+    }
+    if (options.outlier_probability > 0.0) outliers.run(observability.determined(), x);
+    if (options.smoothness && options.smoothness->cross_validated) {
+        result.smoothness = cross_validate(solver, x, options);
+        solver.solve(x);
+    }
+
+    outliers.look(x);
+    const BorderedBand& inverse = outliers.inverse();
+    result.calibration = make_calibration(problem, tables, forms, x, inverse);
+    const std::vector<bool> known = known_unknowns(problem, observability.determined(), inverse);
+    result.calibration.undetermined = observability.sentences(known);
+    if (!is_anything_determined(result.calibration))
+        throw InvalidArgument(
+            "adjustment: nothing can be determined. " +
+            (result.calibration.undetermined.empty() ? std::string() : result.calibration.undetermined.front()));
+    refuse_implausible(result.calibration, measurement, plan, options.plausible);
+    if (options.full_covariance) result.calibration.covariance = full_covariance(problem, forms, solver.factor());
+    result.setup = setup_estimates(problem, known, x, inverse);
+    result.residuals = outliers.residuals();
+    std::stable_sort(result.residuals.begin(), result.residuals.end(),
+                     [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
+    result.combinations = describe(observability, x, inverse);
+    result.weighted_square_sum = solver.equations().square_sum(x);
+    result.degrees_of_freedom = degrees_of_freedom(solver);
+    if (result.degrees_of_freedom > 0)
+        result.chi_square_probability =
+            Eigen::numext::igammac(0.5 * result.degrees_of_freedom, 0.5 * result.weighted_square_sum);
+    result.verdict = judge(result, measurement);
+    result.calibration.fit = result.verdict.fit;
+    if (result.degrees_of_freedom > 0) result.calibration.variance_factor = result.variance_factor();
+    return result;
+}
+
+}  // namespace stepdiag

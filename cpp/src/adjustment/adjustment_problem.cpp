@@ -1,0 +1,328 @@
+#include "adjustment/adjustment_problem.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "adjustment/setup_priors.hpp"
+#include "evaluation/measurement_rows.hpp"
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+namespace {
+
+ChannelKind kind_of(const Measurement& measurement) {
+    if (measurement.beam_count() > 0) return ChannelKind::multi_beam;
+    return measurement.find("spot_x") ? ChannelKind::psd : ChannelKind::ideal;
+}
+
+std::string channel_name(ChannelKind kind, int channel) {
+    if (kind == ChannelKind::multi_beam) return "d" + std::to_string(channel + 1);
+    constexpr const char* names[2][3] = {{"distance", "alpha", "beta"}, {"distance", "spot_x", "spot_y"}};
+    return names[kind == ChannelKind::psd][channel];
+}
+
+double usual_uncertainty(const ReadingUncertainty& uncertainty, const std::string& channel) {
+    if (channel.front() == 'd') return uncertainty.distance;
+    return channel.front() == 's' ? uncertainty.spot : uncertainty.tilt;
+}
+
+Direction direction_of(const Measurement& measurement, const std::vector<std::size_t>& rows) {
+    const Direction direction = measurement.stations()[rows.front()].direction;
+    for (const std::size_t row : rows)
+        if (measurement.stations()[row].direction != direction)
+            throw InvalidArgument(row_name(measurement, row) +
+                                  ": expected the direction of the run's other readings on this line");
+    return direction;
+}
+
+// A mirror that is turned by 45 degrees sends no beam back to its head.
+double usable(const RawValue& raw, const Measurement& measurement, std::size_t row, const std::string& channel) {
+    const bool tilt = channel == "alpha" || channel == "beta";
+    if (tilt && !(std::abs(raw.value) < 1.0))
+        throw InvalidArgument(row_name(measurement, row) + ": expected tilts below 45 degrees");
+    return raw.value;
+}
+
+bool has_tilts(const Measurement& measurement) {
+    return measurement.find("alpha") != nullptr || measurement.find("spot_x") != nullptr;
+}
+
+}  // namespace
+
+AdjustmentProblem::AdjustmentProblem(const Measurement& measurement, const Plan& plan, const Chain& chain,
+                                     const Eigen::Vector3d& tool, const HeadCalibrations& heads,
+                                     const AdjustmentOptions& options)
+    : plan_(plan),
+      chain_(chain),
+      tool_(tool),
+      heads_(std::make_shared<const HeadCalibrations>(heads)),
+      kind_(kind_of(measurement)),
+      rotations_(options.rotations) {
+    if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
+    check_uncertainty(options.uncertainty);
+    check_heads_fit(measurement, heads, true);
+    for (auto& list : node_at_) list.assign(plan.steps() + 1, no_unknown);
+    for (const Station& station : measurement.stations())
+        reversal_ = reversal_ || (options.reversal && station.direction == Direction::backward);
+    collect_setups(measurement, options);
+    collect_points(measurement, options);
+    number_unknowns(options);
+}
+
+// A set-up serves a forward run of a line and the backward runs that follow it, or all runs of the line.
+void AdjustmentProblem::collect_setups(const Measurement& measurement, const AdjustmentOptions& options) {
+    setup_of_row_.resize(measurement.size());
+    std::map<std::string, int> current;  // set-up by line
+    for (const auto& entry : rows_by_pass(measurement)) {
+        const std::vector<std::size_t>& rows = entry.second;
+        const Line line = measurement.stations()[rows.front()].line;
+        const bool backward = direction_of(measurement, rows) == Direction::backward;
+        const auto found = current.find(line.name());
+        if (found == current.end() || !(backward || options.one_setup_per_line)) {
+            const HeadCalibration& head = heads_->of(line.name());
+            const auto planned = planned_points(measurement, rows.front(), plan_);
+            const Eigen::Matrix3d frame = plan_.frame(line);
+            const bool scale = plan_.is_scale_line(line);
+            const Eigen::Vector3d origin = planned.front().commanded + tool_ - head.standoff * frame.col(2);
+            LineSetup setup{entry.first.first, line, scale, ChannelModel(kind_, head, frame, origin), {}, {}, {}};
+            const int columns = setup.model.setup_size();
+            setup.prior = setup_priors(options, line.name(), scale, line.moved_axes() == 1,
+                                       kind_ == ChannelKind::multi_beam || has_tilts(measurement), kind_, columns);
+            setup.unknown.assign(columns, no_unknown);
+            current[line.name()] = int(setups_.size());
+            setups_.push_back(std::move(setup));
+        }
+        for (const std::size_t row : rows) setup_of_row_[row] = current[line.name()];
+    }
+    const Channel* time = measurement.find("time");
+    for (std::size_t row = 0; row < measurement.size(); ++row) {
+        LineSetup& setup = setups_[setup_of_row_[row]];
+        if (setup.prior[setup::drift] == fixed_unknown) continue;
+        if (!time || !time->value[row])
+            throw InvalidArgument(row_name(measurement, row) +
+                                  ": a drift that is not fixed needs the time of every reading (column time_s)");
+        setup.first_time = std::min(setup.first_time.value_or(*time->value[row]), *time->value[row]);
+    }
+}
+
+int AdjustmentProblem::node_index(Axis axis, int node, bool negative) {
+    int& place = node_at_[2 * index(axis) + negative][node];
+    if (place == no_unknown) {
+        place = int(nodes_.size());
+        nodes_.push_back({axis, node, negative, plan_.node_position(axis, node)});
+    }
+    return place;
+}
+
+void AdjustmentProblem::collect_points(const Measurement& measurement, const AdjustmentOptions& options) {
+    std::map<std::pair<std::string, StepOrder>, std::vector<PlanPoint>> planned;
+    const Channel* time = measurement.find("time");
+    std::vector<std::string> names;
+    for (int c = 0; c < std::max(3, measurement.beam_count()); ++c) names.push_back(stepdiag::channel_name(kind_, c));
+    for (std::size_t row = 0; row < measurement.size(); ++row) {
+        const Station& station = measurement.stations()[row];
+        const auto place = planned.try_emplace({station.line.name(), plan_.order(station.run)});
+        if (place.second) place.first->second = planned_points(measurement, row, plan_);
+        const std::vector<PlanPoint>& line = place.first->second;
+        check_station(measurement, row, line);
+
+        const LineSetup& setup = setups_[setup_of_row_[row]];
+        // Without a reflector angle of their own the tilts of a scale line would be taken for the machine's.
+        const bool distance_only =
+            setup.is_scale_line && kind_ != ChannelKind::multi_beam && setup.prior[setup::reflector] == fixed_unknown;
+        AdjustedPoint point{setup_of_row_[row], {no_unknown, no_unknown, no_unknown}, {}, int(readings_.size()), 0};
+        for (int c = 0; c < int(names.size()) && !(distance_only && c > 0); ++c)
+            if (const auto raw =
+                    raw_value(measurement.find(names[c]), row, usual_uncertainty(options.uncertainty, names[c])))
+                readings_.push_back({row, c, usable(*raw, measurement, row, names[c]), raw->standard_uncertainty});
+        point.end_reading = int(readings_.size());
+        if (point.end_reading == point.first_reading) continue;
+
+        const PlanPoint& target = line[station.point];
+        point.place.commanded = target.commanded;
+        point.place.travel = plan_.frame(station.line).col(2).dot(target.commanded - line.front().commanded);
+        if (setup.first_time) point.place.time = *time->value[row] - *setup.first_time;
+        for (const Axis axis : all_axes) {
+            const int sign = station.line.sign(axis) * (station.direction == Direction::backward ? -1 : 1);
+            const bool negative = reversal_ && sign < 0;
+            if (target.node[index(axis)] > 0 || negative)
+                point.node[index(axis)] = node_index(axis, target.node[index(axis)], negative);
+        }
+        points_.push_back(point);
+    }
+}
+
+std::string AdjustmentProblem::channel_name(const AdjustedReading& reading) const {
+    return stepdiag::channel_name(kind_, reading.channel);
+}
+
+std::vector<std::vector<int>> AdjustmentProblem::node_chains() const {
+    std::vector<std::vector<int>> chains;
+    for (const auto& list : node_at_) {
+        auto& chain = chains.emplace_back();
+        for (const int node : list)
+            if (node != no_unknown) chain.push_back(node);
+    }
+    return chains;
+}
+
+const AxisNode* AdjustmentProblem::find(Axis axis, int node, bool negative) const {
+    const int place = node_at_[2 * index(axis) + negative][node];
+    return place == no_unknown ? nullptr : &nodes_[place];
+}
+
+MachineErrors AdjustmentProblem::errors(const AdjustedPoint& point, const Eigen::VectorXd& x) const {
+    MachineErrors errors;
+    for (int a = 0; a < 3; ++a) {
+        errors[a].setZero();
+        if (point.node[a] == no_unknown) continue;
+        const AxisNode& node = nodes_[point.node[a]];
+        for (int c = 0; c < 6; ++c)
+            if (node.unknown[c] != no_unknown) errors[a][c] = x[node.unknown[c]];
+    }
+    return errors;
+}
+
+Eigen::VectorXd AdjustmentProblem::setup_values(const LineSetup& setup, const Eigen::VectorXd& x) const {
+    Eigen::VectorXd values = Eigen::VectorXd::Zero(Eigen::Index(setup.unknown.size()));
+    for (const int c : setup.active) values[c] = x[setup.unknown[c]];
+    return values;
+}
+
+// --- order and weight of the unknowns ---
+
+namespace {
+
+constexpr int largest_border = 10'000;  // a dense matrix of them: 800 MB, minutes
+
+// The frame choice: straightnesses that are 0 at the end of travel and have no squareness to take their slope.
+bool is_zero_at_end(Axis axis, int component) {
+    const FunctionId id{axis, Component(component)};
+    if (!id.is_straightness()) return false;
+    return std::none_of(all_squarenesses.begin(), all_squarenesses.end(), [&](Squareness s) {
+        return squareness_term(s).axis == axis && squareness_term(s).component == component;
+    });
+}
+
+}  // namespace
+
+void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options) {
+    const int steps = plan_.steps();
+    std::vector<int> banded;
+    for (std::size_t i = 0; i < nodes_.size(); ++i)
+        if (nodes_[i].node > 0 && nodes_[i].node < steps) banded.push_back(int(i));
+    const auto fold = [&](int i) {
+        const AxisNode& n = nodes_[i];
+        return std::tuple(std::min(n.node, steps - n.node), index(n.axis), n.node, n.negative);
+    };
+    std::sort(banded.begin(), banded.end(), [&](int i, int j) { return fold(i) < fold(j); });
+    for (std::size_t b = 0; b < banded.size(); ++b) {
+        AxisNode& node = nodes_[banded[b]];
+        node.block = int(b);
+        for (int c = 0; c < 6; ++c)
+            if (c < 3 || options.rotations) node.unknown[c] = int(6 * b) + c;
+    }
+    const int banded_unknowns = int(6 * banded.size());
+    for (AxisNode& node : nodes_) {
+        if (node.block != no_unknown) continue;
+        for (int c = 0; c < 6; ++c)
+            if ((c < 3 || options.rotations) && (node.negative || !is_zero_at_end(node.axis, c)))
+                node.unknown[c] = banded_unknowns + border_++;
+    }
+    for (LineSetup& setup : setups_)
+        for (int c = 0; c < int(setup.prior.size()); ++c)
+            if (setup.prior[c] != fixed_unknown) {
+                setup.unknown[c] = banded_unknowns + border_++;
+                setup.active.push_back(c);
+            }
+
+    if (border_ > largest_border)
+        throw InvalidArgument("adjustment: " + std::to_string(setups_.size()) + " set-ups have more than " +
+                              std::to_string(largest_border) +
+                              " unknowns; where runs of a line have one set-up in common, say so (one_setup_per_line)");
+
+    reach_.resize(banded.size());
+    for (std::size_t b = 0; b < banded.size(); ++b) reach_[b] = int(b);
+    const auto couple = [&](int i, int j) {
+        if (i == no_unknown || j == no_unknown) return;
+        const int a = nodes_[i].block, b = nodes_[j].block;
+        if (a != no_unknown && b != no_unknown)
+            reach_[std::min(a, b)] = std::max(reach_[std::min(a, b)], std::max(a, b));
+    };
+    for (const AdjustedPoint& point : points_)
+        for (int a = 0; a < 3; ++a) couple(point.node[a], point.node[(a + 1) % 3]);
+    for (const Axis axis : all_axes) {
+        const auto &both = node_at_[2 * index(axis)], &negative = node_at_[2 * index(axis) + 1];
+        for (int k = 0; k <= steps; ++k) couple(both[k], negative[k]);
+    }
+    if (options.smoothness)
+        for (const auto& chain : node_chains())
+            for (std::size_t k = 0; k + 1 < chain.size(); ++k) {
+                couple(chain[k], chain[k + 1]);
+                if (k + 2 < chain.size()) couple(chain[k], chain[k + 2]);
+            }
+    for (std::size_t b = 1; b < reach_.size(); ++b) reach_[b] = std::max(reach_[b], reach_[b - 1]);
+
+    sort_points();
+
+    weigh_unknowns();
+}
+
+void AdjustmentProblem::weigh_unknowns() {
+    constexpr double metre = 1e3;                                 // mm
+    constexpr double usual_translation = 0.1, usual_turn = 3e-4;  // of an axis, mm and rad
+    constexpr double usual_angle = 2e-3, usual_psd_zero = 10.0;   // of a set-up, rad and mm
+    prior_.assign(size(), free_unknown);
+    usual_.assign(size(), usual_translation);
+    change_scale_.assign(size(), 1.0 / metre);
+    for (const AxisNode& node : nodes_)
+        for (int c = 3; c < 6; ++c)
+            if (node.unknown[c] != no_unknown) {
+                usual_[node.unknown[c]] = usual_turn;
+                change_scale_[node.unknown[c]] = 1.0;
+            }
+    for (const LineSetup& setup : setups_)
+        for (const int c : setup.active) {
+            const int j = setup.unknown[c];
+            prior_[j] = setup.prior[c];
+            const bool angle = c < setup::distance_constant;
+            const bool psd_zero = c == setup::psd_zero || c == setup::psd_zero + 1;
+            usual_[j] = angle ? usual_angle : psd_zero ? usual_psd_zero : free_unknown;
+            if (angle || c == setup::roll || c == setup::gain || c == setup::cosine) change_scale_[j] = 1.0;
+        }
+}
+
+int AdjustmentProblem::informative_priors() const {
+    int count = 0;
+    for (const LineSetup& setup : setups_)
+        for (const int c : setup.active) {
+            const auto of = setup_column_name(c);
+            count += setup.prior[c] < (of ? broadest_prior(of->quantity) : free_unknown);
+        }
+    return count;
+}
+
+// In the order of the band, so that who goes through the points goes through the matrix once.
+void AdjustmentProblem::sort_points() {
+    const auto first_block = [&](const AdjustedPoint& point) {
+        int first = blocks();
+        for (const int node : point.node)
+            if (node != no_unknown && nodes_[node].block != no_unknown) first = std::min(first, nodes_[node].block);
+        return first;
+    };
+    std::stable_sort(points_.begin(), points_.end(),
+                     [&](const AdjustedPoint& a, const AdjustedPoint& b) { return first_block(a) < first_block(b); });
+    std::vector<AdjustedReading> sorted;
+    sorted.reserve(readings_.size());
+    for (AdjustedPoint& point : points_) {
+        const int first = int(sorted.size());
+        for (int r = point.first_reading; r < point.end_reading; ++r) sorted.push_back(readings_[r]);
+        point.first_reading = first;
+        point.end_reading = int(sorted.size());
+    }
+    readings_ = std::move(sorted);
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,126 @@
+// The adjustment's unknowns, readings and their order, made once from a run's pattern. Internal: not installed.
+// The machine is unknown at nodes: the six errors of one axis at one position (squareness terms included), approached
+// in one direction. Nodes inside the travel are blocks of six in a band; nodes at its ends, whose values fix slopes,
+// and the set-ups of the lines are the border. Both ends of the travel are folded together (nodes k and N - k are
+// neighbours), so that lines of every sign couple blocks that stand near each other.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "adjustment/channel_model.hpp"
+#include "stepdiag/adjustment/adjustment.hpp"
+
+namespace stepdiag {
+
+inline constexpr int no_unknown = -1;
+
+// The errors of an axis at a node. `unknown`: index of each error among all unknowns, or no_unknown where the frame
+// choice says 0.
+struct AxisNode {
+    Axis axis;
+    int node;       // 0 .. steps, from home
+    bool negative;  // approached in - direction, where both are told apart
+    double position;
+    int block = no_unknown;  // in the band; none for the ends of travel
+    std::array<int, 6> unknown{no_unknown, no_unknown, no_unknown, no_unknown, no_unknown, no_unknown};
+};
+
+// How head and mirror stood on one line.
+struct LineSetup {
+    int run;
+    Line line;
+    bool is_scale_line;
+    ChannelModel model;
+    std::vector<PriorUncertainty> prior;  // by setup::Column and beams
+    std::vector<int> unknown;             // likewise
+    std::vector<int> active;              // columns that are unknown
+    std::optional<double> first_time = {};
+};
+
+struct AdjustedReading {
+    std::size_t row;
+    int channel;  // of the head: a row of the model
+    double value;
+    double standard_uncertainty;
+    int outlier = 0, suspect = 0;  // as in ReadingResidual
+
+    bool used() const { return outlier == 0; }
+};
+
+// One point of one pass, and its readings: readings[first_reading .. end_reading).
+struct AdjustedPoint {
+    int setup;
+    std::array<int, 3> node;  // by axis: index of the AxisNode; no_unknown: at home
+    ReadingPlace place;
+    int first_reading, end_reading;
+};
+
+class AdjustmentProblem {
+public:
+    AdjustmentProblem(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
+                      const HeadCalibrations& heads, const AdjustmentOptions& options);
+
+    const Plan& plan() const { return plan_; }
+    const Chain& chain() const { return chain_; }
+    const Eigen::Vector3d& tool() const { return tool_; }
+    const std::vector<AxisNode>& nodes() const { return nodes_; }
+    const AxisNode* find(Axis axis, int node, bool negative) const;  // nullptr where no reading visits it
+    // The nodes of each axis and direction that readings visit, ascending, by index.
+    std::vector<std::vector<int>> node_chains() const;
+    const std::vector<LineSetup>& setups() const { return setups_; }
+    const std::vector<AdjustedPoint>& points() const { return points_; }
+    std::vector<AdjustedReading>& readings() { return readings_; }
+    const std::vector<AdjustedReading>& readings() const { return readings_; }
+    bool tells_reversal() const { return reversal_; }
+    bool has_rotations() const { return rotations_; }
+    std::string channel_name(const AdjustedReading& reading) const;
+
+    const std::vector<int>& reach() const { return reach_; }  // of the band's block columns
+    int blocks() const { return int(reach_.size()); }
+    int border() const { return border_; }
+    int size() const { return 6 * blocks() + border_; }
+    int unknowns() const { return size() - (has_rotations() ? 0 : 3 * blocks()); }  // the band has places without one
+
+    int block_of(int node) const { return node == no_unknown ? no_unknown : nodes_[node].block; }
+    // The errors of the three axes at a point, for the unknowns' values `x`.
+    MachineErrors errors(const AdjustedPoint& point, const Eigen::VectorXd& x) const;
+    Eigen::VectorXd setup_values(const LineSetup& setup, const Eigen::VectorXd& x) const;
+    // Of an unknown of the set-ups: its prior's standard uncertainty; infinite elsewhere.
+    const std::vector<double>& prior() const { return prior_; }
+    int informative_priors() const;  // those that are no limits of what is called free
+    // How far from 0 each unknown usually is.
+    const std::vector<double>& usual() const { return usual_; }
+    // What makes changes of unknowns comparable: 1 for angles (rad), 1/metre for lengths (mm).
+    const std::vector<double>& change_scale() const { return change_scale_; }
+
+private:
+    void collect_setups(const Measurement& measurement, const AdjustmentOptions& options);
+    void collect_points(const Measurement& measurement, const AdjustmentOptions& options);
+    void number_unknowns(const AdjustmentOptions& options);
+    void sort_points();
+    void weigh_unknowns();
+    int node_index(Axis axis, int node, bool negative);
+
+    Plan plan_;
+    Chain chain_;
+    Eigen::Vector3d tool_;
+    std::shared_ptr<const HeadCalibrations> heads_;
+    ChannelKind kind_;
+    bool reversal_ = false, rotations_ = true;
+    std::vector<AxisNode> nodes_;
+    std::array<std::vector<int>, 6> node_at_;  // by axis and direction: index by node number
+    std::vector<LineSetup> setups_;
+    std::vector<int> setup_of_row_;
+    std::vector<AdjustedPoint> points_;
+    std::vector<AdjustedReading> readings_;
+    std::vector<int> reach_;
+    int border_ = 0;
+    std::vector<double> prior_, usual_, change_scale_;
+};
+
+}  // namespace stepdiag

@@ -1,0 +1,131 @@
+// Symmetric positive semi-definite matrices N = [A C^T; C D] of the adjustment: A block-banded, six unknowns a block, C
+// a dense border of scalar rows, D its corner. Cholesky factor, solutions and the inverse on the matrix' own pattern,
+// all in time proportional to the number of blocks. Only lower triangles count. Internal.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <vector>
+
+#include "core/block_product.hpp"
+
+namespace stepdiag {
+
+// Column-major numbers that start at a cache line's.
+class AlignedNumbers {
+public:
+    explicit AlignedNumbers(std::ptrdiff_t count) : lines_(count / 8 + 2) {}
+    double* data() { return lines_.data()->numbers; }
+    const double* data() const { return lines_.data()->numbers; }
+    void set_zero() { std::fill(lines_.begin(), lines_.end(), Line{}); }
+
+private:
+    struct alignas(64) Line {
+        double numbers[8] = {};
+    };
+    std::vector<Line> lines_;
+};
+
+class BorderedBand {
+public:
+    static constexpr int block_size = 6;
+    using Block = Eigen::Map<Eigen::Matrix<double, 6, 6>, 0, Eigen::OuterStride<>>;
+    using ConstBlock = Eigen::Map<const Eigen::Matrix<double, 6, 6>, 0, Eigen::OuterStride<>>;
+    using BorderBlock = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 6>, 0, Eigen::OuterStride<>>;
+    using ConstBorderBlock = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 6>, 0, Eigen::OuterStride<>>;
+
+    // All zero. Block column j is coupled with block rows j ... reach[j]; reach does not decrease.
+    BorderedBand(std::vector<int> reach, int border);
+    void set_zero();
+
+    int blocks() const { return int(reach_.size()); }
+    int border() const { return border_; }
+    int size() const { return block_size * blocks() + border_; }
+    int reach(int column) const { return reach_[column]; }
+
+    // column <= row <= reach(column)
+    Block block(int row, int column) { return Block(at(row, column), Eigen::OuterStride<>(band_step_)); }
+    ConstBlock block(int row, int column) const {
+        return ConstBlock(at(row, column), Eigen::OuterStride<>(band_step_));
+    }
+    // The border's rows of a block column.
+    BorderBlock border_rows(int column) {
+        return BorderBlock(border_at(column), border_, block_size, Eigen::OuterStride<>(border_step_));
+    }
+    ConstBorderBlock border_rows(int column) const {
+        return ConstBorderBlock(border_at(column), border_, block_size, Eigen::OuterStride<>(border_step_));
+    }
+    Eigen::MatrixXd& corner() { return corner_; }
+    const Eigen::MatrixXd& corner() const { return corner_; }
+    Eigen::VectorXd diagonal() const;
+
+private:
+    friend class BorderedFactor;
+
+    double* at(int row, int column) { return band_.data() + block_size * (row + band_step_ * column); }
+    const double* at(int row, int column) const { return band_.data() + block_size * (row + band_step_ * column); }
+    double* border_at(int column) { return border_rows_.data() + block_size * border_step_ * column; }
+    const double* border_at(int column) const { return border_rows_.data() + block_size * border_step_ * column; }
+    MatrixView view(int row, int column) { return {at(row, column), band_step_}; }
+    ConstMatrixView view(int row, int column) const { return {at(row, column), band_step_}; }
+    MatrixView border_view(int column) { return {border_at(column), border_step_}; }
+    ConstMatrixView border_view(int column) const { return {border_at(column), border_step_}; }
+
+    std::vector<int> reach_;
+    int border_;
+    // Element (i, j) of A is at i + j * band_step_ as in a dense matrix, so that rows have a constant step too; columns
+    // that are shorter than the matrix overlap only where A is zero.
+    std::ptrdiff_t band_step_, border_step_;
+    AlignedNumbers band_, border_rows_;
+    Eigen::MatrixXd corner_;
+};
+
+// L of N = L L^T. An unknown whose pivot is at or below `threshold` times its diagonal entry of N depends on those
+// before it, or was never observed: it is held at 0. The border comes last, the corner in the order of falling pivots
+// (each divided by its diagonal entry of N).
+class BorderedFactor {
+public:
+    BorderedFactor(const BorderedBand& matrix, double threshold);
+
+    // Again, of a matrix of the same pattern. One that is moved here gets other numbers of that pattern in exchange, so
+    // that nothing is copied.
+    void factorize(const BorderedBand& matrix);
+    void factorize(BorderedBand&& matrix);
+
+    // Ascending, 0 ... size - 1.
+    const std::vector<int>& held() const { return held_; }
+
+    // In place. Held unknowns are 0, whatever is on the right.
+    void solve(Eigen::Ref<Eigen::VectorXd> right_hand_side) const;
+
+    // L itself: the band with the reciprocals of its pivots, 0 of held ones, and below it the border's rows; the corner
+    // as far as it has rank, its rows and columns being these of the border, in this order.
+    const BorderedBand& band() const { return l_; }
+    using ConstCorner = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+    ConstCorner corner_factor() const;
+    const std::vector<int>& corner_order() const { return order_; }
+
+    // The inverse of N without the held unknowns, whose rows and columns are 0, on the pattern of N; by Takahashi's
+    // recurrence.
+    BorderedBand selected_inverse() const;
+    void selected_inverse(BorderedBand& inverse) const;  // into a matrix of the same pattern
+
+private:
+    using Corner = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+    Corner schur();  // all of it
+
+    void factorize();
+    void eliminate(int column, int first);
+    void reduce_corner(int first, int count);
+    void factorize_corner();
+    void invert_corner(Eigen::MatrixXd& inverse) const;
+
+    double threshold_;
+    BorderedBand l_;          // with the reciprocals of the band's pivots, 0 of held ones
+    AlignedNumbers schur_;    // the corner's factor, rows and columns in the order of elimination
+    std::vector<int> order_;  // of the border
+    int corner_rank_ = 0;
+    std::vector<int> held_;
+};
+
+}  // namespace stepdiag

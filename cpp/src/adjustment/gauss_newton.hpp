@@ -1,0 +1,71 @@
+// Gauss-Newton on the adjustment's normal equations, and what they leave open. Internal: not installed.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "adjustment/normal_equations.hpp"
+
+namespace stepdiag {
+
+class GaussNewton {
+public:
+    // `smoothness`: deviations of second differences by function, 0 for none.
+    GaussNewton(const AdjustmentProblem& problem, const std::array<double, function_count>& smoothness);
+
+    NormalEquations& equations() { return equations_; }
+    const NormalEquations& equations() const { return equations_; }
+    // One unknown for each dimension that the readings leave open, decided at zero: those which depend on the others.
+    const std::vector<int>& dependent() const { return dependent_; }
+    // From here on unknowns that are not determined are what is usual, so that there is one solution.
+    void assume_usual(const std::vector<bool>& determined);
+    const BorderedFactor& factor() const { return *factor_; }
+    const Eigen::VectorXd& scale() const { return scale_; }  // length of each column of the weighted problem
+
+    // The change of all unknowns that no reading sees when the held unknown changes by 1 (at the last factorisation).
+    Eigen::VectorXd null_vector(int held) const;
+
+    static constexpr int usual_most_steps = 100;
+    // From x to the minimum: the number of steps, or none where it is not reached in `most_steps`, x being the last.
+    std::optional<int> try_solve(Eigen::VectorXd& x, int most_steps = usual_most_steps, bool accelerated = true);
+    // Throws InvalidArgument where it is not reached.
+    int solve(Eigen::VectorXd& x);
+    // Derivatives and factor at x, for what has changed (readings left out, smoothness) or for uncertainties.
+    void factorize(const Eigen::VectorXd& x);
+    // Derivatives at x, and the factor where it is of somewhere else.
+    void refresh(const Eigen::VectorXd& x);
+
+private:
+    // One Gauss-Newton step with the derivatives and the factor that there are.
+    struct Step {
+        Eigen::VectorXd dx;
+        double effect;     // largest of one unknown's on the readings, in standard uncertainties
+        double change;     // largest, rad and metres
+        double decrement;  // of the square sum, were the problem linear
+    };
+    Step step(const Eigen::VectorXd& x) const;
+    // Moves x by `move`, or by as much of the Gauss-Newton step as does not make the square sum larger.
+    void descend(Eigen::VectorXd& x, const Eigen::VectorXd& move, const Eigen::VectorXd& step);
+    bool is_settled(const Step& step, double ratio, const Eigen::VectorXd& x) const;
+
+    struct StepHistory {
+        Eigen::VectorXd last_x, last_dx, weight;
+        std::vector<Eigen::VectorXd> moves, changes;
+
+        void clear() { *this = {}; }
+        void add(const Eigen::VectorXd& x, const Eigen::VectorXd& dx, const Eigen::VectorXd& scale);
+        Eigen::VectorXd accelerated() const;
+    };
+    void factorize();  // with the derivatives that there are
+
+    NormalEquations equations_;
+    BorderedBand matrix_;
+    std::optional<BorderedFactor> factor_;
+    Eigen::VectorXd scale_;  // square roots of the diagonal at the last factorisation
+    std::vector<int> held_, dependent_;
+    Eigen::VectorXd factorized_at_;
+    bool fresh_ = true;  // derivatives and factor are those at zero, from the beginning
+};
+
+}  // namespace stepdiag

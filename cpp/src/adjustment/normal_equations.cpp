@@ -1,0 +1,287 @@
+#include "adjustment/normal_equations.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stepdiag {
+double& element(BorderedBand& matrix, int i, int j) {
+    if (i < j) std::swap(i, j);
+    const int banded = 6 * matrix.blocks();
+    if (j >= banded) return matrix.corner()(i - banded, j - banded);
+    if (i >= banded) return matrix.border_rows(j / 6).coeffRef(i - banded, j % 6);
+    return matrix.block(i / 6, j / 6).coeffRef(i % 6, j % 6);
+}
+
+double element(const BorderedBand& matrix, int i, int j) {
+    if (i < j) std::swap(i, j);
+    const int banded = 6 * matrix.blocks();
+    if (j >= banded) return matrix.corner()(i - banded, j - banded);
+    if (i >= banded) return matrix.border_rows(j / 6)(i - banded, j % 6);
+    return matrix.block(i / 6, j / 6)(i % 6, j % 6);
+}
+
+double SmoothRow::value(const Eigen::VectorXd& x) const {
+    double value = 0.0;
+    for (int i = 0; i < 3; ++i)
+        if (unknown[i] != no_unknown) value += coefficient[i] * x[unknown[i]];
+    return value;
+}
+
+double NormalEquations::Row::product(const Eigen::VectorXd& v) const {
+    double sum = 0.0;
+    for (int i = 0; i < size; ++i)
+        if (unknown[i] != no_unknown) sum += derivative[i] * v[unknown[i]];
+    return sum;
+}
+
+NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&problem) {
+    for (const LineSetup& setup : problem.setups()) models_.push_back(setup.model);
+    std::size_t weights = 0;
+    first_weight_.resize(problem.readings().size());
+    point_of_reading_.resize(problem.readings().size());
+    for (std::size_t p = 0; p < problem.points().size(); ++p) {
+        const AdjustedPoint& point = problem.points()[p];
+        first_unknown_.push_back(int(unknowns_.size()));
+        for (const int node : point.node)
+            for (int c = 0; c < 6; ++c)
+                unknowns_.push_back(node == no_unknown ? no_unknown : problem.nodes()[node].unknown[c]);
+        const LineSetup& setup = problem.setups()[point.setup];
+        for (const int c : setup.active) unknowns_.push_back(setup.unknown[c]);
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            first_weight_[r] = weights;
+            point_of_reading_[r] = int(p);
+            weights += 18 + setup.active.size();
+        }
+    }
+    first_unknown_.push_back(int(unknowns_.size()));
+    derivatives_.resize(weights);
+    residuals_.setZero(Eigen::Index(problem.readings().size()));
+    prior_weight_.resize(problem.size());
+    for (int j = 0; j < problem.size(); ++j) prior_weight_[j] = std::pow(problem.prior()[j], -2);
+    usual_weight_ = centre_ = Eigen::VectorXd::Zero(problem.size());
+}
+
+void NormalEquations::assume_usual(const std::vector<bool>& determined, const Eigen::VectorXd& centre, double part) {
+    for (int j = 0; j < problem_->size(); ++j)
+        usual_weight_[j] = determined[j] ? 0.0 : std::pow(part * problem_->usual()[j], -2);
+    centre_ = centre;
+}
+
+std::vector<SmoothRow> second_differences(const AdjustmentProblem& problem,
+                                          const std::array<double, function_count>& deviation) {
+    std::vector<SmoothRow> rows;
+    const auto& nodes = problem.nodes();
+    for (std::vector<int> chain : problem.node_chains()) {
+        if (chain.empty()) continue;
+        const AxisNode& first = nodes[chain.front()];
+        if (first.node > 0 && !first.negative) chain.insert(chain.begin(), no_unknown);  // home
+        for (std::size_t k = 1; k + 1 < chain.size(); ++k) {
+            const auto position = [&](int i) { return i == no_unknown ? 0.0 : nodes[i].position; };
+            const double before = position(chain[k]) - position(chain[k - 1]);
+            const double after = position(chain[k + 1]) - position(chain[k]);
+            const double step = 0.5 * (before + after);
+            for (int c = 0; c < 6; ++c) {
+                const int function = FunctionId{first.axis, Component(c)}.index();
+                if (deviation[function] <= 0.0) continue;
+                const double weight = 1.0 / deviation[function];
+                SmoothRow row{function, {}, {}};
+                row.coefficient = {weight * step / before, -weight * step * (1.0 / before + 1.0 / after),
+                                   weight * step / after};
+                for (int i = 0; i < 3; ++i) {
+                    const int node = chain[k - 1 + i];
+                    row.unknown[i] = node == no_unknown ? no_unknown : nodes[node].unknown[c];
+                }
+                rows.push_back(row);
+            }
+        }
+    }
+    return rows;
+}
+
+void NormalEquations::linearise(const Eigen::VectorXd& x, bool derivatives) {
+    const AdjustmentProblem& problem = *problem_;
+    for (std::size_t s = 0; s < models_.size(); ++s) models_[s].set_up(problem.setup_values(problem.setups()[s], x));
+    Eigen::VectorXd value;
+    ChannelDerivative derivative;
+    for (const AdjustedPoint& point : problem.points()) {
+        const LineSetup& setup = problem.setups()[point.setup];
+        const ChannelModel& model = models_[point.setup];
+        value.resize(model.channels());
+        if (derivatives) derivative.resize(model.channels(), 18 + model.setup_size());
+        const PoseDerivative pose = differentiate_pose(problem.chain(), problem.tool(), point.place.commanded,
+                                                       problem.errors(point, x), derivatives);
+        model.read(pose, point.place, value, derivatives ? &derivative : nullptr);
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            const AdjustedReading& reading = problem.readings()[r];
+            const double weight = 1.0 / reading.standard_uncertainty;
+            residuals_[r] = weight * (reading.value - value[reading.channel]);
+            if (!derivatives) continue;
+            double* row = derivatives_.data() + first_weight_[r];
+            const int* unknown = unknowns_.data() + first_unknown_[point_of_reading_[r]];
+            for (int c = 0; c < 18; ++c)
+                row[c] = unknown[c] == no_unknown ? 0.0 : weight * derivative(reading.channel, c);
+            for (std::size_t c = 0; c < setup.active.size(); ++c)
+                row[18 + c] = weight * derivative(reading.channel, 18 + setup.active[c]);
+        }
+    }
+}
+
+void NormalEquations::drop_roundings() {
+    constexpr double rounding = 1e-13;  // of what a metre or a radian of the largest does to the reading
+    for (const AdjustedPoint& point : problem_->points())
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            const Row row = this->row(point, r);
+            double* derivative = derivatives_.data() + first_weight_[r];
+            const auto size = [&](int i) {
+                return row.unknown[i] == no_unknown
+                           ? 0.0
+                           : std::abs(derivative[i]) / problem_->change_scale()[row.unknown[i]];
+            };
+            double largest = 0.0;
+            for (int i = 0; i < row.size; ++i) largest = std::max(largest, size(i));
+            for (int i = 0; i < row.size; ++i)
+                if (size(i) < rounding * largest) derivative[i] = 0.0;
+        }
+}
+
+NormalEquations::Row NormalEquations::row(const AdjustedPoint& point, int reading) const {
+    const std::size_t p = std::size_t(&point - problem_->points().data());
+    return {unknowns_.data() + first_unknown_[p], derivatives_.data() + first_weight_[reading],
+            first_unknown_[p + 1] - first_unknown_[p]};
+}
+
+double NormalEquations::square_sum(const Eigen::VectorXd& x) const {
+    double sum = 0.0;
+    for (Eigen::Index r = 0; r < residuals_.size(); ++r)
+        if (problem_->readings()[r].used()) sum += residuals_[r] * residuals_[r];
+    for (int j = 0; j < x.size(); ++j)
+        if (std::isfinite(problem_->prior()[j])) sum += std::pow(x[j] / problem_->prior()[j], 2);
+    for (const SmoothRow& row : smooth_) sum += std::pow(row.value(x), 2);
+    return sum;
+}
+
+// The covariance of one point's unknowns, rows and columns of those without being 0.
+void NormalEquations::gather(const AdjustedPoint& point, const BorderedBand& inverse, Square& covariance) const {
+    const Row all = row(point, point.first_reading);
+    covariance.setZero(all.size, all.size);
+    const int banded = 6 * inverse.blocks();
+    std::array<int, 3> block;
+    for (int a = 0; a < 3; ++a) block[a] = problem_->block_of(point.node[a]);
+    for (int a = 0; a < 3; ++a) {
+        if (block[a] == no_unknown) continue;
+        for (int b = 0; b < 3; ++b) {
+            if (block[b] == no_unknown || block[b] > block[a]) continue;
+            const auto part = inverse.block(block[a], block[b]);
+            if (a == b) {
+                covariance.block<6, 6>(6 * a, 6 * a) = part.selfadjointView<Eigen::Lower>();
+            } else {
+                covariance.block<6, 6>(6 * a, 6 * b) = part;
+                covariance.block<6, 6>(6 * b, 6 * a) = part.transpose();
+            }
+        }
+        const auto border = inverse.border_rows(block[a]);
+        for (int i = 0; i < all.size; ++i) {
+            if (all.unknown[i] < banded) continue;
+            covariance.block<1, 6>(i, 6 * a) = border.row(all.unknown[i] - banded);
+            covariance.block<6, 1>(6 * a, i) = border.row(all.unknown[i] - banded).transpose();
+        }
+    }
+    for (int i = 0; i < all.size; ++i)
+        for (int j = 0; j < all.size; ++j)
+            if (all.unknown[i] >= banded && all.unknown[j] >= banded)
+                covariance(i, j) = element(inverse, all.unknown[i], all.unknown[j]);
+}
+
+BorderedBand NormalEquations::matrix() const { return BorderedBand(problem_->reach(), problem_->border()); }
+
+void NormalEquations::assemble(BorderedBand& matrix) const {
+    matrix.set_zero();
+    for (std::size_t p = 0; p < problem_->points().size(); ++p) assemble_point(problem_->points()[p], int(p), matrix);
+    for (int j = 0; j < problem_->size(); ++j) element(matrix, j, j) += prior_weight_[j] + usual_weight_[j];
+    for (const SmoothRow& row : smooth_)
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j <= i; ++j)
+                if (row.unknown[i] != no_unknown && row.unknown[j] != no_unknown)
+                    element(matrix, row.unknown[i], row.unknown[j]) += row.coefficient[i] * row.coefficient[j];
+}
+
+// J^T J of one point is dense over the nodes of three axes and the set-up: blocks of six where both nodes are in the
+// band, single rows and entries in the border.
+void NormalEquations::assemble_point(const AdjustedPoint& point, int number, BorderedBand& matrix) const {
+    const int* unknown = unknowns_.data() + first_unknown_[number];
+    const int size = first_unknown_[number + 1] - first_unknown_[number];
+    const int readings = point.end_reading - point.first_reading;
+    using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const Eigen::Map<const Rows> rows(derivatives_.data() + first_weight_[point.first_reading], readings, size);
+    thread_local Rows square;  // its lower triangle
+    square.setZero(size, size);
+    for (int r = 0; r < readings; ++r) {
+        if (!problem_->readings()[point.first_reading + r].used()) continue;
+        const double* row = rows.row(r).data();
+        for (int i = 0; i < size; ++i) {
+            const double left = row[i];
+            double* out = square.data() + std::ptrdiff_t(i) * size;
+            for (int j = 0; j <= i; ++j) out[j] += left * row[j];
+        }
+    }
+
+    const int banded = 6 * matrix.blocks();
+    std::array<int, 3> block;
+    for (int a = 0; a < 3; ++a) block[a] = problem_->block_of(point.node[a]);
+    for (int a = 0; a < 3; ++a) {
+        if (block[a] == no_unknown) continue;
+        for (int b = 0; b <= a; ++b) {
+            if (block[b] == no_unknown) continue;
+            const auto part = square.block<6, 6>(6 * a, 6 * b);
+            if (block[b] <= block[a]) matrix.block(block[a], block[b]) += part;
+            else matrix.block(block[b], block[a]) += part.transpose();
+        }
+        auto border = matrix.border_rows(block[a]);
+        for (int i = 0; i < size; ++i) {
+            if (unknown[i] < banded) continue;
+            auto row = border.row(unknown[i] - banded);
+            if (i > 6 * a) row += square.block<1, 6>(i, 6 * a);
+            else row += square.block<6, 1>(6 * a, i).transpose();
+        }
+    }
+    for (int i = 0; i < size; ++i) {
+        if (unknown[i] < banded) continue;
+        for (int j = 0; j <= i; ++j) {
+            if (unknown[j] < banded) continue;
+            const int low = std::min(unknown[i], unknown[j]) - banded, high = std::max(unknown[i], unknown[j]) - banded;
+            matrix.corner()(high, low) += square(i, j);
+        }
+    }
+}
+
+Eigen::VectorXd NormalEquations::gradient(const Eigen::VectorXd& x) const {
+    return transposed(residuals_, x) - usual_weight_.cwiseProduct(x - centre_);
+}
+
+// J^T w - P x
+Eigen::VectorXd NormalEquations::transposed(const Eigen::VectorXd& w, const Eigen::VectorXd& x) const {
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(problem_->size());
+    for (const AdjustedPoint& point : problem_->points())
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            if (!problem_->readings()[r].used()) continue;
+            const Row row = this->row(point, r);
+            for (int i = 0; i < row.size; ++i)
+                if (row.unknown[i] != no_unknown) gradient[row.unknown[i]] += row.derivative[i] * w[r];
+        }
+    gradient -= prior_weight_.cwiseProduct(x);
+    for (const SmoothRow& row : smooth_) {
+        const double value = row.value(x);
+        for (int i = 0; i < 3; ++i)
+            if (row.unknown[i] != no_unknown) gradient[row.unknown[i]] -= row.coefficient[i] * value;
+    }
+    return gradient;
+}
+
+Eigen::VectorXd NormalEquations::product(const Eigen::VectorXd& v) const {
+    Eigen::VectorXd image(residuals_.size());
+    for (const AdjustedPoint& point : problem_->points())
+        for (int r = point.first_reading; r < point.end_reading; ++r) image[r] = row(point, r).product(v);
+    return -transposed(-image, v);
+}
+
+}  // namespace stepdiag

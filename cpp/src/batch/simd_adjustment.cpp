@@ -1,0 +1,259 @@
+#include "batch/simd_adjustment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace stepdiag {
+namespace {
+
+constexpr int most_steps = 30;
+// Of the square sum a reading: more may be another minimum than that next to zero.
+constexpr double gross_scatter = 100.0;
+
+using Lanes = double[lane_group];
+
+}  // namespace
+
+SimdStart::SimdStart(const PreparedAdjustment& prepared, const std::vector<std::ptrdiff_t>& input,
+                     const std::vector<double>& standard_uncertainty)
+    : pattern(prepared), input(input), jacobian(pattern.solver.equations()), factor(pattern.solver.factor()) {
+    for (const AdjustedReading& reading : pattern.problem.readings()) {
+        weight.push_back(1.0 / reading.standard_uncertainty);
+        value.push_back(reading.value);
+    }
+    for (const double u : standard_uncertainty) one_over_uncertainty.push_back(u > 0.0 ? 1.0 / u : 0.0);
+}
+
+void SimdNumbers::fill(const Eigen::VectorXd& same) {
+    for (Eigen::Index i = 0; i < same.size(); ++i) std::fill_n(at(i), lane_group, same[i]);
+}
+
+SimdAdjustment::SimdAdjustment(const SimdStart& start)
+    : start_(start),
+      model_(start.pattern.problem, start.input),
+      x_(start.pattern.problem.size() + 1),
+      dx_(start.pattern.problem.size() + 1),
+      centre_(start.pattern.problem.size()),
+      s_(Eigen::Index(start.input.size())),
+      r_(Eigen::Index(start.input.size())),
+      difference_(Eigen::Index(start.input.size())) {}
+
+// Values are F x, and dx = N^-1 J^T (d reading/u): rows of F N^-1 J^T, lane_group at once.
+Eigen::MatrixXd simd_gain(const SimdStart& start, std::size_t readings) {
+    const std::vector<LinearForm>& forms = start.pattern.forms;
+    Eigen::MatrixXd gain = Eigen::MatrixXd::Zero(Eigen::Index(forms.size()), Eigen::Index(readings));
+    const Eigen::Index unknowns = start.pattern.start.size();
+    SimdNumbers column(unknowns), row{Eigen::Index(start.input.size())};
+    for (std::size_t first = 0; first < forms.size(); first += lane_group) {
+        const std::size_t count = std::min(lane_group, forms.size() - first);
+        column.fill(Eigen::VectorXd::Zero(unknowns));
+        for (std::size_t lane = 0; lane < count; ++lane)
+            for (int k = 0; k < forms[first + lane].size; ++k)
+                column.at(forms[first + lane].unknown[k])[lane] += forms[first + lane].coefficient[k];
+        start.factor.solve(column.data());
+        start.jacobian.multiply(column.data(), row.data());
+        for (std::size_t r = 0; r < start.input.size(); ++r)
+            for (std::size_t lane = 0; lane < count; ++lane)
+                gain(Eigen::Index(first + lane), start.input[r]) = start.weight[r] * row.at(Eigen::Index(r))[lane];
+    }
+    return gain;
+}
+
+// Of the changes, the last two tell how the next ones go on: steps shrink by turns, so that it is two steps whose ratio
+// holds.
+void SimdAdjustment::Progress::add(double largest) {
+    constexpr double diverges = 1e4, shrinks = 0.25;
+    constexpr int early = 4, late = 12, most_steps_left = 16;
+    constexpr double safety = 10.0;  // the first ratios are those of second order
+    const double first = change[0];
+    change = {largest, change[0], change[1]};
+    ++steps;
+    if (!std::isfinite(largest) || (steps > 1 && largest > diverges * std::max(1.0, first))) {
+        state = failed;
+    } else if (largest < settled_tolerance) {
+        state = settled;
+    } else if (steps >= 3) {
+        const double ratio = change[0] / change[2];
+        const double left = (change[0] + change[1]) * ratio / (1.0 - ratio);
+        if (ratio < shrinks && safety * left < settled_tolerance) state = settled;
+        // As they went on the whole; full steps are dearer one by one.
+        if (steps == early) at_early = std::max(change[0], change[1]);
+        const double rate = std::log(at_early / change[0]) / (steps - early + 1);
+        if (state == goes_on && steps >= late && !(std::log(largest / settled_tolerance) < most_steps_left * rate))
+            state = failed;
+    }
+    if (state == goes_on && steps >= most_steps) state = failed;
+}
+
+void SimdAdjustment::begin() {
+    x_.fill(start_.pattern.start);
+    std::fill_n(x_.at(start_.pattern.problem.size()), lane_group, 0.0);
+    centre_.fill(Eigen::VectorXd::Zero(start_.pattern.start.size()));
+    s_.fill(start_.pattern.solver.equations().residuals());
+    progress_.fill({});
+}
+
+void SimdAdjustment::step(const double* readings, std::size_t stride) {
+    const NormalEquations& equations = start_.pattern.solver.equations();
+    bool is_valid[lane_group];
+    model_.evaluate({x_.data(), readings, stride, s_.data(), r_.data(), dx_.data(), is_valid});
+    for (std::size_t lane = 0; lane < lane_group; ++lane)
+        if (!is_valid[lane] && progress_[lane].state == Progress::goes_on) progress_[lane].state = Progress::failed;
+    const std::size_t readings_count = lane_group * start_.input.size();
+    for (std::size_t i = 0; i < readings_count; ++i) difference_.data()[i] = r_.data()[i] - s_.data()[i];
+    start_.jacobian.add_transposed(difference_.data(), dx_.data());
+    for (Eigen::Index j = 0; j < start_.pattern.start.size(); ++j) {
+        const double prior = equations.prior_weight()[j], usual = equations.usual_weight()[j];
+        if (prior == 0.0 && usual == 0.0) continue;
+        const double *x = x_.at(j), *centre = centre_.at(j);
+        double* to = dx_.at(j);
+        for (std::size_t i = 0; i < lane_group; ++i) to[i] -= prior * x[i] + usual * (x[i] - centre[i]);
+    }
+    for (const SmoothRow& row : equations.smooth_rows()) {
+        Lanes value = {};
+        for (int k = 0; k < 3; ++k)
+            if (row.unknown[k] != no_unknown)
+                for (std::size_t i = 0; i < lane_group; ++i) value[i] += row.coefficient[k] * x_.at(row.unknown[k])[i];
+        for (int k = 0; k < 3; ++k)
+            if (row.unknown[k] != no_unknown)
+                for (std::size_t i = 0; i < lane_group; ++i) dx_.at(row.unknown[k])[i] -= row.coefficient[k] * value[i];
+    }
+    start_.factor.solve(dx_.data());
+    start_.jacobian.multiply(dx_.data(), difference_.data());
+    for (std::size_t i = 0; i < readings_count; ++i) s_.data()[i] = r_.data()[i] - difference_.data()[i];
+}
+
+// The largest change of a value, in its standard uncertainty; NaN where one is.
+void SimdAdjustment::find_changes(double* largest) const {
+    std::fill_n(largest, lane_group, 0.0);
+    for (std::size_t e = 0; e < start_.pattern.forms.size(); ++e) {
+        const LinearForm& form = start_.pattern.forms[e];
+        Lanes change = {};
+        for (int k = 0; k < form.size; ++k)
+            for (std::size_t i = 0; i < lane_group; ++i) change[i] += form.coefficient[k] * dx_.at(form.unknown[k])[i];
+        for (std::size_t i = 0; i < lane_group; ++i) {
+            const double size = std::abs(change[i]) * start_.one_over_uncertainty[e];
+            largest[i] = size > largest[i] || size != size ? size : largest[i];
+        }
+    }
+}
+
+// Of the residuals before the last step.
+void SimdAdjustment::find_square_sum(double* sum) const {
+    std::fill_n(sum, lane_group, 0.0);
+    for (std::size_t r = 0; r < start_.input.size(); ++r)
+        for (std::size_t i = 0; i < lane_group; ++i) sum[i] += r_.at(Eigen::Index(r))[i] * r_.at(Eigen::Index(r))[i];
+}
+
+void SimdAdjustment::move() {
+    Lanes part;
+    for (std::size_t i = 0; i < lane_group; ++i) part[i] = progress_[i].state == Progress::goes_on ? 1.0 : 0.0;
+    for (Eigen::Index j = 0; j < start_.pattern.start.size(); ++j) {
+        double* x = x_.at(j);
+        const double* dx = dx_.at(j);
+        for (std::size_t i = 0; i < lane_group; ++i) x[i] = part[i] != 0.0 ? x[i] + dx[i] : x[i];
+    }
+}
+
+// What is open is taken to be at 0 first, then where it came out (outlier_search.cpp).
+void SimdAdjustment::recentre(std::size_t lane) {
+    for (Eigen::Index j = 0; j < start_.pattern.start.size(); ++j) centre_.at(j)[lane] = x_.at(j)[lane];
+    progress_[lane] = {};
+    progress_[lane].recentred = true;
+}
+
+void SimdAdjustment::adjust(const double* readings, std::size_t stride, double* values, std::size_t value_stride) {
+    begin();
+    const bool has_open = !start_.pattern.solver.dependent().empty();
+    counts_.fill({0, false});
+    for (std::size_t lane = 0; lane < lane_group; ++lane)
+        if (!has_all_readings(readings, stride, lane)) progress_[lane].state = Progress::lost;
+    const auto goes_on = [](const Progress& p) { return p.state == Progress::goes_on; };
+    while (std::any_of(progress_.begin(), progress_.end(), goes_on)) {
+        step(readings, stride);
+        Lanes largest;
+        find_changes(largest);
+        move();
+        for (std::size_t lane = 0; lane < lane_group; ++lane) {
+            if (!goes_on(progress_[lane])) continue;
+            ++counts_[lane].steps;
+            progress_[lane].add(largest[lane]);
+            if (progress_[lane].state == Progress::settled && has_open && !progress_[lane].recentred) recentre(lane);
+        }
+    }
+    Lanes square_sum;
+    find_square_sum(square_sum);
+    for (std::size_t lane = 0; lane < lane_group; ++lane) {
+        const bool fits = square_sum[lane] < gross_scatter * double(start_.input.size());
+        if (progress_[lane].state == Progress::lost) continue;
+        if (progress_[lane].state == Progress::failed || !fits) adjust_in_full(readings, stride, lane);
+    }
+    put_values(values, value_stride);
+}
+
+void SimdAdjustment::adjust_in_one_step(const double* readings, std::size_t stride, double* values,
+                                        std::size_t value_stride) {
+    x_.fill(start_.pattern.start);
+    std::fill_n(dx_.data(), lane_group * std::size_t(start_.pattern.start.size() + 1), 0.0);
+    for (std::size_t r = 0; r < start_.input.size(); ++r)
+        for (std::size_t i = 0; i < lane_group; ++i)
+            difference_.at(Eigen::Index(r))[i] =
+                start_.weight[r] * (readings[std::size_t(start_.input[r]) * stride + i] - start_.value[r]);
+    progress_.fill({});
+    for (std::size_t lane = 0; lane < lane_group; ++lane)
+        if (!has_all_readings(readings, stride, lane)) progress_[lane].state = Progress::lost;
+    start_.jacobian.add_transposed(difference_.data(), dx_.data());
+    start_.factor.solve(dx_.data());
+    move();
+    put_values(values, value_stride);
+}
+
+void SimdAdjustment::put_values(double* values, std::size_t value_stride) const {
+    for (std::size_t e = 0; e < start_.pattern.forms.size(); ++e) {
+        const LinearForm& form = start_.pattern.forms[e];
+        Lanes value = {};
+        for (int k = 0; k < form.size; ++k)
+            for (std::size_t i = 0; i < lane_group; ++i) value[i] += form.coefficient[k] * x_.at(form.unknown[k])[i];
+        for (std::size_t i = 0; i < lane_group; ++i)
+            values[e * value_stride + i] =
+                progress_[i].state == Progress::lost ? std::numeric_limits<double>::quiet_NaN() : value[i];
+    }
+}
+
+bool SimdAdjustment::has_all_readings(const double* readings, std::size_t stride, std::size_t lane) const {
+    return std::all_of(start_.input.begin(), start_.input.end(), [&](std::ptrdiff_t input) {
+        return std::isfinite(readings[std::size_t(input) * stride + lane]);
+    });
+}
+
+// With derivatives and factor of its own at each step.
+void SimdAdjustment::adjust_in_full(const double* readings, std::size_t stride, std::size_t lane) {
+    if (!in_full_) in_full_ = std::make_unique<PreparedAdjustment>(start_.pattern);
+    PreparedAdjustment& own = *in_full_;
+    auto& list = own.problem.readings();
+    for (std::size_t r = 0; r < list.size(); ++r)
+        list[r].value = readings[std::size_t(start_.input[r]) * stride + lane];
+    counts_[lane].in_full = true;
+    NormalEquations& equations = own.solver.equations();
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(own.start.size());
+    equations.assume_usual(own.determined, x);
+    // If not from near by, then from zero: where set-ups are aligned, no tilt is taken for the effect of a roll, a gain
+    // or a lateral offset.
+    if (progress_[lane].is_near())
+        for (Eigen::Index j = 0; j < x.size(); ++j) x[j] = x_.at(j)[lane];
+    std::optional<int> steps = own.solver.try_solve(x);
+    if (!steps || own.solver.equations().square_sum(x) > gross_scatter * double(start_.input.size())) {
+        x.setZero();
+        steps = own.solver.try_solve(x);
+    }
+    if (steps && !own.solver.dependent().empty()) {
+        equations.assume_usual(own.determined, x);
+        steps = own.solver.try_solve(x);
+    }
+    counts_[lane].steps += steps.value_or(0);
+    progress_[lane].state = steps ? Progress::settled : Progress::lost;
+    for (Eigen::Index j = 0; j < x.size(); ++j) x_.at(j)[lane] = x[j];
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,255 @@
+#include "batch/simd_model.hpp"
+
+#include <algorithm>
+
+// Not those instruction sets that differ from another one only in what is not used here.
+#include <hwy/detect_targets.h>
+#undef HWY_DISABLED_TARGETS
+#ifdef HWY_AVX3_ZEN4  // since Highway 1.1
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4 | HWY_AVX3_SPR)
+#else
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
+#endif
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "batch/simd_model.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once for every instruction set
+//
+#include "batch/simd_channels-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace stepdiag {
+namespace HWY_NAMESPACE {
+
+void prepare_nodes(Chunk& chunk) {
+    for (std::size_t n = 0; n < chunk.problem.nodes.size(); ++n) {
+        const SimdProblem::Node& node = chunk.problem.nodes[n];
+        const auto unknown = [&](int c) HWY_ATTR { return chunk.unknown(node.unknown[c]); };
+        const Vector3 turn{unknown(3), unknown(4), unknown(5)};
+        const Vector angle2 = dot(turn, turn);
+        chunk.largest_turn = hn::Max(chunk.largest_turn, angle2);
+        double* to = chunk.node(int(n));
+        put9(to, node_rotation, rotation_exp(turn, angle2));
+        put3(to, node_shift, Vector3{unknown(0), unknown(1), unknown(2)} + common3(node.position.data()));
+        for (int k = node_turn_pull; k < node_parts; ++k) put(to, k, hn::Zero(Tag()));
+    }
+}
+
+struct SetupAngles {
+    Vector3 reflector, laser, roll;
+};
+
+HWY_INLINE SetupAngles angles_of(const double* from) {
+    const Vector zero = hn::Zero(Tag());
+    const auto value = [&](int column) HWY_ATTR { return part(from, setup_columns + column); };
+    return {{value(setup::reflector), value(setup::reflector + 1), zero},
+            {value(setup::laser), value(setup::laser + 1), zero},
+            {zero, zero, value(setup::roll)}};
+}
+
+void prepare_setups(Chunk& chunk) {
+    for (std::size_t s = 0; s < chunk.problem.setups.size(); ++s) {
+        const SimdProblem::Setup& setup = chunk.problem.setups[s];
+        double* to = chunk.setup(int(s));
+        for (int c = 0; c < chunk.problem.setup_size; ++c) {
+            const bool there = c < int(setup.unknown.size());
+            put(to, setup_columns + c, there ? chunk.unknown(setup.unknown[c]) : hn::Zero(Tag()));
+            put(to, setup_columns + chunk.problem.setup_size + c, hn::Zero(Tag()));
+        }
+        for (int k = normal_pull; k < setup_columns; ++k) put(to, k, hn::Zero(Tag()));
+        const SetupAngles angles = angles_of(to);
+        Vector angle2[3] = {dot(angles.reflector, angles.reflector), dot(angles.laser, angles.laser),
+                            dot(angles.roll, angles.roll)};
+        for (const Vector each : angle2) chunk.largest_turn = hn::Max(chunk.largest_turn, each);
+
+        const Matrix3 line = common9(setup.machine_R_line);
+        const Matrix3 mirror = rotation_exp(angles.reflector, angle2[0]);
+        put3(to, mirror_normal, line * Vector3{mirror.row0.z, mirror.row1.z, mirror.row2.z});
+        put9(to, sensor, line * (rotation_exp(angles.laser, angle2[1]) * rotation_exp(angles.roll, angle2[2])));
+        const Vector3 lateral{part(to, setup_columns + setup::lateral), part(to, setup_columns + setup::lateral + 1),
+                              hn::Zero(Tag())};
+        put3(to, beam_origin, line * lateral + common3(setup.origin.data()));
+    }
+}
+
+// A force on the functional point and one on the normal's tip.
+struct MirrorPull {
+    Vector3 point, normal;
+};
+
+// From the mirror's pose to the readings and back (ChannelModel::read).
+HWY_INLINE MirrorPull pull_mirror(const Chunk& chunk, const SimdProblem::Point& point, const Vector3& position,
+                                  const Vector3& normal) {
+    double* setup = chunk.setup(point.setup);
+    const Matrix3 machine_R_sensor = part9(setup, sensor);
+    const Vector3 q = transposed_product(machine_R_sensor, position - part3(setup, beam_origin));
+    const Vector3 m = transposed_product(machine_R_sensor, normal);
+    const Vector inverse = hn::Div(hn::Set(Tag(), 1.0), m.z);
+    Tilt tilt;
+    tilt.beta = hn::Mul(m.x, inverse);
+    tilt.alpha = hn::Neg(hn::Mul(m.y, inverse));
+    tilt.length = hn::MulAdd(tilt.beta, q.x, hn::NegMulAdd(tilt.alpha, q.y, q.z));
+    pull_channels(chunk, point, setup, tilt);
+
+    const Vector beta_pull = hn::MulAdd(tilt.length_pull, q.x, tilt.beta_pull);
+    const Vector alpha_pull = hn::NegMulAdd(tilt.length_pull, q.y, tilt.alpha_pull);
+    const Vector3 q_pull{hn::Mul(tilt.length_pull, tilt.beta), hn::Neg(hn::Mul(tilt.length_pull, tilt.alpha)),
+                         tilt.length_pull};
+    const Vector m_by_z = hn::MulAdd(beta_pull, tilt.beta, hn::Mul(alpha_pull, tilt.alpha));
+    const Vector3 m_pull{hn::Mul(beta_pull, inverse), hn::Neg(hn::Mul(alpha_pull, inverse)),
+                         hn::Neg(hn::Mul(m_by_z, inverse))};
+    // The sensor turned sees everything turned the other way.
+    add3(setup, sensor_pull, cross(q_pull, q) + cross(m_pull, m));
+    const MirrorPull pull{machine_R_sensor * q_pull, machine_R_sensor * m_pull};
+    put3(setup, origin_pull, part3(setup, origin_pull) - pull.point);
+    return pull;
+}
+
+// Through the chain from the tool to the workpiece, and the forces back to the tool.
+HWY_INLINE void pull_point(const Chunk& chunk, const SimdProblem::Point& point) {
+    const SimdProblem& problem = chunk.problem;
+    double* setup = chunk.setup(point.setup);
+    Vector3 position = common3(problem.tool.data());
+    Vector3 normal = part3(setup, mirror_normal);
+    Vector3 position_arm[3], normal_arm[3];  // what turns with an axis
+    for (int place = 2; place >= 0; --place) {
+        const double* node = chunk.node(point.node[place]);
+        const Matrix3 rotation = part9(node, node_rotation);
+        const Vector3 shift = part3(node, node_shift);
+        normal = normal_arm[place] = rotation * normal;
+        if (problem.carries_workpiece[place]) {
+            position = position_arm[place] = rotation * (position + shift);
+        } else {
+            position_arm[place] = rotation * position;
+            position = position_arm[place] + shift;
+        }
+    }
+    MirrorPull pull = pull_mirror(chunk, point, position, normal);
+    for (int place = 0; place < 3; ++place) {
+        double* node = chunk.node(point.node[place]);
+        const Matrix3 rotation = part9(node, node_rotation);
+        add3(node, node_turn_pull, cross(position_arm[place], pull.point) + cross(normal_arm[place], pull.normal));
+        if (!problem.carries_workpiece[place]) add3(node, node_shift_pull, pull.point);
+        pull = {transposed_product(rotation, pull.point), transposed_product(rotation, pull.normal)};
+        if (problem.carries_workpiece[place]) add3(node, node_shift_pull, pull.point);
+    }
+    add3(setup, normal_pull, pull.normal);
+}
+
+void finish_nodes(const Chunk& chunk) {
+    for (std::size_t n = 0; n < chunk.problem.nodes.size(); ++n) {
+        const auto& unknown = chunk.problem.nodes[n].unknown;
+        const double* from = chunk.node(int(n));
+        const Vector3 shift = part3(from, node_shift_pull);
+        chunk.pull(unknown[0], shift.x), chunk.pull(unknown[1], shift.y), chunk.pull(unknown[2], shift.z);
+        const Vector3 angles{chunk.unknown(unknown[3]), chunk.unknown(unknown[4]), chunk.unknown(unknown[5])};
+        const Vector3 turn = transposed_jacobian(angles, dot(angles, angles), part3(from, node_turn_pull));
+        chunk.pull(unknown[3], turn.x), chunk.pull(unknown[4], turn.y), chunk.pull(unknown[5], turn.z);
+    }
+}
+
+void finish_setups(const Chunk& chunk) {
+    for (std::size_t s = 0; s < chunk.problem.setups.size(); ++s) {
+        const SimdProblem::Setup& setup = chunk.problem.setups[s];
+        double* at = chunk.setup(int(s));
+        const int pulls = setup_columns + chunk.problem.setup_size;
+        const SetupAngles angles = angles_of(at);
+        const Matrix3 line = common9(setup.machine_R_line);
+
+        const Vector3 normal = transposed_product(line, part3(at, mirror_normal));
+        const Vector3 torque = cross(normal, transposed_product(line, part3(at, normal_pull)));
+        const Vector3 reflector =
+            transposed_jacobian(angles.reflector, dot(angles.reflector, angles.reflector), torque);
+        put(at, pulls + setup::reflector, reflector.x), put(at, pulls + setup::reflector + 1, reflector.y);
+
+        const Vector3 sensor_torque = part3(at, sensor_pull);
+        const Vector3 unrolled = rotation_exp(angles.roll, dot(angles.roll, angles.roll)) * sensor_torque;
+        // Exp(v + dv) = Exp(v) Exp(J(v)^T dv), and J(v)^T = J(-v).
+        const Vector3 laser = transposed_jacobian(-angles.laser, dot(angles.laser, angles.laser), unrolled);
+        put(at, pulls + setup::laser, laser.x), put(at, pulls + setup::laser + 1, laser.y);
+        put(at, pulls + setup::roll, sensor_torque.z);
+
+        const Vector3 lateral = transposed_product(line, part3(at, origin_pull));
+        put(at, pulls + setup::lateral, lateral.x), put(at, pulls + setup::lateral + 1, lateral.y);
+        for (std::size_t c = 0; c < setup.unknown.size(); ++c) chunk.pull(setup.unknown[c], part(at, pulls + int(c)));
+    }
+}
+
+void evaluate_lanes(const SimdProblem& problem, const SimdModel::At& at, double* scratch) {
+    const std::size_t width = hn::Lanes(Tag());
+    double* const setups = scratch + problem.nodes.size() * node_parts * width;
+    for (std::size_t lane = 0; lane < lane_group; lane += width) {
+        Chunk chunk{problem, at, lane, scratch, setups, hn::Zero(Tag())};
+        prepare_nodes(chunk);
+        prepare_setups(chunk);
+        for (const SimdProblem::Point& point : problem.points) pull_point(chunk, point);
+        finish_nodes(chunk);
+        finish_setups(chunk);
+        double largest[widest_vector];
+        hn::StoreU(chunk.largest_turn, Tag(), largest);
+        for (std::size_t i = 0; i < width; ++i) at.is_valid[lane + i] = largest[i] <= largest_angle2;
+    }
+}
+
+std::size_t scratch_numbers(const SimdProblem& problem) {
+    return hn::Lanes(Tag()) *
+           (problem.nodes.size() * node_parts + problem.setups.size() * (setup_columns + 2 * problem.setup_size));
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace stepdiag
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace stepdiag {
+namespace {
+
+HWY_EXPORT(evaluate_lanes);
+HWY_EXPORT(scratch_numbers);
+
+}  // namespace
+
+SimdProblem::SimdProblem(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input)
+    : kind(ChannelKind::ideal), unknowns(problem.size()), channels(0), tool(problem.tool()), setup_size(0) {
+    const auto place = [&](int unknown) { return unknown == no_unknown ? unknowns : unknown; };
+    for (const LineSetup& setup : problem.setups()) {
+        const ChannelModel& model = setup.model;
+        kind = model.kind();
+        channels = std::max(channels, model.channels());
+        setup_size = std::max(setup_size, model.setup_size());
+        Setup& to = setups.emplace_back(Setup{{}, model.machine_R_line(), model.origin(), &model.head()});
+        for (const int unknown : setup.unknown) to.unknown.push_back(place(unknown));
+    }
+    for (const AxisNode& node : problem.nodes()) {
+        Node& to = nodes.emplace_back();
+        for (int c = 0; c < 6; ++c) to.unknown[c] = place(node.unknown[c]);
+        to.position = {};
+        to.position[index(node.axis)] = node.position;
+    }
+    nodes.push_back({{unknowns, unknowns, unknowns, unknowns, unknowns, unknowns}, {}});  // home
+    const auto& order = problem.chain().order();
+    for (int p = 0; p < 3; ++p) carries_workpiece[p] = problem.chain().carries_workpiece(order[p]);
+    for (const AdjustedPoint& point : problem.points()) {
+        Point& to = points.emplace_back();
+        to = {point.setup, {}, point.place.travel, point.place.time, int(of_points.size())};
+        for (int p = 0; p < 3; ++p) {
+            const int node = point.node[index(order[p])];
+            to.node[p] = node == no_unknown ? int(nodes.size()) - 1 : node;
+        }
+        of_points.resize(of_points.size() + channels, {no_reading, 0, 0.0});
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            const AdjustedReading& reading = problem.readings()[r];
+            of_points[to.first_channel + reading.channel] = {r, input[r], 1.0 / reading.standard_uncertainty};
+        }
+    }
+}
+
+SimdModel::SimdModel(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input)
+    : problem_(problem, input), scratch_(std::ptrdiff_t(HWY_DYNAMIC_DISPATCH(scratch_numbers)(problem_))) {}
+
+void SimdModel::evaluate(const At& at) {
+    std::fill_n(at.pulled, lane_group * std::size_t(problem_.unknowns + 1), 0.0);
+    HWY_DYNAMIC_DISPATCH(evaluate_lanes)(problem_, at, scratch_.data());
+}
+
+}  // namespace stepdiag
+#endif  // HWY_ONCE

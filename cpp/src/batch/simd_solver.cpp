@@ -1,0 +1,238 @@
+#include "batch/simd_solver.hpp"
+
+#include <algorithm>
+
+#include "stepdiag/core/random_blocks.hpp"
+
+// Not those instruction sets that differ from another one only in what is not used here.
+#include <hwy/detect_targets.h>
+#undef HWY_DISABLED_TARGETS
+#ifdef HWY_AVX3_ZEN4  // since Highway 1.1
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4 | HWY_AVX3_SPR)
+#else
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
+#endif
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "batch/simd_solver.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once for every instruction set
+//
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace stepdiag {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using Tag = hn::ScalableTag<double>;
+using Vector = hn::Vec<Tag>;
+constexpr int six = BorderedBand::block_size;
+
+// Two vectors of lanes of one number: while one waits for a sum, the other goes on.
+struct Pair {
+    Vector a, b;
+};
+HWY_INLINE Pair load(const double* from) { return {hn::LoadU(Tag(), from), hn::LoadU(Tag(), from + hn::Lanes(Tag()))}; }
+HWY_INLINE void store(const Pair& x, double* to) {
+    hn::StoreU(x.a, Tag(), to);
+    hn::StoreU(x.b, Tag(), to + hn::Lanes(Tag()));
+}
+HWY_INLINE void add_product(double factor, const Pair& x, Pair& sum) {
+    const Vector all = hn::Set(Tag(), factor);
+    sum.a = hn::MulAdd(all, x.a, sum.a), sum.b = hn::MulAdd(all, x.b, sum.b);
+}
+HWY_INLINE void subtract_product(double factor, const Pair& x, Pair& sum) {
+    const Vector all = hn::Set(Tag(), factor);
+    sum.a = hn::NegMulAdd(all, x.a, sum.a), sum.b = hn::NegMulAdd(all, x.b, sum.b);
+}
+HWY_INLINE void scale(double factor, Pair& x) {
+    const Vector all = hn::Set(Tag(), factor);
+    x.a = hn::Mul(all, x.a), x.b = hn::Mul(all, x.b);
+}
+HWY_INLINE std::size_t pair_lanes() { return 2 * hn::Lanes(Tag()); }
+
+template <int Rows>
+HWY_INLINE void add_transposed_bundle(const SimdJacobian::Numbers& jacobian, const SimdJacobian::Bundle& bundle,
+                                      const double* readings, double* unknowns) {
+    Pair force[Rows];
+    for (int i = 0; i < Rows; ++i) force[i] = load(readings + lane_group * std::size_t(bundle.first_reading + i));
+    const double* derivative = jacobian.derivative.data() + bundle.first_derivative;
+    const int* unknown = jacobian.unknown.data() + bundle.first_unknown;
+    for (int k = 0; k < bundle.unknowns; ++k, derivative += Rows) {
+        double* to = unknowns + lane_group * std::size_t(unknown[k]);
+        Pair sum = load(to);
+        for (int i = 0; i < Rows; ++i) add_product(derivative[i], force[i], sum);
+        store(sum, to);
+    }
+}
+
+template <int Rows>
+HWY_INLINE void multiply_bundle(const SimdJacobian::Numbers& jacobian, const SimdJacobian::Bundle& bundle,
+                                const double* unknowns, double* readings) {
+    Pair sum[Rows];
+    for (int i = 0; i < Rows; ++i) sum[i] = {hn::Zero(Tag()), hn::Zero(Tag())};
+    const double* derivative = jacobian.derivative.data() + bundle.first_derivative;
+    const int* unknown = jacobian.unknown.data() + bundle.first_unknown;
+    for (int k = 0; k < bundle.unknowns; ++k, derivative += Rows) {
+        const Pair x = load(unknowns + lane_group * std::size_t(unknown[k]));
+        for (int i = 0; i < Rows; ++i) add_product(derivative[i], x, sum[i]);
+    }
+    for (int i = 0; i < Rows; ++i) store(sum[i], readings + lane_group * std::size_t(bundle.first_reading + i));
+}
+
+void add_transposed(const SimdJacobian::Numbers& jacobian, const double* readings, double* unknowns) {
+    for (std::size_t lane = 0; lane < lane_group; lane += pair_lanes())
+        for (const SimdJacobian::Bundle& bundle : jacobian.bundles) {
+            if (bundle.rows == 3) add_transposed_bundle<3>(jacobian, bundle, readings + lane, unknowns + lane);
+            else if (bundle.rows == 2) add_transposed_bundle<2>(jacobian, bundle, readings + lane, unknowns + lane);
+            else add_transposed_bundle<1>(jacobian, bundle, readings + lane, unknowns + lane);
+        }
+}
+
+void multiply(const SimdJacobian::Numbers& jacobian, const double* unknowns, double* readings) {
+    for (std::size_t lane = 0; lane < lane_group; lane += pair_lanes())
+        for (const SimdJacobian::Bundle& bundle : jacobian.bundles) {
+            if (bundle.rows == 3) multiply_bundle<3>(jacobian, bundle, unknowns + lane, readings + lane);
+            else if (bundle.rows == 2) multiply_bundle<2>(jacobian, bundle, unknowns + lane, readings + lane);
+            else multiply_bundle<1>(jacobian, bundle, unknowns + lane, readings + lane);
+        }
+}
+
+// Rows of L right of one block column: y -= L x.
+HWY_INLINE const double* eliminate(const double* l, int rows, const Pair (&own)[six], double* y) {
+    for (int i = 0; i < rows; ++i, l += six, y += lane_group) {
+        Pair sum = load(y);
+        for (int k = 0; k < six; ++k) subtract_product(l[k], own[k], sum);
+        store(sum, y);
+    }
+    return l;
+}
+
+// x -= L^T y
+HWY_INLINE const double* collect(const double* l, int rows, const double* y, Pair (&own)[six]) {
+    for (int i = 0; i < rows; ++i, l += six, y += lane_group) {
+        const Pair from = load(y);
+        for (int k = 0; k < six; ++k) subtract_product(l[k], from, own[k]);
+    }
+    return l;
+}
+
+void solve_corner(const SimdFactor::Numbers& factor, double* border) {
+    const int rank = int(factor.corner_order.size());
+    std::vector<double> numbers(2 * lane_group * std::size_t(rank));  // no more than a pair of the widest vectors each
+    const std::size_t width = pair_lanes();
+    const auto at = [&](int i) HWY_ATTR { return numbers.data() + width * std::size_t(i); };
+    const auto l = [&](int i, int k) { return factor.corner[std::size_t(k) * rank + i]; };
+    for (int i = 0; i < rank; ++i) store(load(border + lane_group * std::size_t(factor.corner_order[i])), at(i));
+    const auto step = [&](int k, int from, int to, bool transposed) HWY_ATTR {
+        Pair own = load(at(k));
+        scale(l(k, k), own);
+        store(own, at(k));
+        for (int i = from; i < to; ++i) {
+            Pair sum = load(at(i));
+            subtract_product(transposed ? l(k, i) : l(i, k), own, sum);
+            store(sum, at(i));
+        }
+    };
+    for (int k = 0; k < rank; ++k) step(k, k + 1, rank, false);
+    for (int k = rank; k-- > 0;) step(k, 0, k, true);
+    const Vector zero = hn::Zero(Tag());
+    for (int i = 0; i < factor.border; ++i) store({zero, zero}, border + lane_group * std::size_t(i));
+    for (int i = 0; i < rank; ++i) store(load(at(i)), border + lane_group * std::size_t(factor.corner_order[i]));
+}
+
+void solve_pair(const SimdFactor::Numbers& factor, double* x) {
+    const int blocks = int(factor.rows.size());
+    const auto block = [&](int column) { return x + lane_group * std::size_t(six * column); };
+    double* border = block(blocks);
+    const double* l = factor.column.data();
+    Pair own[six];
+    for (int column = 0; column < blocks; ++column) {
+        double* at = block(column);
+        for (int i = 0; i < six; ++i) {
+            own[i] = load(at + lane_group * std::size_t(i));
+            for (int k = 0; k < i; ++k) subtract_product(l[six * i + k], own[k], own[i]);
+            scale(l[six * i + i], own[i]);
+            store(own[i], at + lane_group * std::size_t(i));
+        }
+        l = eliminate(l + six * six, factor.rows[column], own, block(column + 1));
+        l = eliminate(l, factor.border, own, border);
+    }
+    solve_corner(factor, border);
+    for (int column = blocks; column-- > 0;) {
+        double* at = block(column);
+        l -= six * (six + factor.rows[column] + factor.border);
+        for (int i = 0; i < six; ++i) own[i] = load(at + lane_group * std::size_t(i));
+        collect(collect(l + six * six, factor.rows[column], block(column + 1), own), factor.border, border, own);
+        for (int i = six; i-- > 0;) {
+            for (int k = i + 1; k < six; ++k) subtract_product(l[six * k + i], own[k], own[i]);
+            scale(l[six * i + i], own[i]);
+            store(own[i], at + lane_group * std::size_t(i));
+        }
+    }
+}
+
+void solve(const SimdFactor::Numbers& factor, double* x) {
+    for (std::size_t lane = 0; lane < lane_group; lane += pair_lanes()) solve_pair(factor, x + lane);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace stepdiag
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace stepdiag {
+namespace {
+
+HWY_EXPORT(add_transposed);
+HWY_EXPORT(multiply);
+HWY_EXPORT(solve);
+
+}  // namespace
+
+SimdJacobian::SimdJacobian(const NormalEquations& equations) {
+    for (const AdjustedPoint& point : equations.problem().points())
+        for (int first = point.first_reading; first < point.end_reading; first += most_rows) {
+            const int rows = std::min(most_rows, point.end_reading - first);
+            Bundle bundle{first, rows, 0, numbers_.unknown.size(), numbers_.derivative.size()};
+            const auto common = equations.row(point, first);
+            for (int k = 0; k < common.size; ++k) {
+                if (common.unknown[k] == no_unknown) continue;
+                numbers_.unknown.push_back(common.unknown[k]);
+                for (int i = 0; i < rows; ++i)
+                    numbers_.derivative.push_back(equations.row(point, first + i).derivative[k]);
+                ++bundle.unknowns;
+            }
+            numbers_.bundles.push_back(bundle);
+        }
+}
+
+SimdFactor::SimdFactor(const BorderedFactor& factor) {
+    constexpr int six = BorderedBand::block_size;
+    const BorderedBand& l = factor.band();
+    numbers_.border = l.border();
+    for (int column = 0; column < l.blocks(); ++column) {
+        numbers_.rows.push_back(six * (l.reach(column) - column));
+        for (int row = column; row <= l.reach(column); ++row)
+            for (int i = 0; i < six; ++i)
+                for (int k = 0; k < six; ++k) numbers_.column.push_back(l.block(row, column)(i, k));
+        for (int i = 0; i < l.border(); ++i)
+            for (int k = 0; k < six; ++k) numbers_.column.push_back(l.border_rows(column)(i, k));
+    }
+    const auto corner = factor.corner_factor();
+    numbers_.corner_order.assign(factor.corner_order().begin(), factor.corner_order().begin() + corner.cols());
+    for (int k = 0; k < corner.cols(); ++k)
+        for (int i = 0; i < corner.rows(); ++i) numbers_.corner.push_back(i == k ? 1.0 / corner(i, k) : corner(i, k));
+}
+
+void SimdJacobian::add_transposed(const double* readings, double* unknowns) const {
+    HWY_DYNAMIC_DISPATCH(add_transposed)(numbers_, readings, unknowns);
+}
+
+void SimdJacobian::multiply(const double* unknowns, double* readings) const {
+    HWY_DYNAMIC_DISPATCH(multiply)(numbers_, unknowns, readings);
+}
+
+void SimdFactor::solve(double* right_hand_side) const { HWY_DYNAMIC_DISPATCH(solve)(numbers_, right_hand_side); }
+
+}  // namespace stepdiag
+#endif  // HWY_ONCE

@@ -1,0 +1,56 @@
+// The adjustment's linear algebra for many right-hand sides at once, one a lane (simd_model.hpp), with derivatives and
+// factor as they are at one place. Internal: not installed.
+#pragma once
+
+#include <vector>
+
+#include "adjustment/normal_equations.hpp"
+
+namespace stepdiag {
+
+// J, the derivatives of all weighted readings.
+class SimdJacobian {
+public:
+    explicit SimdJacobian(const NormalEquations& equations);
+
+    void add_transposed(const double* readings, double* unknowns) const;  // unknowns += J^T readings
+    void multiply(const double* unknowns, double* readings) const;        // readings = J unknowns
+
+    // Up to three readings of a point, which have their unknowns in common.
+    static constexpr int most_rows = 3;
+    struct Bundle {
+        int first_reading, rows;
+        int unknowns;
+        std::size_t first_unknown;     // into `unknown`
+        std::size_t first_derivative;  // into `derivative`, by unknown and row
+    };
+    struct Numbers {
+        std::vector<Bundle> bundles;
+        std::vector<int> unknown;
+        std::vector<double> derivative;
+    };
+
+private:
+    Numbers numbers_;
+};
+
+// L of N = L L^T, in the order in which it is read.
+class SimdFactor {
+public:
+    explicit SimdFactor(const BorderedFactor& factor);
+
+    void solve(double* right_hand_side) const;  // in place; held unknowns are 0
+
+    struct Numbers {
+        std::vector<int> rows;       // of the band below each diagonal block
+        std::vector<double> column;  // by block column: diagonal block, rows below, the border's rows; row by row
+        int border;
+        std::vector<int> corner_order;
+        std::vector<double> corner;  // column by column, with reciprocals of the pivots
+    };
+
+private:
+    Numbers numbers_;
+};
+
+}  // namespace stepdiag

@@ -1,0 +1,60 @@
+#include "stepdiag/core/instruction_set.hpp"
+
+#include <cstdint>
+
+#include "stepdiag/core/error.hpp"
+
+// Not those instruction sets that differ from another one only in what is not used here.
+#include <hwy/detect_targets.h>
+#undef HWY_DISABLED_TARGETS
+#ifdef HWY_AVX3_ZEN4  // since Highway 1.1
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4 | HWY_AVX3_SPR)
+#else
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
+#endif
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/instruction_set.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once for every instruction set
+//
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace stepdiag {
+namespace HWY_NAMESPACE {
+
+const char* target() { return hwy::TargetName(HWY_TARGET); }
+
+}  // namespace HWY_NAMESPACE
+}  // namespace stepdiag
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace stepdiag {
+namespace {
+
+HWY_EXPORT(target);
+
+}  // namespace
+
+std::string instruction_set() { return HWY_DYNAMIC_DISPATCH(target)(); }
+
+std::vector<std::string> instruction_sets() {
+    std::vector<std::string> names;
+    for (const std::int64_t each : hwy::SupportedAndGeneratedTargets()) names.push_back(hwy::TargetName(each));
+    return names;
+}
+
+void choose_instruction_set(const std::string& name) {
+    std::string known;
+    for (const std::int64_t each : hwy::SupportedAndGeneratedTargets()) {
+        if (name == hwy::TargetName(each)) {
+            hwy::GetChosenTarget().Update(each);
+            return;
+        }
+        known += std::string(" ") + hwy::TargetName(each);
+    }
+    throw InvalidArgument("replay target: \"" + name + "\": expected one of" + known);
+}
+
+}  // namespace stepdiag
+#endif  // HWY_ONCE

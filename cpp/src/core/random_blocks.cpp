@@ -1,0 +1,68 @@
+#include "stepdiag/core/random_blocks.hpp"
+
+// Not those instruction sets that differ from another one only in what is not used here.
+#include <hwy/detect_targets.h>
+#undef HWY_DISABLED_TARGETS
+#ifdef HWY_AVX3_ZEN4  // since Highway 1.1
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4 | HWY_AVX3_SPR)
+#else
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
+#endif
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/random_blocks.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once for every instruction set
+//
+#include "core/random_blocks-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace stepdiag {
+namespace HWY_NAMESPACE {
+
+template <class Numbers>
+STEPDIAG_INLINE void fill(const RandomBlocks& lanes, std::size_t items, double* out, Numbers numbers) {
+    const WordTag words;
+    const std::size_t width = hn::Lanes(words);
+    const RoundKeys keys(lanes.seed);
+    const Words ramp = hn::Iota(words, 0);
+    for (std::size_t item = 0; item < items; ++item, out += 2 * lanes.lanes)
+        for (std::size_t lane = 0; lane < lanes.lanes; lane += 2 * width) {
+            const auto samples = [&](std::size_t first)
+                                     HWY_ATTR { return hn::Add(hn::Set(words, lanes.first_sample + first), ramp); };
+            const TwoPairs pair = numbers(keys, lanes.stream, WordPair{samples(lane), samples(lane + width)},
+                                          std::uint32_t(lanes.first_item + item), lanes.draw);
+            store(pair.first, out + lane);
+            store(pair.second, out + lanes.lanes + lane);
+        }
+}
+
+void fill_uniform_lanes(const RandomBlocks& lanes, std::size_t items, double* out) {
+    fill(lanes, items, out, [](const auto&... block) HWY_ATTR { return uniform_lanes(block...); });
+}
+
+void fill_normal_lanes(const RandomBlocks& lanes, std::size_t items, double* out) {
+    fill(lanes, items, out, [](const auto&... block) HWY_ATTR { return normal_lanes(block...); });
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace stepdiag
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace stepdiag {
+namespace {
+
+HWY_EXPORT(fill_uniform_lanes);
+HWY_EXPORT(fill_normal_lanes);
+
+}  // namespace
+
+void fill_uniform(const RandomBlocks& lanes, std::size_t items, double* out) {
+    HWY_DYNAMIC_DISPATCH(fill_uniform_lanes)(lanes, items, out);
+}
+
+void fill_normal(const RandomBlocks& lanes, std::size_t items, double* out) {
+    HWY_DYNAMIC_DISPATCH(fill_normal_lanes)(lanes, items, out);
+}
+
+}  // namespace stepdiag
+#endif  // HWY_ONCE

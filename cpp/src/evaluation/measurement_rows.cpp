@@ -1,0 +1,78 @@
+#include "evaluation/measurement_rows.hpp"
+
+#include <cmath>
+#include <sstream>
+
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+namespace {
+
+constexpr double position_tolerance = 1e-3;  // mm: positions are written with three decimals by many controllers
+
+void check_head_fits(const HeadCalibration& head, int beams, bool has_spots) {
+    if (beams > 0 && beams != int(head.beam_offsets.size()))
+        throw InvalidArgument("measurement: has " + std::to_string(beams) + " beams d1 ... d" + std::to_string(beams) +
+                              ", but the head's beam_offsets name " + std::to_string(head.beam_offsets.size()));
+    if (has_spots && !head.psd_distance)
+        throw InvalidArgument("measurement: has spot readings, but the head has no psd_distance (layout \"psd\")");
+}
+
+}  // namespace
+
+std::string row_name(const Measurement& measurement, std::size_t row) {
+    const Station& station = measurement.stations()[row];
+    return "data row " + std::to_string(row + 1) + " (run " + std::to_string(station.run) + ", line " +
+           station.line.name() + ", point " + std::to_string(station.point) + ")";
+}
+
+std::optional<RawValue> raw_value(const Channel* channel, std::size_t row, double usual_uncertainty) {
+    if (!channel || !channel->value[row]) return std::nullopt;
+    const auto own = channel->standard_uncertainty.empty() ? std::nullopt : channel->standard_uncertainty[row];
+    return RawValue{*channel->value[row], own.value_or(usual_uncertainty)};
+}
+
+std::map<std::pair<int, std::string>, std::vector<std::size_t>> rows_by_pass(const Measurement& measurement) {
+    std::map<std::pair<int, std::string>, std::vector<std::size_t>> rows;
+    for (std::size_t i = 0; i < measurement.size(); ++i)
+        rows[{measurement.stations()[i].run, measurement.stations()[i].line.name()}].push_back(i);
+    return rows;
+}
+
+void check_uncertainty(const ReadingUncertainty& uncertainty) {
+    for (const auto& [key, u] : {std::pair("distance", uncertainty.distance), std::pair("tilt", uncertainty.tilt),
+                                 std::pair("spot", uncertainty.spot)})
+        if (!(u > 0.0 && std::isfinite(u)))
+            throw InvalidArgument(std::string("uncertainty.") + key +
+                                  ": expected a positive finite standard uncertainty");
+}
+
+void check_heads_fit(const Measurement& measurement, const HeadCalibrations& heads, bool spots_count) {
+    const int beams = measurement.beam_count();
+    const bool has_spots = spots_count && measurement.find("spot_x");
+    check_head_fits(heads.head, beams, has_spots);
+    for (const auto& entry : heads.by_line) check_head_fits(entry.second, beams, has_spots);
+}
+
+std::vector<PlanPoint> planned_points(const Measurement& measurement, std::size_t row, const Plan& plan) {
+    try {
+        return plan.points(measurement.stations()[row].line, measurement.stations()[row].run);
+    } catch (const InvalidArgument& error) {
+        throw InvalidArgument(row_name(measurement, row) + ": " + error.what());
+    }
+}
+
+void check_station(const Measurement& measurement, std::size_t row, const std::vector<PlanPoint>& planned) {
+    const Station& station = measurement.stations()[row];
+    if (station.point >= int(planned.size()))
+        throw InvalidArgument(row_name(measurement, row) + ": the line has the points 0 to " +
+                              std::to_string(planned.size() - 1));
+    const Eigen::Vector3d &expected = planned[station.point].commanded, &commanded = station.commanded;
+    if ((commanded - expected).cwiseAbs().maxCoeff() <= position_tolerance) return;
+    std::ostringstream text;
+    text << row_name(measurement, row) << ": the plan has this point at (" << expected.transpose()
+         << ") mm, the row says (" << commanded.transpose() << ") mm";
+    throw InvalidArgument(text.str());
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,58 @@
+// A run as the linear evaluations see it: passes along lines, each reading reduced to a length and two tilts that the
+// parameters enter linearly. Internal: not installed.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "stepdiag/evaluation/evaluation.hpp"
+#include "stepdiag/measurement/reading.hpp"
+
+namespace stepdiag {
+
+// How one raw channel of a reading moves (length, alpha, beta) by one standard uncertainty.
+using ChannelEffect = Eigen::Vector3d;
+
+struct PassPoint {
+    PlanPoint plan;
+    Eigen::Vector2d lateral =
+        Eigen::Vector2d::Zero();  // commanded travel from the line's first point, in local x and y, mm
+    bool has_length = false;
+    bool has_tilt = false;
+    Eigen::Vector3d reading = Eigen::Vector3d::Zero();  // length less the commanded travel (mm), alpha, beta (rad)
+    std::vector<ChannelEffect> effects;                 // one for each raw channel that was read
+
+    Eigen::Vector3d variance() const;
+};
+
+struct Pass {
+    Line line;
+    bool is_scale_line;
+    Eigen::Matrix3d frame;  // machine_R_line
+    std::vector<PassPoint> points;
+    int first_reading;  // readings of all passes are counted through: that of points[0]
+
+    Eigen::Vector3d direction() const { return frame.col(2); }
+};
+
+enum class LengthKind {
+    distance,             // the distance itself, less the commanded travel
+    lever_arm_corrected,  // beam length L less commanded travel and lever arm times tilts; needs both tilts
+};
+
+// Throws InvalidArgument naming the row for a line or point that is not the plan's, a commanded position more than 1 um
+// off the plan's, channels that do not fit the head, or readings that no mirror gives.
+std::vector<Pass> collect_passes(const Measurement& measurement, const Plan& plan, const HeadCalibrations& heads,
+                                 const ReadingUncertainty& uncertainty, LengthKind kind);
+
+// A step of one axis over one of its intervals, as one pass made it; scale lines make none.
+struct Step {
+    int pass;
+    int point;    // from `point` to `point + 1`
+    double sign;  // travel sign: increments times sign count in the axis' own direction
+};
+using AxisSteps = std::vector<std::vector<Step>>;  // per interval, counted from home
+std::array<AxisSteps, 3> collect_steps(const std::vector<Pass>& passes, const Plan& plan);
+
+}  // namespace stepdiag

@@ -1,0 +1,234 @@
+// The exact adjustment as a C++ caller uses it. (The Python tests go further; these also run under the sanitizers.)
+#include "stepdiag/adjustment/adjustment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "stepdiag/simulation/simulate.hpp"
+#include "support/refuses.hpp"
+
+namespace {
+
+using Eigen::Vector3d;
+using stepdiag::Adjustment;
+using stepdiag::AdjustmentOptions;
+using stepdiag::FunctionId;
+using stepdiag::Line;
+using stepdiag::Measurement;
+using stepdiag::SetupQuantity;
+
+constexpr double micro = 1e-6;
+
+std::vector<Line> parse(std::initializer_list<const char*> names) {
+    std::vector<Line> lines;
+    for (const char* name : names) lines.push_back(Line::parse(name));
+    return lines;
+}
+
+// A machine, its plan and its head, every measured line misaligned by up to 1 mrad.
+struct Workshop {
+    int steps = 8;
+    std::vector<Line> lines = parse({"ppp", "npp", "pnp", "nnp"});
+    std::vector<Line> scale_lines = parse({"p00", "0p0", "00p"});
+    stepdiag::Head head = {};
+    Vector3d volume{800.0, 600.0, 500.0}, tool{20.0, -10.0, 50.0};
+
+    stepdiag::Plan plan() const { return {volume, lines, steps, stepdiag::all_axes, scale_lines}; }
+    stepdiag::Machine machine() const {
+        stepdiag::RandomErrorMap errors;
+        errors.intervals = steps;
+        errors.seed = 3;
+        return {stepdiag::Chain::parse("[w X' b Y Z t]"), make_random_error_map(volume, errors), tool};
+    }
+    stepdiag::SimulationOptions simulation() const {
+        stepdiag::SimulationOptions options;
+        double angle = 300 * micro;
+        for (const Line& line : lines) {
+            options.misalignment[line.name()].reflector = {angle, -0.5 * angle};
+            options.misalignment[line.name()].laser = {1e-3 - angle, angle};
+            options.misalignment[line.name()].distance_constant = 7.0;
+            angle += 200 * micro;
+        }
+        return options;
+    }
+    Measurement run() const { return simulate(machine(), plan(), head, simulation()); }
+    Adjustment adjust(const Measurement& run, const AdjustmentOptions& options = {}) const {
+        return stepdiag::adjust(run, plan(), machine().chain(), tool, head.calibration(), options);
+    }
+};
+
+struct Worst {
+    double position = 0.0, angle = 0.0;
+};
+
+Worst worst(const stepdiag::Calibration& calibration, const stepdiag::ErrorMap& truth) {
+    Worst worst;
+    for (int i = 0; i < stepdiag::function_count; ++i) {
+        if (!calibration.functions[i] || !calibration.functions[i]->slope_determined) continue;
+        const auto& function = *calibration.functions[i];
+        double& largest = FunctionId::at(i).is_rotation() ? worst.angle : worst.position;
+        for (std::size_t k = 0; k < function.position.size(); ++k)
+            largest = std::max(largest,
+                               std::abs(function.value[k] - truth.function(FunctionId::at(i), function.position[k])));
+    }
+    for (const auto s : stepdiag::all_squarenesses)
+        if (const auto& entry = calibration.squarenesses[static_cast<int>(s)])
+            worst.angle = std::max(worst.angle, std::abs(entry->value - truth.squareness(s)));
+    return worst;
+}
+
+Measurement changed(const Measurement& run, const char* channel, std::size_t row, double change) {
+    auto channels = run.channels();
+    for (auto& c : channels)
+        if (c.name == channel) c.value[row] = *c.value[row] + change;
+    return Measurement(run.stations(), channels);
+}
+
+// The floor of double precision: a metre rounded to 1e-13 mm, and a few steps' sum of it.
+constexpr double floor_mm = 2e-11, floor_rad = 1e-13;
+
+TEST(Adjustment, FindsMachineAndSetUpToTheFloorOfDoublePrecision) {
+    const Workshop shop;
+    const Adjustment result = shop.adjust(shop.run());
+    const Worst error = worst(result.calibration, shop.machine().errors());
+    EXPECT_LE(error.position, floor_mm);
+    EXPECT_LE(error.angle, floor_rad);
+    EXPECT_LE(result.iterations, 6);
+    EXPECT_TRUE(result.calibration.undetermined.empty());
+    EXPECT_EQ(result.calibration.method, "adjustment");
+    const auto truth = shop.simulation().misalignment;
+    for (const auto& estimate : result.setup) {
+        const auto entry = truth.find(estimate.line);
+        if (entry == truth.end()) continue;
+        if (estimate.quantity == SetupQuantity::reflector) {
+            EXPECT_NEAR(*estimate.value, entry->second.reflector[estimate.component], floor_rad);
+        } else if (estimate.quantity == SetupQuantity::laser) {
+            EXPECT_NEAR(*estimate.value, entry->second.laser[estimate.component], floor_rad);
+        } else if (estimate.quantity == SetupQuantity::distance_constant) {
+            EXPECT_NEAR(*estimate.value, 7.0, floor_mm);
+        }
+    }
+}
+
+TEST(Adjustment, FindsTheZeroOfAPositionSensingDevice) {
+    Workshop shop;
+    shop.head.layout = stepdiag::HeadLayout::psd;
+    shop.head.psd_distance = 40.0;
+    auto options = shop.simulation();
+    for (const Line& line : shop.lines) options.misalignment[line.name()].psd_zero = {1.5, 2.0};
+    const auto result = shop.adjust(simulate(shop.machine(), shop.plan(), shop.head, options));
+    EXPECT_LE(worst(result.calibration, shop.machine().errors()).position, floor_mm);
+    EXPECT_LE(worst(result.calibration, shop.machine().errors()).angle, floor_rad);
+}
+
+TEST(Adjustment, SaysWhatWithoutScaleLinesStaysOpenAndKeepsTheShapes) {
+    Workshop shop;
+    shop.scale_lines.clear();
+    const Adjustment result = shop.adjust(shop.run());
+    for (const char axis : {'X', 'Y', 'Z'}) {
+        const auto& sentences = result.calibration.undetermined;
+        const std::string scale = std::string("scale of ") + axis + ": add the line";
+        EXPECT_TRUE(std::any_of(sentences.begin(), sentences.end(), [&](const std::string& s) {
+            return s.find(scale) != std::string::npos;
+        })) << scale;
+    }
+    EXPECT_FALSE(result.calibration.functions[0]->slope_determined);
+    EXPECT_TRUE(result.calibration.squarenesses[0]);
+    // The scales are not known one by one, but along the diagonal they are.
+    ASSERT_FALSE(result.combinations.empty());
+    EXPECT_NE(result.combinations.back().find("scale of X + "), std::string::npos);
+    // Open slopes leave products of angles: 300 urad x 60 urad and a few of them.
+    EXPECT_LE(worst(result.calibration, shop.machine().errors()).angle, 1e-7);
+}
+
+TEST(Adjustment, FindsAndNamesReadingsThatDoNotFit) {
+    Workshop shop;
+    auto options = shop.simulation();
+    options.noise = {0.1e-3, 1e-6, 0.0, 5};
+    const Measurement run = simulate(shop.machine(), shop.plan(), shop.head, options);
+    const Measurement spoilt = changed(changed(run, "distance", 30, 2e-3), "beta", 61, -20e-6);
+    const Adjustment result = shop.adjust(spoilt);
+    std::vector<std::pair<std::size_t, std::string>> found;
+    for (const std::size_t i : result.outliers())
+        found.emplace_back(result.residuals[i].row, result.residuals[i].channel);
+    std::sort(found.begin(), found.end());
+    ASSERT_EQ(found.size(), 2u);
+    EXPECT_EQ(found[0], std::pair(std::size_t(30), std::string("distance")));
+    EXPECT_EQ(found[1], std::pair(std::size_t(61), std::string("beta")));
+    // The distance of the same point on another line fits as badly.
+    EXPECT_TRUE(std::any_of(result.residuals.begin(), result.residuals.end(),
+                            [](const auto& residual) { return residual.suspect > 0; }));
+    EXPECT_GT(result.chi_square_probability, 1e-3);
+    AdjustmentOptions keep;
+    keep.outlier_probability = 0.0;
+    EXPECT_LT(shop.adjust(spoilt, keep).chi_square_probability, 1e-6);
+}
+
+TEST(Adjustment, CovarianceHasTheVariancesOfTheTables) {
+    const Workshop shop;
+    AdjustmentOptions options;
+    options.full_covariance = true;
+    const auto calibration = shop.adjust(shop.run(), options).calibration;
+    Eigen::Index i = 0;
+    for (const auto& function : calibration.functions)
+        for (const double u : function->standard_uncertainty) {
+            EXPECT_NEAR(std::sqrt(calibration.covariance(i, i)), u, 1e-9 * u);  // condition squared times rounding
+            ++i;
+        }
+    for (const auto& squareness : calibration.squarenesses) {
+        EXPECT_NEAR(std::sqrt(calibration.covariance(i, i)), squareness->standard_uncertainty,
+                    1e-9 * squareness->standard_uncertainty);
+        ++i;
+    }
+    EXPECT_EQ(i, calibration.covariance.rows());
+}
+
+TEST(Adjustment, TellsReversalWhereRunsGoBothWays) {
+    const Workshop shop;
+    auto options = shop.simulation();
+    options.backward = true;
+    stepdiag::ParameterTable table = shop.machine().errors().table();
+    auto& exx = *table.functions[FunctionId::parse("EXX")->index()];
+    auto negative = exx;
+    for (double& value : negative.value) value += 3e-3;
+    table.negative_functions[FunctionId::parse("EXX")->index()] = negative;
+    const stepdiag::Machine machine(shop.machine().chain(), stepdiag::ErrorMap(table), shop.tool);
+    const auto result = shop.adjust(simulate(machine, shop.plan(), shop.head, options));
+    const auto& reversal = result.calibration.reversal[FunctionId::parse("EXX")->index()];
+    ASSERT_TRUE(reversal);
+    EXPECT_TRUE(reversal->constant_determined);
+    // Reversals of straightness are open at home: micrometres of them, times angles of 1 mrad.
+    constexpr double second_order = 1e-5;  // mm
+    for (const double value : reversal->value) EXPECT_NEAR(value, -3e-3, second_order);
+    EXPECT_LE(worst(result.calibration, shop.machine().errors()).position, second_order);
+}
+
+TEST(Adjustment, RefusesWhatMakesNoSense) {
+    const Workshop shop;
+    const Measurement run = shop.run();
+    const auto refused = [&](const AdjustmentOptions& options, const char* culprit) {
+        expect_refused([&] { shop.adjust(run, options); }, culprit);
+    };
+    AdjustmentOptions options;
+    options.outlier_probability = 0.9;
+    refused(options, "outlier_probability");
+    options = {};
+    options.setup[static_cast<int>(SetupQuantity::drift)] = stepdiag::free_unknown;
+    refused(options, "time");
+    options = {};
+    options.setup[static_cast<int>(SetupQuantity::roll)] = -1.0;
+    refused(options, "roll");
+    options = {};
+    options.setup_by_line["pp0"] = {};
+    refused(options, "pp0");
+    options = {};
+    options.setup_by_line["p00"][static_cast<int>(SetupQuantity::laser)] = stepdiag::free_unknown;
+    refused(options, "laser of p00");
+    options = {};
+    options.smoothness = stepdiag::Smoothness{-1.0, 0.0, false};
+    refused(options, "smoothness");
+}
+
+}  // namespace
