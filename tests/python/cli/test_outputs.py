@@ -13,6 +13,7 @@ import click
 import numpy as np
 import pytest
 import xarray as xr
+from places import SHIPPED_HEADS
 from small_scenario import SCENARIO, of_map
 
 import stepdiag as sd
@@ -123,7 +124,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
         assert main(["simulate", "scenario.toml", "-o", "run.csv"]) == 0
         for name in ("calibration.csv", "calibration.nc"):
             assert main(["evaluate", "scenario.toml", "run.csv", "-o", name]) == 0
-        shutil.copy(Path(sd.__file__).parent / "heads" / "three_beams.toml", folder)
+        shutil.copy(SHIPPED_HEADS / "three_beams.toml", folder)
         described = sd.read_scenario("beams.toml")
         with Twin(described) as twin:
             acquiring.acquire_through(described, twin, Path("acquired.csv"))
