@@ -18,8 +18,7 @@ import time
 
 from million import virtual
 
-from stepdiag._core import StatisticsOptions
-from stepdiag.monte_carlo import run_monte_carlo
+import stepdiag as sd
 
 
 def measure(samples: int, threads: int, covariance: bool) -> None:
@@ -27,7 +26,8 @@ def measure(samples: int, threads: int, covariance: bool) -> None:
     model = virtual("enhanced", "psd", 50)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     start = time.monotonic()
-    result = run_monte_carlo(model, samples=samples, threads=threads, options=StatisticsOptions(covariance=covariance))
+    options = sd.StatisticsOptions(covariance=covariance)
+    result = sd.run_monte_carlo(model, samples=samples, threads=threads, options=options)
     seconds = time.monotonic() - start
     assert result.samples == samples
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -28,7 +28,7 @@ constexpr int steps = 50;
 constexpr std::uint64_t seed = 1;
 constexpr std::size_t block = 80;  // what the statistics take at a time: 0.6 MB of outputs
 
-// python/stepdiag/heads/beam_and_psd.toml
+// python/stepdiag/head/shipped/beam_and_psd.toml
 Head layout_b() {
     const auto turned = [](const Eigen::Vector3d& degrees) { return rotation_exp(degrees * pi / 180.0); };
     const auto body = [&](const char* name, std::vector<Face> faces, Material material, const Eigen::Vector3d& position,

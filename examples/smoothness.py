@@ -7,7 +7,6 @@ import numpy as np
 import numpy.typing as npt
 
 import stepdiag as sd
-from stepdiag.comparison import kind_of
 
 VOLUME = (800.0, 600.0, 500.0)  # mm
 STEPS = 50
@@ -100,7 +99,7 @@ def main() -> None:
 
 
 def is_angle(name: str) -> bool:
-    return kind_of(name) == "angle"
+    return sd.kind_of(name) == "angle"
 
 
 if __name__ == "__main__":

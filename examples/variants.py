@@ -3,9 +3,7 @@
 python examples/variants.py
 """
 
-from stepdiag.observe import extents, observe
-from stepdiag.report import in_report_units, largest_uncertainties
-from stepdiag.scenario import parse_scenario
+import stepdiag as sd
 
 SCENARIO = """
 [volume]
@@ -54,7 +52,7 @@ def row(
     def quoted(names: tuple[str, ...]) -> str:
         return ", ".join(f'"{name}"' for name in names)
 
-    scenario = parse_scenario(
+    scenario = sd.parse_scenario(
         SCENARIO.format(
             lines=quoted(lines),
             scale_lines=quoted(scale_lines),
@@ -64,11 +62,11 @@ def row(
             laser='"free"' if tilts else LASER,
         )
     )
-    calibration = observe(scenario)[1].calibration
-    whole, shapes, parts = extents(calibration, scenario.plan)
-    largest = largest_uncertainties(calibration)
+    calibration = sd.observe(scenario)[1].calibration
+    whole, shapes, parts = sd.extents(calibration, scenario.plan)
+    largest = sd.largest_uncertainties(calibration)
     sizes = [
-        f"{in_report_units(kind, largest[kind][0]):.2g}" if kind in largest else "-"
+        f"{sd.in_report_units(kind, largest[kind][0]):.2g}" if kind in largest else "-"
         for kind in ("positioning", "straightness", "angle", "squareness")
     ]
     wanted = 21 if angles else 12

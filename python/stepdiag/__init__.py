@@ -11,6 +11,7 @@ Units are native throughout: length mm, angle rad, wavelength nm.
 Bad input raises InvalidArgument, a ValueError.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from stepdiag._core import (
@@ -24,10 +25,12 @@ from stepdiag._core import (
     Chain,
     Compensator,
     DiagonalErrors,
+    Distribution,
     Environment,
     ErrorAtPoint,
     ErrorMap,
     FitReason,
+    FunctionModel,
     GaussianMode,
     Head,
     HeadBeam,
@@ -40,22 +43,30 @@ from stepdiag._core import (
     Machine,
     Measurement,
     Misalignment,
+    MonteCarloResult,
     Noise,
     Outlier,
     Plan,
     PlausibleLimits,
     Propagation,
     RangeModel,
+    ReadingNoise,
     ReadingUncertainty,
     ReplayMismatch,
     ReturnedBeam,
+    SampleModel,
     Sensitivity,
     SetupEstimate,
     SetupPriors,
     Smoothness,
     SpotSensor,
+    StatisticsOptions,
+    UncertainInput,
+    UncertainInputs,
     Validation,
     Verdict,
+    VirtualCalibrations,
+    VirtualReadout,
     VolumetricAccuracy,
     __version__,
     adjust,
@@ -83,14 +94,28 @@ from stepdiag._core import (
     volumetric_accuracy,
     with_covariance,
 )
-from stepdiag.comparison import Deviation, largest_deviations
-from stepdiag.data_files import read_calibration, read_measurement, write_calibration, write_measurement
-from stepdiag.functional_point import functional_point_straightness
-from stepdiag.side_by_side import Comparison, Difference, compare_calibrations
+from stepdiag.io.to_xarray import attach
 
 if TYPE_CHECKING:
-    from stepdiag.head_description import parse_head_design, read_head_design, shipped_head
-    from stepdiag.scenario import (
+    from stepdiag.acquisition.acquire import acquire
+    from stepdiag.acquisition.options import AcquireOptions
+    from stepdiag.acquisition.settle_trigger import SettleTrigger
+    from stepdiag.acquisition.settling import Settling
+    from stepdiag.acquisition.tcp_trigger import TcpTrigger
+    from stepdiag.acquisition.triggers import KeyTrigger
+    from stepdiag.acquisition.twin import Twin
+    from stepdiag.calibration.comparison import Comparison, Difference, compare_calibrations
+    from stepdiag.calibration.functional_point import functional_point_straightness
+    from stepdiag.calibration.largest_by_kind import Deviation, largest_deviations, largest_uncertainties
+    from stepdiag.export.common import ExportOptions
+    from stepdiag.export.write import export_calibration
+    from stepdiag.head.description import parse_head_design, read_head_design, shipped_head
+    from stepdiag.io.data_files import read_calibration, read_measurement, write_calibration, write_measurement
+    from stepdiag.linuxcnc.processes import LinuxcncError
+    from stepdiag.linuxcnc.session import LinuxcncSession
+    from stepdiag.parameters import in_report_units, kind_of
+    from stepdiag.planning.observation import extents, observe
+    from stepdiag.scenario.description import (
         Scenario,
         adjust_scenario,
         evaluate_scenario,
@@ -98,8 +123,18 @@ if TYPE_CHECKING:
         read_scenario,
         simulate_scenario,
     )
+    from stepdiag.uncertainty.dask_workers import workers_of
+    from stepdiag.uncertainty.model_source import ModelSource
+    from stepdiag.uncertainty.monte_carlo import run_monte_carlo
+    from stepdiag.uncertainty.result import UncertaintyResult
+    from stepdiag.uncertainty.run import UncertaintyRequest, evaluate_uncertainty
+    from stepdiag.uncertainty.study import FinishedCells, run_study
+    from stepdiag.uncertainty.study_keys import read_study
+    from stepdiag.uncertainty.study_table import study_table
+    from stepdiag.uncertainty.table import uncertainty_table
 
 __all__ = [
+    "AcquireOptions",
     "Adjustment",
     "BatchEvaluator",
     "BeamSegment",
@@ -113,10 +148,14 @@ __all__ = [
     "Deviation",
     "DiagonalErrors",
     "Difference",
+    "Distribution",
     "Environment",
     "ErrorAtPoint",
     "ErrorMap",
+    "ExportOptions",
+    "FinishedCells",
     "FitReason",
+    "FunctionModel",
     "GaussianMode",
     "Head",
     "HeadBeam",
@@ -125,29 +164,48 @@ __all__ = [
     "HeadDesign",
     "Interferometer",
     "InvalidArgument",
+    "KeyTrigger",
     "LateralEffect",
+    "LinuxcncError",
+    "LinuxcncSession",
     "Machine",
     "Measurement",
     "Misalignment",
+    "ModelSource",
+    "MonteCarloResult",
     "Noise",
     "Outlier",
     "Plan",
     "PlausibleLimits",
     "Propagation",
     "RangeModel",
+    "ReadingNoise",
     "ReadingUncertainty",
     "ReplayMismatch",
     "ReturnedBeam",
+    "SampleModel",
     "Scenario",
     "Sensitivity",
+    "SettleTrigger",
+    "Settling",
     "SetupEstimate",
     "SetupPriors",
     "Smoothness",
     "SpotSensor",
+    "StatisticsOptions",
+    "TcpTrigger",
+    "Twin",
+    "UncertainInput",
+    "UncertainInputs",
+    "UncertaintyRequest",
+    "UncertaintyResult",
     "Validation",
     "Verdict",
+    "VirtualCalibrations",
+    "VirtualReadout",
     "VolumetricAccuracy",
     "__version__",
+    "acquire",
     "adjust",
     "adjust_scenario",
     "beam_radius",
@@ -161,11 +219,18 @@ __all__ = [
     "error_at_point",
     "evaluate",
     "evaluate_scenario",
+    "evaluate_uncertainty",
+    "export_calibration",
     "expose",
+    "extents",
     "functional_point_straightness",
     "head_sensitivities",
+    "in_report_units",
+    "kind_of",
     "largest_deviations",
+    "largest_uncertainties",
     "locate",
+    "observe",
     "parse_head_design",
     "parse_scenario",
     "power_inside",
@@ -179,36 +244,97 @@ __all__ = [
     "read_head_design",
     "read_measurement",
     "read_scenario",
+    "read_study",
+    "run_monte_carlo",
+    "run_study",
     "shipped_head",
     "simulate",
     "simulate_scenario",
+    "study_table",
     "trace_beams",
+    "uncertainty_table",
     "volumetric_accuracy",
     "with_covariance",
+    "workers_of",
     "write_calibration",
     "write_measurement",
 ]
 
-# Where to find what has to do with our TOML files.
+# Imported on first use, since pydantic, xarray and others take their time: by module, as above for type checkers.
 _LATER = {
-    "Scenario": "scenario",
-    "adjust_scenario": "scenario",
-    "evaluate_scenario": "scenario",
-    "parse_scenario": "scenario",
-    "read_scenario": "scenario",
-    "simulate_scenario": "scenario",
-    "parse_head_design": "head_description",
-    "read_head_design": "head_description",
-    "shipped_head": "head_description",
+    "acquisition.acquire": ("acquire",),
+    "acquisition.options": ("AcquireOptions",),
+    "acquisition.settle_trigger": ("SettleTrigger",),
+    "acquisition.settling": ("Settling",),
+    "acquisition.tcp_trigger": ("TcpTrigger",),
+    "acquisition.triggers": ("KeyTrigger",),
+    "acquisition.twin": ("Twin",),
+    "calibration.comparison": (
+        "Comparison",
+        "Difference",
+        "compare_calibrations",
+    ),
+    "calibration.functional_point": ("functional_point_straightness",),
+    "calibration.largest_by_kind": (
+        "Deviation",
+        "largest_deviations",
+        "largest_uncertainties",
+    ),
+    "export.common": ("ExportOptions",),
+    "export.write": ("export_calibration",),
+    "head.description": (
+        "parse_head_design",
+        "read_head_design",
+        "shipped_head",
+    ),
+    "io.data_files": (
+        "read_calibration",
+        "read_measurement",
+        "write_calibration",
+        "write_measurement",
+    ),
+    "linuxcnc.processes": ("LinuxcncError",),
+    "linuxcnc.session": ("LinuxcncSession",),
+    "parameters": (
+        "in_report_units",
+        "kind_of",
+    ),
+    "planning.observation": (
+        "extents",
+        "observe",
+    ),
+    "scenario.description": (
+        "Scenario",
+        "adjust_scenario",
+        "evaluate_scenario",
+        "parse_scenario",
+        "read_scenario",
+        "simulate_scenario",
+    ),
+    "uncertainty.dask_workers": ("workers_of",),
+    "uncertainty.model_source": ("ModelSource",),
+    "uncertainty.monte_carlo": ("run_monte_carlo",),
+    "uncertainty.result": ("UncertaintyResult",),
+    "uncertainty.run": (
+        "UncertaintyRequest",
+        "evaluate_uncertainty",
+    ),
+    "uncertainty.study": (
+        "FinishedCells",
+        "run_study",
+    ),
+    "uncertainty.study_keys": ("read_study",),
+    "uncertainty.study_table": ("study_table",),
+    "uncertainty.table": ("uncertainty_table",),
 }
+_MODULE_OF = {name: module for module, names in _LATER.items() for name in names}
+
+attach()
 
 
 def __getattr__(name: str) -> Any:
-    """Imports what has to do with TOML files on first use: it brings pydantic along."""
-    if name in _LATER:
-        from importlib import import_module
-
-        return getattr(import_module(f"stepdiag.{_LATER[name]}"), name)
+    if name in _MODULE_OF:
+        return getattr(import_module(f"stepdiag.{_MODULE_OF[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -24,8 +24,8 @@ from typing import Any
 import acquisition_readers as acquisition
 
 import stepdiag as sd
-from stepdiag.head_description import read_head_design
-from stepdiag.scenario import read_scenario
+from stepdiag.head.description import read_head_design
+from stepdiag.scenario.description import read_scenario
 
 ROOT = Path(__file__).parents[2]
 WEIRD = [
@@ -75,7 +75,7 @@ def scenarios() -> list[bytes]:
 
 
 def heads() -> list[bytes]:
-    return [path.read_bytes() for path in sorted((ROOT / "python/stepdiag/heads").glob("*.toml"))]
+    return [path.read_bytes() for path in sorted((ROOT / "python/stepdiag/head/shipped").glob("*.toml"))]
 
 
 READERS = {

@@ -13,7 +13,7 @@ import pytest
 from linuxcnc_machine import CHAIN, KINS
 
 from stepdiag import Compensator
-from stepdiag.linuxcnc_session import LinuxcncError, LinuxcncSession
+from stepdiag.linuxcnc.session import LinuxcncError, LinuxcncSession
 
 CONTROLLER = Path(__file__).parents[2] / "controllers" / "linuxcnc"
 ARITHMETIC = 1e-11  # mm: see test_kinematics.py

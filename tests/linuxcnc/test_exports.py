@@ -6,19 +6,15 @@ calibration.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.append(str(Path(__file__).parents[1] / "python"))
-
 from exported import CHAINS, TOOL, VOLUME, calibration_of, export, machine_of, points_in, random_calibration
 
 import stepdiag as sd
-from stepdiag.linuxcnc_session import LinuxcncError, LinuxcncSession
+from stepdiag.linuxcnc.session import LinuxcncError, LinuxcncSession
 
 AT = (31.0, 12.0, 44.0)
 # What an exact inverse at the rows leaves between them: an error of 24 µm, slopes that change by 8 mm/m.

@@ -8,7 +8,7 @@ import pytest
 from linuxcnc_machine import CHAIN, KINS, TOOL, VOLUME, distances, random_points
 
 from stepdiag import Compensator, Machine
-from stepdiag.linuxcnc_session import LinuxcncSession
+from stepdiag.linuxcnc.session import LinuxcncSession
 
 # Numbers of some hundred mm have 6e-14 mm between neighbours; LinuxCNC's planner and interpolation add a few of these.
 ARITHMETIC = 1e-11

@@ -8,7 +8,7 @@ import pytest
 from linuxcnc_machine import CHAIN, KINS, VOLUME, distances
 
 from stepdiag import Compensator
-from stepdiag.linuxcnc_session import LinuxcncError, LinuxcncSession
+from stepdiag.linuxcnc.session import LinuxcncError, LinuxcncSession
 
 ARITHMETIC = 1e-11  # mm: see test_kinematics.py
 OUTSIDE, REFUSED, CAPPED = 1, 4, 2

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from stepdiag import Compensator, read_measurement
-from stepdiag.loop import run_loop
-from stepdiag.loop_cases import CHAIN, CLEAN, NOISE
-from stepdiag.loop_job import Calculated
-from stepdiag.loop_linuxcnc import Linuxcnc
+from stepdiag.demo.loop import run_loop
+from stepdiag.demo.loop_cases import CHAIN, CLEAN, NOISE
+from stepdiag.demo.loop_job import Calculated
+from stepdiag.demo.loop_linuxcnc import Linuxcnc
 
 STEPS, NODES, COUNT = 10, 40, 100
 
@@ -58,8 +58,8 @@ def test_the_run_is_that_of_the_virtual_machine_to_the_picometre(folder: Path, r
 
 def test_the_joints_are_those_of_the_library(folder: Path) -> None:
     """The errors left follow from the joints; those from the table that LinuxCNC had read."""
-    from stepdiag.loop_points import errors_at
-    from stepdiag.scenario import read_scenario
+    from stepdiag.demo.loop_points import errors_at
+    from stepdiag.scenario.description import read_scenario
 
     here = folder / "linuxcnc" / "noise"
     compensator, machine = Compensator(here / "calibration.csv", CHAIN), read_scenario(here / "scenario.toml").machine()

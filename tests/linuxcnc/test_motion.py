@@ -7,7 +7,7 @@ import pytest
 from linuxcnc_machine import CHAIN, KINS, Points, distances
 
 from stepdiag import Machine
-from stepdiag.linuxcnc_session import LinuxcncSession
+from stepdiag.linuxcnc.session import LinuxcncSession
 
 PERIOD = 1e-3  # s
 SPEED, ACCELERATION = 100.0, 1000.0  # mm/s, mm/s²

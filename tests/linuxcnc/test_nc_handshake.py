@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from stepdiag.linuxcnc_session import LinuxcncSession
-from stepdiag.nc import measuring_program
-from stepdiag.nc_options import Options
-from stepdiag.scenario import parse_scenario
+from stepdiag.linuxcnc.session import LinuxcncSession
+from stepdiag.program.measuring_program import measuring_program
+from stepdiag.program.options import Options
+from stepdiag.scenario.description import parse_scenario
 
 SCENARIO = """
 [volume]

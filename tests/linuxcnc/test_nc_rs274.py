@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stepdiag.nc import measuring_program
-from stepdiag.nc_options import Options
-from stepdiag.nc_text import Trigger
-from stepdiag.scenario import Scenario, parse_scenario
-from stepdiag.visits import visits_of
+from stepdiag.program.gcode import Trigger
+from stepdiag.program.measuring_program import measuring_program
+from stepdiag.program.options import Options
+from stepdiag.scenario.description import Scenario, parse_scenario
+from stepdiag.scenario.order_of_run import visits_of
 
 pytestmark = pytest.mark.skipif(shutil.which("rs274") is None, reason="rs274 is part of linuxcnc-uspace")
 

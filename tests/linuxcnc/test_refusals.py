@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from linuxcnc_machine import CHAIN
 
-from stepdiag.linuxcnc_session import LinuxcncError, LinuxcncSession
+from stepdiag.linuxcnc.session import LinuxcncError, LinuxcncSession
 
 
 def start(table: Path, **more: object) -> str:

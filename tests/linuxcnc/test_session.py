@@ -9,11 +9,11 @@ import time
 
 import pytest
 
-from stepdiag.linuxcnc_processes import PROCESSES, processes
-from stepdiag.linuxcnc_session import LinuxcncError, LinuxcncSession
+from stepdiag.linuxcnc.processes import PROCESSES, processes
+from stepdiag.linuxcnc.session import LinuxcncError, LinuxcncSession
 
 CRASH = """
-from stepdiag.linuxcnc_session import LinuxcncSession
+from stepdiag.linuxcnc.session import LinuxcncSession
 with LinuxcncSession() as session:
     print("started", session.folder, flush=True)
     session.mdi("G4 P100", timeout=200)

@@ -7,7 +7,7 @@ import pytest
 from linuxcnc_machine import CHAIN, KINS, TOOL, VOLUME, distances, make_errors
 
 from stepdiag import Machine
-from stepdiag.linuxcnc_session import LinuxcncSession
+from stepdiag.linuxcnc.session import LinuxcncSession
 
 PERIOD = 1e-3  # s
 PROMISED = 1e-9  # mm

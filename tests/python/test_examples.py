@@ -4,9 +4,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import stepdiag as sd
+from places import EXAMPLES
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+import stepdiag as sd
 
 
 def output_of(*arguments: str | Path) -> str:

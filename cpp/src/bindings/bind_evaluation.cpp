@@ -163,14 +163,7 @@ void bind_evaluation(py::module_& m) {
             "written.")
         .def(
             "to_error_map", [](const Calibration& c) { return ErrorMap(to_parameter_table(c)); },
-            "The calibration as a machine's errors; what is undetermined is 0 there.")
-        .def(
-            "to_xarray",
-            [](const py::object& self) {
-                return py::reinterpret_steal<XarrayDataset>(
-                    py::module_::import("stepdiag.tables").attr("calibration_table")(self).release());
-            },
-            "The calibration as a labelled table.");
+            "The calibration as a machine's errors; what is undetermined is 0 there.");
     m.def(
         "read_calibration", [](const PathLike& path) { return read_calibration(to_path(path)); }, py::arg("path"),
         "Reads a calibration CSV. Raises InvalidArgument naming file and line.");

@@ -125,14 +125,7 @@ void bind_measurement(py::module_& m) {
             "write", [](const Measurement& run, const PathLike& path) { write_measurement(run, to_path(path)); },
             py::arg("path"),
             "Writes the measurement CSV; numbers are read back to the same bits. Raises InvalidArgument when it cannot "
-            "be written.")
-        .def(
-            "to_xarray",
-            [](const py::object& self) {
-                return py::reinterpret_steal<XarrayDataset>(
-                    py::module_::import("stepdiag.tables").attr("measurement_table")(self).release());
-            },
-            "The run as a labelled table.");
+            "be written.");
     m.def(
         "read_measurement", [](const PathLike& path) { return read_measurement(to_path(path)); }, py::arg("path"),
         "Reads a measurement CSV. Raises InvalidArgument naming file and line.");

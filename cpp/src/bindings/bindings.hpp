@@ -44,9 +44,6 @@ class MaterialLike : public py::object {
 class PathLike : public py::object {
     PYBIND11_OBJECT_DEFAULT(PathLike, py::object, PyObject_Type)
 };
-class XarrayDataset : public py::object {
-    PYBIND11_OBJECT_DEFAULT(XarrayDataset, py::object, PyObject_Type)
-};
 
 // What Python calls SetupPriors.
 struct Priors {
@@ -120,9 +117,5 @@ struct handle_type_name<stepdiag::bindings::MaterialLike> {
 template <>
 struct handle_type_name<stepdiag::bindings::PathLike> {
     static constexpr auto name = const_name("str | os.PathLike[str]");
-};
-template <>
-struct handle_type_name<stepdiag::bindings::XarrayDataset> {
-    static constexpr auto name = const_name("xarray.Dataset");
 };
 }  // namespace pybind11::detail

@@ -1,5 +1,5 @@
 // Files that are no calibration for a controller: refused by the C++ and by the C interface, for the reason that
-// tests/data/bad_tables/refusals.txt states. (tests/python/test_bad_tables.py reads the same files.)
+// tests/data/bad_tables/refusals.txt states. (tests/python/controller/test_bad_tables.py reads the same files.)
 #include <gtest/gtest.h>
 
 #include <fstream>

@@ -57,7 +57,7 @@ TEST(Fingerprint, IsTheSameOnEveryMachineAndInEveryVersion) {
     ParameterTable table;
     table.functions[0] = FunctionTable{{0.0, 800.0}, {0.0, 0.01}, {std::nullopt, std::nullopt}};
     EXPECT_EQ(fingerprint(with_header(table)),
-              7928635067038002598u);  // tests/python/test_compensator.py computes it by itself
+              7928635067038002598u);  // tests/python/controller/test_compensator.py computes it by itself
 }
 
 }  // namespace

@@ -1,0 +1,1 @@
+"""Readings from an instrument: when to read, what was read, and the simulated instrument."""

@@ -1,0 +1,124 @@
+"""Acquisition: a run's readings from the instrument to the disk, and from there to a measurement file."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from stepdiag._core import InvalidArgument
+from stepdiag.acquisition.ids3010 import Ids3010, InstrumentError, parse_source
+from stepdiag.acquisition.options import AcquireOptions
+from stepdiag.acquisition.raw_file import RawContent, RawFile, check_new
+from stepdiag.acquisition.raw_records import Header
+from stepdiag.acquisition.reading_plan import channels_of, check_axes, described_plan, digest_of
+from stepdiag.acquisition.run_from_raw import measurement_of
+from stepdiag.acquisition.triggers import Operator, Silent, Trigger
+from stepdiag.acquisition.visit_loop import Acquisition, Resume
+from stepdiag.io.data_files import write_measurement
+from stepdiag.io.whole_files import check_output
+from stepdiag.scenario.description import Scenario
+
+
+@dataclass(frozen=True)
+class Acquired:
+    """What there is when an acquisition ends."""
+
+    raw: Path
+    output: Path
+    readings: int
+    lost: int  # of them, with a beam missing at least
+    planned: int
+
+    @property
+    def complete(self) -> bool:
+        return self.readings == self.planned
+
+
+def raw_path(output: Path) -> Path:
+    """Where the raw file of an output stands, if nobody says otherwise: beside it, run.csv as run.raw.jsonl."""
+    return output.with_suffix(".raw.jsonl")
+
+
+def acquire(
+    scenario: Scenario,
+    source: str,
+    output: Path,
+    *,
+    trigger: Trigger,
+    options: AcquireOptions | None = None,
+    resume: Resume | None = None,
+    raw: Path | None = None,
+    operator: Operator | None = None,
+) -> Acquired:
+    """Takes the readings of a scenario's plan, when `trigger` wants them, from an instrument ("ids3010://HOST[:PORT]").
+
+    Every value goes to the raw file first; `output` is made from it after every visit and at the end, whatever ends
+    it. `resume` goes on with a raw file: at the point where it stopped, or with its line or set-up once more. Raises
+    InvalidArgument, and InstrumentError where the instrument fails: what is read is kept, and can be resumed. Closes
+    the trigger."""
+    options = options or AcquireOptions()
+    try:
+        channels = channels_of(scenario)
+        axes = options.axes or tuple(range(1, len(channels) + 1))
+        check_axes(axes, channels)
+        host, port = parse_source(source)
+        check_output(output)
+        path = raw or raw_path(output)
+        if path.resolve() == output.resolve():
+            raise InvalidArgument(f"{path}: expected different names for the raw file and the output")
+        if output.exists() and not path.exists():
+            raise InvalidArgument(f"{output}: exists, and was not made from {path}: move it away, or name another -o")
+        plan = described_plan(scenario)
+        header = Header(
+            created=datetime.now(UTC),
+            scenario=scenario.path.name,
+            digest=digest_of(channels, plan),
+            channels=channels,
+            axes=list(axes),
+            sign=options.sign,
+            plan=plan,
+        )
+        instrument = Ids3010(host, port, timeout=options.timeout, attempts=options.attempts)
+        with instrument, _opened(path, header, resume, instrument) as (file, content):
+            work = Acquisition(scenario, header, file, instrument, trigger, operator or Silent(), options)
+            if content is not None:
+                work.go_on(content, resume or "point")
+
+            def write() -> None:
+                # What the raw file holds, without reading it again after every visit.
+                known = RawContent(path, header, tuple(work.done.values()), sound_bytes=0, torn_bytes=0)
+                run = measurement_of(known, zero=options.zero, uncertainties=options.uncertainties)
+                write_measurement(run, output)
+
+            try:
+                work.run(source, write)
+            except (InstrumentError, InvalidArgument) as error:
+                trigger.failed(str(error))
+                raise
+            finally:
+                if work.done:
+                    write()
+    finally:
+        trigger.close()
+    lost = sum(1 for reading in work.done.values() if reading.is_lost)
+    return Acquired(path, output, len(work.done), lost, sum(len(visit.points) for visit in plan))
+
+
+@contextmanager
+def _opened(
+    path: Path, header: Header, resume: Resume | None, instrument: Ids3010
+) -> Iterator[tuple[RawFile, RawContent | None]]:
+    """The raw file, begun or to go on with."""
+    if resume is None:
+        check_new(path)
+        instrument.describe()  # one that cannot be reached leaves no file behind
+        with RawFile.create(path, header) as file:
+            yield file, None
+        return
+    file, content = RawFile.resume(path)
+    with file:
+        for key, what in (("digest", "plan, head or channels"), ("axes", "axes"), ("sign", "sign")):
+            if getattr(content.header, key) != getattr(header, key):
+                raise InvalidArgument(f"{path}: was begun with another {what}: a run is resumed as it was begun")
+        yield file, content

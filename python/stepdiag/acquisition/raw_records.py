@@ -1,0 +1,122 @@
+"""The records of a raw file, one a line: what was acquired, as it came."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import AwareDatetime, Field, TypeAdapter, ValidationError, model_validator
+
+from stepdiag._core import InvalidArgument
+from stepdiag.acquisition.settling import ValueKind
+from stepdiag.config.key_types import Section, Triple
+
+Picometres = Annotated[int, Field(gt=-(2**63), lt=2**63)]
+Count = Annotated[int, Field(ge=0, le=10**9)]
+Direction = Literal["forward", "backward"]
+
+
+class Visited(Section):
+    """A visit of the plan. `nominal_mm`: what an ideal head would read there with a machine without errors."""
+
+    visit: Count
+    set_up: Count
+    line: str
+    run: Count
+    direction: Direction
+    scale_line: bool
+    points: list[Count]
+    position_mm: list[Triple]
+    nominal_mm: list[float]
+
+    @model_validator(mode="after")
+    def _of_one_length(self) -> Self:
+        if not len(self.points) == len(self.position_mm) == len(self.nominal_mm):
+            raise ValueError("expected as many positions and distances as points")
+        return self
+
+
+class Header(Section):
+    """The first record: all that a measurement file is made with."""
+
+    record: Literal["header"] = "header"
+    format: Literal["stepdiag raw readings"] = "stepdiag raw readings"
+    version: Literal[1] = 1
+    created: AwareDatetime
+    scenario: str
+    digest: str  # of channels and plan
+    channels: Annotated[list[str], Field(min_length=1)]
+    axes: list[Count]  # of the instrument, from 1, one for each channel
+    sign: Literal[1, -1]  # -1: its positions fall where the distance grows
+    plan: list[Visited]
+
+
+class Session(Section):
+    """Where an acquisition began or was taken up again, with what."""
+
+    record: Literal["session"] = "session"
+    time: AwareDatetime
+    stepdiag: str
+    source: str
+    instrument: dict[str, str]
+    options: str
+    visit: Count
+    point: Count
+
+
+class Again(Section):
+    """What was read of this visit and of later ones is read once more."""
+
+    record: Literal["again"] = "again"
+    time: AwareDatetime
+    visit: Count
+
+
+class Point(Section):
+    """At which point of the plan."""
+
+    visit: Count
+    line: str
+    run: Count
+    direction: Direction
+    point: Count
+    position_mm: Triple  # commanded
+
+
+class Value(Point):
+    """One value of every axis as the instrument gave it; null where the beam was missing."""
+
+    record: Literal["value"] = "value"
+    time: AwareDatetime
+    kind: ValueKind
+    pm: list[Picometres | None]
+
+
+class RawReading(Point):
+    """What became of the values of a point: means, standard deviations of one value, how many were averaged, and why
+    channels were lost."""
+
+    record: Literal["reading"] = "reading"
+    time: AwareDatetime
+    pm: list[Picometres | None]
+    sd_pm: list[float | None]
+    values: Count
+    lost: dict[str, str]
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether a beam is missing at least."""
+        return any(pm is None for pm in self.pm)
+
+
+Record = Annotated[Header | Session | Again | Value | RawReading, Field(discriminator="record")]
+_RECORD: TypeAdapter[Record] = TypeAdapter(Record)
+
+
+def parse_record(line: bytes, place: str) -> Record:
+    """The record of a line. Raises InvalidArgument, with `place` in front."""
+    try:
+        return _RECORD.validate_json(line)
+    except ValidationError as error:
+        detail = error.errors(include_url=False)[0]
+        keys = ".".join(str(key) for key in detail["loc"][1:])
+        got = ascii(line[:40].decode(errors="replace") if detail["type"] == "json_invalid" else detail["input"])
+        got = got if len(got) <= 60 else got[:60] + "..."
+        raise InvalidArgument(f"{place}: {keys + ': ' if keys else ''}{detail['msg']}, got {got}") from None

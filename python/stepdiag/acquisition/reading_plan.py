@@ -1,0 +1,88 @@
+"""What an acquisition is to read: the channels of the scenario's head, its visits, and where head and mirror stand."""
+
+import hashlib
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from stepdiag._core import InvalidArgument
+from stepdiag.acquisition.ids3010 import AXES
+from stepdiag.acquisition.raw_records import Visited
+from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.order_of_run import Visit, visits_of
+
+
+def channels_of(scenario: Scenario) -> list[str]:
+    """The channels that the instrument's axes fill. Raises InvalidArgument for a head that it cannot be."""
+    head = scenario.head
+    if head.layout == "multi_beam":
+        if len(head.signals) != AXES:
+            raise InvalidArgument(
+                f"{scenario.path}: head: expected {AXES} beams, one for each axis of the IDS3010, "
+                f"got {len(head.signals)}"
+            )
+        return list(head.signals)
+    if head.layout == "ideal":
+        return ["distance"]  # which conventional evaluation takes alone
+    raise InvalidArgument(
+        f'{scenario.path}: head: the layout "{head.layout}" cannot be read: the IDS3010 gives distances and no spot; '
+        f'expected "multi_beam" with {AXES} beams, or "ideal" of which one axis reads the distance'
+    )
+
+
+def check_axes(axes: Sequence[int], channels: Sequence[str]) -> None:
+    """Raises InvalidArgument where the instrument's axes (from 1) are not one for each channel."""
+    good = len(set(axes)) == len(axes) == len(channels) and all(1 <= axis <= AXES for axis in axes)
+    if not good:
+        raise InvalidArgument(
+            f"axes: expected {len(channels)} different numbers from 1 to {AXES} ({', '.join(channels)}), "
+            f"got {','.join(map(str, axes)) or 'none'}"
+        )
+
+
+def nominal_distances(scenario: Scenario, visit: Visit) -> list[float]:
+    """What an ideal head would read along a visit with a machine without errors, mm."""
+    start = scenario.plan.points(visit.line, visit.run)[0]
+    along = scenario.plan.frame(visit.line)[:, 2]
+    return [float(d) for d in scenario.heads[visit.line].standoff + (visit.positions - start) @ along]
+
+
+def described_plan(scenario: Scenario) -> list[Visited]:
+    """The visits as a raw file keeps them."""
+    return [
+        Visited(
+            visit=visit.number,
+            set_up=visit.set_up,
+            line=visit.line,
+            run=visit.run,
+            direction=visit.direction,
+            scale_line=visit.is_scale_line,
+            points=[int(point) for point in visit.points],
+            position_mm=[(float(x), float(y), float(z)) for x, y, z in visit.positions],
+            nominal_mm=nominal_distances(scenario, visit),
+        )
+        for visit in visits_of(scenario)
+    ]
+
+
+def digest_of(channels: Sequence[str], plan: Sequence[Visited]) -> str:
+    """Of all that must be the same for an acquisition to be taken up again."""
+    text = ",".join(channels) + "".join(visit.model_dump_json() for visit in plan)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def placement(scenario: Scenario, visit: Visit) -> str:
+    """Where head and mirror go for a visit's line, in words, in the machine frame."""
+    first = scenario.plan.points(visit.line, visit.run)[0] + np.array(scenario.tool)
+    along = scenario.plan.frame(visit.line)[:, 2]
+    origin = first - scenario.heads[visit.line].standoff * along
+    kind = "scale line" if visit.is_scale_line else "line"
+    return (
+        f"set-up {visit.set_up}, {kind} {visit.line}: beam from ({_numbers(origin, 2)}) mm along "
+        f"({_numbers(along, 6)}), mirror on the tool across it, which starts at ({_numbers(first, 2)}) mm"
+    )
+
+
+def _numbers(vector: Any, digits: int) -> str:
+    return ", ".join(f"{float(x) + 0.0:.{digits}f}" for x in vector)

@@ -1,0 +1,138 @@
+"""Reading when the mirror has come to rest at the next point: for programs that only wait at each point."""
+
+import time
+from collections import deque
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Final
+
+from stepdiag.acquisition.settling import Reading, Settling
+from stepdiag.acquisition.triggers import Context, Stopped, of_start, point_text
+from stepdiag.scenario.order_of_run import Visit
+
+# mm. A rest counts as the next point within this share of the plan's shortest step, as the last one within BACK after
+# the mirror was more than AWAY from it. A shorter step than SMALLEST is none that a distance could tell.
+STEP_SHARE: Final = 0.25
+AWAY: Final = 0.1
+BACK: Final = 0.05
+SMALLEST: Final = 0.01
+PICOMETRE: Final = 1e-9  # mm
+
+Row = tuple[int | None, ...]  # pm of every axis
+
+
+class SettleTrigger:
+    """The first reading of every set-up is the operator's. Then a mirror that comes to rest a step further is at the
+    next point; one that leaves the last point and comes back to it, as programs do to take up backlash, is read there
+    once more. A visit that begins where the one before it ended begins at once."""
+
+    def __init__(self) -> None:
+        self._context: Context | None = None
+        self._set_up = 0
+        self._last: Row | None = None  # of the last point that was read, in this set-up
+        self._is_asked = False  # the operator has just asked for a reading
+        self._last_nominal = 0.0
+        self._nominal = 0.0  # of the point that is being read
+        self._rest: Row | None = None  # where the mirror was found at rest; an operator may ask before
+        self._told = float("-inf")
+
+    def start(self, context: Context) -> None:
+        self._context = context
+
+    def begin(self, visit: Visit, index: int, text: str) -> None:
+        operator = of_start(self._context).operator
+        operator.tell(text)
+        if visit.set_up != self._set_up:
+            operator.confirm(f"read {point_text(visit, index)}, then move on")
+            self._last, self._is_asked = None, True
+        self._set_up = visit.set_up
+
+    def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
+        self._rest = None
+        if self._last is None and not self._is_asked:  # nothing tells the next rest from the point before
+            of_start(self._context).operator.confirm(f"the last reading was lost: read {point_text(visit, index)}")
+        self._is_asked = False
+        is_next = self._last is None or self._await(self._last, visit, index, nominal)
+        self._nominal = nominal[index] if is_next else self._last_nominal
+        return is_next
+
+    def _await(self, last: Row, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
+        step = nominal[index] - self._last_nominal
+        if abs(step) < SMALLEST:
+            if index > 0:
+                operator = of_start(self._context).operator
+                operator.confirm(f"the distance does not change to it: read {point_text(visit, index)}")
+            else:
+                self._rest = last
+            return True
+        return self._watch(last, visit, index, step, STEP_SHARE * _shortest(nominal, step))
+
+    def _watch(self, last: Row, visit: Visit, index: int, step: float, tolerance: float) -> bool:
+        context = of_start(self._context)
+        deadline = time.monotonic() + context.wait_timeout
+        window: deque[Row] = deque(maxlen=context.settling.count)
+        was_away = False
+        while time.monotonic() < deadline:
+            window.append(context.read().pm)
+            moved = _change(window[-1], last, context.sign)
+            if moved is None:
+                self._complain("no beam: where the mirror rests cannot be told")
+                window.clear()
+            elif at_rest(window, context.settling):
+                self._rest = window[-1]
+                if abs(moved - step) <= tolerance:
+                    return True
+                if abs(moved) <= BACK and was_away:
+                    return False
+                if abs(moved) > max(tolerance, BACK):
+                    self._complain(
+                        f"the mirror rests {moved:+.4f} mm from the last point, but it is {step:+.4f} mm from there "
+                        f"to {point_text(visit, index)}"
+                    )
+            was_away = was_away or (moved is not None and abs(moved) > AWAY)
+            time.sleep(max(context.settling.interval, 0.001))
+        raise Stopped(f"{point_text(visit, index)}: the mirror did not come there in {context.wait_timeout:g} s")
+
+    def _complain(self, text: str) -> None:
+        """Not more often than every five seconds: it is asked many times a second."""
+        if time.monotonic() - self._told > 5.0:
+            self._told = time.monotonic()
+            of_start(self._context).operator.tell(text)
+
+    def doubt(self, reading: Reading) -> str | None:
+        """A program that does not wait long enough is at the next point before this one is read."""
+        moved = None if self._rest is None else _change(tuple(reading.mean_pm), self._rest, 1)
+        if moved is None or abs(moved) <= BACK:
+            return None
+        return f"the mirror moved on by {abs(moved):.4f} mm while it was read"
+
+    def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
+        if any(value is not None for value in pm):  # else the next rest is told from the point before
+            self._last, self._last_nominal = tuple(pm), self._nominal
+
+    def failed(self, why: str) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
+
+
+def at_rest(window: Sequence[Row], settling: Settling) -> bool:
+    """Whether these values agree, on every axis that has a beam in all of them."""
+    if len(window) < settling.count:
+        return False
+    columns = [[pm for pm in column if pm is not None] for column in zip(*window, strict=True)]
+    whole = [column for column in columns if len(column) == len(window)]
+    return bool(whole) and all(max(column) - min(column) <= settling.limit_pm for column in whole)
+
+
+def _change(row: Row, last: Row, sign: int) -> float | None:
+    """By how much the distance is longer than at the last reading, mm: the mean of the beams that both have."""
+    changes = [now - then for now, then in zip(row, last, strict=True) if now is not None and then is not None]
+    return sign * sum(changes) / len(changes) * PICOMETRE if changes else None
+
+
+def _shortest(nominal: Sequence[float], step: float) -> float:
+    """The shortest step of a visit that a distance can tell, or this one."""
+    steps = [abs(b - a) for a, b in pairwise(nominal)]
+    return min([abs(step), *(length for length in steps if length >= SMALLEST)])

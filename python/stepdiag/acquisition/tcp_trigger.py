@@ -1,0 +1,145 @@
+"""Reading when a controller asks, over a socket."""
+
+import selectors
+import socket
+import time
+from collections.abc import Sequence
+from typing import Final
+
+from stepdiag._core import InvalidArgument
+from stepdiag.acquisition.settling import Reading
+from stepdiag.acquisition.triggers import Context, Stopped, of_start, point_text
+from stepdiag.io.whole_files import reason
+from stepdiag.scenario.order_of_run import Visit
+
+
+class TcpTrigger:
+    """A controller asks, by lines of text: READ <visit> <point> is answered by DONE <visit> <point> when the reading is
+    on the disk, or by FAIL <reason>. The last point may be asked for once more, by a controller that had no answer: it
+    stands there, and is read again."""
+
+    LONGEST: Final = 256  # bytes of a line
+
+    def __init__(self, host: str = "127.0.0.1", port: int = 0) -> None:
+        try:
+            self._server = socket.create_server((host, port))
+        except OSError as error:
+            raise InvalidArgument(f"trigger: cannot listen on {host}:{port}: {reason(error)}") from None
+        self._server.setblocking(False)
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(self._server, selectors.EVENT_READ)
+        self._clients: dict[socket.socket, bytes] = {}
+        self._asking: socket.socket | None = None
+        self._context: Context | None = None
+        self._last: tuple[int, int] | None = None
+        self._wanted = (0, 0)
+        self.address: tuple[str, int] = self._server.getsockname()[:2]
+
+    def start(self, context: Context) -> None:
+        self._context, self._last = context, context.last
+
+    def begin(self, visit: Visit, index: int, text: str) -> None:
+        of_start(self._context).operator.tell(f"{text}; waiting for {point_text(visit, index)}")
+
+    def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
+        context = of_start(self._context)
+        expected = (visit.number, int(visit.points[index]))
+        deadline = time.monotonic() + context.wait_timeout
+        while (left := deadline - time.monotonic()) > 0.0:
+            asked = self._next_line(left)
+            if asked is None:
+                continue
+            client, line = asked
+            wanted = _wanted(line)
+            if wanted is not None and wanted in (expected, self._last):
+                self._asking, self._wanted = client, wanted
+                return wanted == expected
+            wrong = _expectation(expected, line)
+            context.operator.tell(f"the controller asked in vain: {wrong}")
+            self._answer(client, f"FAIL {wrong}")
+        raise Stopped(f"{point_text(visit, index)}: nobody asked for it in {context.wait_timeout:g} s")
+
+    def doubt(self, reading: Reading) -> str | None:
+        return None  # a controller waits for its answer
+
+    def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
+        if self._asking is not None:
+            self._answer(self._asking, f"DONE {self._wanted[0]} {self._wanted[1]}")
+        self._asking, self._last = None, self._wanted
+
+    def failed(self, why: str) -> None:
+        if self._asking is not None:
+            self._answer(self._asking, f"FAIL {' '.join(why.split())}")
+        self._asking = None
+
+    def close(self) -> None:
+        for client in list(self._clients):
+            self._drop(client)
+        self._selector.close()
+        self._server.close()
+
+    def _next_line(self, timeout: float) -> tuple[socket.socket, bytes] | None:
+        """A whole line and who sent it, waiting for one if there is none. Clients take turns."""
+        ready = any(b"\n" in rest for rest in self._clients.values())
+        for key, _ in self._selector.select(0.0 if ready else timeout):
+            if key.fileobj is self._server:
+                self._accept()
+            elif isinstance(key.fileobj, socket.socket) and b"\n" not in self._clients[key.fileobj]:
+                self._receive(key.fileobj)
+        for client, text in self._clients.items():
+            line, end, rest = text.partition(b"\n")
+            if end:
+                del self._clients[client]
+                self._clients[client] = rest  # at the end of the row
+                return client, line
+        return None
+
+    def _accept(self) -> None:
+        try:
+            client, _ = self._server.accept()
+        except OSError:
+            return
+        client.settimeout(1.0)  # for answers; who does not take them is dropped
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._clients[client] = b""
+        self._selector.register(client, selectors.EVENT_READ)
+
+    def _receive(self, client: socket.socket) -> None:
+        try:
+            data = client.recv(4096)
+        except OSError:
+            data = b""
+        if not data:
+            self._drop(client)
+            return
+        self._clients[client] += data
+        if b"\n" not in self._clients[client] and len(self._clients[client]) > self.LONGEST:
+            self._answer(client, "FAIL expected READ <visit> <point>, got a line without an end")
+            self._drop(client)
+
+    def _answer(self, client: socket.socket, text: str) -> None:
+        try:
+            client.sendall(text.encode() + b"\n")
+        except OSError:
+            self._drop(client)
+
+    def _drop(self, client: socket.socket) -> None:
+        if self._clients.pop(client, None) is not None:
+            self._selector.unregister(client)
+            client.close()
+
+
+def _wanted(line: bytes) -> tuple[int, int] | None:
+    words = line.decode("ascii", errors="replace").split()
+    if len(words) != 3 or words[0] != "READ" or not all(word.isdigit() and len(word) < 10 for word in words[1:]):
+        return None
+    return int(words[1]), int(words[2])
+
+
+def _expectation(expected: tuple[int, int], line: bytes) -> str:
+    """What is wrong with a line, if it does not ask for this visit and point."""
+    wanted = _wanted(line)
+    if wanted is None:
+        words = line.decode("ascii", errors="replace").split()
+        return f"expected READ <visit> <point>, got {' '.join(words)[:60]!a}"
+    return f"expected visit {expected[0]} point {expected[1]}, got visit {wanted[0]} point {wanted[1]}"

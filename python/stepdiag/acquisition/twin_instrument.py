@@ -1,0 +1,250 @@
+"""The instrument of a twin: a virtual machine with its head, read as an IDS3010 reads."""
+
+import math
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stepdiag import _core
+from stepdiag._core import InvalidArgument
+from stepdiag.acquisition.ids3010 import AXES, IDLE, RUNNING
+from stepdiag.acquisition.reading_plan import channels_of, described_plan, digest_of
+from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.heads import of_run
+from stepdiag.scenario.order_of_run import visits_of
+
+PICOMETRES = 1e9  # in a millimetre
+# The instrument's own numbers are not public; these say in words what they mean (errorNumberToString).
+NO_BEAM = 9001
+NOT_MEASURING = 9002
+WRONG_AXIS = 9003
+TEXTS = {
+    0: "Ok",
+    NO_BEAM: "the beam was interrupted",
+    NOT_MEASURING: "the measurement is not running",
+    WRONG_AXIS: "there is no such axis",
+}
+
+
+@dataclass(frozen=True)
+class TwinBehaviour:
+    """What a twin does beside reading exactly, to try a client with."""
+
+    settling: float = 0.0  # s: a move rings out, by 1/e in a fifth of this time
+    sampling_noise_um: float = 0.0  # of every value, beside the scenario's noise, which is that of a point
+    latch: bool = True  # a beam that was interrupted stays lost until the measurement is started anew
+    lost: frozenset[tuple[int, int]] = frozenset()  # (visit, point) where every beam is interrupted
+    interrupt: bool = False  # moving the head to another line interrupts every beam, as it does in truth
+
+    def __post_init__(self) -> None:
+        for name, value in (("settling", self.settling), ("sampling_noise_um", self.sampling_noise_um)):
+            if not (math.isfinite(value) and value >= 0.0):
+                raise InvalidArgument(f"{name}: expected a finite number of at least 0, got {value!r}")
+
+
+class TwinInstrument:
+    """State and readings, for several threads. Raises InvalidArgument for a head that is none of three axes.
+
+    The scenario's noise is that of a point: it is drawn anew with every move, not with every value. With `visit` it
+    is that of the same row of a simulated run; a visit begun again draws anew."""
+
+    def __init__(self, scenario: Scenario, behaviour: TwinBehaviour | None = None) -> None:
+        self._channels = channels_of(scenario)
+        self._scenario = scenario
+        self._behaviour = behaviour or TwinBehaviour()
+        self._visits = list(visits_of(scenario))
+        self._digest = digest_of(self._channels, described_plan(scenario))
+        counts = [len(visit.points) for visit in self._visits]
+        self._first_rows = [sum(counts[:number]) for number in range(len(counts))]
+        self._rows = sum(counts)
+        self._machine = scenario.machine()
+        self._heads = of_run(scenario.actual_heads())
+        self._readouts: dict[int, _core.VirtualReadout] = {}
+        self._lock = threading.RLock()
+        self._random = np.random.default_rng(scenario.noise.seed)
+        self._begun = [0] * len(self._visits)
+        self._visit: int | None = None
+        self._set_up = 1
+        self._position = np.array(self._visits[0].positions[0])
+        self._approach = "+++"
+        self._row, self._setup_row = 0, 0
+        self._index = 0  # in the visit
+        self._moved_at = -math.inf
+        self._before: list[float | None] = [None] * AXES
+        self._exact: list[float | None] | None = None  # mm, while nothing changes
+        self.mode = RUNNING
+        self._interrupted = [False] * AXES
+        self._reference = [0] * AXES
+        self.visit_begun = threading.Event()  # for whoever moves it
+        self.moves_itself = False  # through a visit that is begun (Twin, play)
+
+    # --- the machine ---
+
+    def move_to(self, position: Sequence[float], *, counts: bool = True) -> None:
+        """The axes' positions, mm: as they come from a controller. Every call is a new point, if it counts; of a visit
+        only one that moves."""
+        target = np.array(position, dtype=float)
+        if target.shape != (3,) or not np.all(np.isfinite(target)):
+            raise InvalidArgument("moveTo: expected three finite numbers")
+        with self._lock:
+            self._remember()
+            moved = target - self._position
+            if self._visit is None:
+                self._approach = "".join(
+                    "+" if d > 0 else "-" if d < 0 else old for d, old in zip(moved, self._approach, strict=True)
+                )
+            self._position = target
+            counts = counts and (self._visit is None or bool(np.any(moved)))
+            self._row += counts
+            self._index += counts
+
+    def set_up(self, number: int) -> None:
+        """Puts head and mirror up for the plan's line of this number (from 1). What the axes come from is from now on
+        told by their moves."""
+        if not 1 <= number <= self._visits[-1].set_up:
+            raise InvalidArgument(f"setUp: expected 1 to {self._visits[-1].set_up}, got {number}")
+        with self._lock:
+            self._remember()
+            self._visit = None
+            self._place(number)
+            self._setup_row = self._row
+
+    def visit(self, number: int, index: int = 0, digest: str | None = None) -> None:
+        """The same for a visit of the plan, which is at its point of this place: also says how the axes come there,
+        and which row of the run it is. The axes stay where they are, unless the twin moves them itself."""
+        if digest is not None and digest != self._digest:
+            raise InvalidArgument("visit: the twin has another plan or head")
+        if not 1 <= number <= len(self._visits):
+            raise InvalidArgument(f"visit: expected 1 to {len(self._visits)}, got {number}")
+        visit = self._visits[number - 1]
+        if not 0 <= index < len(visit.points):
+            raise InvalidArgument(f"visit: expected a place from 0 to {len(visit.points) - 1}, got {index}")
+        with self._lock:
+            self._remember()
+            self._visit, self._index = number, index
+            self._approach = "".join("-" if sign < 0 else "+" for sign in visit.approach)
+            self._place(visit.set_up)
+            if self.moves_itself:  # at once: the client reads as soon as it has its answer
+                self._position = np.array(visit.positions[index])
+            repeated = self._begun[number - 1] * self._rows
+            self._begun[number - 1] += 1
+            self._row = repeated + self._first_rows[number - 1] + index
+            forward = number - 1 if visit.direction == "forward" else number - 2
+            self._setup_row = repeated + self._first_rows[forward]
+            self.visit_begun.set()
+
+    def state(self) -> dict[str, Any]:
+        """Where it stands, for whoever asks."""
+        with self._lock:
+            position = [float(p) for p in self._position]
+            return {"visit": self._visit, "set_up": self._set_up, "position_mm": position, "approach": self._approach}
+
+    def where(self) -> tuple[int | None, int]:
+        """The visit that was begun, and the place in it."""
+        with self._lock:
+            return self._visit, self._index
+
+    def _place(self, set_up: int) -> None:
+        if set_up != self._set_up:  # without `interrupt`, whoever moved the head has started the measurement anew
+            self._interrupted = [self._behaviour.interrupt] * AXES
+        self._set_up = set_up
+
+    def _remember(self) -> None:
+        if self._behaviour.settling > 0.0:
+            self._before = self._now()
+            self._moved_at = time.monotonic()
+        self._exact = None
+
+    # --- the instrument ---
+
+    def positions(self) -> tuple[list[int], list[int]]:
+        """Warning number and position (pm) of every axis."""
+        with self._lock:
+            if self.mode != RUNNING:
+                return [NOT_MEASURING] * AXES, [0] * AXES
+            warnings, positions = [], []
+            for axis, distance in enumerate(self._now()):
+                if distance is None:
+                    self._interrupted[axis] = self._interrupted[axis] or axis < len(self._channels)
+                dark = distance is None or (self._behaviour.latch and self._interrupted[axis])
+                if not self._behaviour.latch:
+                    self._interrupted[axis] = distance is None
+                warnings.append(NO_BEAM if dark and axis < len(self._channels) else 0)
+                positions.append(0 if dark or distance is None else round(distance * PICOMETRES))
+            return warnings, positions
+
+    def start(self) -> None:
+        with self._lock:
+            self.mode = RUNNING
+            self._interrupted = [False] * AXES
+            self._reference = self.positions()[1]
+
+    def stop(self) -> None:
+        with self._lock:
+            self.mode = IDLE
+
+    def reset_error(self) -> None:
+        with self._lock:
+            self._interrupted = [False] * AXES
+
+    def reset_displacement(self) -> None:
+        with self._lock:
+            self._reference = self.positions()[1]
+
+    def displacements(self) -> tuple[list[int], list[int]]:
+        warnings, positions = self.positions()
+        return warnings, [position - reference for position, reference in zip(positions, self._reference, strict=True)]
+
+    def _now(self) -> list[float | None]:
+        """Distances in mm by axis, None without a beam."""
+        if self._exact is None:
+            self._exact = self._distances()
+        distances = list(self._exact)
+        elapsed = time.monotonic() - self._moved_at
+        if self._behaviour.settling > 0.0 and elapsed < 10.0 * self._behaviour.settling:
+            decay = self._behaviour.settling / 5.0
+            share = math.exp(-elapsed / decay) * math.cos(2.0 * math.pi * elapsed / decay)
+            distances = [
+                now if now is None or old is None else now + (old - now) * share
+                for now, old in zip(distances, self._before, strict=True)
+            ]
+        if self._behaviour.sampling_noise_um > 0.0:
+            noise = self._behaviour.sampling_noise_um * 1e-3 * self._random.standard_normal(AXES)
+            distances = [d if d is None else d + float(n) for d, n in zip(distances, noise, strict=True)]
+        return distances
+
+    def _distances(self) -> list[float | None]:
+        if self._point() in self._behaviour.lost:
+            return [None] * AXES
+        seconds = self._scenario.keys.plan.seconds_per_reading or 0.0
+        elapsed = max(0, self._row - self._setup_row) * seconds
+        signals = self._readout().read(self._position, self._approach, row=self._row, elapsed=elapsed)
+        count = len(self._channels)
+        return [None if axis >= count or math.isnan(signals[axis]) else float(signals[axis]) for axis in range(AXES)]
+
+    def _point(self) -> tuple[int, int] | None:
+        if self._visit is None:
+            return None
+        points = self._visits[self._visit - 1].points
+        return (self._visit, int(points[self._index])) if self._index < len(points) else None
+
+    def _readout(self) -> _core.VirtualReadout:
+        if self._set_up not in self._readouts:
+            scenario = self._scenario
+            line = next(visit.line for visit in self._visits if visit.set_up == self._set_up)
+            self._readouts[self._set_up] = _core.VirtualReadout(
+                self._machine,
+                scenario.plan,
+                self._heads,
+                line,
+                misalignment=dict(scenario.misalignment),
+                noise=scenario.noise,
+                environment=scenario.environment,
+                assumed_environment=scenario.assumed_environment,
+                verified_share=scenario.keys.head.verified_share,
+            )
+        return self._readouts[self._set_up]

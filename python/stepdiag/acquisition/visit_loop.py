@@ -1,0 +1,205 @@
+"""The loop of an acquisition over visits and points."""
+
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from typing import Literal
+
+from stepdiag._core import __version__
+from stepdiag.acquisition.ids3010 import RUNNING, STARTING, TWIN, Ids3010, InstrumentError, Sample
+from stepdiag.acquisition.options import AcquireOptions
+from stepdiag.acquisition.raw_file import RawContent, RawFile
+from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, Session, Value
+from stepdiag.acquisition.reading_plan import placement
+from stepdiag.acquisition.settling import Reading, take_reading
+from stepdiag.acquisition.triggers import Context, Operator, Trigger, point_text
+from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.order_of_run import Visit, visits_of
+
+Resume = Literal["point", "line", "set-up"]
+
+
+class Acquisition:
+    """What is done, and what is still to be read. `done`: the readings by (visit, point), as they were taken."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        header: Header,
+        file: RawFile,
+        instrument: Ids3010,
+        trigger: Trigger,
+        operator: Operator,
+        options: "AcquireOptions",
+    ) -> None:
+        self._scenario, self._header, self._options = scenario, header, options
+        self._file, self._instrument = file, instrument
+        self._trigger, self._operator = trigger, operator
+        self._visits = list(visits_of(scenario))
+        self._axes = [axis - 1 for axis in header.axes]
+        self._is_twin = False
+        self._set_up = 0  # for which the instrument was found ready
+        self._visit = 0  # of the last reading
+        self.done: dict[tuple[int, int], RawReading] = {}
+
+    def go_on(self, content: RawContent, resume: Resume) -> None:
+        """Takes what a raw file holds for done, but for its last line or set-up if those are to be read again."""
+        if content.torn is not None:
+            self._operator.tell(content.torn)
+        self.done = content.readings()
+        if resume == "point" or not self.done:
+            return
+        last, _ = next(reversed(self.done))
+        set_up = self._visits[last - 1].set_up
+        first = last if resume == "line" else min(visit.number for visit in self._visits if visit.set_up == set_up)
+        self._file.append([Again(time=datetime.now(UTC), visit=first)])
+        self.done = {key: reading for key, reading in self.done.items() if key[0] < first}
+
+    def run(self, source: str, write: Callable[[], None]) -> None:
+        """Reads what is not done; calls `write` after every visit."""
+        remaining = list(self._remaining())
+        if not remaining:
+            self._operator.tell("every point of the plan is read already")
+            return
+        known = self._instrument.describe()
+        self._is_twin = TWIN in known.get("type", "")
+        visit, index = remaining[0]
+        self._file.append([self._session(source, known, visit, index)])
+        if self.done:
+            self._operator.tell(f"going on with {point_text(visit, index)}: bring the machine there")
+        options = self._options
+        last = next(reversed(self.done), None)
+        self._trigger.start(
+            Context(self._read, options.settling, options.wait_timeout, options.sign, self._operator, last)
+        )
+        begun = 0
+        for visit, index in remaining:
+            if visit.number != begun:
+                self._trigger.begin(visit, index, self._instruction(visit, begun))
+            begun = visit.number
+            while not self._trigger.wait(visit, index, self._header.plan[visit.number - 1].nominal_mm):
+                self._take(*self._last_taken(), once_more=True)
+            self._take(visit, index)
+            if index + 1 == len(visit.points):
+                write()
+                self._operator.tell(self._summary(visit))
+
+    def _remaining(self) -> Iterator[tuple[Visit, int]]:
+        for visit in self._visits:
+            for index, point in enumerate(visit.points):
+                if (visit.number, int(point)) not in self.done:
+                    yield visit, index
+
+    def _instruction(self, visit: Visit, last: int) -> str:
+        if last and self._visits[last - 1].set_up == visit.set_up:
+            return f"set-up {visit.set_up} stays as it is: run {visit.run}, {visit.direction}"
+        return placement(self._scenario, visit)
+
+    def _last_taken(self) -> tuple[Visit, int]:
+        number, point = next(reversed(self.done))
+        visit = self._visits[number - 1]
+        return visit, visit.points.tolist().index(point)
+
+    def _take(self, visit: Visit, index: int, *, once_more: bool = False) -> None:
+        if self._is_twin and visit.number != self._visit:
+            self._instrument.ask("stepdiag.twin.visit", [visit.number, index, self._header.digest])
+        self._visit = visit.number
+        if visit.set_up != self._set_up:
+            self._make_ready(visit)
+            self._set_up = visit.set_up
+        reading = take_reading(self._read, len(self._axes), self._options.settling, told=self._instrument.error_text)
+        doubt = self._trigger.doubt(reading)
+        if doubt is not None:
+            reading.lost = dict.fromkeys(range(len(self._axes)), doubt)
+        *values, stored = _records(visit, index, reading, self._header.channels)
+        assert isinstance(stored, RawReading)
+        self._tell_lost(visit, index, stored)
+        key = (stored.visit, stored.point)
+        if once_more and stored.is_lost and not self.done[key].is_lost:
+            self._file.append(values)  # the reading that there is was better
+        else:
+            self._file.append([*values, stored])
+            self.done.pop(key, None)
+            self.done[key] = stored
+        self._trigger.stored(visit, index, self.done[key].pm)
+
+    def _tell_lost(self, visit: Visit, index: int, reading: RawReading) -> None:
+        for channel, why in reading.lost.items():
+            self._operator.tell(f"{point_text(visit, index)}: {channel} is lost: {why}")
+        if any("no beam" in why for why in reading.lost.values()):
+            self._operator.tell(
+                "after an interrupted beam this set-up may carry another constant: stop, and `restart_set_up`"
+            )
+
+    def _read(self) -> Sample:
+        return self._instrument.read(self._axes)
+
+    def _make_ready(self, visit: Visit) -> None:
+        """The instrument measures, and reports no beam missing: whoever moves the head interrupts them all."""
+        mode = self._instrument.mode()
+        if mode in STARTING:
+            self._instrument.wait_for(RUNNING, self._options.start_timeout)
+            mode = RUNNING
+        sample = self._read() if mode == RUNNING else None
+        if sample is not None and not any(sample.warnings):
+            return
+        texts = {self._instrument.error_text(warning) for warning in sample.warnings if warning} if sample else {mode}
+        state = f"{self._instrument.name}: {', '.join(sorted(texts))}"
+        if any(self._visits[number - 1].set_up == visit.set_up for number, _ in self.done):
+            raise InstrumentError(
+                f"{state}; a measurement started anew would give this set-up another constant: use `restart_set_up`"
+            )
+        if self._options.start == "never":
+            raise InstrumentError(f"{state}; expected a running measurement without warnings")
+        self._operator.tell(f"{state}; its measurement is started anew")
+        self._instrument.start(self._options.start_timeout)
+
+    def _session(self, source: str, instrument: dict[str, str], visit: Visit, index: int) -> Session:
+        return Session(
+            time=datetime.now(UTC),
+            stepdiag=__version__,
+            source=source,
+            instrument=instrument,
+            options=repr(self._options),
+            visit=visit.number,
+            point=int(visit.points[index]),
+        )
+
+    def _summary(self, visit: Visit) -> str:
+        readings = [reading for key, reading in self.done.items() if key[0] == visit.number]
+        lost = sum(1 for reading in readings if reading.is_lost)
+        return (
+            f"visit {visit.number} of {len(self._visits)} (line {visit.line}, run {visit.run}, {visit.direction}): "
+            f"{len(readings)} readings, {lost} lost"
+        )
+
+
+def _records(visit: Visit, index: int, reading: Reading, channels: list[str]) -> Iterator[Record]:
+    """The values of a reading, and at last the reading itself."""
+    x, y, z = (float(p) for p in visit.positions[index])
+    number, line, run, direction = visit.number, visit.line, visit.run, visit.direction
+    point, position = int(visit.points[index]), (x, y, z)
+    for value in reading.values:
+        yield Value(
+            visit=number,
+            line=line,
+            run=run,
+            direction=direction,
+            point=point,
+            position_mm=position,
+            time=value.time,
+            kind=value.kind,
+            pm=list(value.pm),
+        )
+    yield RawReading(
+        visit=number,
+        line=line,
+        run=run,
+        direction=direction,
+        point=point,
+        position_mm=position,
+        time=reading.values[-1].time if reading.values else datetime.now(UTC),
+        pm=reading.mean_pm,
+        sd_pm=reading.deviation_pm,
+        values=len(reading.averaged),
+        lost={channels[place]: why for place, why in reading.lost.items()},
+    )

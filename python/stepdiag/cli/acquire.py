@@ -1,0 +1,268 @@
+"""The commands that take a run's readings from an instrument, and that simulate the instrument."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from stepdiag._core import InvalidArgument
+from stepdiag.cli.options import PATH, Writes, in_flags, out_file, tell
+from stepdiag.io.outputs import MEASUREMENT, RAW, OutputFile
+
+if TYPE_CHECKING:
+    from stepdiag.acquisition.options import AcquireOptions
+    from stepdiag.acquisition.triggers import Trigger
+    from stepdiag.acquisition.visit_loop import Resume
+
+SECONDS = click.FloatRange(min=0.0, min_open=True)
+
+
+class _Terminal:
+    """The operator, at the terminal."""
+
+    def tell(self, text: str) -> None:
+        click.echo(in_flags(text))
+
+    def confirm(self, text: str) -> None:
+        click.echo(f"{text}: Enter", nl=False)
+        sys.stdout.flush()
+        if not sys.stdin.readline():
+            raise InvalidArgument("standard input ended: nobody is there to press Enter; --resume goes on")
+
+
+@click.command(epilog="\b\nExample: stepdiag acquire scenario.toml --source ids3010://192.168.1.1 -o run.csv")
+@click.argument("scenario", type=PATH, required=False)
+@click.option("--source", metavar="URL", help="The instrument: ids3010://HOST or ids3010://HOST:PORT.")
+@click.option(
+    "--trigger",
+    default="key",
+    show_default=True,
+    metavar="WHAT",
+    help="When to read: key (Enter), settle (at rest a step further), or tcp://HOST:PORT, where a controller asks.",
+)
+@click.option(
+    "--axes", metavar="N,N,N", help="The instrument's axes of d1, d2, d3 (or of the distance).  [default: 1,2,3]"
+)
+@click.option(
+    "--sign", type=click.Choice(["+", "-"]), default="+", show_default=True, help="- if positions fall with distance."
+)
+@click.option(
+    "--zero",
+    type=click.Choice(["none", "first"]),
+    default="none",
+    show_default=True,
+    help="first: each set-up's first reading becomes the nominal distance, by a constant of each beam.",
+)
+@click.option("--settle-count", type=click.IntRange(2), default=5, show_default=True, help="Values that must agree.")
+@click.option("--settle-limit-um", type=SECONDS, default=0.5, show_default=True, help="Within this, on every axis.")
+@click.option(
+    "--settle-timeout", type=SECONDS, default=20.0, show_default=True, help="Seconds; then the reading is lost."
+)
+@click.option("--average", type=click.IntRange(1), default=10, show_default=True, help="Values to average then.")
+@click.option(
+    "--interval-ms", type=click.FloatRange(min=0.0), default=10.0, show_default=True, help="Between two values."
+)
+@click.option("--retries", type=click.IntRange(0), default=5, show_default=True, help="Values without a beam to bear.")
+@click.option(
+    "--timeout", type=SECONDS, default=2.0, show_default=True, help="Seconds for an answer of the instrument."
+)
+@click.option("--wait-timeout", type=SECONDS, default=3600.0, show_default=True, help="Seconds for the next point.")
+@click.option(
+    "--start",
+    type=click.Choice(["auto", "never"]),
+    default="auto",
+    show_default=True,
+    help="auto: start the instrument's measurement anew at a set-up where it is stopped or warns.",
+)
+@click.option("--uncertainties", is_flag=True, help="Also write the standard deviation of each mean (u_d1_um ...).")
+@click.option(
+    "--raw", type=Writes(RAW), metavar="FILE", help="Raw file (.jsonl).  [default: beside the output, run.raw.jsonl]"
+)
+@click.option("--resume", is_flag=True, help="Go on with the raw file, at the point where it stopped.")
+@click.option("--restart-line", is_flag=True, help="Go on with it, and read its last line once more.")
+@click.option("--restart-set-up", is_flag=True, help="Go on with it, and read all of its last set-up once more.")
+@click.option("--from-raw", type=PATH, metavar="FILE", help="Only make the output, from this raw file.")
+@out_file("Measurement to write, CSV or netCDF (.nc).", MEASUREMENT)
+def acquire(scenario: Path | None, output: OutputFile, from_raw: Path | None, **given: Any) -> None:
+    """Take the readings of SCENARIO's plan from an attocube IDS3010.
+
+    At every point waits until the distances have settled, and averages. Says before every set-up where head and
+    mirror go. Each value is on the disk, in the raw file, before the next point; the output is made from it after
+    every visit and at the end. A beam that is missing is a lost reading, an empty field.
+    """
+    if from_raw is not None:
+        if scenario is not None or given["source"] is not None:
+            raise InvalidArgument("--from-raw: reads no scenario and no --source")
+        _convert(from_raw, output, _options(given))
+        return
+    if scenario is None or given["source"] is None:
+        raise InvalidArgument("expected SCENARIO and --source, or --from-raw")
+    _take(scenario, output, given)
+
+
+def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
+    from stepdiag.acquisition.acquire import acquire, raw_path
+    from stepdiag.scenario.description import read_scenario
+
+    described = read_scenario(scenario)
+    raw: OutputFile = given["raw"] or OutputFile(raw_path(output.path), (RAW,))
+    # An output that was not made from the raw file, and a raw file that nobody goes on with, are refused by acquire.
+    path = output.claim(scenario, raw.path, error_map=described.error_map, overwrite=True)
+    raw.claim(scenario, error_map=described.error_map, overwrite=True)
+    options, resume = _options(given), _resume(given)
+    trigger = _trigger(given["trigger"])
+    result = acquire(
+        described,
+        given["source"],
+        path,
+        trigger=trigger,
+        options=options,
+        resume=resume,
+        raw=raw.path,
+        operator=_Terminal(),
+    )
+    click.echo(f"wrote {result.output}: {result.readings} of {result.planned} readings, {result.lost} lost")
+
+
+def _convert(raw: Path, output: OutputFile, options: "AcquireOptions") -> None:
+    from stepdiag.acquisition.acquire import raw_path
+    from stepdiag.acquisition.raw_file import read_raw
+    from stepdiag.acquisition.run_from_raw import write_run
+
+    path = output.claim(raw, overwrite=True)
+    if path.exists() and raw_path(path).resolve() != raw.resolve():
+        raise InvalidArgument(f"{path}: exists, and does not stand beside {raw}: move it away, or name another -o")
+    content = read_raw(raw)
+    if content.torn is not None:
+        tell("warning", content.torn)
+    write_run(raw, path, zero=options.zero, uncertainties=options.uncertainties)
+    click.echo(f"wrote {path}: {len(content.readings())} of {content.planned} readings")
+
+
+def _options(given: dict[str, Any]) -> "AcquireOptions":
+    from stepdiag.acquisition.options import AcquireOptions
+    from stepdiag.acquisition.settling import Settling
+
+    return AcquireOptions(
+        axes=_axes(given["axes"]),
+        sign=1 if given["sign"] == "+" else -1,
+        settling=Settling(
+            count=given["settle_count"],
+            limit_um=given["settle_limit_um"],
+            timeout=given["settle_timeout"],
+            average=given["average"],
+            interval=given["interval_ms"] * 1e-3,
+            retries=given["retries"],
+        ),
+        zero=given["zero"],
+        uncertainties=given["uncertainties"],
+        start=given["start"],
+        timeout=given["timeout"],
+        wait_timeout=given["wait_timeout"],
+    )
+
+
+def _axes(text: str | None) -> tuple[int, ...] | None:
+    if text is None:
+        return None
+    words = [word.strip() for word in text.split(",")]
+    if not all(word.isascii() and word.isdigit() and len(word) < 4 for word in words):
+        raise InvalidArgument(f"--axes: expected numbers with commas between them, such as 1,2,3, got {text!r}")
+    return tuple(int(word) for word in words)
+
+
+def _resume(given: dict[str, Any]) -> "Resume | None":
+    flags: dict[str, Resume] = {"resume": "point", "restart_line": "line", "restart_set_up": "set-up"}
+    chosen = [way for flag, way in flags.items() if given[flag]]
+    if len(chosen) > 1:
+        raise InvalidArgument("expected one of --resume, --restart-line and --restart-set-up")
+    return chosen[0] if chosen else None
+
+
+def _trigger(text: str) -> "Trigger":
+    from stepdiag.acquisition.settle_trigger import SettleTrigger
+    from stepdiag.acquisition.tcp_trigger import TcpTrigger
+    from stepdiag.acquisition.triggers import KeyTrigger
+
+    simple: dict[str, Callable[[], Trigger]] = {"key": KeyTrigger, "settle": SettleTrigger}
+    if text in simple:
+        return simple[text]()
+    trigger = TcpTrigger(*_address(text))
+    click.echo(f"listening on {trigger.address[0]}:{trigger.address[1]} for READ <visit> <point>")
+    sys.stdout.flush()
+    return trigger
+
+
+def _address(text: str) -> tuple[str, int]:
+    from urllib.parse import urlsplit
+
+    try:
+        parts = urlsplit(text)
+        if parts.scheme == "tcp" and parts.hostname and parts.port is not None and not parts.path:
+            return parts.hostname, parts.port
+    except ValueError:
+        pass
+    raise InvalidArgument(f"--trigger: expected key, settle or tcp://HOST:PORT, got {text!r}")
+
+
+def _point(context: click.Context, option: click.Parameter, texts: tuple[str, ...]) -> frozenset[tuple[int, int]]:
+    points = set()
+    for text in texts:
+        visit, colon, point = text.partition(":")
+        if not colon or not visit.isdecimal() or not point.isdecimal():
+            raise click.BadParameter(f"expected VISIT:POINT such as 2:5, got {text!r}")
+        points.add((int(visit), int(point)))
+    return frozenset(points)
+
+
+@click.command(epilog="\b\nExample: stepdiag twin scenario.toml --port 9090 --play 1")
+@click.argument("scenario", type=PATH)
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
+@click.option("--port", type=click.IntRange(0, 65535), default=9090, show_default=True, help="0: any that is free.")
+@click.option(
+    "--play", type=SECONDS, metavar="SECONDS", help="Move through the plan by itself, resting so long at each point."
+)
+@click.option(
+    "--settling-ms", type=click.FloatRange(min=0.0), default=0.0, show_default=True, help="Moves ring out in this time."
+)
+@click.option(
+    "--sampling-noise-um", type=click.FloatRange(min=0.0), default=0.0, show_default=True, help="Of every value."
+)
+@click.option("--lose", multiple=True, callback=_point, metavar="VISIT:POINT", help="Interrupt the beams there.")
+@click.option(
+    "--latch/--no-latch", default=True, show_default=True, help="Beams stay lost until the measurement starts anew."
+)
+@click.option("--interrupt", is_flag=True, help="Interrupt the beams whenever the head moves to another line.")
+def twin(
+    scenario: Path,
+    host: str,
+    port: int,
+    play: float | None,
+    settling_ms: float,
+    sampling_noise_um: float,
+    lose: frozenset[tuple[int, int]],
+    latch: bool,
+    interrupt: bool,
+) -> None:
+    """Simulate the instrument: an IDS3010 that reads SCENARIO's virtual machine.
+
+    Whoever moves the machine tells it so by stepdiag.twin.moveTo; with --play it moves by itself, one visit after the
+    other as a client begins them. Ends with Ctrl-C.
+    """
+    import threading
+
+    from stepdiag.acquisition.twin import Twin
+    from stepdiag.acquisition.twin_instrument import TwinBehaviour
+
+    behaviour = TwinBehaviour(
+        settling=settling_ms * 1e-3, sampling_noise_um=sampling_noise_um, latch=latch, lost=lose, interrupt=interrupt
+    )
+    with Twin(scenario, host=host, port=port, behaviour=behaviour, play=play) as running:
+        click.echo(f"listening on {running.address[0]}:{running.address[1]} (Ctrl-C ends)")
+        sys.stdout.flush()
+        try:
+            threading.Event().wait()
+        except KeyboardInterrupt:
+            click.echo("ended")

@@ -1,0 +1,88 @@
+"""The commands that read calibrations: report one, compare two."""
+
+from pathlib import Path
+
+import click
+
+from stepdiag._core import InvalidArgument
+from stepdiag.cli.options import PATH, Writes, tell_fit
+from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, OutputFile
+
+
+@click.command(epilog="\b\nExample: stepdiag report calibration.nc --functional-point straightness.csv")
+@click.argument("calibration", type=PATH)
+@click.option(
+    "--functional-point",
+    "output",
+    type=Writes(FUNCTIONAL_POINT),
+    metavar="FILE",
+    help="Straightness of the functional point beside the table's, to write as CSV.",
+)
+@click.pass_context
+def report(context: click.Context, calibration: Path, output: OutputFile | None) -> None:
+    """Tell what a CALIBRATION (CSV or netCDF) says.
+
+    Largest values and uncertainties, and the point to which straightness refers: the tables hold that of the axes' own
+    frames. For an axis that carries the workpiece, or with a tool offset, the functional point's differs; a netCDF file
+    has it too.
+    """
+    from stepdiag.io.data_files import read_calibration
+    from stepdiag.io.whole_files import check_input, write_whole
+    from stepdiag.report.calibration import calibration_report, functional_point_csv
+
+    path = None if output is None else output.claim(calibration)
+    check_input(calibration)
+    read = read_calibration(calibration)
+    if path is not None:
+        write_whole(path, functional_point_csv(read))
+    for line in calibration_report(read):
+        click.echo(line)
+    tell_fit(context, calibration, read.fit)
+
+
+@click.command(epilog="\b\nExample: stepdiag compare before.csv after.nc -o differences.csv")
+@click.argument("a", type=PATH)
+@click.argument("b", type=PATH)
+@click.option(
+    "-o", "output", type=Writes(COMPARISON), metavar="FILE", help="Differences to write, CSV or netCDF (.nc)."
+)
+@click.option(
+    "--limit",
+    type=float,
+    default=0.05,
+    show_default=True,
+    metavar="P",
+    help="Probability of any false alarm among all values compared, at which a difference counts as significant.",
+)
+@click.pass_context
+def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None, limit: float) -> None:
+    """Set two calibrations A and B (CSV or netCDF) side by side.
+
+    For every parameter the largest difference B - A, where it is, its standard uncertainty sqrt(u_A^2 + u_B^2), and
+    whether any difference is more than chance explains: the probability of one is multiplied by the number of values
+    compared (Bonferroni). Where nodes differ, the longer table is interpolated. Of functions whose slope is not
+    determined in both, the shapes are compared.
+    """
+    from stepdiag.calibration.comparison import compare_calibrations
+    from stepdiag.io.data_files import read_calibration
+    from stepdiag.io.whole_files import check_input
+    from stepdiag.report.comparison import comparison_report
+
+    written = None if output is None else output.claim(a, b)
+    if not 0.0 < limit < 1.0:
+        raise InvalidArgument(f"--limit: expected a probability between 0 and 1, got {limit:g}")
+    for path in (a, b):
+        check_input(path)
+    one, other = read_calibration(a), read_calibration(b)
+    try:
+        comparison = compare_calibrations(one, other, limit=limit)
+    except InvalidArgument as error:
+        raise InvalidArgument(f"{a}, {b}: {error}") from None
+    if written is not None:
+        from stepdiag.report.comparison import write_comparison
+
+        write_comparison(comparison, written)
+    for line in comparison_report(comparison, str(a), str(b)):
+        click.echo(line)
+    for path, calibration in ((a, one), (b, other)):
+        tell_fit(context, path, calibration.fit)

@@ -1,0 +1,98 @@
+"""The command line: the commands of the other modules of cli, and exit codes.
+
+What is imported inside a command keeps the others fast.
+"""
+
+import io
+import sys
+
+import click
+
+from stepdiag._core import InvalidArgument, ReplayMismatch, __version__
+from stepdiag.cli.acquire import acquire, twin
+from stepdiag.cli.calibrations import compare, report
+from stepdiag.cli.evaluate import evaluate, observe
+from stepdiag.cli.export import export
+from stepdiag.cli.files import check, init
+from stepdiag.cli.head import head
+from stepdiag.cli.nc import nc
+from stepdiag.cli.options import InOrder, tell
+from stepdiag.cli.plan import plan
+from stepdiag.cli.simulate import demo, simulate
+from stepdiag.cli.study import study
+from stepdiag.cli.uncertainty import uncertainty
+
+EPILOG = """\b
+See it all at once:
+  stepdiag demo
+A first round trip (uncomment [machine.random] in the scenario for a machine with errors):
+  stepdiag init -o machine
+  stepdiag simulate machine/scenario.toml -o run.csv
+  stepdiag evaluate machine/scenario.toml run.csv -o calibration.csv
+Your own measurement: fill in machine/measurement.csv, then evaluate it in place of run.csv.
+What a plan would determine, before measuring: stepdiag observe machine/scenario.toml
+"""
+
+# In the order in which somebody new needs them.
+COMMANDS = {
+    demo: "Show the method on the machine of its paper.",
+    init: "Begin with your own machine: scenario and sheet.",
+    observe: "Tell what a plan and head can determine, before measuring.",
+    plan: "Tell which plan to measure in the time that there is.",
+    uncertainty: "Tell how uncertain a calibration would be.",
+    study: "Tell the same over a grid of scenarios.",
+    nc: "Write the measuring program for a controller.",
+    acquire: "Take a run's readings from an IDS3010.",
+    twin: "Simulate the instrument, behind a socket.",
+    simulate: "Simulate the run of a scenario.",
+    evaluate: "Calibrate the machine from a run.",
+    report: "Tell what a calibration says.",
+    compare: "Set two calibrations side by side.",
+    export: "Write a calibration for a controller.",
+    check: "Tell what a file is, and whether it is sound.",
+    head: "Look at the description of a laser head.",
+}
+
+
+@click.group(
+    cls=InOrder, epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+)
+@click.version_option(__version__, message="stepdiag %(version)s")
+def cli() -> None:
+    """Calibrate three-axis machine tools by the laser step-diagonal method."""
+
+
+for command, short_help in COMMANDS.items():
+    command.short_help = short_help
+    cli.add_command(command)
+
+
+def _complain(message: str) -> None:
+    tell("error", message)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs the command line and returns the exit code: 0 done, 1 our mistake, 2 a caller's, 3 done but not to be
+    trusted, 130 interrupted."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without µ still gets the rest of the line
+    try:
+        result = cli.main(arguments, prog_name="stepdiag", standalone_mode=False)
+        return result if isinstance(result, int) else 0
+    except click.Abort:
+        return 130
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        return 0
+    except click.UsageError as error:
+        hint = f' (see "{error.ctx.command_path} --help")' if error.ctx else ""
+        _complain(error.format_message() + hint)
+    except (InvalidArgument, click.ClickException) as error:
+        _complain(error.format_message() if isinstance(error, click.ClickException) else str(error))
+    except ReplayMismatch as error:
+        _complain(f"{error}; nothing was written (verified_share = 1 traces every pose)")
+        return 1
+    except OSError as error:
+        _complain(str(error))
+    return 2

@@ -1,0 +1,120 @@
+"""The commands that calibrate a machine from a run, and that say beforehand what a run would determine."""
+
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from stepdiag._core import Calibration, InvalidArgument
+from stepdiag.cli.options import PATH, Writes, out_file, tell_fit
+from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
+
+
+@click.command(epilog="\b\nExample: stepdiag evaluate scenario.toml run.csv -o calibration.csv")
+@click.argument("scenario", type=PATH)
+@click.argument("run", type=PATH)
+@click.option(
+    "-m",
+    "method",
+    type=click.Choice(["adjustment", "enhanced", "conventional"]),
+    default="adjustment",
+    show_default=True,
+    help="What to evaluate with; see above.",
+)
+@click.option("--covariance", is_flag=True, help="Also write the covariance of all values (netCDF only).")
+@out_file("Calibration to write, CSV or netCDF (.nc, which keeps the set-up and the residuals as well).", CALIBRATION)
+@click.pass_context
+def evaluate(
+    context: click.Context,
+    scenario: Path,
+    run: Path,
+    method: Literal["adjustment", "enhanced", "conventional"],
+    covariance: bool,
+    output: OutputFile,
+) -> None:
+    """Evaluate the measurement RUN (CSV or netCDF), made by SCENARIO's plan and head.
+
+    Finds the machine's 21 error parameters with their standard uncertainties, and says what the readings do
+    not determine. Of the scenario only chain, tool, plan, head, uncertainties and the unknowns of the
+    adjustment are used.
+
+    The first line of the report is the verdict of the fit, which the calibration carries as well. A rejected fit ends
+    with a warning and exit code 3: the calibration is written, but not to be used. A result that no machine can have
+    ([plausible] in the scenario) is an error, and nothing is written.
+
+    \b
+    adjustment    all readings at once and exactly: the machine's errors, and how head and mirror were set up
+    enhanced      distances, tilts and scale lines, to first order
+    conventional  the distances of body diagonals
+    """
+    from stepdiag.config.toml_text import located
+    from stepdiag.io.data_files import is_netcdf, read_measurement, write_calibration
+    from stepdiag.io.whole_files import check_input
+    from stepdiag.report.evaluation import evaluation_report
+    from stepdiag.scenario.description import adjust_scenario, evaluate_scenario, read_scenario
+
+    check_input(run)
+    if covariance and not is_netcdf(output.path):
+        raise InvalidArgument(f"--covariance: expected an output named .nc, for CSV keeps none; got {output.path}")
+    plan = read_scenario(scenario)
+    path = output.claim(scenario, run, error_map=plan.error_map)
+    measurement = read_measurement(run)
+    with located(str(run)):
+        result = (
+            adjust_scenario(plan, measurement, full_covariance=covariance)
+            if method == "adjustment"
+            else evaluate_scenario(plan, measurement, method=method, full_covariance=covariance)
+        )
+    write_calibration(result, path, measurement=measurement)
+    for line in evaluation_report(result, measurement, plan):
+        click.echo(line)
+    tell_fit(context, path, (result if isinstance(result, Calibration) else result.calibration).fit)
+
+
+def _step_counts(context: click.Context, option: click.Parameter, text: str | None) -> tuple[int, ...] | None:
+    from stepdiag._core import Plan
+
+    if text is None:
+        return None
+    try:
+        counts = tuple(int(word) for word in text.split(","))
+    except ValueError:
+        counts = (0,)
+    if not all(1 <= count <= Plan.largest_step_count for count in counts):
+        expected = f"numbers from 1 to {Plan.largest_step_count} with commas between them, such as 10,20,50"
+        raise click.BadParameter(f"expected {expected}, got {text!r}")
+    return counts
+
+
+@click.command(epilog="\b\nExample: stepdiag observe scenario.toml --steps 10,20,50,100")
+@click.argument("scenario", type=PATH)
+@click.option(
+    "--steps",
+    metavar="N,N,...",
+    callback=_step_counts,
+    help="Numbers of steps per axis for the table, beside the scenario's own.  [default: 5,10,20,50,100,200]",
+)
+@click.option("-o", "output", type=Writes(OBSERVATION), metavar="FILE", help="Also write the table (CSV).")
+def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | None) -> None:
+    """Tell what SCENARIO's plan and head can determine, and how well, before anyone measures.
+
+    Adjusts an error-free run with the scenario's uncertainties and unknowns. Says which of the 21 parameters
+    and of the set-up's unknowns the readings determine, with which standard uncertainty, what is missing for the
+    others, and how the largest uncertainties grow with the number of steps.
+    """
+    from stepdiag.io.whole_files import write_whole
+    from stepdiag.planning.observation import USUAL_STEPS, observe, prospects
+    from stepdiag.report.observation import observation_report, prospect_csv, prospect_rows
+    from stepdiag.scenario.description import read_scenario
+
+    plan = read_scenario(scenario)
+    path = None if output is None else output.claim(scenario, error_map=plan.error_map)
+    run, found = observe(plan)
+    for line in observation_report(found, run, plan):
+        click.echo(line)
+    table = prospects(plan, [*(steps or USUAL_STEPS), plan.plan.steps])
+    click.echo("largest standard uncertainties by the number of steps, and the mirror that they take:")
+    for line in prospect_rows(table):
+        click.echo(line)
+    if path is not None:
+        write_whole(path, prospect_csv(table))

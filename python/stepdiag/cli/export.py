@@ -1,0 +1,91 @@
+"""The command that writes a calibration for a controller."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from stepdiag.cli.options import PATH, Writes, tell, tell_fit
+from stepdiag.io.outputs import COMP_FILE, COMP_LINES, GRID, ISG_TABLE, KINEMATICS_TABLE, OutputFile, claim_folder
+
+# Those of stepdiag.export.FORMATS, which needs not be imported to show a help text; a test compares.
+FORMATS = ("linuxcnc-comp", "linuxcnc-kins", "isg", "csv-grid")
+KINDS = {"linuxcnc-kins": KINEMATICS_TABLE, "isg": ISG_TABLE, "csv-grid": GRID}
+FOLDER = {"compensation.ini": COMP_LINES} | {f"joint{n}.comp": COMP_FILE for n in range(3)}  # of linuxcnc-comp
+MM = "<X Y Z>"
+
+
+@click.command(
+    epilog="\b\nExamples:\n"
+    "  stepdiag export calibration.csv --to linuxcnc-kins -o machine.csv\n"
+    "  stepdiag export calibration.csv --to linuxcnc-comp --at 400 300 250 -o comp\n"
+    "  stepdiag export calibration.csv --to csv-grid --step 25 -o grid.csv"
+)
+@click.argument("calibration", type=PATH)
+@click.option("--to", "to", required=True, type=click.Choice(FORMATS), help="Format.")
+@click.option(
+    "-o",
+    "output",
+    required=True,
+    type=Writes(*KINDS.values()),
+    metavar="OUT",
+    help="File to write (.csv); of linuxcnc-comp the folder.",
+)
+@click.option("--tool", type=float, nargs=3, metavar=MM, help="Tool offset, mm.  [default: the calibration's]")
+@click.option(
+    "--origin", type=float, nargs=3, metavar=MM, help="Controller's coordinates of home, mm.  [default: 0 0 0]"
+)
+@click.option("--incomplete", is_flag=True, help="Export what is not determined as 0.")
+@click.option(
+    "--approach",
+    type=click.Choice(("mean", "positive", "negative")),
+    help="Of tables with two directions of approach, which is compensated (not linuxcnc-comp).  [default: mean]",
+)
+@click.option(
+    "--at",
+    type=float,
+    nargs=3,
+    metavar=MM,
+    help="Point through which the corrected lines go, mm from home (linuxcnc-comp).  [default: centre of the volume]",
+)
+@click.option("--rows", type=int, metavar="N", help="Most rows of a table (linuxcnc-comp, isg).  [default: 256, 5000]")
+@click.option(
+    "--squareness",
+    type=click.Choice(("straightness", "parameters")),
+    help="Where squareness is written (isg).  [default: straightness]",
+)
+@click.option(
+    "--nodes", type=int, nargs=3, metavar="<NX NY NZ>", help="Points of the grid (csv-grid).  [default: 11 11 11]"
+)
+@click.option("--step", type=float, metavar="MM", help="Largest spacing of the grid, in place of --nodes (csv-grid).")
+@click.option("--accept-rejected", is_flag=True, help="Export a calibration although its fit was rejected.")
+@click.option("--orientation", is_flag=True, default=None, help="Rotations of the tool too (csv-grid).")
+@click.pass_context
+def export(context: click.Context, /, calibration: Path, to: str, output: OutputFile, **options: Any) -> None:
+    """Write a CALIBRATION (CSV or netCDF) for a controller.
+
+    \b
+    linuxcnc-kins  the table of the kinematics module stepdiagkins: all 21 errors
+    linuxcnc-comp  a COMP_FILE for each joint, and the INI lines: positioning errors along three lines
+    isg            volumetric compensation of ISG-CNC and TwinCAT CNC; written from the manual, not tried
+    csv-grid       error vectors on a grid
+
+    Tells the sign convention, the reference point, what resampling loses and what is not compensated. What the
+    calibration does not determine is refused unless --incomplete. An error map is taken too: what it lacks is 0.
+    """
+    from stepdiag.export.common import ExportOptions
+    from stepdiag.export.write import check_fit, export_calibration, read_what_is_exported
+    from stepdiag.io.whole_files import check_input
+
+    if to in KINDS:
+        path = OutputFile(output.path, (KINDS[to],)).claim(calibration)
+    else:
+        path = claim_folder(output.path, FOLDER, marks=["compensation.ini"])
+    check_input(calibration)
+    read = read_what_is_exported(calibration)
+    check_fit(read, f"{calibration}", options["accept_rejected"])
+    for line in export_calibration(read, to, path, ExportOptions(**options)):
+        click.echo(line)
+    if read.fit == "unchecked":
+        tell("warning", f"{calibration}: the fit is unchecked: nothing controlled the readings of this calibration")
+    tell_fit(context, calibration, read.fit)

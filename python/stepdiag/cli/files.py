@@ -1,0 +1,110 @@
+"""The commands that begin with files of one's own, and that tell what a file is."""
+
+from pathlib import Path
+
+import click
+
+from stepdiag._core import InvalidArgument
+from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, tell
+from stepdiag.io.outputs import OutputFile
+
+
+@click.command(epilog="\b\nExample: stepdiag check scenario.toml run.csv")
+@click.argument("files", nargs=-1, required=True, type=PATH, metavar="FILE...")
+@click.pass_context
+def check(context: click.Context, files: tuple[Path, ...]) -> None:
+    """Tell what kind each FILE is, and whether it is sound.
+
+    Knows scenarios, heads and studies (TOML), measurements and calibrations (CSV or netCDF), error maps (CSV)
+    and raw readings (JSON lines). A
+    scenario is checked together with the error map that it names. With one scenario among the files, each measurement
+    is adjusted with it: do its lines, points and distances belong to that plan, and what is the verdict of the fit?
+
+    Exit code 2 if any file is not sound or two do not belong together, 3 if a fit is rejected.
+    """
+    from stepdiag.report.file_check import examine
+
+    sound, untrusted = True, False
+    found: dict[str, list[Path]] = {}
+    for file in files:
+        try:
+            finding = examine(file)
+        except InvalidArgument as error:
+            sound = False
+            tell("error", str(error))
+            continue
+        click.echo(f"{file}: {finding.kind}: {finding.summary}")
+        for warning in finding.warnings:
+            click.echo(f"{file}: warning: {warning}")
+        found.setdefault(finding.kind, []).append(file)
+        untrusted = untrusted or finding.fit == "rejected"
+    if len(found.get("scenario", [])) == 1:
+        from stepdiag.report.scenario_and_run import adjust_run
+
+        (scenario,) = found["scenario"]
+        for run in found.get("measurement", []):
+            try:
+                said, fit = adjust_run(scenario, run)
+            except InvalidArgument as error:
+                sound = False
+                tell("error", str(error))
+                continue
+            for line in said:
+                click.echo(f"{run} with {scenario}: {line}")
+            untrusted = untrusted or fit == "rejected"
+    if not sound:
+        context.exit(2)
+    if untrusted:
+        tell("warning", "a fit is rejected: do not use what comes of it")
+        context.exit(NOT_TO_BE_TRUSTED)
+
+
+@click.command(epilog="\b\nExample: stepdiag init -o machine")
+@click.option("-o", "output", required=True, type=Writes(), metavar="DIR", help="Folder to write.")
+@click.option(
+    "--sheet-for",
+    "scenario",
+    type=PATH,
+    metavar="SCENARIO",
+    help="Write only measurement.csv, for the plan and head of this scenario.",
+)
+@click.option("--head", "head_name", metavar="NAME", help="Begin with a copy of this shipped head (see head list).")
+def init(output: OutputFile, scenario: Path | None, head_name: str | None) -> None:
+    """Begin with your own machine: a scenario to edit and a sheet to fill in.
+
+    Writes scenario.toml, with a comment on every key, and measurement.csv with all commanded points and empty
+    fields for the readings of your instrument. Existing files are never overwritten. After changing the plan
+    in the scenario, make a new sheet with --sheet-for. With --head the scenario's head is head.toml, a copy of a
+    shipped description, in place of a layout.
+    """
+    from stepdiag.config.scenario_template import template
+    from stepdiag.head.description import find_shipped_head
+    from stepdiag.io.whole_files import make_folder, read_text, write_whole
+    from stepdiag.scenario.description import parse_scenario, read_scenario, runs_of
+    from stepdiag.scenario.planned_readings import empty_sheet
+
+    if scenario is not None and head_name is not None:
+        raise InvalidArgument("--head: goes with a new scenario, not with --sheet-for")
+    texts = {}
+    if scenario is not None:
+        plan = read_scenario(scenario)
+    else:
+        texts["scenario.toml"] = template("head.toml" if head_name else None)
+        shipped = find_shipped_head(head_name) if head_name else None
+        if shipped is not None:
+            texts["head.toml"] = read_text(shipped)
+        # As it is read in its new folder, where the head's copy is not yet.
+        plan = parse_scenario(template(head_name))
+    folder = output.path
+    written = [folder / name for name in (*texts, "measurement.csv")]
+    for path in written:
+        if path.exists() or path.is_symlink():
+            raise InvalidArgument(f"{path}: exists already, and is not overwritten")
+    make_folder(folder)
+    for name, text in texts.items():
+        write_whole(folder / name, text)
+    empty_sheet(plan.plan, plan.signals, repeats=runs_of(plan.keys.plan), backward=plan.keys.plan.backward).write(
+        folder / "measurement.csv"
+    )
+    for path in written:
+        click.echo(f"wrote {path}")

@@ -1,0 +1,87 @@
+"""The command that writes the measuring program of a plan."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from stepdiag.cli.options import PATH, out_file, tell
+from stepdiag.io.outputs import PROGRAM, OutputFile
+
+_AXES = ("X", "Y", "Z")
+
+
+@click.command(epilog="\b\nExample: stepdiag nc scenario.toml -o run.ngc --dialect linuxcnc")
+@click.argument("scenario", type=PATH)
+@out_file("Program to write, such as run.ngc (not .nc, which is netCDF here).", PROGRAM)
+@click.option(
+    "--dialect",
+    type=click.Choice(["linuxcnc", "iso"]),
+    default="linuxcnc",
+    show_default=True,
+    help="LinuxCNC's G-code, or words of ISO 6983 that most controllers have.",
+)
+@click.option("--origin", nargs=3, type=float, metavar="X Y Z", help="Where home is, in mm.  [default: 0 0 0]")
+@click.option(
+    "--coordinates",
+    metavar="G5x",
+    help="G53, of the machine, or a work offset G54 to G59.  [default: G53 for linuxcnc, G54 for iso]",
+)
+@click.option(
+    "--limits",
+    nargs=6,
+    type=float,
+    metavar="X X Y Y Z Z",
+    help="Where the travel of X, Y, Z begins and ends, in mm: no move goes further.  [default: unlimited]",
+)
+@click.option(
+    "--overrun", type=float, metavar="MM", help="How far to overrun before a line's first point.  [default: 1]"
+)
+@click.option(
+    "--safe",
+    nargs=3,
+    type=float,
+    metavar="X Y Z",
+    help="Where the axes stand for a set-up.  [default: the middle of X and Y, the far end of Z]",
+)
+@click.option("--retreat", metavar="ORDER", help="Axes one at a time to the safe position.  [default: ZXY]")
+@click.option(
+    "--trigger",
+    type=click.Choice(["handshake", "pulse", "dwell"]),
+    help="How a reading is asked for (docs/measuring.md).  [default: handshake for linuxcnc, dwell for iso]",
+)
+@click.option("--trigger-code", metavar="M80", help="An M-code of yours that asks for a reading.")
+@click.option("--timeout", type=float, metavar="S", help="How long a handshake waits for a reading.  [default: 300]")
+@click.option(
+    "--dwell-word",
+    type=click.Choice(["P", "X", "F", "PMS"]),
+    help="G4 takes seconds as P, X or F, or milliseconds as P (PMS).  [default: P]",
+)
+@click.option("--decimals", type=int, metavar="N", help="Of a millimetre.  [default: 6 for linuxcnc, 4 for iso]")
+@click.option("--align/--no-align", default=None, help="Stop at a line's first point to align the beam.  [default: do]")
+@click.option("--line-numbers", is_flag=True, default=None, help="Number the blocks (iso).")
+def nc(scenario: Path, output: OutputFile, **given: Any) -> None:
+    """Write the measuring program of SCENARIO: G-code for the machine's controller.
+
+    The axes go through the plan's points in its order, with feed and times of [plan_by_time], wait at each, and ask
+    for a reading; acquire takes the readings. Between lines the program stops for head and mirror.
+
+    Positions are those of the axes, counted from home, without tool length. Every visit of a line begins with an
+    overrun, so that all axes come to all points from the side that the plan says.
+    """
+    from stepdiag.io.whole_files import write_whole
+    from stepdiag.program.measuring_program import measuring_program
+    from stepdiag.program.options import Options
+    from stepdiag.scenario.description import read_scenario
+
+    described = read_scenario(scenario)
+    path = output.claim(scenario, error_map=described.error_map)
+    program = measuring_program(
+        described, Options(**{name: value for name, value in given.items() if value is not None})
+    )
+    write_whole(path, program.text)
+    for text in program.unapproached:
+        tell("warning", text)
+    for line in program.summary:
+        click.echo(line)
+    click.echo(f"wrote {path}")

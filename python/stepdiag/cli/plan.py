@@ -1,0 +1,98 @@
+"""The command that chooses a plan by the time that there is."""
+
+import math
+import sys
+from pathlib import Path
+from typing import Any, Literal
+
+import click
+
+from stepdiag.cli.options import PATH, Writes
+from stepdiag.io.outputs import PLANS, PNG, SVG, OutputFile
+
+Family = Literal["length", "angle", "squareness"]
+
+
+class _Positive(click.FloatRange):
+    """Click's range lets NaN pass."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        number = float(super().convert(value, param, ctx))
+        if math.isnan(number):
+            self.fail("expected a positive number, got nan", param, ctx)
+        return number
+
+
+_POSITIVE = _Positive(min=0.0, min_open=True, max=1e9)
+
+
+@click.command(epilog="\b\nExample: stepdiag plan scenario.toml --minutes 30 -o plan.png")
+@click.argument("scenario", type=PATH)
+@click.option(
+    "--minutes",
+    type=_POSITIVE,
+    metavar="T",
+    help="The time that there is.  [default: plan_by_time.minutes of the scenario, 30]",
+)
+@click.option(
+    "--spacing",
+    type=_POSITIVE,
+    metavar="MM",
+    help="Nodes of an axis are to be at most so far apart.  [default: as in the scenario's own plan]",
+)
+@click.option(
+    "--for",
+    "family",
+    type=click.Choice(["length", "angle", "squareness"]),
+    default="length",
+    show_default=True,
+    help="Whose largest standard uncertainty is to be small; length: positioning errors and straightnesses.",
+)
+@click.option(
+    "-o",
+    "output",
+    type=Writes(PNG, SVG, PLANS),
+    metavar="FILE",
+    help="Also draw the curve (.png, .svg), or write all (.csv).",
+)
+def plan(
+    scenario: Path, minutes: float | None, spacing: float | None, family: Family, output: OutputFile | None
+) -> None:
+    """Tell which plan to measure in the time that there is.
+
+    Takes head, uncertainties and unknowns of SCENARIO, and the times of its section [plan_by_time]. For numbers
+    of steps, sets of lines and repeats it finds the time to measure, set-ups included, and the largest standard
+    uncertainties that an adjustment then has, for a machine with the errors of [machine.random].
+
+    The table has the plans that no other beats in time, in distance between nodes, and in uncertainty (see --for).
+    More steps resolve more, take longer, and make each value less certain: it is a sum over more steps.
+    """
+    from stepdiag.io.whole_files import write_whole
+    from stepdiag.planning.plan_by_time import choose, outcomes, own_spacing
+    from stepdiag.report.plan_by_time import advice, left_out_rows, plan_csv, plan_rows
+    from stepdiag.scenario.description import read_scenario
+
+    described = read_scenario(scenario)
+    path = None if output is None else output.claim(scenario, error_map=described.error_map)
+    available = described.keys.plan_by_time.minutes if minutes is None else minutes
+    near = own_spacing(described) if spacing is None else spacing
+    with click.progressbar(length=1, label="plans", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
+
+        def show(done: int, of: int) -> None:
+            bar.length = of
+            bar.update(done - bar.pos)
+
+        found = outcomes(described, show)
+    choice = choose(found, available, near, family)
+    click.echo("largest standard uncertainties by measuring time, for a machine with usual errors:")
+    for line in plan_rows(found, choice, available, family):
+        click.echo(line)
+    for line in [*left_out_rows(found), *advice(found, available, near, family)]:
+        click.echo(line)
+    suffix = "" if path is None else path.suffix.lower().lstrip(".")
+    if path is not None and suffix == "csv":
+        write_whole(path, plan_csv(found))
+    elif path is not None:
+        from stepdiag.figures.plan_by_time import draw_plans
+
+        write_whole(path, draw_plans(found, choice.taken, available, suffix))

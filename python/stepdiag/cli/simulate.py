@@ -1,0 +1,72 @@
+"""The commands that simulate: a run of a scenario, and the demonstrations."""
+
+from pathlib import Path
+
+import click
+
+from stepdiag.cli.options import PATH, Writes, out_file, tell
+from stepdiag.io.outputs import MEASUREMENT, OutputFile
+
+
+@click.command(epilog="\b\nExample: stepdiag simulate scenario.toml -o run.csv")
+@click.argument("scenario", type=PATH)
+@out_file("Measurement file to write, CSV or netCDF (.nc).", MEASUREMENT)
+@click.option("--overwrite", is_flag=True, help="Also where a measurement has this name: it is lost.")
+def simulate(scenario: Path, output: OutputFile, overwrite: bool) -> None:
+    """Simulate the run that SCENARIO (TOML) describes.
+
+    The virtual machine moves through the plan with its errors, and the head reads the mirror at every point.
+    Lost readings are empty fields, in netCDF missing values. A measurement that is there already is kept, unless told
+    to overwrite it.
+    """
+    from stepdiag.io.data_files import write_measurement
+    from stepdiag.scenario.description import read_scenario, simulate_scenario
+    from stepdiag.scenario.map_warnings import scenario_warnings
+
+    described = read_scenario(scenario)
+    path = output.claim(scenario, error_map=described.error_map, overwrite=overwrite)
+    for warning in scenario_warnings(described):
+        tell("warning", warning)
+    write_measurement(simulate_scenario(described), path)
+
+
+@click.command(epilog="\b\nExample: stepdiag demo -o demo")
+@click.option(
+    "-o",
+    "output",
+    type=Writes(),
+    metavar="DIR",
+    help="Folder to write, a new one or that of an earlier demo.  [default: demo, or demo-linuxcnc]",
+)
+@click.option(
+    "--controller",
+    type=click.Choice(["linuxcnc", "calculated"]),
+    help="Close the loop in LinuxCNC, or calculate the same without it.",
+)
+def demo(output: OutputFile | None, controller: str | None) -> None:
+    """Simulate and evaluate the machine of the method's paper, and draw its Figure 5.
+
+    Writes scenarios, truth, runs, calibrations, a table and the figure; go on from them with simulate and
+    evaluate. Written again, they are replaced, unless a scenario was changed.
+
+    With --controller linuxcnc the loop is closed: LinuxCNC runs the measuring program on a virtual machine, the run
+    is evaluated, LinuxCNC compensates with the calibration, and is measured again (docs/loop.md).
+    """
+    from stepdiag.demo.paper import claim_demo, run_demo
+
+    def progress(text: str) -> None:
+        click.echo(text, err=True)
+
+    folder = output.path if output else Path("demo" if controller is None else f"demo-{controller}")
+    if controller is None:
+        lines = run_demo(claim_demo(folder), progress=progress)
+    else:
+        from stepdiag.demo.loop import claim_loop, controller_of, run_loop
+        from stepdiag.linuxcnc.processes import LinuxcncError
+
+        try:
+            lines = run_loop(claim_loop(folder), controller_of(controller), progress=progress)
+        except LinuxcncError as error:
+            raise click.ClickException(str(error)) from error
+    for line in lines:
+        click.echo(line)

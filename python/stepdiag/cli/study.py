@@ -1,0 +1,58 @@
+"""The command that goes through a grid of scenarios."""
+
+import sys
+from pathlib import Path
+
+import click
+
+from stepdiag.cli.options import PATH, out_file, tell
+from stepdiag.cli.workers import chosen_workers, worker_options
+from stepdiag.io.outputs import STUDY, OutputFile
+
+
+@click.command(epilog="\b\nExample: stepdiag study study.toml -o study.nc --workers 2")
+@click.argument("file", type=PATH, metavar="STUDY")
+@out_file("Result to write, netCDF (.nc).", STUDY)
+@click.option("--resume", is_flag=True, help="Go on with what an interrupted study has done.")
+@worker_options
+def study(file: Path, output: OutputFile, resume: bool, scheduler: str | None, workers: int | None) -> None:
+    """Vary keys of a scenario over a grid, each cell with its virtual calibrations.
+
+    STUDY (TOML) names the scenario, the keys and their values, methods and the number of samples; see docs/study.md.
+    The result has a dimension for each key, and of each parameter and family the largest and the median mean,
+    standard uncertainty and coverage interval over its nodes. A cell that cannot be computed says why.
+
+    Finished cells are kept in a file beside the result until it is written.
+    """
+    from stepdiag.uncertainty.study import FinishedCells, run_study
+    from stepdiag.uncertainty.study_keys import read_study
+    from stepdiag.uncertainty.study_table import write_study
+
+    wanted = read_study(file)
+    maps = {str(cell.content["machine"]["errors"]) for cell in wanted.cells() if "errors" in cell.content["machine"]}
+    path = output.claim(file, wanted.scenario, *(wanted.scenario.parent / name for name in maps))
+    finished = FinishedCells(Path(f"{path}.cells"), resume)
+    try:
+        with (
+            chosen_workers(scheduler, workers) as chosen,
+            click.progressbar(length=1, label="cells", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar,
+        ):
+
+            def show(done: int, of: int) -> None:
+                bar.length = of
+                bar.update(done - bar.pos)
+
+            results = run_study(wanted, finished, workers=chosen, progress=show)
+        write_study(wanted, results, path)
+    except BaseException:
+        finished.close()
+        if finished.path.stat().st_size == 0:
+            finished.remove()
+        else:
+            tell("interrupted", f"{finished.path} keeps what is done; the same command with --resume goes on")
+        raise
+    finished.remove()
+    failures = [result.failure for result in results.values() if result.failure]
+    click.echo(f"wrote {path}: {len(results)} cells of {' x '.join(map(str, wanted.shape))}")
+    for failure in dict.fromkeys(failures):
+        click.echo(f"no result in {failures.count(failure)} cells: {failure}")

@@ -1,0 +1,265 @@
+"""The command that tells how uncertain a calibration would be: propagation, and virtual calibrations by the million."""
+
+import math
+import re
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from stepdiag._core import InvalidArgument
+from stepdiag.cli.options import PATH, Writes, tell
+from stepdiag.cli.workers import chosen_workers, worker_options
+from stepdiag.io.outputs import CHECKPOINT, UNCERTAINTY, OutputFile
+
+if TYPE_CHECKING:
+    from stepdiag.scenario.description import Scenario
+    from stepdiag.uncertainty.dask_workers import Workers
+    from stepdiag.uncertainty.result import UncertaintyResult
+    from stepdiag.uncertainty.run import UncertaintyRequest
+
+Point = tuple[tuple[float, float, float], tuple[float, float, float] | None]
+
+
+def _sample_count(context: click.Context, option: click.Parameter, text: str | None) -> int | None:
+    """A whole number, also as 1e6."""
+    if text is None:
+        return None
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not (1.0 <= number <= 1e12 and number == math.floor(number)):
+        raise click.BadParameter(f"expected a whole number such as 100000 or 1e6, got {text!r}")
+    return int(number)
+
+
+def _points(context: click.Context, option: click.Parameter, texts: tuple[str, ...]) -> list[Point]:
+    """Three numbers, or six: the tool's offset behind them."""
+    result: list[Point] = []
+    for text in texts:
+        try:
+            numbers = [float(word) for word in text.split(",")]
+        except ValueError:
+            numbers = []
+        if len(numbers) not in (3, 6) or not all(map(math.isfinite, numbers)):
+            expected = "X,Y,Z in mm, or X,Y,Z and the offset of a tool behind them"
+            raise click.BadParameter(f"expected {expected}, such as 400,300,250, got {text!r}")
+        x, y, z, *offset = numbers
+        result.append(((x, y, z), (offset[0], offset[1], offset[2]) if offset else None))
+    return result
+
+
+@click.command(epilog="\b\nExample: stepdiag uncertainty scenario.toml -n 1e6 --compare -o uncertainty.nc")
+@click.argument("scenario", type=PATH)
+@click.option(
+    "-n",
+    "samples",
+    metavar="SAMPLES",
+    callback=_sample_count,
+    help="Virtual calibrations of the Monte Carlo method, such as 1e6; with --adaptive at most so many.",
+)
+@click.option(
+    "-m",
+    "method",
+    type=click.Choice(["adjustment", "enhanced", "conventional", "one_step"]),
+    default="adjustment",
+    show_default=True,
+    help="What each of them is evaluated with.",
+)
+@click.option("--adaptive", is_flag=True, help="As many samples as the digits need (JCGM 101, 7.9).")
+@click.option(
+    "--digits",
+    type=click.IntRange(1, 3),
+    default=2,
+    show_default=True,
+    help="Significant digits of standard uncertainties, for --adaptive and --compare.",
+)
+@click.option(
+    "--coverage",
+    type=float,
+    default=0.95,
+    show_default=True,
+    metavar="P",
+    help="Probability of coverage intervals and expanded uncertainties.",
+)
+@click.option("--seed", type=click.IntRange(0, 2**64 - 1), default=0, show_default=True, help="Of all that is drawn.")
+@click.option("--threads", type=click.IntRange(0), default=0, metavar="N", help="By default all that the computer has.")
+@click.option("--covariance", is_flag=True, help="Also the covariance of all outputs (needs -o with .nc).")
+@click.option(
+    "--keep", multiple=True, metavar="NAME", help="Keep all samples of an output, such as C0Y or EXX@400 (with .nc)."
+)
+@click.option(
+    "--joint", multiple=True, metavar="NAMES", help="Joint coverage region of two or three outputs, such as C0Y,B0Z."
+)
+@click.option("--compare", is_flag=True, help="Validate the propagation by the Monte Carlo method (JCGM 101, 8).")
+@click.option(
+    "--point",
+    "points",
+    multiple=True,
+    metavar="X,Y,Z[,TOOL]",
+    callback=_points,
+    help="Also the error vector there; TOOL: another offset x,y,z than the scenario's.",
+)
+@click.option("--volume", is_flag=True, help="Also the volumetric accuracy V_XYZ (ISO 230-1) and the body diagonals.")
+@click.option(
+    "--checkpoint",
+    type=Writes(CHECKPOINT),
+    metavar="FILE",
+    help="What is done (.checkpoint), every ten seconds and at the end; by default only of a run that was interrupted, "
+    "beside -o. One that is there already is never overwritten: --resume, or remove it.",
+)
+@click.option("--resume", is_flag=True, help="Go on from the checkpoint, to the same bits.")
+@click.option("--inputs", "list_inputs", is_flag=True, help="Only list the uncertain inputs by name.")
+@click.option(
+    "-o", "output", type=Writes(UNCERTAINTY), metavar="FILE", help="Result to write, netCDF (.nc) or CSV (.csv)."
+)
+@worker_options
+def uncertainty(
+    scenario: Path,
+    samples: int | None,
+    method: Any,
+    adaptive: bool,
+    digits: int,
+    coverage: float,
+    seed: int,
+    threads: int,
+    covariance: bool,
+    keep: tuple[str, ...],
+    joint: tuple[str, ...],
+    compare: bool,
+    points: list[Point],
+    volume: bool,
+    checkpoint: OutputFile | None,
+    resume: bool,
+    list_inputs: bool,
+    output: OutputFile | None,
+    scheduler: str | None,
+    workers: int | None,
+) -> None:
+    """Tell how uncertain a calibration of SCENARIO's machine would be, by what its [uncertainty] names.
+
+    Without -n by the law of propagation alone (GUM): tables by family of parameters, and where the largest
+    uncertainties come from. With -n also by the Monte Carlo method (JCGM 101): whole virtual calibrations, each
+    with inputs drawn from their distributions, every pose traced, noise added, and evaluated.
+
+    \b
+    adjustment    all readings at once and exactly: what evaluate does
+    enhanced      distances, tilts and scale lines, to first order: ten times faster
+    conventional  the distances of body diagonals
+    one_step      the adjustment's first step from the solution without deviations
+    """
+    from stepdiag.io.data_files import is_netcdf
+    from stepdiag.report.uncertainty import input_rows, opening_rows, result_rows
+    from stepdiag.scenario.description import read_scenario
+    from stepdiag.scenario.map_warnings import scenario_warnings
+    from stepdiag.uncertainty.run import UncertaintyRequest
+
+    kept = checkpoint or OutputFile(Path(f"{output.path if output else scenario.stem}.checkpoint"), (CHECKPOINT,))
+    wanted = UncertaintyRequest(
+        method=method,
+        samples=samples,
+        adaptive=adaptive,
+        digits=digits,
+        coverage=coverage,
+        seed=seed,
+        threads=threads,
+        covariance=covariance,
+        keep=keep,
+        joint=tuple(tuple(re.split(r",(?![^(]*\))", names)) for names in joint),  # not within X at (1, 2, 3)
+        compare=compare,
+        points=tuple(points),
+        volume=volume,
+        checkpoint=kept.path,
+        resume=resume,
+    )
+    wanted.check()
+    if (scheduler is not None or workers is not None) and not wanted.draws:
+        raise InvalidArgument("--scheduler and --workers: go with the Monte Carlo method: -n or --adaptive")
+    if checkpoint is not None and not wanted.draws:
+        raise InvalidArgument("--checkpoint: goes with the Monte Carlo method: -n or --adaptive")
+    if (covariance or keep) and (output is None or not is_netcdf(output.path)):
+        raise InvalidArgument(f"{'--covariance' if covariance else '--keep'}: expected -o with a name that ends in .nc")
+    described = read_scenario(scenario)
+    path = None if output is None else output.claim(scenario, error_map=described.error_map)
+    if list_inputs:
+        for line in input_rows(described.uncertain):
+            click.echo(line)
+        return
+    if wanted.draws:
+        others = [scenario] if path is None else [scenario, path]
+        kept.claim(*others, error_map=described.error_map, overwrite=resume)
+    for warning in scenario_warnings(described):
+        tell("warning", warning)
+    with _kept(wanted, KeyboardInterrupt), chosen_workers(scheduler, workers) as chosen:
+        result = _evaluate(described, wanted, chosen)
+    with _kept(wanted, BaseException):
+        if path is not None:
+            from stepdiag.uncertainty.write import write_uncertainty
+
+            write_uncertainty(result, path)
+        for line in (*opening_rows(result), *result_rows(result)):
+            click.echo(line)
+    if wanted.draws and checkpoint is None:  # one that was named can go on to more samples
+        kept.path.unlink(missing_ok=True)
+
+
+@contextmanager
+def _kept(wanted: "UncertaintyRequest", errors: type[BaseException]) -> Iterator[None]:
+    """Says how to go on where one of these errors ends the block."""
+    try:
+        yield
+    except errors as error:
+        if wanted.draws and wanted.checkpoint is not None and wanted.checkpoint.exists():
+            tell("interrupted", f"{wanted.checkpoint} keeps what is done; the same command with --resume goes on")
+        elif isinstance(error, KeyboardInterrupt):
+            tell("interrupted", "nothing was kept")
+        if isinstance(error, KeyboardInterrupt):
+            raise click.Abort from None
+        raise
+
+
+def _evaluate(scenario: "Scenario", wanted: "UncertaintyRequest", workers: "Workers | None") -> "UncertaintyResult":
+    """With a progress bar."""
+    from stepdiag.uncertainty.packed_calibrations import pack_calibrations
+    from stepdiag.uncertainty.run import evaluate_uncertainty
+
+    executor = workers.executor(pack_calibrations(scenario.path, wanted)) if workers is not None else None
+    with Bar() as bar:
+        return evaluate_uncertainty(scenario, wanted, bar.show, executor)
+
+
+class Bar:
+    """Samples done, their rate and the time left, on standard error where that is a terminal."""
+
+    def __init__(self) -> None:
+        self._bar: Any = None
+        self._done = 0
+        self._start = 0.0
+        self._first = 0
+
+    def __enter__(self) -> "Bar":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._bar is not None:
+            self._bar.render_finish()
+
+    def show(self, done: int, total: int) -> None:
+        """Called several times a second."""
+        now = time.monotonic()
+        if self._bar is None:
+            if not sys.stderr.isatty():
+                return
+            self._bar = click.progressbar(
+                length=total, label="virtual calibrations", file=sys.stderr, item_show_func=lambda rate: rate
+            )
+            self._start, self._first = now, done
+        rate = (done - self._first) / max(now - self._start, 1e-9)
+        self._bar.length = total
+        self._bar.update(done - self._done, f"{rate:,.0f} a second" if done > self._first else "")
+        self._done = done

@@ -1,0 +1,163 @@
+"""The keys of a scenario that say what it is measured with, and in what air: `[head]`, `[line]`, `[environment]`."""
+
+from typing import Annotated, Final, Literal
+
+from pydantic import Field
+
+from stepdiag.config.key_types import (
+    POSITIVE,
+    POSITIVE_LENGTH,
+    READING_MODEL,
+    SHARE,
+    THREE_ANGLES,
+    THREE_LENGTHS,
+    AngleTriple,
+    Length,
+    Pair,
+    Positive,
+    PositiveLength,
+    ReadingModel,
+    Section,
+    Share,
+    Triple,
+    key,
+    tables,
+)
+
+
+class PoseErrorKeys(Section):
+    """How a component of the described head stands out of its place, along the head's axes. Used by `simulate` only."""
+
+    shift_mm: Triple = key(THREE_LENGTHS, "Shift along the head's x, y, z.", (0.0, 0.0, 0.0))
+    rotation_urad: AngleTriple = key(
+        THREE_ANGLES, "Rotation vector, about the component's own origin.", (0.0, 0.0, 0.0)
+    )
+
+
+class HeadKeys(Section):
+    """What `[head]` and `[head.NAME]` have in common."""
+
+    layout: Literal["ideal", "psd", "multi_beam"] | None = key(
+        '"ideal", "psd" or "multi_beam"',
+        "Readings by their closed definition: `ideal` reads distance and two tilts, `psd` distance and spot, "
+        "`multi_beam` three or more distances. Required, unless there is a `description`.",
+        None,
+        "ideal",
+    )
+    description: Annotated[str, Field(min_length=1)] | None = key(
+        "the name of a shipped head, or the path of a head description (TOML)",
+        "Readings by ray tracing of a described head (docs/head.md); a path is relative to this file.",
+        None,
+        "beam_and_psd",
+    )
+    standoff_mm: PositiveLength = key(POSITIVE_LENGTH, "Distance from head to mirror at a line's first point.", 100.0)
+    mirror_mm: tuple[PositiveLength, PositiveLength] | None = key(
+        "two positive lengths in mm",
+        "Width and height of the mirror; by default as large as the plan needs. A beam that misses it is a lost "
+        "reading of `ideal` and of described heads; the layouts `psd` and `multi_beam` lose none.",
+        None,
+        [120.0, 120.0],
+    )
+    psd_distance_mm: Length | None = key(
+        "a length in mm",
+        "Distance from reference plane to position sensing device; required for the layout `psd`.",
+        None,
+        50.0,
+    )
+    beam_offsets_mm: tuple[Pair, ...] | None = key(
+        "a list of pairs of lengths in mm",
+        "Offsets (u, v) of the beams in the reference plane; required for the layout `multi_beam`, at least three.",
+        None,
+        [[0.0, 0.0], [20.0, 0.0], [0.0, 20.0]],
+    )
+    wavelength_nm: Positive = key(
+        POSITIVE, "Vacuum wavelength, for the index of the air; a description has one for each beam.", 1530.0
+    )
+    aperture_mm: PositiveLength = key(
+        POSITIVE_LENGTH,
+        "Edge of the square that takes the beam back. A beam outside it is a lost reading of `ideal`; "
+        "the other layouts lose none.",
+        50.0,
+    )
+    reading_model: ReadingModel | None = key(
+        READING_MODEL,
+        "What the interferometers of a description read; by default what it says for each.",
+        None,
+        "coupled_mode",
+    )
+    pose_errors: dict[str, PoseErrorKeys] = tables("COMPONENT")
+
+
+class HeadSection(HeadKeys):
+    """The measuring head and its mirror: a `layout`, or a `description` of its optics.
+
+    `[head.NAME]` describes further heads; each replaces the keys that it names, and has the others from `[head]`.
+    `[line.LINE]` says which of them measures a line; a line without is measured with that of `[head]`. All heads of a
+    run have the same layout and number of beams."""
+
+    verified_share: Share = key(
+        SHARE, "Described heads: share of the poses whose replay is compared with the full trace.", 1e-3
+    )
+    tilts: bool = key(
+        "true or false",
+        "false: distances only. Runs and sheets have no tilts or spots, and an evaluation does not look at those of a "
+        "run that has them. Not for beams d1, d2, ...",
+        True,
+    )
+    by_head: dict[str, HeadKeys] = tables("NAME")
+
+
+# Keys of [head] that go with a layout or a description alone.
+LAYOUT_KEYS: Final = ("psd_distance_mm", "beam_offsets_mm", "wavelength_nm", "aperture_mm")
+DESCRIPTION_KEYS: Final = ("reading_model", "pose_errors")
+
+
+class LineKeys(Section):
+    """What is particular to one line, such as `[line.ppp]`."""
+
+    head: Annotated[str, Field(min_length=1)] = key(
+        "the name of a head", "The `[head.NAME]` that measures it.", example="left"
+    )
+
+
+class AirKeys(Section):
+    """The state of the air, or its index."""
+
+    refractive_index: Annotated[float, Field(ge=1.0, le=2.0)] | None = key(
+        "a refractive index from 1 to 2",
+        "Index at every wavelength, in place of the keys below.",
+        None,
+        1.0,
+    )
+    temperature_c: Annotated[float, Field(ge=-40.0, le=100.0)] | None = key(
+        "a temperature from -40 to 100", "By default 20, if any of these keys is there.", None, 20.0
+    )
+    pressure_hpa: Annotated[float, Field(ge=100.0, le=1400.0)] | None = key(
+        "a pressure from 100 to 1400", "By default 1013.25.", None, 1013.25
+    )
+    humidity_percent: Annotated[float, Field(ge=0.0, le=100.0)] | None = key(
+        "a relative humidity from 0 to 100", "By default 50.", None, 50.0
+    )
+    co2_ppm: Annotated[float, Field(ge=0.0, le=2000.0)] | None = key(
+        "a number from 0 to 2000", "Carbon dioxide by volume, for Ciddor's equation alone; by default 450.", None, 450.0
+    )
+    equation: Literal["ciddor", "modified_edlen", "edlen_1966"] | None = key(
+        '"ciddor", "modified_edlen" or "edlen_1966"', "From state to index; by default Ciddor's.", None, "ciddor"
+    )
+
+
+class AssumedAirKeys(AirKeys):
+    """The air that readings are reduced with, where the instrument takes it to be another.
+
+    Keys that are not named are as in `[environment]`. By default the true air."""
+
+
+class EnvironmentSection(AirKeys):
+    """The air around machine and head, constant over a run: a `refractive_index`, or the state of the air.
+
+    Without any key: air of 20 °C before a described head, an index of 1 before one by its layout; but with a key in
+    `[environment.assumed]` air of 20 °C before every head.
+
+    Used by `simulate` only. The equations hold for wavelengths of 300 to 1700 nm."""
+
+    assumed: AssumedAirKeys | None = None

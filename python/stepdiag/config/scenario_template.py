@@ -1,0 +1,50 @@
+"""The commented new scenario, made from the scenario's keys."""
+
+import textwrap
+from typing import Any, Final
+
+from pydantic.fields import FieldInfo
+
+from stepdiag.config.key_errors import expectation
+from stepdiag.config.key_reference import Part, keys, paragraphs, sections, show_full
+from stepdiag.config.scenario_keys import ScenarioKeys
+
+# Keys that a new scenario has although they are not required. Without scale lines the slopes of the positioning errors
+# stay unknown.
+OFFERED: Final = (("plan", "scale_lines"),)
+
+
+def template(head: str | None = None) -> str:
+    """A complete scenario with a comment on every key; optional keys are commented out. `head`: a description."""
+    given = {("head", "layout"): None, ("head", "description"): head} if head else {}
+    offered = {*OFFERED, ("head", "description" if head else "layout")}
+    lines = [
+        "# A scenario for stepdiag: machine, plan and head. The end of a key is its unit.",
+        "",
+    ]
+    for part in sections(ScenarioKeys):
+        active = part.required and "." not in part.title
+        lines += [*_comment(paragraphs(part.model)), f"{'' if active else '# '}[{_named(part)}]"]
+        for name, field in keys(part.model):
+            place = (part.title, name)
+            is_given = (active and field.is_required()) or place in offered
+            lines += _comment(f"{field.description} Expected: {expectation(field)}.")
+            value = given.get(place) or _example(field)
+            lines.append(f"{'' if is_given else '# '}{name} = {show_full(value)}")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _named(part: Part) -> str:
+    return part.title.replace("LINE", "ppp").replace("COMPONENT", "window")
+
+
+def _example(field: FieldInfo) -> Any:
+    extra = field.json_schema_extra
+    example = extra.get("example") if isinstance(extra, dict) else None
+    return field.default if example is None else example
+
+
+def _comment(text: str) -> list[str]:
+    plain = text.replace("**", "").replace("`", "")
+    return [f"# {line}" for paragraph in plain.split("\n\n") for line in textwrap.wrap(paragraph, 110)]

@@ -1,0 +1,1 @@
+"""The demonstrations: the paper's figure, and the closed loop."""

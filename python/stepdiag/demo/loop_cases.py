@@ -1,0 +1,122 @@
+"""The machines of the closed loop: their truths, and the scenarios that they are measured with.
+
+The head is three beams in a triangle, one for each axis of one IDS3010. Of a triangle of radius r with a noise s of
+each distance, their mean is known to s/sqrt(3) and the mirror's tilts to s/(r sqrt(3/2)): 0.1 µm and 1 µrad make
+r = 81.65 mm.
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from stepdiag import _core
+from stepdiag.io.whole_files import make_folder, write_whole
+
+VOLUME: Final = (800.0, 600.0, 500.0)
+STEPS: Final = 50
+CHAIN: Final = "[w X' b Y Z t]"
+TOOL: Final = (0.0, 0.0, -50.0)
+SEED: Final = 0
+FINER: Final = 8  # nodes of the truth to a step of the plan, at least
+SCREW_PITCH: Final = 10.0  # mm
+SCREW_AMPLITUDE: Final = 0.003  # mm
+
+DISTANCE_NOISE: Final = 1e-4  # mm, of each beam
+TILT_NOISE: Final = 1e-6  # rad
+RADIUS: Final = DISTANCE_NOISE / TILT_NOISE / math.sqrt(1.5)
+
+
+@dataclass(frozen=True)
+class LoopCase:
+    """A machine and how it is measured; folders and tables call it by its name."""
+
+    name: str
+    title: str
+    screw: bool = False
+    noise: bool = False
+
+    @property
+    def truth(self) -> str:
+        """The file of its errors."""
+        return "truth_screw.csv" if self.screw else "truth.csv"
+
+
+CLEAN: Final = LoopCase("clean", "no noise, mirror and laser out of true")
+SCREW: Final = LoopCase("screw", "the same with a screw error of 10 mm pitch and 3 µm", screw=True)
+NOISE: Final = LoopCase("noise", "as clean, with noise of 0.1 µm and 1 µrad", noise=True)
+CASES: Final = (CLEAN, SCREW, NOISE)
+
+
+def finer(steps: int) -> int:
+    """How many nodes of the truth there are to a step: as many as resolve the screw, with few steps too."""
+    return -(-FINER * STEPS // steps)
+
+
+def write_truth(case: LoopCase, folder: Path, steps: int = STEPS) -> None:
+    """The errors of a case's machine, with nodes at those of the plan and at least FINER times as many."""
+    screw = {"screw_pitch": SCREW_PITCH, "screw_amplitude": SCREW_AMPLITUDE} if case.screw else {}
+    truth = _core.random_error_map(VOLUME, seed=SEED, intervals=steps * finer(steps), **screw)
+    truth.write(folder / case.truth, chain=_core.Chain(CHAIN), volume=VOLUME, tool=TOOL)
+
+
+def write_scenario(case: LoopCase, folder: Path, steps: int = STEPS, seed: int = 1) -> Path:
+    """The scenario of a case; `seed` is that of its noise. The truth lies in the folder above."""
+    make_folder(folder)
+    path = folder / "scenario.toml"
+    write_whole(path, scenario_text(case, steps, seed))
+    return path
+
+
+def scenario_text(case: LoopCase, steps: int = STEPS, seed: int = 1) -> str:
+    """What there is to know of a case, as a scenario file."""
+    beams = [
+        [round(RADIUS * math.cos(angle), 4), round(RADIUS * math.sin(angle), 4)]
+        for angle in (math.radians(90), math.radians(210), math.radians(330))
+    ]
+    noise = ["", "[noise]", f"distance_um = {DISTANCE_NOISE * 1e3:g}", f"seed = {seed}"] if case.noise else []
+    return "\n".join(
+        [
+            f"# The closed loop in a controller: {case.title}",
+            "[volume]",
+            *(f"{axis}_mm = {edge}" for axis, edge in zip("xyz", VOLUME, strict=True)),
+            "",
+            "[machine]",
+            f'chain = "{CHAIN}"',
+            f"tool_mm = {list(TOOL)}",
+            f'errors = "../{case.truth}"',
+            "",
+            "[plan]",
+            'lines = ["ppp", "npp", "pnp", "nnp"]',
+            f"steps = {steps}",
+            'scale_lines = ["p00", "0p0", "00p"]',
+            "",
+            "# Three beams, one for each axis of an IDS3010",
+            "[head]",
+            'layout = "multi_beam"',
+            f"beam_offsets_mm = {beams}",
+            "",
+            "[misalignment]",
+            "reflector_urad = [100.0, 300.0]",
+            "laser_urad = [200.0, -150.0]",
+            "",
+            "# The three axes of the instrument begin to count at the same distance, and nothing else is out of true:",
+            "# the uncertainties that are stated are of what is in the readings.",
+            "[adjustment]",
+            'beam_constants_um = "fixed"',
+            'lateral_mm = "fixed"',
+            'roll_urad = "fixed"',
+            'gain = "fixed"',
+            *(f'{line}.laser_urad = "fixed"' for line in ("p00", "0p0", "00p")),
+            "",
+            "# A virtual machine is at once where it is sent; what is left is the controller's own time.",
+            "[plan_by_time]",
+            "feed_mm_per_min = 60000000.0",
+            "acceleration_mm_per_s2 = 1e9",
+            "settle_s = 0.0",
+            "measure_s = 0.02",
+            "line_change_min = 0.0",
+            *noise,
+            "",
+        ]
+    )

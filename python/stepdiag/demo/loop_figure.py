@@ -1,0 +1,88 @@
+"""The picture of the closed loop: errors before and after, what a screw leaves, and noise against its statement."""
+
+import math
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from stepdiag.demo.loop_outcome import LoopOutcome
+from stepdiag.demo.loop_points import Agreement, FloatArray
+from stepdiag.demo.loop_report import UM, WORDS, left_along
+from stepdiag.style import own_style, save
+
+SHOWN: Final = 100.0  # mm of X in the screw's panel
+DASHES: Final = {"nodes": "-", "random": "--"}
+
+
+def draw_loop(outcomes: list[LoopOutcome], repeated: dict[str, Agreement] | None) -> dict[str, bytes]:
+    """The figure as the content of files, by name."""
+    with own_style():
+        figure = Figure(figsize=(12.0, 3.9), layout="constrained")
+        left, middle, right = figure.subplots(1, 3)
+        draw_errors(left, outcomes)
+        for outcome in outcomes:
+            if outcome.case.screw:
+                draw_screw(middle, outcome)
+            if outcome.case.noise:
+                draw_noise(right, outcome, repeated)
+        return {f"loop.{suffix}": save(figure, suffix) for suffix in ("png", "svg")}
+
+
+def draw_errors(axes: Axes, outcomes: list[LoopOutcome]) -> None:
+    """Of all points the share whose error is smaller."""
+    for number, outcome in enumerate(outcomes):
+        for kind, points in outcome.points.items():
+            label = f"{outcome.case.name}, {WORDS[kind]}"
+            draw_shares(axes, lengths(points.after), color=f"C{number}", linestyle=DASHES[kind], label=label)
+    before = outcomes[0].points["random"].before
+    draw_shares(axes, lengths(before), color="0.4", linestyle="-", label="before")
+    axes.set_xscale("log")
+    axes.set_xlim(1e-7, 3e2)  # room for the legend
+    axes.set_xlabel("error of the functional point, µm")
+    axes.set_ylabel("share of points with a smaller one")
+    axes.set_title("Volumetric error before and after compensation")
+    axes.legend(fontsize=7, loc="upper left")
+
+
+def lengths(errors: FloatArray) -> FloatArray:
+    """In µm."""
+    return np.asarray(np.linalg.norm(errors, axis=1) * UM)
+
+
+def draw_shares(axes: Axes, values: FloatArray, *, color: str, linestyle: str, label: str) -> None:
+    shares = np.arange(1, len(values) + 1) / len(values)
+    axes.plot(np.sort(values), shares, color=color, linestyle=linestyle, label=label, linewidth=1.2)
+
+
+def draw_screw(axes: Axes, outcome: LoopOutcome) -> None:
+    """Along the first part of X, what is left in X."""
+    fine, nodes = np.linspace(0.0, SHOWN, 1001), outcome.scenario.plan.nodes("X")
+    nodes = nodes[nodes <= SHOWN]
+    targets = np.zeros((len(fine), 3))
+    targets[:, 0] = fine
+    axes.plot(fine, outcome.machine.error(targets)[:, 0] * UM, color="0.4", label="before", linewidth=1.2)
+    axes.plot(fine, left_along(outcome, 0, fine)[:, 0] * UM, color="C1", label="after", linewidth=1.2)
+    axes.plot(nodes, left_along(outcome, 0, nodes)[:, 0] * UM, "o", color="C1", markersize=4, label="after, at nodes")
+    axes.set_xlabel("X, mm")
+    axes.set_ylabel("error in X, µm")
+    axes.set_title("A screw error of 10 mm pitch stays between nodes")
+    axes.legend(fontsize=7)
+
+
+def draw_noise(axes: Axes, outcome: LoopOutcome, repeated: dict[str, Agreement] | None) -> None:
+    """Errors by the uncertainty that the calibration states, and the chi-square distribution that they should have."""
+    for kind, found in outcome.agreement.items():
+        draw_shares(axes, found.chi_square, color="C2", linestyle=DASHES[kind], label=f"this run, {WORDS[kind]}")
+    for kind, found in (repeated or {}).items():
+        label = f"repetitions, {WORDS[kind]}"
+        draw_shares(axes, found.chi_square, color="C3", linestyle=DASHES[kind], label=label)
+    x = np.linspace(0.0, 20.0, 400)
+    expected = [math.erf(math.sqrt(v / 2.0)) - math.sqrt(2.0 * v / math.pi) * math.exp(-v / 2.0) for v in x]
+    axes.plot(x, expected, color="0.0", linewidth=0.8, label="expected, three degrees of freedom")
+    axes.set_xlim(0.0, 20.0)
+    axes.set_xlabel("chi-square of the error vector")
+    axes.set_ylabel("share of points with a smaller one")
+    axes.set_title("Noise: what is left, by the calibration's own uncertainty")
+    axes.legend(fontsize=7, loc="lower right")

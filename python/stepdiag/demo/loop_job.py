@@ -1,0 +1,72 @@
+"""What a controller is asked to do in the loop, whichever it is: a measuring program, then points to go to."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from stepdiag import _core
+from stepdiag.acquisition.run_from_raw import PICOMETRES
+from stepdiag.acquisition.twin_instrument import TwinInstrument
+from stepdiag.demo.loop_cases import CHAIN
+from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.order_of_run import visits_of
+
+FloatArray = npt.NDArray[np.float64]
+PATIENCE: Final = 20.0  # s for one reading
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Job:
+    """One start of the controller."""
+
+    scenario: Scenario  # of the machine that it moves
+    program: Path  # the measuring program (nc)
+    run: Path  # the measurement file to write
+    points: FloatArray  # (n, 3) machine positions, mm
+    table: Path | None = None  # the calibration that it compensates with
+
+
+class Controller(Protocol):
+    """Does a job: writes the run, and returns where the axes stood for the points, (n, 3), mm."""
+
+    name: str
+
+    def do(self, job: Job, say: Say) -> FloatArray: ...
+
+
+class Calculated:
+    """No controller, but the same compensator and the same instrument, without program, sockets and clock."""
+
+    name = "no controller (calculated)"
+
+    def do(self, job: Job, say: Say) -> FloatArray:
+        instrument = TwinInstrument(job.scenario)
+        rows = []
+        visits = list(visits_of(job.scenario))
+        for visit in visits:
+            for index, joints in enumerate(self._joints(job, visit.positions)):
+                instrument.move_to(joints)
+                if index == 0:
+                    instrument.visit(visit.number)
+                warnings, picometres = instrument.positions()
+                rows.append(np.where(warnings, np.nan, np.array(picometres) / PICOMETRES))
+        readings = np.array(rows)
+        _core.Measurement(
+            [visit.line for visit in visits for _ in visit.points],
+            [int(point) for visit in visits for point in visit.points],
+            np.concatenate([visit.positions for visit in visits]),
+            {name: readings[:, i] for i, name in enumerate(job.scenario.signals)},
+            run=[visit.run for visit in visits for _ in visit.points],
+            direction=[visit.direction for visit in visits for _ in visit.points],
+        ).write(job.run)
+        return self._joints(job, job.points)
+
+    def _joints(self, job: Job, targets: FloatArray) -> FloatArray:
+        if job.table is None:
+            return targets
+        return _core.Compensator(job.table, CHAIN).command(targets)

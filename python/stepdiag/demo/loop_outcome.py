@@ -1,0 +1,133 @@
+"""A case of the closed loop: the machine is measured, calibrated, compensated and measured again."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from stepdiag import _core
+from stepdiag.demo.loop_cases import CHAIN, NOISE, LoopCase, scenario_text, write_scenario, write_truth
+from stepdiag.demo.loop_job import PATIENCE, Controller, FloatArray, Job
+from stepdiag.demo.loop_points import Agreement, Sizes, agreement, covariances, errors_at, grid_nodes, random_points
+from stepdiag.demo.loop_recheck import Translations, translations
+from stepdiag.io.whole_files import write_whole
+from stepdiag.program.measuring_program import measuring_program
+from stepdiag.program.options import Options
+from stepdiag.scenario.description import Scenario, adjust_scenario, parse_scenario, read_scenario, simulate_scenario
+
+POINTS_OF_A_SEED: Final = 100  # of each kind
+POINT_SEED: Final = 2026
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class PointSet:
+    """Points that the controller went to, and the errors there, (n, 3), mm."""
+
+    targets: FloatArray
+    before: FloatArray
+    after: FloatArray
+
+
+@dataclass(frozen=True)
+class LoopOutcome:
+    """What the loop made of a case."""
+
+    case: LoopCase
+    scenario: Scenario
+    machine: _core.Machine
+    calibration: _core.Calibration
+    table: Path
+    points: dict[str, PointSet]  # "nodes" and "random"
+    first: Translations  # of the runs before and after compensation
+    second: Translations
+    agreement: dict[str, Agreement]  # with noise: by kind of points
+
+
+def run_case(
+    case: LoopCase,
+    folder: Path,
+    controller: Controller,
+    standing: FloatArray | None,
+    steps: int,
+    counts: tuple[int, int],
+    progress: Progress,
+) -> tuple[LoopOutcome, FloatArray]:
+    """Measures, calibrates, compensates and measures again; also returns where the axes stood for the points before."""
+    here, later = folder / case.name, folder / f"{case.name}-again"
+    write_truth(case, folder, steps)
+    scenario = read_scenario(write_scenario(case, here, steps))
+    compensated = read_scenario(write_scenario(case, later, steps, seed=2))  # other noise
+    program, table = here / "program.ngc", here / "calibration.csv"
+    made = measuring_program(scenario, Options(timeout=PATIENCE))
+    write_whole(program, made.text)
+    sets = {
+        "nodes": grid_nodes(scenario.plan, counts[0], POINT_SEED),
+        "random": random_points(scenario.plan, counts[1], POINT_SEED),
+    }
+    points = np.concatenate(list(sets.values()))
+
+    def say(text: str) -> None:
+        progress(f"{case.name}: {text}")
+
+    say(f"measure the machine, {made.readings} readings: {case.title}")
+    went = controller.do(Job(scenario, program, here / "run.csv", points if standing is None else points[:0]), say)
+    standing = went if standing is None else standing
+    run = _core.read_measurement(here / "run.csv")
+    say("evaluate")
+    calibration = adjust_scenario(scenario, run, full_covariance=True).calibration
+    calibration.write(table)
+    say("measure the compensated machine")
+    after = controller.do(Job(compensated, program, later / "run.csv", points, table), say)
+    machine = scenario.machine()
+    found, row = {}, 0
+    for name, targets in sets.items():
+        rows = slice(row, row + len(targets))
+        row += len(targets)
+        errors = (errors_at(machine, joints[rows], targets) for joints in (standing, after))
+        found[name] = PointSet(targets, *errors)
+    outcome = LoopOutcome(
+        case,
+        scenario,
+        machine,
+        calibration,
+        table,
+        found,
+        translations(scenario, run),
+        translations(compensated, _core.read_measurement(later / "run.csv")),
+        {name: agreement(s.after, covariances(calibration, s.targets)) for name, s in found.items()}
+        if case.noise
+        else {},
+    )
+    return outcome, standing
+
+
+def repetitions(outcome: LoopOutcome, seeds: int) -> dict[str, Agreement]:
+    """The noisy case with other noise, calculated: what is left, and the uncertainty that each calibration states."""
+    errors: dict[str, list[FloatArray]] = {}
+    variances: dict[str, list[FloatArray]] = {}
+    steps = outcome.scenario.plan.steps
+    for seed in range(1000, 1000 + seeds):
+        scenario = parse_scenario(scenario_text(NOISE, steps, seed), outcome.scenario.path)
+        calibration = adjust_scenario(scenario, simulate_scenario(scenario), full_covariance=True).calibration
+        compensator = _core.Compensator(calibration, CHAIN)
+        for name, points in outcome.points.items():
+            targets = points.targets[:: max(1, len(points.targets) // POINTS_OF_A_SEED)]
+            errors.setdefault(name, []).append(errors_at(outcome.machine, compensator.command(targets), targets))
+            variances.setdefault(name, []).append(covariances(calibration, targets))
+    return {name: agreement(np.concatenate(errors[name]), np.concatenate(variances[name])) for name in errors}
+
+
+def whole_grid(outcome: LoopOutcome) -> tuple[float, float]:
+    """The largest errors at any node of the plan's grid, before and after compensation, by calculation, mm."""
+    nodes = [outcome.scenario.plan.nodes(axis) for axis in "XYZ"]
+    compensator = _core.Compensator(outcome.table, CHAIN)
+    before = after = 0.0
+    for x in nodes[0]:
+        targets = np.stack(np.meshgrid([x], nodes[1], nodes[2], indexing="ij"), axis=-1).reshape(-1, 3)
+        before = max(before, Sizes.of(outcome.machine.error(targets)).largest)
+        left = errors_at(outcome.machine, compensator.command(targets), targets)
+        after = max(after, Sizes.of(left).largest)
+    return before, after

@@ -1,0 +1,67 @@
+"""The second calibration: what a run says of a machine whose controller compensates.
+
+Such a machine still tilts as it did, since three axes cannot undo a tilt, but its tilts no longer move the functional
+point. So it is not a chain of axes with tilts any more, and no calibration with free angles fits its readings. The
+tilts are taken from the readings instead, and what is asked for are translations: how far the point is from its place.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from stepdiag._core import Calibration, Head, Measurement, adjust
+from stepdiag.parameters import kind_of
+from stepdiag.scenario.description import Scenario
+
+ITERATIONS = 5  # of t = alpha^2 + beta^2, each of which gains a factor of t, about 1e-7
+
+
+@dataclass(frozen=True)
+class Translations:
+    """A calibration of translations alone, and its largest values."""
+
+    calibration: Calibration
+    length: float  # mm, of positioning errors and straightnesses
+    squareness: float  # rad
+
+
+def translations(scenario: Scenario, run: Measurement) -> Translations:
+    """Of a run with three beams or more."""
+    place = along_beam(scenario, run)
+    sound = np.isfinite(place)
+    reduced = Measurement(
+        [line for line, good in zip(run.line, sound, strict=True) if good],
+        [int(point) for point in run.point[sound]],
+        run.position[sound],
+        {"distance": place[sound]},
+    )
+    head = Head("ideal", standoff=scenario.head.standoff)
+    found = adjust(reduced, scenario.plan, head, scenario.chain, scenario.tool, rotations=False).calibration
+    lengths = [
+        float(np.max(np.abs(values)))
+        for name, (_, values, _) in found.functions.items()
+        if kind_of(name) in ("positioning", "straightness")
+    ]
+    return Translations(found, max(lengths), max(abs(angle) for angle, _ in found.squareness.values()))
+
+
+def along_beam(scenario: Scenario, run: Measurement) -> npt.NDArray[np.float64]:
+    """How far along the beam the functional point is, (n,), mm: from the distances and the tilts in them.
+
+    Beam i reads (L - beta u_i + alpha v_i)/(1 - t), t = alpha^2 + beta^2, and L = z + beta x - alpha y of the
+    functional point (x, y, z) in the sensor frame (docs/method.md), of which x and y are the commanded ones."""
+    offsets = scenario.head.beam_offsets
+    distances = np.stack([run.channels[name] for name in scenario.signals], axis=1)
+    design = np.column_stack([np.ones(len(offsets)), -offsets[:, 0], offsets[:, 1]])
+    scaled = np.linalg.lstsq(design, distances.T, rcond=None)[0]
+    t = np.zeros(len(distances))
+    for _ in range(ITERATIONS):
+        length, beta, alpha = scaled * (1.0 - t)
+        t = alpha**2 + beta**2
+    lateral = np.empty((len(distances), 2))
+    lines = np.array(run.line)
+    for line in set(run.line):
+        rows = lines == line
+        lateral[rows] = (run.position[rows] - scenario.plan.points(line)[0]) @ scenario.plan.frame(line)[:, :2]
+    return np.asarray(length - beta * lateral[:, 0] + alpha * lateral[:, 1])

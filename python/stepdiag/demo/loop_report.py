@@ -1,0 +1,128 @@
+"""What the closed loop says: a table of errors before and after, and what explains what is left."""
+
+import csv
+import io
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from stepdiag import _core
+from stepdiag.demo.loop_cases import CHAIN, DISTANCE_NOISE, RADIUS, SCREW_AMPLITUDE, SCREW_PITCH, TILT_NOISE, finer
+from stepdiag.demo.loop_outcome import LoopOutcome, whole_grid
+from stepdiag.demo.loop_points import Agreement, FloatArray, Sizes, errors_at
+from stepdiag.demo.paper_report import alias_of
+from stepdiag.units import MICRO
+
+UM = 1e3  # of a mm
+WORDS = {"nodes": "nodes of the plan", "random": "random points"}
+
+
+def report_lines(outcomes: list[LoopOutcome], repeated: dict[str, Agreement] | None, controller: str) -> Iterator[str]:
+    steps = outcomes[0].scenario.plan.steps
+    nodes, count = (len(outcomes[0].points[kind].targets) for kind in ("nodes", "random"))
+    yield f"The closed loop, moved by {controller}: {steps} steps an axis, the truth {finer(steps)} times finer"
+    yield from error_table(outcomes)
+    yield f"({nodes} nodes and {count} random points, gone to before and after; the error is the whole vector's length)"
+    yield ""
+    yield from node_note(outcomes)
+    for outcome in outcomes:
+        if outcome.case.screw:
+            yield ""
+            yield from screw_note(outcome)
+        if outcome.case.noise:
+            yield ""
+            yield from noise_note(outcome, repeated)
+    yield ""
+    yield from recheck_table(outcomes)
+
+
+def error_table(outcomes: list[LoopOutcome]) -> Iterator[str]:
+    yield f"{'':<9}{'':<20}{'before, µm':>18}{'after, µm':>20}{'largest is':>14}"
+    yield f"{'case':<9}{'points':<20}{'largest':>10}{'rms':>8}{'largest':>12}{'rms':>8}{'smaller by':>14}"
+    for outcome in outcomes:
+        for kind, points in outcome.points.items():
+            before, after = Sizes.of(points.before), Sizes.of(points.after)
+            yield (
+                f"{outcome.case.name:<9}{WORDS[kind]:<20}{before.largest * UM:>10.4g}{before.rms * UM:>8.3g}"
+                f"{after.largest * UM:>12.3g}{after.rms * UM:>8.2g}{before.largest / after.largest:>14,.0f}"
+            )
+
+
+def node_note(outcomes: list[LoopOutcome]) -> Iterator[str]:
+    yield "The calibration knows the errors where it measured: with the axes at nodes. Compensated axes stand beside"
+    yield "them, by the error itself, where the finer truth has another slope than the calibration."
+    for outcome in outcomes:
+        if not outcome.case.noise:
+            count = (outcome.scenario.plan.steps + 1) ** 3
+            before, after = whole_grid(outcome)
+            yield (
+                f"{outcome.case.name}: largest error at any of the {count:,} nodes, calculated: "
+                f"{before * UM:.4g} µm before, {after * UM:.3g} µm after: {before / after:,.0f} times smaller"
+            )
+    yield "Between nodes what is left is the truth's departure from straight lines between them: more steps resolve it."
+
+
+def screw_note(outcome: LoopOutcome) -> Iterator[str]:
+    """A screw error has its period between the nodes, or nearly so: the plan cannot know it."""
+    yield f"A screw error of {SCREW_PITCH:g} mm pitch and {SCREW_AMPLITUDE * UM:g} µm on all axes stays between nodes:"
+    yield f"{'':<6}{'step':>10}{'seen as':>22}{'left at nodes':>16}{'left between':>16}"
+    for axis, name in enumerate("XYZ"):
+        step = outcome.scenario.plan.volume[axis] / outcome.scenario.plan.steps
+        nodes, fine = outcome.scenario.plan.nodes(name), np.linspace(0.0, outcome.scenario.plan.volume[axis], 20001)
+        at, between = (float(np.max(np.abs(left_along(outcome, axis, p)[:, axis]))) for p in (nodes, fine))
+        yield f"E{name}{name:<4}{step:7.3g} mm{alias_of(step):>22}{at * UM:>13.2g} µm{between * UM:>13.2g} µm"
+    slope, beside = 2.0 * math.pi * SCREW_AMPLITUDE / SCREW_PITCH, Sizes.of(outcome.points["nodes"].before).largest
+    yield f"Its slope is {slope * UM:.2g} µm/mm, and compensated axes stand up to {beside:.2g} mm beside a node:"
+    yield f"{slope * beside * UM:.2g} µm can be left even at nodes."
+    yield "Steps of at most a quarter of the pitch would resolve it."
+
+
+def left_along(outcome: LoopOutcome, axis: int, positions: FloatArray) -> FloatArray:
+    """What compensation leaves along an axis, the others at home, calculated, (n, 3), mm."""
+    targets = np.zeros((len(positions), 3))
+    targets[:, axis] = positions
+    return errors_at(outcome.machine, _core.Compensator(outcome.table, CHAIN).command(targets), targets)
+
+
+def noise_note(outcome: LoopOutcome, repeated: dict[str, Agreement] | None) -> Iterator[str]:
+    yield (
+        f"Noise: {DISTANCE_NOISE * UM:g} µm of each of three beams, {RADIUS:.4g} mm from their middle, which is "
+        f"{TILT_NOISE * MICRO:g} µrad of tilt"
+    )
+    yield f"{'':<44}{'what is left':>13}{'stated':>10}{'chi-square':>13}{'in 95 %':>10}"
+    yield f"{'':<44}{'rms, µm':>13}{'rms, µm':>10}{'per freedom':>13}{'regions':>10}"
+    rows = [(f"this run, {WORDS[kind]}", found) for kind, found in outcome.agreement.items()]
+    rows += [(f"repetitions, {WORDS[kind]}", found) for kind, found in (repeated or {}).items()]
+    for text, found in rows:
+        yield (
+            f"{text:<44}{found.found_rms * UM:>13.3g}{found.stated_rms * UM:>10.3g}"
+            f"{found.mean_chi_square:>13.3g}{found.covered * 100:>8.1f} %"
+        )
+    yield "Stated: the calibration's own covariance of its error vector at the point. Of one run all points share one"
+    yield "calibration and go wrong together, so its share may be far from 95 %; that of many runs may not."
+
+
+def recheck_table(outcomes: list[LoopOutcome]) -> Iterator[str]:
+    yield "The second calibration, of the compensated machine by the same program. It tilts as before: tilts are taken"
+    yield f"{'from the readings, translations asked for':<41}{'before':>21}{'after':>22}"
+    yield f"{'':<40}{'µm':>12}{'µrad':>10}{'µm':>12}{'µrad':>10}"
+    for outcome in outcomes:
+        cells = "".join(
+            f"{found.length * UM:>12.3g}{found.squareness * MICRO:>10.2g}" for found in (outcome.first, outcome.second)
+        )
+        yield f"{outcome.case.name:<9}{'largest length, squareness':<31}{cells}"
+
+
+def point_table(outcomes: list[LoopOutcome]) -> str:
+    """Every point as a row of CSV, errors in µm."""
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    parts = [f"{when}_{axis}_um" for when in ("before", "after") for axis in "xyz"]
+    rows.writerow(["case", "points", "x_mm", "y_mm", "z_mm", *parts])
+    for outcome in outcomes:
+        for kind, points in outcome.points.items():
+            for target, before, after in zip(points.targets, points.before, points.after, strict=True):
+                numbers = [float(value) for value in (*target, *(before * UM), *(after * UM))]
+                rows.writerow([outcome.case.name, kind, *map(repr, numbers)])
+    return text.getvalue()

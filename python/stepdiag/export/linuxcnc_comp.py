@@ -1,0 +1,167 @@
+"""LinuxCNC's screw compensation: one COMP_FILE of type 0 for each joint, as usrmotLoadComp and motmod read it.
+
+A row is `nominal actual_forward actual_reverse`: where the axis was sent, and where it came to, approached in + and
+in - direction. LinuxCNC moves the motor to position + trim, trim = nominal - actual interpolated linearly, and holds
+the first and last trim outside. So one function of one axis is all that it can correct, while the error of a point
+depends on all three: what is corrected is the positioning error along the line on which the other two stand at `at`,
+
+    E(p) = e_a(p on the line) - e_a(home on the line),
+
+which is EXX plus theta x L of that line (Abbe). The trims are those of the inverse, c + E(c) = nominal, and therefore
+exact at every row; `actual` differs from nominal + E by E times its slope, nanometres.
+"""
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from stepdiag._core import Calibration, InvalidArgument, Machine
+from stepdiag.calibration.verdict_text import fit_row
+from stepdiag.export.common import (
+    Export,
+    ExportOptions,
+    FloatArray,
+    common_nodes,
+    inside,
+    origin_of,
+    require,
+    spread,
+    tool_of,
+    words,
+)
+from stepdiag.export.fewest_nodes import best_subset
+from stepdiag.parameters import AXES
+
+MOST_ROWS: Final = 256  # EMCMOT_COMP_SIZE; LinuxCNC 2.9 complains about more, and starts without the rest
+COMPANION: Final = "compensation.ini"
+
+
+def linuxcnc_comp(calibration: Calibration, output: Path, options: ExportOptions) -> Export:
+    """The three files, and a companion with the INI lines and what the files cannot say themselves."""
+    rows = MOST_ROWS if options.rows is None else options.rows
+    if not 2 <= rows <= MOST_ROWS:
+        raise InvalidArgument(f"`rows`: expected 2 to {MOST_ROWS}, as LinuxCNC takes, got {rows}")
+    at = calibration.volume / 2.0 if options.at is None else np.array(options.at, dtype=float)
+    outside = (at < 0.0) | (at > calibration.volume)
+    if np.any(outside):
+        raise InvalidArgument(f"`at`: expected a point of the volume {words(calibration.volume)} mm, got {words(at)}")
+    tool = tool_of(calibration, options)
+    missing = require(calibration, _needed(), options)
+    machine = Machine(calibration.chain, calibration.to_error_map(), tool)
+    joints = [JointTable(machine, calibration.volume, axis, at, rows) for axis in AXES]
+
+    head = list(_what_the_files_are(calibration, at, tool, origin_of(options), missing))
+    losses = [joint.sentence() for joint in joints]
+    left = list(_what_is_left(machine, calibration.volume, joints))
+    files = {output / f"joint{n}.comp": joint.text(float(origin_of(options)[n])) for n, joint in enumerate(joints)}
+    files[output / COMPANION] = _companion([*head, *losses, *left])
+    return Export(files, [*head, *losses, *left, f"note: paste the lines of {output / COMPANION} into the INI file"])
+
+
+def _needed() -> list[str]:
+    """What a positioning error away from home is made of."""
+    return [f"E{component}{axis}" for axis in AXES for component in (axis, *"ABC")]
+
+
+class JointTable:
+    """The table of one joint: kept nodes, trims in both directions, and what resampling loses."""
+
+    def __init__(self, machine: Machine, volume: FloatArray, axis: str, at: FloatArray, rows: int) -> None:
+        self.axis, self.index = axis, AXES.index(axis)
+        edge = float(volume[self.index])
+        self.nodes = inside(common_nodes(machine.errors, axis), edge)
+        line = np.tile(at, (len(self.nodes), 1))
+        line[:, self.index] = self.nodes
+        there, back = (machine.error(line, self._approach(sign))[:, self.index] for sign in "+-")
+        self.error = np.array([there, back]) - there[0]
+        self.trims = np.array([self._exact_trim(error, self.nodes) for error in self.error])
+        self.kept = best_subset(self.nodes, self.trims, rows)
+        self.loss = self._largest_loss()
+
+    def _approach(self, sign: str) -> str:
+        return "".join(sign if axis == self.axis else "+" for axis in AXES)
+
+    def _exact_trim(self, error: FloatArray, nominal: FloatArray) -> FloatArray:
+        """By how much the motor must go elsewhere for the axis to come to these positions."""
+        comes_to = self.nodes + error
+        if np.any(np.diff(comes_to) <= 0.0):
+            raise InvalidArgument(f"E{self.axis}{self.axis}: so steep that positions of the axis are not distinct")
+        beyond = np.clip(nominal, comes_to[0], comes_to[-1])  # outside the table the end's error holds
+        return np.asarray(np.interp(beyond, comes_to, self.nodes) - beyond)
+
+    def trim(self, nominal: FloatArray, direction: int) -> FloatArray:
+        """What LinuxCNC adds to a position when it moves in direction 0 (+) or 1 (-)."""
+        return np.asarray(np.interp(nominal, self.nodes[self.kept], self.trims[direction, self.kept]))
+
+    def _largest_loss(self) -> float:
+        """Largest deviation of the table's trims from the exact ones, mm; both are linear between these positions."""
+        where = np.unique(np.concatenate([self.nodes, *(self.nodes + self.error).clip(0.0, self.nodes[-1])]))
+        return max(
+            float(np.max(np.abs(self.trim(where, d) - self._exact_trim(error, where))))
+            for d, error in enumerate(self.error)
+        )
+
+    def text(self, origin: float) -> str:
+        """Nine digits after the point: picometres."""
+        rows = []
+        for p, there, back in zip(self.nodes[self.kept], *self.trims[:, self.kept], strict=True):
+            nominal = float(p) + origin
+            rows.append(f"{nominal:.9f} {nominal - there:.9f} {nominal - back:.9f}\n")
+        return "".join(rows)
+
+    def sentence(self) -> str:
+        reversal = float(np.max(np.abs(self.error[0] - self.error[1])))
+        two = f"reversal up to {reversal * 1e3:.3g} µm" if reversal else "no reversal: both directions alike"
+        return (
+            f"joint {self.index} ({self.axis}): {len(self.kept)} rows of {len(self.nodes)} nodes, error up to "
+            f"{np.max(np.abs(self.error)) * 1e3:.4g} µm, {two}; the table deviates from the exact inverse by at most "
+            f"{self.loss * 1e3:.2g} µm"
+        )
+
+
+def _what_the_files_are(
+    calibration: Calibration, at: FloatArray, tool: FloatArray, origin: FloatArray, missing: list[str]
+) -> list[str]:
+    return [
+        fit_row(calibration),
+        f"chain {calibration.chain}, volume {words(calibration.volume)} mm, home at {words(origin)} mm in the "
+        "controller's coordinates",
+        f"corrected: the positioning error of each axis along its line through {words(at)} mm from home, for a tool "
+        f"offset of {words(tool)} mm; 0 at its home in + direction",
+        "sign: actual = where the axis comes to when sent to nominal; LinuxCNC subtracts actual - nominal",
+        *missing,
+    ]
+
+
+def _what_is_left(machine: Machine, volume: FloatArray, joints: list[JointTable]) -> list[str]:
+    """Largest errors in the volume without and with the compensation, on a grid, in both directions of all axes."""
+    axes = [spread(joint.nodes, 21) for joint in joints]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    before, after = [], []
+    for direction, sign in enumerate("+-"):
+        motor = grid + np.column_stack([joint.trim(grid[:, n], direction) for n, joint in enumerate(joints)])
+        before.append(machine.error(grid, 3 * sign))
+        after.append(motor + machine.error(motor, 3 * sign) - grid)
+    b, a = (np.concatenate(errors) * 1e3 for errors in (before, after))
+    return [
+        f"largest error in the volume without compensation {_largest(b)}, with it {_largest(a)}",
+        "what is left: straightness, squareness, and what the angles do away from the lines; a COMP_FILE cannot "
+        "correct these, stepdiagkins (--to linuxcnc-kins) does",
+    ]
+
+
+def _largest(errors: FloatArray) -> str:
+    components = ", ".join(
+        f"{axis} {value:.4g}" for axis, value in zip(AXES, np.max(np.abs(errors), axis=0), strict=True)
+    )
+    return f"{np.max(np.linalg.norm(errors, axis=1)):.4g} µm ({components})"
+
+
+def _companion(sentences: list[str]) -> str:
+    ini = [f"# {sentence}" for sentence in ["stepdiag export --to linuxcnc-comp", *sentences]]
+    ini.append("# LinuxCNC ignores BACKLASH of a joint with a COMP_FILE: what is known of reversal is in the files")
+    ini.append("# for LINEAR_UNITS = mm, and joints 0 1 2 = X Y Z; paths are relative to the INI file")
+    for n in range(3):
+        ini += ["", f"[JOINT_{n}]", f"COMP_FILE = joint{n}.comp", "COMP_FILE_TYPE = 0"]
+    return "\n".join(ini).replace("µ", "u") + "\n"

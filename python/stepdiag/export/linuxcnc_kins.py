@@ -1,0 +1,79 @@
+"""The table that LinuxCNC's kinematics module stepdiagkins loads: a calibration CSV (docs/linuxcnc.md).
+
+It is the CSV of the calibration, with its chain, volume and tool.
+"""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from stepdiag._core import Calibration, Compensator
+from stepdiag.calibration.verdict_text import fit_row
+from stepdiag.export.common import Export, ExportOptions, FloatArray, origin_of, require, tool_of, words
+from stepdiag.parameters import FUNCTIONS, SQUARENESSES
+
+
+def linuxcnc_kins(calibration: Calibration, output: Path, options: ExportOptions) -> Export:
+    """The table, and the INI line that loads it."""
+    missing = require(calibration, [*FUNCTIONS, *SQUARENESSES], options)
+    tool, origin = tool_of(calibration, options), origin_of(options)
+    table = _with_tool(calibration, tool)
+    # What the module would refuse is refused here.
+    loaded = Compensator(
+        table,
+        calibration.chain,
+        origin=origin,
+        approach=options.approach or "mean",
+        accept_rejected=options.accept_rejected,
+    )
+    # INI files do not pass on quotes, and the module knows where the bed is.
+    arguments = f"table={output.absolute()} chain={''.join(c for c in calibration.chain.name if c.isalpha())}"
+    if origin.any():
+        arguments += f" origin={','.join(repr(o) for o in origin.tolist())}"
+    if options.approach not in (None, "mean"):
+        arguments += f" approach={options.approach}"
+    if calibration.fit == "rejected":
+        arguments += " accept_rejected=1"
+    lines = [
+        fit_row(calibration),
+        f"chain {calibration.chain}, volume {words(calibration.volume)} mm, tool offset {words(tool)} mm, home at "
+        f"{words(origin)} mm in the controller's coordinates",
+        "sign: errors, actual - commanded of the tool relative to the workpiece; the module moves the joints by the "
+        "inverse, joints + error = commanded",
+        "loss: none, every node is kept",
+        f"table id {loaded.fingerprint:016x}, as the module's pins table-id-high and table-id-low tell it",
+        *missing,
+        f"INI file: [KINS] KINEMATICS = stepdiagkins {arguments}",
+    ]
+    if " " in str(output.absolute()):
+        lines.append("note: KINEMATICS takes no space in a path: move the table to where there is none")
+    return Export({output: _csv_text(table)}, lines)
+
+
+def _csv_text(calibration: Calibration) -> str:
+    with tempfile.TemporaryDirectory(prefix="stepdiag-") as folder:
+        path = Path(folder) / "table.csv"
+        calibration.write(path)
+        return path.read_text(encoding="utf-8")
+
+
+def _with_tool(calibration: Calibration, tool: FloatArray) -> Calibration:
+    if np.array_equal(tool, calibration.tool):
+        return calibration
+    return Calibration(
+        calibration.method,
+        calibration.chain,
+        calibration.volume,
+        tool,
+        calibration.functions,
+        calibration.squareness,
+        undetermined_slopes=calibration.undetermined_slopes,
+        undetermined=calibration.undetermined,
+        reversal=calibration.reversal,
+        reversal_negative_uncertainty={name: table[2] for name, table in calibration.negative_functions.items()},
+        undetermined_reversal_constants=calibration.undetermined_reversal_constants,
+        date=calibration.date,
+        fit=calibration.fit,
+        variance_factor=calibration.variance_factor,
+    )

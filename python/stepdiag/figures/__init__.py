@@ -1,0 +1,1 @@
+"""Pictures of results, in the one style of style.py."""

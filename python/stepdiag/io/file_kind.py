@@ -1,0 +1,82 @@
+"""Which of our files is this, by its first lines."""
+
+import re
+from pathlib import Path
+from typing import Final
+
+from stepdiag._core import InvalidArgument
+from stepdiag.io.whole_files import read_beginning
+
+CHECKPOINT_BEGINS: Final = "stepdiag checkpoint "
+# By the format that a table states.
+_FORMATS: Final = {
+    "measurement": "measurement",
+    "calibration": "calibration",
+    "error map": "error map",
+    "comparison": "comparison",
+    "functional point": "functional point table",
+    "uncertainty": "uncertainty result",
+    "study": "study result",
+    "error grid": "error grid",
+}
+_NUMBER: Final = r"[-+]?[\d.]+(?:e[-+]?\d+)?"
+# What else there is, by how it begins.
+_BEGINNINGS: Final = {
+    "checkpoint": CHECKPOINT_BEGINS,
+    "PNG picture": "\ufffdPNG\r\n\x1a\n",
+    "SVG picture": r"(?:<\?xml[^>]*>\s*)?(?:<!DOCTYPE svg[^>]*>\s*)?<svg\b",
+    "measuring program": r"(?i:%\n)?\((?i:measuring program)\b",
+    "ISG table": "// stepdiag export --to isg\n",
+    "compensation.ini": "# stepdiag export --to linuxcnc-comp\n",
+    "COMP_FILE": rf"(?:{_NUMBER} {_NUMBER} {_NUMBER}\n)+\Z",
+    "study cells": r"(?s:.*\n)?[0-9a-f]{64} \{|\s*[0-9a-f]{1,64} ?\Z",  # or the first half of its first line
+    "table of steps": "steps,mirror_width_mm,",
+    "table of plans": "minutes,lines,scale_lines,",
+    "table of points": "case,points,x_mm,",
+    "report of the demonstration": "Largest remaining errors at the nodes|The closed loop, moved by ",
+}
+NETCDF_BEGINS: Final = ("\ufffdHDF", "CDF")
+
+
+def kind_of_file(path: Path) -> str | None:
+    """What a file is by how it begins, whatever its name is; None for what is not known. It may be damaged all the
+    same. Raises InvalidArgument where it cannot be read."""
+    text = read_beginning(path)
+    if not text.startswith(NETCDF_BEGINS):
+        return kind_of_text(text)
+    from stepdiag.io.netcdf_read import kind_of_netcdf
+
+    try:
+        return _FORMATS.get(kind_of_netcdf(path))
+    except InvalidArgument:
+        return None
+
+
+def kind_of_text(text: str) -> str | None:
+    """The same of the beginning of a text file."""
+    comments, header = head_of(text)
+    leading = dict(re.findall(r"(?m)^#\s*(\w+)\s*=\s*(.*?)\s*$", "\n".join(comments)))
+    columns = {column.strip().strip('"') for column in header.split(",")}
+    for name, kind in _FORMATS.items():
+        if leading.get("format", "").startswith(f"stepdiag {name}"):
+            return kind
+    for kind, beginning in _BEGINNINGS.items():
+        if re.match(beginning, text):
+            return kind
+    if {"parameter", "value"} & columns:
+        return "calibration" if "method" in leading else "error map"
+    if header.startswith("{"):
+        return "raw readings"
+    if {"line", "point"} & columns:
+        return "measurement"
+    return "TOML file" if header.lstrip().startswith("[") or "=" in header else None
+
+
+def head_of(text: str) -> tuple[list[str], str]:
+    """The comments above the first other line, and that line."""
+    comments: list[str] = []
+    for line in text.splitlines():
+        if line.strip() and not line.startswith("#"):
+            return comments, line
+        comments.append(line)
+    return comments, ""

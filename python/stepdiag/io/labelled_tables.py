@@ -1,0 +1,175 @@
+"""Runs and calibrations as labelled tables (xarray). Units are native and said: mm, rad."""
+
+import re
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stepdiag._core import Calibration, Measurement
+from stepdiag.calibration.functional_point import functional_point_straightness
+from stepdiag.parameters import units_of
+
+_COMPONENT = {
+    "X": "displacement along X",
+    "Y": "displacement along Y",
+    "Z": "displacement along Z",
+    "A": "rotation about X",
+    "B": "rotation about Y",
+    "C": "rotation about Z",
+}
+_SQUARENESS = {"C0Y": "squareness of Y to X", "B0Z": "squareness of Z to X", "A0Z": "squareness of Z to Y"}
+_CHANNEL = {
+    "distance": ("mm", "distance from reference plane to mirror"),
+    "alpha": ("rad", "tilt of the mirror about local x"),
+    "beta": ("rad", "tilt of the mirror about local y"),
+    "spot_x": ("mm", "spot position along local x"),
+    "spot_y": ("mm", "spot position along local y"),
+    "time": ("s", "time of the reading"),
+    "temperature": ("degC", "temperature"),
+}
+
+
+def measurement_table(measurement: Measurement) -> xr.Dataset:
+    """One row per reading along the dimension `reading`; lost readings are NaN.
+
+    Coordinates: line, point, run, direction, and the commanded position x, y, z (mm). Variables: the channels,
+    and their standard uncertainties as NAME_u where the run gives them."""
+    coordinates: dict[str, Any] = {
+        "line": ("reading", np.asarray(measurement.line, dtype=str), {"long_name": "measurement line"}),
+        "point": ("reading", measurement.point, {"long_name": "point number on the line"}),
+        "run": ("reading", measurement.run, {"long_name": "run"}),
+        "direction": (
+            "reading",
+            np.asarray(measurement.direction, dtype=str),
+            {"long_name": "direction of travel"},
+        ),
+    }
+    for column, axis in enumerate("xyz"):
+        attributes = {"units": "mm", "long_name": f"commanded position of {axis.upper()}"}
+        coordinates[axis] = ("reading", measurement.position[:, column], attributes)
+    variables: dict[str, Any] = {}
+    for name, value in measurement.channels.items():
+        units = channel_units(name)
+        meaning = _CHANNEL[name][1] if name in _CHANNEL else f"distance of beam {name[1:]}"
+        variables[name] = ("reading", value, {"units": units, "long_name": meaning})
+    for name, value in measurement.standard_uncertainty.items():
+        variables[f"{name}_u"] = ("reading", value, _uncertainty_of(variables[name][2]))
+    return xr.Dataset(variables, coordinates, {"title": "step-diagonal measurement"})
+
+
+def calibration_table(calibration: Calibration) -> xr.Dataset:
+    """The determined parameters by name, each with its standard uncertainty as NAME_u.
+
+    Functions lie over the position x, y or z (mm) of their axis; one whose nodes differ from those of its
+    axis has a dimension of its own (x_EXX). Squarenesses are scalars. Where backward runs tell reversal errors,
+    functions are those of the + direction; those of the - direction are less by NAME_reversal, and NAME_negative_u is
+    their uncertainty. NAME_functional_point is the straightness of the functional point where it is not the table's.
+    A full covariance lies over the dimensions entry and entry_2, which covariance_parameter and covariance_position
+    label. What is not determined is absent, and the attributes say so."""
+    coordinates: dict[str, Any] = {}
+    variables: dict[str, Any] = {}
+
+    def dimension(name: str, position: Any) -> str:
+        axis = name[2].lower()
+        if axis in coordinates and not np.array_equal(coordinates[axis][1], position):
+            axis = f"{axis}_{name}"
+        coordinates[axis] = (axis, position, {"units": "mm", "long_name": f"position of {name[2]}"})
+        return axis
+
+    for name, (position, value, uncertainty) in sorted(calibration.functions.items(), key=lambda item: _order(item[0])):
+        axis = dimension(name, position)
+        attributes = {
+            "units": units_of(name),
+            "long_name": f"{_COMPONENT[name[1]]} of axis {name[2]}",
+            "slope_determined": str(name not in calibration.undetermined_slopes).lower(),
+        }
+        variables[name] = (axis, value, attributes)
+        variables[f"{name}_u"] = (axis, uncertainty, _uncertainty_of(attributes))
+    for name, (position, value, uncertainty) in sorted(calibration.reversal.items(), key=lambda item: _order(item[0])):
+        axis = dimension(f"{name}_reversal", position)
+        attributes = {
+            "units": units_of(name),
+            "long_name": f"reversal error of the {_COMPONENT[name[1]]} of axis {name[2]}",
+            "constant_determined": str(name not in calibration.undetermined_reversal_constants).lower(),
+        }
+        variables[f"{name}_reversal"] = (axis, value, attributes)
+        variables[f"{name}_reversal_u"] = (axis, uncertainty, _uncertainty_of(attributes))
+        negative = calibration.negative_functions.get(name)  # none without the function itself
+        if negative is not None:
+            variables[f"{name}_negative_u"] = (
+                axis,
+                negative[2],
+                _uncertainty_of(attributes | {"long_name": f"{name} approached in - direction"}),
+            )
+    for name, (_, value, uncertainty) in functional_point_straightness(calibration).items():
+        moved = f"{_COMPONENT[name[1]]} of the functional point, moved by {name[2]} alone"
+        attributes = {"units": "mm", "long_name": moved}
+        axis = variables[name][0]
+        variables[f"{name}_functional_point"] = (axis, value, attributes)
+        variables[f"{name}_functional_point_u"] = (axis, uncertainty, _uncertainty_of(attributes))
+    for name, (angle, angle_uncertainty) in calibration.squareness.items():
+        attributes = {"units": "rad", "long_name": _SQUARENESS[name]}
+        variables[name] = ((), angle, attributes)
+        variables[f"{name}_u"] = ((), angle_uncertainty, _uncertainty_of(attributes))
+    variables |= _covariance(calibration)
+    verdict: dict[str, Any] = {}
+    if calibration.fit is not None:
+        verdict["fit"] = calibration.fit
+    if calibration.variance_factor is not None:
+        verdict["variance_factor"] = calibration.variance_factor
+    return xr.Dataset(
+        variables,
+        coordinates,
+        verdict
+        | {
+            "title": "calibration of a three-axis machine",
+            "method": calibration.method,
+            "date": calibration.date,
+            "chain": calibration.chain.name,
+            "volume_mm": calibration.volume,
+            "tool_mm": calibration.tool,
+            "straightness_reference": calibration.straightness_reference,
+            "undetermined": "\n".join(calibration.undetermined),
+        },
+    )
+
+
+def channel_units(name: str) -> str | None:
+    """The native unit of a measurement's channel; none for a name that is no channel's."""
+    return _CHANNEL[name][0] if name in _CHANNEL else "mm" if re.fullmatch(r"d[1-9][0-9]*", name) else None
+
+
+def _order(function: str) -> tuple[int, int]:
+    """Axis by axis, displacements before rotations."""
+    return "XYZ".index(function[2]), "XYZABC".index(function[1])
+
+
+def _covariance(calibration: Calibration) -> dict[str, Any]:
+    covariance = calibration.covariance
+    if covariance is None:
+        return {}
+    labels = calibration.covariance_labels
+    names = [name for name, _ in labels]
+    positions = [np.nan if position is None else position for _, position in labels]
+    return {
+        "covariance_parameter": ("entry", np.asarray(names, dtype=str), {"long_name": "parameter of a row or column"}),
+        "covariance_position": (
+            "entry",
+            np.asarray(positions),
+            {"units": "mm", "long_name": "position of a row or column; missing for a squareness"},
+        ),
+        "covariance": (
+            ("entry", "entry_2"),
+            covariance,
+            {
+                "long_name": "covariance of all values",
+                "comment": "of two values in the units of their parameters, mm or rad; rows and columns in one order, "
+                "that of covariance_parameter and covariance_position",
+            },
+        ),
+    }
+
+
+def _uncertainty_of(attributes: dict[str, str]) -> dict[str, str]:
+    return {"units": attributes["units"], "long_name": f"standard uncertainty of {attributes['long_name']}"}

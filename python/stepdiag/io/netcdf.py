@@ -1,0 +1,202 @@
+"""netCDF files (netCDF-4): written whole or not at all, read with every doubt said.
+
+What a measurement or a calibration looks like in one: labelled_tables.py, netcdf_read.py, docs/files.md.
+"""
+
+import struct
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from xarray.backends import NetCDF4DataStore
+
+from stepdiag._core import InvalidArgument, __version__
+from stepdiag.io.whole_files import read_bytes, whole_file
+
+# What a file may declare beyond a hundred times its own size: a header is no data, and compression has its bounds.
+_FREE_SIZE = 64 * 2**20
+_LARGEST_COMPRESSION = 100
+
+_FILL = netCDF4.default_fillvals["f8"]  # netCDF's own mark of a value that was never written
+
+
+def write_dataset(dataset: xr.Dataset, path: Path, attributes: dict[str, Any]) -> None:
+    """Writes a table, these global attributes in front of its own. Raises InvalidArgument where it cannot be written.
+
+    Texts become characters and numbers get a check sum (Fletcher-32), so that damage is noticed when they are read."""
+    first = {"Conventions": "CF-1.11", "source": f"stepdiag {__version__}"} | attributes
+    dataset = dataset.assign_attrs(first)
+    dataset.attrs = first | dataset.attrs
+    dataset.encoding["unlimited_dims"] = set()
+    for name, variable in dataset.variables.items():
+        if variable.dtype.kind in "US":
+            variable.encoding = {"dtype": "S1", "char_dim_name": f"{name}_length", "fletcher32": True}
+            continue
+        variable.encoding = {"fletcher32": variable.ndim > 0}
+        if variable.dtype.kind == "f" and not np.isnan(variable.values).any():
+            variable.encoding["_FillValue"] = None
+    with whole_file(path) as temporary:
+        try:
+            dataset.to_netcdf(temporary, mode="w", engine="netcdf4", format="NETCDF4")
+        except RuntimeError as error:  # of the C libraries
+            raise InvalidArgument(f"{path}: cannot be written: {error}") from None
+
+
+@contextmanager
+def open_dataset(path: Path) -> Iterator["NetcdfFile"]:
+    """A netCDF file to read from. Raises InvalidArgument naming the file for whatever is wrong with it."""
+    content = read_bytes(path)
+    _check_heaps(content, path)
+    try:
+        file = netCDF4.Dataset("memory.nc", memory=content)
+        _check_size(file, len(content), path)
+        store = NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
+        dataset = xr.open_dataset(store, decode_times=False, decode_timedelta=False)
+    except InvalidArgument:
+        raise
+    except Exception as error:  # whatever the libraries make of a damaged file
+        raise InvalidArgument(f"{path}: expected a netCDF file: {_one_line(error)}") from None
+    with dataset:
+        yield NetcdfFile(path, dataset)
+
+
+class NetcdfFile:
+    """The variables and attributes of an open file, each asked for as what it should be."""
+
+    def __init__(self, path: Path, dataset: xr.Dataset) -> None:
+        self.path = path
+        self._dataset = dataset
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._dataset.variables
+
+    @property
+    def names(self) -> list[str]:
+        return [str(name) for name in self._dataset.variables]
+
+    def fail(self, name: str, message: str) -> InvalidArgument:
+        return InvalidArgument(f"{self.path}: {name}: {message}")
+
+    def dimensions(self, name: str) -> tuple[str, ...]:
+        return tuple(str(dimension) for dimension in self._variable(name).dims)
+
+    def numbers(
+        self, name: str, dimensions: Sequence[str], units: str | None, *, missing: bool = False
+    ) -> npt.NDArray[np.float64]:
+        """A variable of these dimensions and units, as doubles; NaN only where values may be missing."""
+        variable = self._variable(name, dimensions)
+        if variable.dtype.kind not in "fiu":
+            raise self.fail(name, f"expected numbers, got values of type {variable.dtype}")
+        given = variable.attrs.get("units")
+        if units is not None and not (isinstance(given, str) and given == units):
+            raise self.fail(name, f'units: expected "{units}", got {_show(given)}')
+        values = np.array(self._load(name, variable), dtype=np.float64)
+        values[values == _FILL] = np.nan
+        if np.isinf(values).any():
+            raise self.fail(name, "expected finite numbers, got an infinite one")
+        if not missing and np.isnan(values).any():
+            raise self.fail(name, f"expected finite numbers, but value {int(np.argmax(np.isnan(values)))} is missing")
+        return values
+
+    def integers(self, name: str, dimensions: Sequence[str]) -> list[int]:
+        variable = self._variable(name, dimensions)
+        if variable.dtype.kind not in "iu":
+            raise self.fail(name, f"expected whole numbers, none missing, got values of type {variable.dtype}")
+        return [int(value) for value in self._load(name, variable)]
+
+    def texts(self, name: str, dimensions: Sequence[str]) -> list[str]:
+        values = self._load(name, self._variable(name, dimensions)).tolist()
+        if not all(isinstance(value, str | bytes) for value in values):
+            raise self.fail(name, "expected texts")
+        try:
+            return [value.decode() if isinstance(value, bytes) else value for value in values]
+        except UnicodeDecodeError:
+            raise self.fail(name, "expected UTF-8 text") from None
+
+    def text(self, attribute: str, default: str | None = None, *, of: str | None = None) -> str:
+        """A text among the global attributes, or among those of a variable."""
+        where = self._dataset.attrs if of is None else self._variable(of).attrs
+        name = f"attribute {attribute}" if of is None else f"{of}: attribute {attribute}"
+        value = where.get(attribute, default)
+        if value is None:
+            raise self.fail(name, "missing")
+        if not isinstance(value, str):
+            raise self.fail(name, f"expected a text, got {_show(value)}")
+        return value
+
+    def lengths(self, attribute: str) -> npt.NDArray[np.float64]:
+        """Three lengths among the global attributes."""
+        value = self._dataset.attrs.get(attribute)
+        if value is None:
+            raise self.fail(f"attribute {attribute}", "missing")
+        lengths = np.asarray(value)
+        if lengths.dtype.kind not in "fiu" or lengths.shape != (3,):
+            raise self.fail(f"attribute {attribute}", f"expected three numbers, got {_show(value)}")
+        return lengths.astype(np.float64)
+
+    def number(self, attribute: str) -> float | None:
+        """A number among the global attributes; None where it is missing."""
+        value = self._dataset.attrs.get(attribute)
+        if value is None:
+            return None
+        number = np.asarray(value)
+        if number.dtype.kind not in "fiu" or number.size != 1:
+            raise self.fail(f"attribute {attribute}", f"expected a number, got {_show(value)}")
+        return float(number.reshape(()))
+
+    def _variable(self, name: str, dimensions: Sequence[str] | None = None) -> xr.Variable:
+        if name not in self._dataset.variables:
+            raise self.fail(name, "the variable is missing")
+        variable = self._dataset.variables[name]
+        if dimensions is not None and variable.dims != tuple(dimensions):
+            wanted, given = (f"({', '.join(map(str, dims))})" for dims in (dimensions, variable.dims))
+            raise self.fail(name, f"expected the dimensions {wanted}, got {given}")
+        return variable
+
+    def _load(self, name: str, variable: xr.Variable) -> npt.NDArray[Any]:
+        try:
+            return np.asarray(variable.values)
+        except Exception as error:  # a check sum that is wrong, for one
+            raise self.fail(name, f"cannot be read: {_one_line(error)}") from None
+
+
+def _check_size(file: netCDF4.Dataset, size: int, path: Path) -> None:
+    """A small file can declare any number of values; nobody's memory is to be filled with them."""
+    declared = sum(v.size * max(np.dtype(v.dtype).itemsize, 16) for v in file.variables.values())  # 16: of a text
+    if declared > _FREE_SIZE + _LARGEST_COMPRESSION * size:
+        raise InvalidArgument(f"{path}: declares {declared / 2**20:.0f} MiB of values, but has {size / 2**20:.3g} MiB")
+
+
+def _check_heaps(content: bytes, path: Path) -> None:
+    """Walks through the global heaps of HDF5: its library never comes back from one whose sizes are damaged."""
+    signature = b"GCOL\x01\0\0\0"  # with the version
+    start = content.find(signature)
+    while start >= 0:
+        size = struct.unpack_from("<Q", content, start + 8)[0] if start + 16 <= len(content) else 0
+        sound = 16 <= size <= len(content) - start
+        at, end = start + 16, start + size
+        while sound and at + 16 <= end:
+            index, length = struct.unpack_from("<H6xQ", content, at)
+            step = length if index == 0 else 16 + (length + 7) // 8 * 8  # index 0: free, its header counted
+            at += step
+            sound = step >= 16 and at <= end
+        if not sound:
+            raise InvalidArgument(f"{path}: expected a netCDF file: a heap in it is damaged")
+        start = content.find(signature, start + 8)
+
+
+def _show(value: Any) -> str:
+    if value is None:
+        return "none"
+    text = f'"{value}"' if isinstance(value, str) else " ".join(str(value).split())
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _one_line(error: Exception) -> str:
+    text = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return " ".join(str(text).split())[:200]

@@ -1,0 +1,30 @@
+"""`to_xarray()` of the extension's classes. Made in Python, so that the extension knows nothing of this package.
+
+`import stepdiag` attaches them; xarray, which takes its time, is imported when one is called.
+"""
+
+from typing import TYPE_CHECKING
+
+from stepdiag._core import Calibration, Measurement
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def calibration_to_xarray(self: Calibration) -> "xarray.Dataset":
+    """The calibration as a labelled table."""
+    from stepdiag.io.labelled_tables import calibration_table
+
+    return calibration_table(self)
+
+
+def measurement_to_xarray(self: Measurement) -> "xarray.Dataset":
+    """The run as a labelled table."""
+    from stepdiag.io.labelled_tables import measurement_table
+
+    return measurement_table(self)
+
+
+def attach() -> None:
+    Calibration.to_xarray = calibration_to_xarray  # type: ignore[method-assign]
+    Measurement.to_xarray = measurement_to_xarray  # type: ignore[method-assign]

@@ -1,0 +1,1 @@
+"""LinuxCNC without a screen, run by a program."""

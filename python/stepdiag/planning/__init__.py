@@ -1,0 +1,1 @@
+"""Before anyone measures: what a plan determines, and how long it takes."""

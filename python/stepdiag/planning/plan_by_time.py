@@ -1,0 +1,236 @@
+"""Which plan to measure in the time that there is: for step numbers, sets of lines and repeats, how long each takes and
+the largest standard uncertainty of each kind that it gives, before anyone measures."""
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from stepdiag import _core
+from stepdiag._core import InvalidArgument
+from stepdiag.calibration.largest_by_kind import largest_uncertainties
+from stepdiag.config.toml_text import located
+from stepdiag.parameters import KINDS, Kind, kind_of
+from stepdiag.planning.measuring_time import measuring_time, times_of
+from stepdiag.planning.observation import extents, with_usual_errors
+from stepdiag.scenario.description import Scenario, adjust_scenario, runs_of, simulate_scenario
+from stepdiag.units import MINUTE
+
+Family = Literal["length", "angle", "squareness"]
+FAMILIES: Final[dict[Family, tuple[Kind, ...]]] = {
+    "length": ("positioning", "straightness"),
+    "angle": ("angle",),
+    "squareness": ("squareness",),
+}
+
+# Of two plans whose uncertainties differ by less than this share, the faster one is shown.
+ALIKE: Final = 0.05
+MOST_CANDIDATES: Final = 2000
+
+_DIAGONALS: Final = ("ppp", "npp", "pnp", "nnp")
+_FACES: Final = ("pp0", "np0", "p0p", "n0p", "0pp", "0np")
+_SCALES: Final = ("p00", "0p0", "00p")
+_USUAL_SETS: Final = (
+    (*_DIAGONALS, *_SCALES),
+    (*_DIAGONALS, *_SCALES[:2]),
+    _DIAGONALS,
+    (*_DIAGONALS[:3], *_SCALES),
+    _FACES,
+    (*_FACES, *_SCALES),
+    (*_DIAGONALS, *_FACES),
+    (*_DIAGONALS, *_FACES, *_SCALES),
+)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    lines: tuple[str, ...]
+    scale_lines: tuple[str, ...]
+    steps: int
+    repeats: int
+
+    @property
+    def description(self) -> str:
+        """ "4 body diagonals, 3 scale lines"; in what few words do."""
+        counts = [(sum(_moved(line) == axes for line in self.lines), name) for axes, name in _NAMES]
+        counts.append((len(self.scale_lines), "scale line"))
+        return ", ".join(f"{count} {name}{'s' * (count > 1)}" for count, name in counts if count)
+
+
+_NAMES: Final = ((3, "body diagonal"), (2, "face diagonal"), (1, "single axis line"))
+
+
+def _moved(line: str) -> int:
+    return 3 - line.count("0")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a plan takes and gives. `seconds` include set-ups; `spacing`: mm, the farthest that nodes are apart; largest
+    standard uncertainties in mm or rad; `determined`: the parameters that are, as a whole. `trouble`: why there are
+    none."""
+
+    candidate: Candidate
+    seconds: float
+    spacing: float
+    mirror: tuple[float, float]
+    largest: dict[Kind, float]
+    determined: frozenset[str]
+    trouble: str = ""
+
+    @property
+    def minutes(self) -> float:
+        return self.seconds / MINUTE
+
+    def worst(self, family: Family) -> float:
+        """The largest standard uncertainty of a family; infinite where there is none."""
+        return max(self.largest.get(kind, math.inf) for kind in FAMILIES[family])
+
+
+def candidates(scenario: Scenario) -> list[Candidate]:
+    """All plans to choose from. Raises InvalidArgument where the scenario names lines that there are not."""
+    keys, plan = scenario.keys.plan_by_time, scenario.plan
+    own = Candidate(tuple(plan.lines), tuple(plan.scale_lines), plan.steps, scenario.keys.plan.repeats)
+    sets = {(own.lines, own.scale_lines): None}
+    for index, lines in enumerate(_USUAL_SETS if keys.line_sets is None else keys.line_sets):
+        measured = tuple(line for line in lines if _moved(line) != 1)
+        scales = tuple(line for line in lines if _moved(line) == 1)
+        with located(f"{scenario.path}: plan_by_time.line_sets: set {index + 1}"):
+            _core.Plan(plan.volume, list(measured), plan.steps, scale_lines=list(scales))
+        sets[measured, scales] = None
+    steps, repeats = sorted({*keys.steps, own.steps}), sorted({*keys.repeats, own.repeats})
+    count = len(sets) * len(steps) * len(repeats)
+    if count > MOST_CANDIDATES:
+        raise InvalidArgument(
+            f"{scenario.path}: plan_by_time: expected at most {MOST_CANDIDATES} plans to choose from, got {count} "
+            f"({len(sets)} sets of lines, {len(steps)} numbers of steps, {len(repeats)} of repeats)"
+        )
+    return [Candidate(*lines, n, r) for lines, n, r in itertools.product(sets, steps, repeats)]
+
+
+def outcomes(scenario: Scenario, progress: Callable[[int, int], None] | None = None) -> list[Outcome]:
+    """Of all candidates. `progress` is told how many of how many are done."""
+    everything = candidates(scenario)
+    result = []
+    for done, candidate in enumerate(everything, 1):
+        result.append(outcome(scenario, candidate))
+        if progress is not None:
+            progress(done, len(everything))
+    return result
+
+
+def outcome(scenario: Scenario, candidate: Candidate) -> Outcome:
+    """The time that a plan takes, and the uncertainties of the adjustment of a run of it.
+
+    The machine of that run has errors: some uncertainties depend on them, for a beam that is 1 mm beside its place
+    reads more or less as the mirror tilts."""
+    plan_keys = scenario.keys.plan
+    plan = _core.Plan(
+        scenario.plan.volume,
+        list(candidate.lines),
+        candidate.steps,
+        order=scenario.plan.orders,
+        scale_lines=list(candidate.scale_lines),
+    )
+    times = times_of(scenario.keys.plan_by_time, f"{scenario.path}: plan_by_time")
+    runs = candidate.repeats * runs_of(plan_keys) // plan_keys.repeats
+    seconds, between = measuring_time(plan, times, repeats=runs, backward=plan_keys.backward)
+    spacing = float(max(plan.volume)) / candidate.steps
+    width, height = plan.smallest_mirror()
+    largest: dict[Kind, float] = {}
+    determined: frozenset[str] = frozenset()
+    trouble = ""
+    try:
+        changes = {
+            "lines": candidate.lines,
+            "scale_lines": candidate.scale_lines,
+            "steps": candidate.steps,
+            "repeats": candidate.repeats,
+            "seconds_per_reading": between or None,
+        }
+        more = _says_more(scenario)
+        usual = with_usual_errors(scenario, changes, noise=more)
+        calibration, largest = _propagated(usual) if more else _adjusted(usual)
+        determined = frozenset(extents(calibration, plan)[0])
+    except InvalidArgument as error:
+        trouble = str(error)
+    return Outcome(candidate, seconds, spacing, (float(width), float(height)), largest, determined, trouble)
+
+
+def _says_more(scenario: Scenario) -> bool:
+    """Whether its [uncertainty] names more than the noise of the readings."""
+    return bool(scenario.uncertain.inputs) or any(noise.quantity != "channel" for noise in scenario.uncertain.noise)
+
+
+def _adjusted(usual: Scenario) -> tuple[_core.Calibration, dict[Kind, float]]:
+    """By the readings' own uncertainties."""
+    calibration = adjust_scenario(usual, simulate_scenario(usual)).calibration
+    return calibration, {kind: value for kind, (value, _) in largest_uncertainties(calibration).items()}
+
+
+def _propagated(usual: Scenario) -> tuple[_core.Calibration, dict[Kind, float]]:
+    """By all that [uncertainty] names: drifts and walks take the longer, the longer measuring takes."""
+    from stepdiag.uncertainty.virtual_calibrations import virtual_calibrations
+
+    model = virtual_calibrations(usual, method="adjustment")
+    largest: dict[Kind, float] = {}
+    with located(str(usual.path)):
+        found = _core.propagate(model)
+    for output, u in zip(model.outputs, found.standard_uncertainty, strict=True):
+        kind = kind_of(output.name)
+        largest[kind] = max(largest.get(kind, 0.0), float(u))
+    return model.calibration, {kind: largest[kind] for kind in KINDS if kind in largest}
+
+
+def complete(found: Sequence[Outcome]) -> list[Outcome]:
+    """Those that determine as many parameters as any."""
+    most = max((len(o.determined) for o in found), default=0)
+    return [o for o in found if most > 0 and len(o.determined) == most]
+
+
+def front(found: Sequence[Outcome], family: Family = "length") -> list[Outcome]:
+    """Of the complete ones, those that no other one beats in time, spacing and the uncertainty of a family, fastest
+    first. What is but a little better is not."""
+    kept: list[Outcome] = []
+    for one in sorted(complete(found), key=lambda o: (o.seconds, o.spacing, o.worst(family))):
+        limit = (1.0 + ALIKE) * one.worst(family)
+        if not any(other.spacing <= one.spacing and other.worst(family) <= limit for other in kept):
+            kept.append(one)
+    return kept
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The plan to take, None where none is fast enough; `next_better`: the fastest with nodes as near and an
+    uncertainty smaller by a fifth at least. `spacing_kept`: its nodes are as near as was asked for."""
+
+    taken: Outcome | None
+    spacing_kept: bool
+    next_better: Outcome | None
+    fastest: Outcome | None  # of those with nodes near enough
+
+
+def choose(found: Sequence[Outcome], minutes: float, spacing: float, family: Family = "length") -> Choice:
+    """The plan of the smallest uncertainty within the time and with nodes at most `spacing` mm apart; where none has,
+    of those within the time whose nodes are nearest."""
+    plans = front(found, family)
+    fitting = [o for o in plans if o.minutes <= minutes]
+    near = [o for o in plans if o.spacing <= spacing * (1.0 + 1e-9)]
+    allowed = [o for o in near if o in fitting]
+    kept = bool(allowed)
+    if not kept and fitting:
+        nearest = min(o.spacing for o in fitting)
+        allowed = [o for o in fitting if o.spacing == nearest]
+    taken = min(allowed, key=lambda o: (o.worst(family), o.seconds), default=None)
+    better = [o for o in plans if taken and o.spacing <= taken.spacing and o.worst(family) <= 0.8 * taken.worst(family)]
+    return Choice(taken, kept, min(better, key=_seconds, default=None), min(near, key=_seconds, default=None))
+
+
+def _seconds(one: Outcome) -> float:
+    return one.seconds
+
+
+def own_spacing(scenario: Scenario) -> float:
+    """How far nodes of the scenario's own plan are apart, mm: the largest of three axes."""
+    return float(max(scenario.plan.volume)) / scenario.plan.steps

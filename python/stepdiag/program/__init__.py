@@ -1,0 +1,1 @@
+"""Measuring programs for controllers (G-code)."""

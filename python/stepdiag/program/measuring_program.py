@@ -1,0 +1,122 @@
+"""The measuring program of a scenario's plan: G-code that moves the axes through its points and asks for the readings.
+
+Every point stands in the program as numbers, in the order of order_of_run.py. docs/measuring.md says how to run it.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stepdiag.planning.measuring_time import Times, times_of
+from stepdiag.program.blocks import Body, header, modes
+from stepdiag.program.gcode import Writer, numbered
+from stepdiag.program.options import Options, space_of, trigger_of, writer_of
+from stepdiag.program.path import AXES, Action, Begin, Feed, Rapid, Read, SetUp, Space, actions_of
+from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.order_of_run import Visit, visits_of
+from stepdiag.units import MINUTE
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program's text, and what there is to say of it."""
+
+    text: str
+    readings: int
+    seconds: float
+    set_up_seconds: float
+    rounding: float  # mm, largest
+    unapproached: list[str] = field(default_factory=list)  # points that an axis does not come to from its side in full
+
+    @property
+    def summary(self) -> list[str]:
+        """Lines for a terminal, and for the program's own head."""
+        lines = [
+            f"{self.readings} readings, about {_minutes(self.seconds)}, "
+            f"of these {_minutes(self.set_up_seconds)} for set-ups"
+        ]
+        if self.rounding > 0.0:
+            lines.append(f"positions are rounded, by up to {self.rounding * 1e6:.2g} nm")
+        return lines
+
+
+def measuring_program(scenario: Scenario, options: Options) -> Program:
+    """The program for a scenario's plan, with the feed and times of its [plan_by_time]. Raises InvalidArgument."""
+    times = times_of(scenario.keys.plan_by_time, f"{scenario.path}: plan_by_time")
+    writer, trigger = writer_of(options), trigger_of(options)
+    space = space_of(scenario, options)
+    visits = list(visits_of(scenario))
+    actions = list(actions_of(visits, space, align=options.align))
+    seconds, set_up_seconds = _duration(actions, space, times)
+    program = Program(
+        text="",
+        readings=sum(len(visit.points) for visit in visits),
+        seconds=seconds,
+        set_up_seconds=set_up_seconds,
+        rounding=_rounding(actions, writer),
+        unapproached=_unapproached(actions, space),
+    )
+    body = Body(scenario, options, writer, trigger, times, space)
+    lines = ["%"] if options.dialect == "iso" else []
+    for text in [*header(scenario, options, space, times, visits), *program.summary, *program.unapproached]:
+        lines += writer.comment(text)
+    lines += modes(writer, trigger, options, times.feed)
+    for action in actions:
+        lines += body.lines(action)
+    lines += [*writer.comment("end"), "M2"] if options.dialect == "linuxcnc" else [*writer.comment("end"), "M30", "%"]
+    lines = numbered(lines) if options.line_numbers else lines
+    return Program(
+        "\n".join(lines) + "\n", *(getattr(program, name) for name in list(program.__dataclass_fields__)[1:])
+    )
+
+
+def _rounding(actions: list[Action], writer: Writer) -> float:
+    """By how much the numbers of points that are read differ from the plan's."""
+    positions = np.array([action.position for action in actions if isinstance(action, Feed)])
+    written = np.array([float(writer.number(value)) for value in positions.ravel()]).reshape(positions.shape)
+    return float(np.max(np.abs(written - positions)))
+
+
+def _duration(actions: list[Action], space: Space, times: Times) -> tuple[float, float]:
+    """Of all, and of the set-ups in it, s; every move with the feed."""
+    place, seconds, set_ups = space.safe.copy(), 0.0, 0.0
+    for action in actions:
+        if isinstance(action, Rapid | Feed):
+            there = place.copy()
+            if isinstance(action, Rapid):
+                there[action.axis] = action.position
+            else:
+                there = action.position
+            seconds += float(times.move(np.asarray(np.linalg.norm(there - place))))
+            place = there
+        elif isinstance(action, Read):
+            seconds += times.settle + times.measure
+        elif isinstance(action, SetUp):
+            set_ups += times.scale_line_change if action.visit.is_scale_line else times.line_change
+    return seconds + set_ups, set_ups
+
+
+def _unapproached(actions: list[Action], space: Space) -> list[str]:
+    """What the limits of travel keep from being approached, in words."""
+    texts = []
+    visit: Visit | None = None
+    for action in actions:
+        if isinstance(action, Begin):
+            visit = action.visit
+        elif isinstance(action, Feed) and action.short and visit is not None:
+            first = visit.positions[0] + space.origin
+            ways = [
+                f"{AXES[axis]} {first[axis]:g} from {'below' if visit.approach[axis] > 0 else 'above'} "
+                f"by {abs(first[axis] - action.position[axis]):.3g} mm only"
+                for axis in action.short
+            ]
+            texts.append(
+                f"visit {visit.number}, line {visit.line}, point {visit.points[0]}: "
+                f"the limits let it be approached in {', '.join(ways)}"
+            )
+    return texts
+
+
+def _minutes(seconds: float) -> str:
+    minutes = round(seconds / MINUTE)
+    return f"{minutes // 60} h {minutes % 60} min" if minutes >= 60 else f"{seconds / MINUTE:.1f} min"

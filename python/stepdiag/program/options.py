@@ -1,0 +1,75 @@
+"""How a measuring program is written: what one may choose, its defaults and its checks."""
+
+from dataclasses import dataclass
+from typing import Final, get_args
+
+import numpy as np
+
+from stepdiag._core import InvalidArgument
+from stepdiag.program.gcode import Dialect, DwellWord, Trigger, Writer
+from stepdiag.program.path import Space
+from stepdiag.scenario.description import Scenario
+
+COORDINATES: Final = ("G53", "G54", "G55", "G56", "G57", "G58", "G59")
+
+
+@dataclass(frozen=True)
+class Options:
+    """How the program of a plan is written. Lengths mm, in the controller's coordinates; what is None has a default."""
+
+    dialect: Dialect = "linuxcnc"
+    coordinates: str | None = None  # G53 in LinuxCNC, else G54
+    decimals: int | None = None  # 6 in LinuxCNC, else 4
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    safe: tuple[float, float, float] | None = None
+    retreat: str = "ZXY"
+    overrun: float = 1.0
+    limits: tuple[float, float, float, float, float, float] | None = None  # X from, to, Y from, to, Z from, to
+    trigger: Trigger | None = None  # handshake in LinuxCNC, else dwell
+    trigger_code: str = ""
+    timeout: float = 300.0  # s, for a reading
+    dwell_word: DwellWord = "P"
+    align: bool = True
+    line_numbers: bool = False
+
+
+def writer_of(options: Options) -> Writer:
+    linuxcnc = options.dialect == "linuxcnc"
+    coordinates = options.coordinates or ("G53" if linuxcnc else "G54")
+    decimals = options.decimals if options.decimals is not None else 6 if linuxcnc else 4
+    if coordinates not in COORDINATES:
+        raise InvalidArgument(f"coordinates: expected one of {', '.join(COORDINATES)}, got {coordinates}")
+    if not 3 <= decimals <= 12:
+        raise InvalidArgument(f"decimals: expected 3 to 12 of a millimetre, got {decimals}")
+    if options.dwell_word not in get_args(DwellWord) or (linuxcnc and options.dwell_word != "P"):
+        raise InvalidArgument("dwell word: expected P, or in the dialect iso X, F or PMS")
+    return Writer(options.dialect, decimals, coordinates, options.dwell_word)
+
+
+def trigger_of(options: Options) -> Trigger:
+    if options.trigger_code and options.trigger not in (None, "code"):
+        raise InvalidArgument(f"trigger: expected {options.trigger} or the code {options.trigger_code}, got both")
+    trigger = options.trigger or ("code" if options.trigger_code else None)
+    trigger = trigger or ("handshake" if options.dialect == "linuxcnc" else "dwell")
+    if trigger == "code" and not (options.trigger_code[:1] == "M" and options.trigger_code[1:].isdecimal()):
+        raise InvalidArgument(f'trigger code: expected an M-code such as M80, got "{options.trigger_code}"')
+    if not 0.0 < options.timeout < np.inf:
+        raise InvalidArgument(f"timeout: expected a time above 0, got {options.timeout:g}")
+    if trigger in ("handshake", "pulse") and options.dialect == "iso":
+        raise InvalidArgument(f"trigger: {trigger} is LinuxCNC's; iso has dwell, or a trigger code")
+    return trigger
+
+
+def space_of(scenario: Scenario, options: Options) -> Space:
+    for name in ("origin", "safe", "limits"):
+        if not np.all(np.isfinite(getattr(options, name) or 0.0)):
+            raise InvalidArgument(f"{name}: expected finite lengths, got {getattr(options, name)}")
+    origin, volume = np.asarray(options.origin), scenario.plan.volume
+    # Z as far as it goes: on most machines that is up, away from the table.
+    safe = origin + volume * (0.5, 0.5, 1.0) if options.safe is None else np.asarray(options.safe)
+    lowest, highest = np.full(3, -np.inf), np.full(3, np.inf)
+    if options.limits is not None:
+        lowest, highest = np.asarray(options.limits[::2]), np.asarray(options.limits[1::2])
+    if not 0.0 <= options.overrun < np.inf:
+        raise InvalidArgument(f"overrun: expected a length of at least 0, got {options.overrun:g}")
+    return Space(origin, safe, options.retreat.upper(), options.overrun, lowest, highest)

@@ -1,0 +1,95 @@
+"""What a calibration says, as text; the straightness of the functional point beside the table's, as CSV."""
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from stepdiag._core import Calibration
+from stepdiag.calibration.functional_point import functional_point_straightness
+from stepdiag.calibration.verdict_text import fit_row
+from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
+from stepdiag.report.comparison import decimal
+from stepdiag.report.evaluation import reversal_rows, undetermined_rows
+
+FUNCTIONAL_POINT_FORMAT: Final = "stepdiag functional point 1"
+
+
+def calibration_report(calibration: Calibration) -> Iterator[str]:
+    """Verdict of the fit, method, machine, the largest values and uncertainties of each kind, and to which point
+    straightness refers."""
+    yield fit_row(calibration)
+    yield f"method: {calibration.method or 'not known'}, date: {calibration.date or 'not known'}"
+    volume, tool = (
+        " x ".join(f"{edge:g}" for edge in calibration.volume),
+        " ".join(f"{t:g}" for t in calibration.tool),
+    )
+    yield f"machine: chain {calibration.chain}, volume {volume} mm, tool offset {tool} mm"
+    yield f"{'':<14}{'largest value':<32}largest standard uncertainty"
+    for kind in KINDS:
+        values = list(_values(calibration, kind))
+        if values:
+            largest = _largest(kind, [(value, place) for value, _, place in values])
+            uncertain = _largest(kind, [(u, place) for _, u, place in values])
+            yield f"{kind:<14}{largest:<32}{uncertain}"
+    yield from reversal_rows(calibration)
+    yield "signs: actual less commanded; rotations and squarenesses by the right-hand rule"
+    yield f"reference: {calibration.straightness_reference}"
+    yield from _functional_point(calibration)
+    yield from undetermined_rows(calibration)
+
+
+def _values(calibration: Calibration, kind: Kind) -> Iterator[tuple[float, float, str]]:
+    """Value, standard uncertainty and place of every value of a kind."""
+    for name, (position, value, uncertainty) in calibration.functions.items():
+        if kind_of(name) == kind:
+            shape = "'s shape" if name in calibration.undetermined_slopes else ""
+            for p, v, u in zip(position.tolist(), value.tolist(), uncertainty.tolist(), strict=True):
+                yield v, u, f"{name}{shape} at {p:g} mm"
+    for name, (angle, u) in calibration.squareness.items():
+        if kind_of(name) == kind:
+            yield angle, u, name
+
+
+def _largest(kind: Kind, numbers: list[tuple[float, str]]) -> str:
+    known = [(number, place) for number, place in numbers if not np.isnan(number)]
+    if not known:
+        return "not known"
+    number, place = max(known, key=lambda entry: abs(entry[0]))
+    return f"{in_report_units(kind, number):9.4g} {REPORT_UNIT[kind]:<5}({place})"
+
+
+def _functional_point(calibration: Calibration) -> Iterator[str]:
+    for name, (position, value, uncertainty) in functional_point_straightness(calibration).items():
+        table = calibration.functions[name][1]
+        k = int(np.argmax(np.abs(value)))
+        yield (
+            f"functional point: {name} {value[k] * 1e3:.4g} µm at {position[k]:g} mm "
+            f"(u {uncertainty[k] * 1e3:.2g} µm), where the table has {table[k] * 1e3:.4g} µm"
+        )
+
+
+def functional_point_csv(calibration: Calibration) -> str:
+    """Straightness of the table and of the functional point, with the latter's standard uncertainty, in µm."""
+    counted = calibration.covariance is not None
+    leading = {
+        "format": FUNCTIONAL_POINT_FORMAT,
+        "chain": calibration.chain.name,
+        "volume_mm": _lengths(calibration.volume),
+        "tool_mm": _lengths(calibration.tool),
+        "method": calibration.method,
+        "date": calibration.date,
+        "straightness_reference": calibration.straightness_reference,
+        "covariance": "counted" if counted else "not known: straightness and rotations are taken as independent",
+    }
+    lines = [f"# {key}={value}" for key, value in leading.items() if value]
+    lines.append("parameter,position_mm,table,functional_point,unit,standard_uncertainty")
+    for name, (position, value, uncertainty) in functional_point_straightness(calibration).items():
+        for row in zip(position, calibration.functions[name][1], value, uncertainty, strict=True):
+            p, table, there, u = (float(number) for number in row)
+            lines.append(f"{name},{decimal(p)},{decimal(table, 3)},{decimal(there, 3)},um,{decimal(u, 3)}")
+    return "\n".join(lines) + "\n"
+
+
+def _lengths(values: np.ndarray) -> str:
+    return " ".join(f"{value!r}" for value in values.tolist())

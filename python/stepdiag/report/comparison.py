@@ -1,0 +1,190 @@
+"""A comparison of two calibrations as text, as CSV and as a labelled table."""
+
+from collections.abc import Iterator, Sequence
+from decimal import Decimal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from stepdiag._core import Calibration
+from stepdiag.calibration.comparison import Comparison, Difference
+from stepdiag.io.data_files import date_of_today, is_netcdf
+from stepdiag.io.whole_files import write_whole
+from stepdiag.parameters import REPORT_UNIT, in_report_units, kind_of, units_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+COMPARISON_FORMAT: Final = "stepdiag comparison 1"
+
+
+def comparison_report(comparison: Comparison, name_a: str, name_b: str) -> Iterator[str]:
+    """What is compared, a table by parameter with the significant ones marked, and what cannot be compared."""
+    yield f"A: {name_a}: {_described(comparison.a)}"
+    yield f"B: {name_b}: {_described(comparison.b)}"
+    a = comparison.a
+    volume, tool = (" x ".join(f"{edge:g}" for edge in a.volume), " ".join(f"{offset:g}" for offset in a.tool))
+    yield f"machine: chain {a.chain}, volume {volume} mm, tool offset {tool} mm"
+    yield ""
+    yield f"{'':<19}{'largest difference':>30}   {'most significant difference':>33}"
+    yield f"{'':<19}{'B - A':>10}{'u':>10}{'at mm':>10}   {'(B - A)/u':>10}{'at mm':>10}{'probability':>13}"
+    for difference in comparison.differences:
+        yield _row(comparison, difference)
+    yield ""
+    yield from _rules(comparison)
+
+
+def _described(calibration: Calibration) -> str:
+    return f"{calibration.method or 'method not known'}, {calibration.date or 'date not known'}"
+
+
+def _row(comparison: Comparison, difference: Difference) -> str:
+    kind = kind_of(difference.parameter)
+    k, worst = difference.largest, difference.most_significant
+    value, u = (in_report_units(kind, float(x[k])) for x in (difference.value, difference.standard_uncertainty))
+    name = difference.parameter.replace("_", " ") + (" shape" if difference.shape_only else "")
+    row = f"{name:<19}{value:10.4g}{'-' if np.isnan(u) else f'{u:.3g}':>10}{_place(difference, k):>10}   "
+    probability = comparison.probability(difference)
+    if worst is None or probability is None:
+        return f"{row}{'-':>10}{'-':>10}{'-':>13}  {REPORT_UNIT[kind]}"
+    mark = " significant" if comparison.is_significant(difference) else ""
+    normalised = float(difference.normalised[worst])
+    return f"{row}{normalised:10.3g}{_place(difference, worst):>10}{probability:13.3g}  {REPORT_UNIT[kind]}{mark}"
+
+
+def _place(difference: Difference, k: int) -> str:
+    return "-" if np.isnan(difference.position[k]) else f"{difference.position[k]:g}"
+
+
+def _rules(comparison: Comparison) -> Iterator[str]:
+    if comparison.count:
+        marked = sum(map(comparison.is_significant, comparison.differences))
+        yield (
+            f"significant: {marked} of {len(comparison.differences)} parameters, where |B - A| is beyond "
+            f"{comparison.threshold:.3g} u for any of its values"
+        )
+        yield (
+            f"probability: that chance makes any of the {comparison.count} values differ so, at most (Bonferroni); "
+            f"significant up to {comparison.limit:g}"
+        )
+        yield "u = sqrt(u_A^2 + u_B^2), as if A and B were independent: two evaluations of one run are not,"
+        yield "and then differ by less than u says"
+    else:
+        yield "significance: not known, because one of the two has no standard uncertainties"
+    for which in "AB":
+        yield from _named(
+            f"note: {which} is interpolated at the nodes of the other one:",
+            [d.parameter for d in comparison.differences if d.interpolated == which],
+        )
+    shapes = [d.parameter for d in comparison.differences if d.shape_only]
+    slopes = [name for name in shapes if not name.endswith("_reversal")]
+    yield from _named("note: shapes, both ends at 0, because a slope is not determined:", slopes)
+    if len(shapes) > len(slopes):
+        yield "note: shapes of reversal errors, 0 at the first position, because a constant is not determined"
+    yield from _named("only in A:", comparison.only_in_a)
+    yield from _named("only in B:", comparison.only_in_b)
+    for note in comparison.notes:
+        yield f"note: {note}"
+
+
+def _named(what: str, parameters: Sequence[str]) -> Iterator[str]:
+    if parameters:
+        yield f"{what} {', '.join(parameters)}"
+
+
+def comparison_csv(comparison: Comparison) -> str:
+    """The differences value by value, with leading lines that say of what; in µm and µrad."""
+    a, b = comparison.a, comparison.b
+    leading = {
+        "format": COMPARISON_FORMAT,
+        "chain": a.chain.name,
+        "volume_mm": " ".join(map(str, a.volume.tolist())),
+        **{f"{key}_{which}": getattr(c, key) for which, c in (("a", a), ("b", b)) for key in ("method", "date")},
+        "limit": str(comparison.limit),
+        "values": str(comparison.count),
+    }
+    lines = [f"# {key}={value}" for key, value in leading.items() if value]
+    lines.append("parameter,position_mm,difference,unit,standard_uncertainty,normalised_difference,shape_only")
+    for difference in comparison.differences:
+        shift, unit = (3, "um") if units_of(difference.parameter) == "mm" else (6, "urad")
+        for position, value, u, normalised in zip(
+            difference.position.tolist(),
+            difference.value.tolist(),
+            difference.standard_uncertainty.tolist(),
+            difference.normalised.tolist(),
+            strict=True,
+        ):
+            fields = [difference.parameter, decimal(position), decimal(value, shift), unit, decimal(u, shift)]
+            lines.append(",".join([*fields, decimal(normalised), str(difference.shape_only).lower()]))
+    return "\n".join(lines) + "\n"
+
+
+def decimal(value: float, shift: int = 0) -> str:
+    """The number times 10^shift without rounding; empty for one that is not known."""
+    if not np.isfinite(value):
+        return ""
+    return repr(value) if shift == 0 or value == 0.0 else str(Decimal(repr(value)).scaleb(shift))
+
+
+def comparison_table(comparison: Comparison) -> "xr.Dataset":
+    """The differences as NAME_difference, with NAME_difference_u and NAME_normalised, over positions x, y, z (mm)."""
+    import xarray as xr  # takes half a second, which the other reports need not wait for
+
+    coordinates: dict[str, Any] = {}
+    variables: dict[str, Any] = {}
+    for difference in comparison.differences:
+        name = difference.parameter
+        dimensions: tuple[str, ...] = ()
+        if not np.isnan(difference.position[0]):
+            axis = name[2].lower()
+            if axis in coordinates and not np.array_equal(coordinates[axis][1], difference.position):
+                axis = f"{axis}_{name}"
+            coordinates[axis] = (axis, difference.position, {"units": "mm", "long_name": f"position of {name[2]}"})
+            dimensions = (axis,)
+        attributes = {
+            "units": units_of(name),
+            "long_name": f"{name}, B - A",
+            "shape_only": _flag(difference.shape_only),
+        }
+        attributes["significant"] = _flag(comparison.is_significant(difference))
+        for suffix, values, own in (
+            ("difference", difference.value, attributes),
+            (
+                "difference_u",
+                difference.standard_uncertainty,
+                {"units": units_of(name), "long_name": f"standard uncertainty of {name}, B - A, as if independent"},
+            ),
+            ("normalised", difference.normalised, {"units": "1", "long_name": f"{name}, (B - A)/u"}),
+        ):
+            variables[f"{name}_{suffix}"] = (dimensions, values if dimensions else float(values[0]), own)
+    a, b = comparison.a, comparison.b
+    return xr.Dataset(
+        variables,
+        coordinates,
+        {
+            "title": "difference of two calibrations, B - A",
+            **{f"{key}_{which}": getattr(c, key) for which, c in (("a", a), ("b", b)) for key in ("method", "date")},
+            "chain": a.chain.name,
+            "volume_mm": a.volume,
+            "limit": comparison.limit,
+            "values": comparison.count,
+            "only_in_a": " ".join(comparison.only_in_a),
+            "only_in_b": " ".join(comparison.only_in_b),
+            "notes": "\n".join(comparison.notes),
+        },
+    )
+
+
+def write_comparison(comparison: Comparison, path: Path) -> None:
+    """Writes the differences as CSV or, where the name ends in .nc, as netCDF. Raises InvalidArgument."""
+    if not is_netcdf(path):
+        write_whole(path, comparison_csv(comparison))
+        return
+    from stepdiag.io.netcdf import write_dataset
+
+    write_dataset(comparison_table(comparison), path, {"format": COMPARISON_FORMAT, "date": date_of_today()})
+
+
+def _flag(value: bool) -> str:
+    return str(value).lower()

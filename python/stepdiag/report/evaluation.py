@@ -1,0 +1,147 @@
+"""What the commands tell about their results, as lines of text."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from stepdiag._core import Adjustment, Calibration, Measurement, Outlier, straightness_reference
+from stepdiag.calibration.largest_by_kind import largest_uncertainties
+from stepdiag.calibration.verdict_text import verdict_rows
+from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
+from stepdiag.report.setup_table import setup_rows
+from stepdiag.scenario.adjustment import scale_line_angle
+from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.planned_readings import lost_readings
+from stepdiag.units import MICRO
+
+
+def evaluation_report(result: Calibration | Adjustment, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
+    """The verdict of the fit, lost readings, largest standard uncertainties and what is not determined; of an
+    adjustment also which readings were left out, and how head and mirror were set up."""
+    if isinstance(result, Calibration):
+        return _published(result, measurement, scenario)
+    return _adjusted(result, measurement, scenario)
+
+
+def _published(calibration: Calibration, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
+    yield f"fit: unchecked: the method {calibration.method} does not test it; -m adjustment does"
+    yield from _what_was_done(calibration, measurement, scenario)
+    yield from uncertainty_rows(calibration)
+    yield from undetermined_rows(calibration)
+    yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
+    if scenario.keys.adjustment.model_fields_set:
+        yield f"note: [adjustment] is not used by the method {calibration.method}"
+
+
+def _adjusted(adjustment: Adjustment, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
+    calibration = adjustment.calibration
+    yield from verdict_rows(adjustment)
+    yield from _what_was_done(calibration, measurement, scenario)
+    yield from _left_out(adjustment.outliers)
+    yield from uncertainty_rows(calibration)
+    yield from reversal_rows(calibration)
+    rows = list(setup_rows(adjustment.setup, [*scenario.plan.lines, *scenario.plan.scale_lines]))
+    if rows:
+        yield "set-up found, 12.3(45) being 12.3 with a standard uncertainty of 4.5:"
+        yield from rows
+    yield from undetermined_rows(calibration, adjustment.combinations)
+    yield from smoothness_rows(adjustment.smoothness)
+    yield from cosine_rows(scenario)
+    yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
+
+
+def _what_was_done(calibration: Calibration, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
+    yield f"method: {calibration.method}, chain {calibration.chain.name}"
+    yield f"readings: {len(measurement)} points on {len(set(measurement.line))} lines"
+    incomplete, missing = lost_readings(measurement, scenario.plan, scenario.signals)
+    if incomplete or missing:
+        yield f"lost: {incomplete} rows without a complete reading, {missing} points of the plan without a row"
+
+
+def _left_out(outliers: Sequence[Outlier]) -> Iterator[str]:
+    for outlier in outliers:
+        if not outlier.left_out:
+            continue
+        is_angle = outlier.channel in ("alpha", "beta")
+        size = outlier.residual * (MICRO if is_angle else 1e3)
+        alike = [_place(other) for other in outliers if other.number == outlier.number and not other.left_out]
+        doubt = f"; it may be {' or '.join(alike)} instead: no other reading tells" if alike else ""
+        yield (
+            f"left out: {_place(outlier)}: off by {size:.3g} {'µrad' if is_angle else 'µm'}, "
+            f"{abs(outlier.normalised):.1f} standard uncertainties{doubt}"
+        )
+
+
+def _place(outlier: Outlier) -> str:
+    return f"run {outlier.run}, line {outlier.line}, point {outlier.point}, {outlier.channel}"
+
+
+def undetermined_rows(calibration: Calibration, combinations: Sequence[str] = ()) -> Iterator[str]:
+    """What is not determined, and what is known of it all the same."""
+    for sentence in calibration.undetermined:
+        yield f"undetermined: {sentence}"
+    for combination in combinations:
+        yield f"known: {_in_report_signs(combination)}"
+    if calibration.undetermined_slopes:
+        yield "note: a function of undetermined slope is given by its shape, with both ends at 0"
+
+
+def _in_report_signs(text: str) -> str:
+    return text.replace("+-", "±").replace("urad", "µrad").replace("um/m", "µm/m")
+
+
+def smoothness_rows(deviations: Mapping[str, float]) -> Iterator[str]:
+    """Which functions were smoothed, and how much."""
+    if deviations:
+        said = (
+            f"{name} {in_report_units(kind_of(name), d):.3g} {REPORT_UNIT[kind_of(name)]}"
+            for name, d in deviations.items()
+        )
+        yield f"smoothed, standard deviation of second differences: {', '.join(said)}"
+
+
+def cosine_rows(scenario: Scenario) -> Iterator[str]:
+    """What angles that no reading tells may do to lengths, in words."""
+    if scenario.signals == ("distance",):
+        yield (
+            "lines without tilts: a laser at an angle to its line reads wrong by the square of it; laser_urad in "
+            "[adjustment] says how well it stands (2000 at most), and that is in the uncertainties"
+        )
+    lines: dict[float, list[str]] = {}
+    for line in scenario.plan.scale_lines:
+        angle = scale_line_angle(scenario.keys.adjustment, line)
+        if angle > 0.0:
+            lines.setdefault(angle, []).append(line)
+    for angle, names in lines.items():
+        # (a^2 + b^2)/2 of two normal angles: angle^2 on average.
+        yield (
+            f"scale lines {', '.join(names)}: a laser that stands along the axis to {angle * MICRO:g} µrad reads too "
+            f"short, never too long, by {angle**2 * MICRO:.2g} µm/m on average; that is in the uncertainties, "
+            "not corrected"
+        )
+
+
+def reversal_rows(calibration: Calibration) -> Iterator[str]:
+    """The largest reversal error of each kind."""
+    largest: dict[Kind, tuple[float, float, str]] = {}
+    for name, (position, value, uncertainty) in calibration.reversal.items():
+        kind, worst = kind_of(name), int(np.argmax(np.abs(value)))
+        if abs(value[worst]) >= abs(largest.get(kind, (0.0, 0.0, ""))[0]):
+            largest[kind] = float(value[worst]), float(uncertainty[worst]), f"{name} at {position[worst]:g} mm"
+    if largest:
+        yield "largest reversal errors, + less - direction of approach:"
+    for kind in KINDS:
+        if kind in largest:
+            error, uncertainty_of_it, where = largest[kind]
+            unit, u = REPORT_UNIT[kind], "not known"  # as of a calibration that was read from CSV
+            if not math.isnan(uncertainty_of_it):
+                u = f"{in_report_units(kind, uncertainty_of_it):.2g} {unit}"
+            yield f"  {kind:<13}{in_report_units(kind, error):9.3g} {unit:<5} ({where}; standard uncertainty {u})"
+
+
+def uncertainty_rows(calibration: Calibration) -> Iterator[str]:
+    """The largest standard uncertainty of each kind, and where it is."""
+    yield "largest standard uncertainties:"
+    for kind, (uncertainty, where) in largest_uncertainties(calibration).items():
+        yield f"  {kind:<13}{in_report_units(kind, uncertainty):9.3g} {REPORT_UNIT[kind]:<5} ({where})"

@@ -1,0 +1,100 @@
+"""What `stepdiag plan` tells: the table of plans, which one to take, and all of them as a file."""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units
+from stepdiag.planning.plan_by_time import Choice, Family, Outcome, choose, complete, front
+
+FAR: Final = 2.0  # times the time that there is: how far the table goes on
+
+
+def plan_rows(found: Sequence[Outcome], choice: Choice, minutes: float, family: Family = "length") -> Iterator[str]:
+    """The table, what is taken marked, and a line where the time ends; much slower plans are only counted."""
+    everything = front(found, family)
+    shown = [choice.taken, choice.next_better, choice.fastest]
+    longest = max([FAR * minutes, *(o.minutes for o in shown if o is not None)])
+    plans = [o for o in everything if o.minutes <= longest] or everything[:1]
+    width = max((len(o.candidate.description) for o in plans), default=5)
+    names = "".join(f"{kind:>14}" for kind in KINDS)
+    yield f"  {'min':>6}  {'lines':<{width}}{'steps':>7}{'spacing':>9}{'repeats':>9}{names}"
+    yield f"  {'':>6}  {'':<{width}}{'':>7}{'mm':>9}{'':>9}" + "".join(f"{REPORT_UNIT[kind]:>14}" for kind in KINDS)
+    ended = False
+    for o in plans:
+        if o.minutes > minutes and not ended:
+            ended = True
+            yield f"  {minutes:6.1f}  -- the time that there is --"
+        cells = "".join(f"{_cell(kind, o):>14}" for kind in KINDS)
+        c = o.candidate
+        mark = "*" if o is choice.taken else " "
+        yield f" {mark}{o.minutes:6.1f}  {c.description:<{width}}{c.steps:7}{o.spacing:9.3g}{c.repeats:9}{cells}"
+    if len(plans) < len(everything):
+        yield f"  and {len(everything) - len(plans)} that take longer, up to {everything[-1].minutes:.0f} minutes"
+
+
+def _cell(kind: Kind, one: Outcome) -> str:
+    return f"{in_report_units(kind, one.largest[kind]):.3g}" if kind in one.largest else "-"
+
+
+def advice(found: Sequence[Outcome], minutes: float, spacing: float, family: Family = "length") -> Iterator[str]:
+    """Which plan to take, in words, and what more time would give."""
+    choice = choose(found, minutes, spacing, family)
+    taken = choice.taken
+    if not complete(found):
+        yield "none of these plans determines any parameter as a whole"
+        return
+    if taken is None:
+        quickest = front(found, family)[0]
+        yield f"no plan fits {minutes:g} minutes; the fastest takes {quickest.minutes:.1f}: {_named(quickest)}"
+        return
+    if not choice.spacing_kept:
+        needed = f"; the fastest takes {choice.fastest.minutes:.1f}" if choice.fastest else ""
+        yield f"no plan with nodes at most {spacing:.3g} mm apart fits {minutes:g} minutes{needed}"
+    yield f"take: {_named(taken)}, in {taken.minutes:.1f} minutes: {_said(taken)}"
+    better = choice.next_better
+    if better is not None:
+        yield f"next better with nodes as near: {_named(better)}, in {better.minutes:.1f} minutes: {_said(better)}"
+
+
+def _named(one: Outcome) -> str:
+    c = one.candidate
+    times = {1: "once", 2: "twice"}.get(c.repeats, f"{c.repeats} times")
+    return f"{c.description}, {c.steps} steps ({one.spacing:.3g} mm), {times}"
+
+
+def _said(one: Outcome) -> str:
+    parts = [f"{kind} {_cell(kind, one)} {REPORT_UNIT[kind]}" for kind in KINDS if kind in one.largest]
+    return "u at most " + ", ".join(parts)
+
+
+def left_out_rows(found: Sequence[Outcome]) -> Iterator[str]:
+    """Why plans are not in the table though no other beats them: each reason once."""
+    most = max((len(o.determined) for o in found), default=0)
+    reasons: dict[str, list[Outcome]] = {}
+    for o in found:
+        if o.trouble:
+            reasons.setdefault(o.trouble, []).append(o)
+        elif len(o.determined) < most:
+            everything = frozenset().union(*(other.determined for other in complete(found)))
+            missing = ", ".join(sorted(everything - o.determined))
+            reasons.setdefault(f"does not determine {missing}", []).append(o)
+    for reason, plans in reasons.items():
+        descriptions = list(dict.fromkeys(o.candidate.description for o in plans))
+        steps = sorted({o.candidate.steps for o in plans})
+        yield f"left out: {' / '.join(descriptions)}; {', '.join(map(str, steps))} steps: {reason}"
+
+
+def plan_csv(found: Sequence[Outcome]) -> str:
+    """All plans as a file, also those that others beat; what is not determined is an empty field."""
+    kept = {id(o) for o in front(found)}
+    rows = [
+        "minutes,lines,scale_lines,steps,spacing_mm,repeats,mirror_width_mm,mirror_height_mm,parameters_determined,"
+        "u_positioning_um,u_straightness_um,u_angle_urad,u_squareness_urad,on_front"
+    ]
+    for o in sorted(found, key=lambda o: o.seconds):
+        c = o.candidate
+        cells = [repr(in_report_units(kind, o.largest[kind])) if kind in o.largest else "" for kind in KINDS]
+        fields = [repr(o.minutes), " ".join(c.lines), " ".join(c.scale_lines), str(c.steps), repr(o.spacing)]
+        fields += [str(c.repeats), *map(repr, o.mirror), str(len(o.determined)), *cells, str(int(id(o) in kept))]
+        rows.append(",".join(fields))
+    return "\n".join(rows) + "\n"

@@ -1,0 +1,105 @@
+"""How head and mirror were set up, as an adjustment found it: one row a set-up, one column an unknown."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Final
+
+from stepdiag._core import SetupEstimate
+from stepdiag.units import HOUR
+
+# Of each quantity: its unit in reports, that unit in native ones, and what its components are called.
+UNITS: Final[Mapping[str, tuple[str, float]]] = {
+    "reflector": ("µrad", 1e-6),
+    "laser": ("µrad", 1e-6),
+    "distance_constant": ("µm", 1e-3),
+    "beam_constants": ("µm", 1e-3),
+    "psd_zero": ("µm", 1e-3),
+    "lateral": ("mm", 1.0),
+    "roll": ("µrad", 1e-6),
+    "gain": ("ppm", 1e-6),
+    "drift": ("µm/h", 1e-3 / HOUR),
+}
+COMPONENTS: Final[Mapping[str, Sequence[str]]] = {
+    "reflector": ("reflector a", "reflector b"),
+    "laser": ("laser a", "laser b"),
+    "distance_constant": ("constant",),
+    "psd_zero": ("psd zero x", "psd zero y"),
+    "lateral": ("lateral x", "lateral y"),
+}
+
+# Above this share of its prior uncertainty an unknown is as good as unread.
+NOTHING_LEARNT: Final = 0.9
+
+
+def setup_rows(estimates: Sequence[SetupEstimate], lines: Sequence[str], *, values: bool = True) -> Iterator[str]:
+    """A table of what was found, as 12.34(56): the uncertainty of the last digits in brackets; without `values` the
+    standard uncertainties alone. By run, and in it in the order of `lines`. Unknowns of which next to nothing was
+    learnt are named below it."""
+    told = sorted((e for e in estimates if e.prior > 0.0), key=lambda e: (e.run, lines.index(e.line)))
+    learnt = [e for e in told if e.value is None or e.standard_uncertainty < NOTHING_LEARNT * e.prior]
+    found = {(e.quantity, e.component) for e in learnt if e.value is not None}
+    columns = sorted(found, key=lambda column: (list(UNITS).index(column[0]), column[1]))
+    if columns:
+        write = _value if values else _uncertainty
+        yield from _table(learnt, columns, write)
+    prior: dict[str, list[SetupEstimate]] = {}
+    for estimate in told:
+        if estimate not in learnt:
+            prior.setdefault(estimate.quantity, []).append(estimate)
+    for quantity, known in prior.items():
+        unit, native = UNITS[quantity]
+        everywhere = len(known) == sum(e.quantity == quantity for e in told)
+        places = "every line" if everywhere else ", ".join(dict.fromkeys(e.line for e in known))
+        widths = ", ".join(dict.fromkeys(f"{e.prior / native:g}" for e in known))
+        yield f"  {quantity.replace('_', ' ')} hardly better known than beforehand ({widths} {unit}) on {places}"
+
+
+def concise(value: float, uncertainty: float) -> str:
+    """A value with the uncertainty of its last digits: 12.34(56)."""
+    if not math.isfinite(uncertainty) or uncertainty <= 0.0:
+        return f"{value:.4g}"
+    digits = 1 - math.floor(math.log10(float(f"{uncertainty:.1e}")))  # two of the rounded uncertainty
+    shown = max(0, digits)
+    last = round(round(uncertainty, digits) * 10**shown)
+    return f"{round(value, digits) + 0.0:.{shown}f}({last})"
+
+
+def _value(estimate: SetupEstimate) -> str:
+    native = UNITS[estimate.quantity][1]
+    if estimate.value is None:
+        return "-"
+    return concise(estimate.value / native, estimate.standard_uncertainty / native)
+
+
+def _uncertainty(estimate: SetupEstimate) -> str:
+    if estimate.value is None:
+        return "-"
+    size = estimate.standard_uncertainty / UNITS[estimate.quantity][1]
+    return f"{size:#.3g}" if size < 100.0 else f"{size:.0f}"
+
+
+def _table(
+    estimates: Iterable[SetupEstimate], columns: Sequence[tuple[str, int]], write: Callable[[SetupEstimate], str]
+) -> Iterator[str]:
+    rows: dict[tuple[int, str], dict[tuple[str, int], str]] = {}
+    for estimate in estimates:
+        row = rows.setdefault((estimate.run, estimate.line), {})
+        row[estimate.quantity, estimate.component] = write(estimate)
+    several_runs = len({run for run, _ in rows}) > 1
+    heading = ["", *(_heading(quantity, component) for quantity, component in columns)]
+    units = ["", *(UNITS[quantity][0] for quantity, _ in columns)]
+    body = [
+        [f"{line} run {run}" if several_runs else line, *(row.get(column, "") for column in columns)]
+        for (run, line), row in rows.items()
+    ]
+    widths = [max(map(len, column)) for column in zip(heading, units, *body, strict=True)]
+    for cells in (heading, units, *body):
+        first, *others = (cell.rjust(width) for cell, width in zip(cells, widths, strict=True))
+        yield f"  {cells[0].ljust(len(first))}  {'  '.join(others)}".rstrip()
+
+
+def _heading(quantity: str, component: int) -> str:
+    if quantity == "beam_constants":
+        return f"beam d{component + 1}"
+    names = COMPONENTS.get(quantity, (quantity,))
+    return names[component]

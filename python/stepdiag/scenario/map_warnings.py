@@ -1,0 +1,53 @@
+"""What is odd about an error map that is used as given."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from stepdiag._core import Chain, ErrorMap, InvalidArgument
+from stepdiag.scenario.description import Scenario
+
+
+def scenario_warnings(scenario: Scenario) -> Iterator[str]:
+    """One sentence for each oddity of the error map that a scenario names, with the map's path in front."""
+    file = scenario.error_map
+    if file is None:
+        return
+    for warning in map_warnings(scenario.machine().errors, scenario):
+        yield f"{file}: {warning}"
+
+
+def map_warnings(errors: ErrorMap, scenario: Scenario) -> Iterator[str]:
+    """The map against the frame's zeros, and its leading lines against the machine that it is used for."""
+    yield from errors.warnings(scenario.plan.volume)
+    header = errors.header
+    chain = header.get("chain")
+    if chain is not None and not _is_chain(chain, scenario.chain):
+        yield f"is for the chain {chain}, the scenario has {scenario.chain.name}; used as given"
+    for key, what, wanted in (
+        ("volume_mm", "volume", scenario.plan.volume.tolist()),
+        ("tool_mm", "tool offset", scenario.tool),
+    ):
+        if key in header and not _are_numbers(header[key], wanted):
+            mine = " ".join(f"{number:g}" for number in wanted)
+            yield f"is for the {what} {header[key]} mm, the scenario has {mine} mm; used as given"
+    slopes = header.get("undetermined_slopes", "").split()
+    if slopes:
+        yield f"is a calibration that leaves the slopes of {', '.join(slopes)} open; used as if they were 0"
+
+
+def _is_chain(text: str, chain: Chain) -> bool:
+    try:
+        return Chain(text) == chain
+    except InvalidArgument:
+        return False
+
+
+def _are_numbers(text: str, wanted: Sequence[float]) -> bool:
+    try:
+        numbers = [float(word) for word in text.split()]
+    except ValueError:
+        return False
+    # A nanometre: somebody else's writer may have rounded.
+    return len(numbers) == len(wanted) and all(
+        math.isclose(a, b, rel_tol=0.0, abs_tol=1e-6) for a, b in zip(numbers, wanted, strict=True)
+    )

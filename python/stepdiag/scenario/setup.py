@@ -1,0 +1,121 @@
+"""A scenario's set-up in native units: misalignments, constants, noise, air and weights."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from stepdiag import _core
+from stepdiag._core import InvalidArgument
+from stepdiag.config.key_errors import BY_LINE, show, suggest
+from stepdiag.config.scenario_head_keys import AirKeys, EnvironmentSection
+from stepdiag.config.scenario_keys import SECTIONS_BY_LINE, MisalignmentKeys, NoiseSection, ScenarioKeys
+from stepdiag.config.toml_text import located
+from stepdiag.units import HECTOPASCAL, HOUR, MICROMETRE, MICRORADIAN, PERCENT
+
+
+def misalignments(keys: ScenarioKeys, heads: Mapping[str, _core.Head], path: Path) -> dict[str, _core.Misalignment]:
+    """By line. A line that is missing is aligned."""
+    lines = [*keys.plan.lines, *keys.plan.scale_lines]
+    for section in SECTIONS_BY_LINE:
+        for line in getattr(keys, section).by_line:
+            if line not in lines:
+                raise InvalidArgument(f"{path}: {section}.{line}: not a line of the plan; {suggest(line, lines)}")
+    result = {}
+    for line in lines:
+        own = keys.misalignment.by_line.get(line)
+        if line in keys.plan.scale_lines and own is None:
+            continue
+        shared = MisalignmentKeys() if line in keys.plan.scale_lines else keys.misalignment
+        values = shared.model_dump(exclude={BY_LINE}) | (own.model_dump(exclude_unset=True) if own else {})
+        place = f"misalignment.{line}" if own and own.beam_constants_um is not None else "misalignment"
+        result[line] = _core.Misalignment(
+            reflector=_scaled(values["reflector_urad"]),
+            laser=_scaled(values["laser_urad"]),
+            psd_zero=values["psd_zero_mm"],
+            distance_constant=values["distance_constant_mm"],
+            beam_constants=_beam_constants(values["beam_constants_um"], heads[line], f"{path}: {place}"),
+            lateral=values["lateral_mm"],
+            roll=values["roll_urad"] * MICRORADIAN,
+            gain=values["gain"],
+            drift=values["drift_um_per_h"] * MICROMETRE / HOUR,
+        )
+        if values["drift_um_per_h"] != 0.0 and keys.plan.seconds_per_reading is None:
+            place = f"misalignment.{line}" if own and "drift_um_per_h" in own.model_fields_set else "misalignment"
+            raise InvalidArgument(
+                f"{path}: {place}.drift_um_per_h: expected plan.seconds_per_reading as well, got none"
+            )
+    return result
+
+
+def _beam_constants(constants: tuple[float, ...] | None, head: _core.Head, where: str) -> list[float]:
+    if constants is None:
+        return []
+    count = len(head.signals) if head.layout == "multi_beam" else 0
+    if len(constants) != count:
+        expected = f"{count} constants, one for each beam" if count else f"none, for the layout {show(head.layout)}"
+        raise InvalidArgument(f"{where}.beam_constants_um: expected {expected}, got {show(constants)}")
+    return [constant * MICROMETRE for constant in constants]
+
+
+def _scaled(angles: tuple[float, float]) -> tuple[float, float]:
+    return angles[0] * MICRORADIAN, angles[1] * MICRORADIAN
+
+
+def noise_of(keys: NoiseSection) -> _core.Noise:
+    return _core.Noise(
+        distance=keys.distance_um * MICROMETRE,
+        tilt=keys.tilt_urad * MICRORADIAN,
+        spot=keys.spot_um * MICROMETRE,
+        seed=keys.seed,
+        common=keys.common_um * MICROMETRE,
+    )
+
+
+Air = _core.Environment | None
+
+
+def environments(keys: EnvironmentSection, path: Path) -> tuple[Air, Air]:
+    """The air of the trace, and the air that readings are reduced with; None where nothing is said of it."""
+    true = environment(keys, f"{path}: environment")
+    if keys.assumed is None:
+        return true, true
+    mine = {name: getattr(keys.assumed, name) for name in keys.assumed.model_fields_set}
+    others = {name: getattr(keys, name) for name in keys.model_fields_set & AirKeys.model_fields.keys()}
+    if mine and ("refractive_index" in keys.model_fields_set) != ("refractive_index" in mine):
+        others = {}  # an index takes the place of a state, and the other way round
+    return true, environment(AirKeys.model_validate(others | mine), f"{path}: environment.assumed")
+
+
+def environment(keys: AirKeys, place: str) -> Air:
+    """Air of the given state, at 20 °C and so on where it is not; or of the given index; None without either."""
+    state = keys.model_fields_set & AirKeys.model_fields.keys() - {"refractive_index"}
+    if "refractive_index" in keys.model_fields_set and state:
+        named = ", ".join(sorted(state))
+        raise InvalidArgument(f"{place}: expected refractive_index or a state of the air, got both ({named})")
+    with located(place):
+        if not state:
+            return None if keys.refractive_index is None else _core.Environment(keys.refractive_index)
+        values = {
+            "temperature": keys.temperature_c,
+            "pressure": None if keys.pressure_hpa is None else keys.pressure_hpa * HECTOPASCAL,
+            "relative_humidity": None if keys.humidity_percent is None else keys.humidity_percent * PERCENT,
+            "carbon_dioxide": keys.co2_ppm,
+        }
+        given = {name: value for name, value in values.items() if value is not None}
+        return _core.Environment.from_air(equation=keys.equation or "ciddor", **given)
+
+
+def weights(keys: ScenarioKeys) -> _core.ReadingUncertainty:
+    """[uncertainty], else the positive deviations of [noise], else the core's defaults; key by key."""
+    given = {}
+    for name, key, unit in (
+        ("distance", "distance_um", MICROMETRE),
+        ("tilt", "tilt_urad", MICRORADIAN),
+        ("spot", "spot_um", MICROMETRE),
+    ):
+        # A standard deviation of 0 makes a perfect simulation; it is no statement about readings.
+        stated, deviation = getattr(keys.uncertainty, key), getattr(keys.noise, key)
+        if stated is not None:
+            given[name] = stated.native(unit).standard_uncertainty
+        elif deviation > 0.0:
+            given[name] = deviation * unit
+    return _core.ReadingUncertainty(**given)

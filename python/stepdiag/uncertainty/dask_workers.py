@@ -1,0 +1,284 @@
+"""Monte Carlo runs on the workers of Dask distributed: of another computer's scheduler, or processes of this one.
+
+A task is a pure function of the source of a model, the bytes of the bins and a range of leaves; it gives the bytes of
+the statistics of these leaves. They are merged by the numbers of the leaves, so neither who computed what, nor how
+leaves were shared out, nor a worker that is lost on the way (others do its tasks again) changes a bit of the result.
+Bits do depend on the instruction set: workers that use another one than this program take no part.
+
+Dask is imported when it is used: it is an optional dependency.
+"""
+
+import ipaddress
+import logging
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+from stepdiag import _core
+from stepdiag._core import Bins, InvalidArgument, PartialStatistics
+from stepdiag.uncertainty.model_source import ModelSource, model_of
+from stepdiag.uncertainty.monte_carlo import Executor, LeafRange
+
+TASKS_A_THREAD: Final = 2  # under way: one that is computed, one that waits
+CONNECT_SECONDS: Final = 10.0
+LOOPBACK: Final = "127.0.0.1"
+PRELOAD: Final = ["stepdiag.uncertainty.dask_preload"]
+CREDENTIALS: Final = "ca-file, client.cert and client.key in Dask's configuration, distributed.comm.tls"
+
+Warn = Callable[[str], None]
+
+
+class WorkersLost(ConnectionError):
+    """The scheduler is gone, or a task lost every worker that it was given to."""
+
+
+@dataclass(frozen=True)
+class Platform:
+    """What bits depend on beside the task: our version, and the instruction set in use."""
+
+    version: str
+    instruction_set: str
+
+    def __str__(self) -> str:
+        return f"stepdiag {self.version} with {self.instruction_set}"
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """The answer of a worker that is not the machine that a task is for."""
+
+    machine: Platform
+
+
+def this_machine() -> Platform:
+    return Platform(_core.__version__, _core.instruction_set())
+
+
+# --- tasks: what workers do ------------------------------------------------------------------------------------------
+# One thread each: a worker has as many tasks at a time as it has threads, its share of the computer.
+def perform(machine: Platform, function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
+    return function(*arguments) if this_machine() == machine else Refusal(this_machine())
+
+
+def compute_leaves(source: ModelSource, bins: bytes, first: int, end: int) -> bytes:
+    return _core.run_leaves(model_of(source), _bins_of(bins), first, end - first, threads=1).to_bytes()
+
+
+@lru_cache(maxsize=2)
+def _bins_of(content: bytes) -> Bins:
+    return Bins.from_bytes(content)
+
+
+# --- the client ------------------------------------------------------------------------------------------------------
+class Workers:
+    """Those of a scheduler that take part. Make it with `workers_of`."""
+
+    def __init__(self, client: Any, warn: Warn) -> None:
+        self._client = client
+        self._warn = warn
+        self._refused: set[str] = set()
+        self._chosen: list[str] | None = None  # addresses; None: all
+        self.machine = this_machine()
+        found = self._machines()
+        if not found:
+            raise InvalidArgument(f"{self.address}: the scheduler has no workers")
+        if any(machine != self.machine for machine in found.values()):
+            self._choose(found)
+        known = client.scheduler_info(n_workers=-1)["workers"]
+        self.threads = sum(int(known[address]["nthreads"]) for address in self._chosen or found if address in known)
+
+    @property
+    def address(self) -> str:
+        return str(self._client.scheduler.address)
+
+    def executor(self, source: ModelSource) -> Executor:
+        """For run_monte_carlo: each range of leaves is a task."""
+
+        def compute(bins: Bins, ranges: Iterable[LeafRange]) -> Iterator[PartialStatistics]:
+            content = bins.to_bytes()
+            for _, part in self.compute(compute_leaves, ((source, content, *leaves) for leaves in ranges)):
+                yield PartialStatistics.from_bytes(part)
+
+        return compute
+
+    def compute(self, function: Callable[..., Any], arguments: Iterable[Sequence[Any]]) -> Iterator[tuple[int, Any]]:
+        """A pure function of each of these arguments, as the answers come: which, and the answer. A few are under way
+        at a time. What one worker refuses is given to others; closing the iterator gives up what is under way."""
+        tasks = enumerate(arguments)
+        return self._answers(function, tasks)
+
+    def _answers(
+        self, function: Callable[..., Any], tasks: Iterator[tuple[int, Sequence[Any]]]
+    ) -> Iterator[tuple[int, Any]]:
+        distributed = _dask()
+        lost = distributed.client.FutureCancelledError, distributed.comm.CommClosedError
+        futures = distributed.as_completed(loop=self._client.loop)
+        under_way: dict[str, tuple[int, Sequence[Any]]] = {}
+
+        def submit(task: tuple[int, Sequence[Any]] | None) -> None:
+            if task is not None:
+                arguments = perform, self.machine, function, task[1]
+                # Others are asked where the chosen ones are gone: a worker that is started again has a new address.
+                future = self._client.submit(
+                    *arguments, pure=False, workers=self._chosen, allow_other_workers=self._chosen is not None
+                )
+                under_way[future.key] = task
+                futures.add(future)
+
+        try:
+            for _ in range(TASKS_A_THREAD * self.threads):
+                submit(next(tasks, None))
+            for future in futures:
+                task = under_way.pop(future.key)
+                answer = future.result()
+                if isinstance(answer, Refusal):
+                    self._choose(self._machines())
+                    submit(task)
+                    continue
+                submit(next(tasks, None))
+                yield task[0], answer
+        except distributed.KilledWorker as error:
+            raise WorkersLost(f"a task lost every worker that it was given to: {error}") from None
+        except lost as error:
+            raise WorkersLost(f"{self.address}: the scheduler is gone: {error}") from None
+        finally:
+            futures.clear()  # lets go of what is under way
+
+    def _machines(self) -> dict[str, Platform | Exception]:
+        """By address; of one that has another stepdiag, or none, the error of asking."""
+        found: dict[str, Platform | Exception] = self._client.run(this_machine, on_error="return")
+        return found
+
+    def _choose(self, found: Mapping[str, Platform | Exception]) -> None:
+        """Keeps to the workers that are what this machine is, and says which are not."""
+        self._chosen = sorted(address for address, machine in found.items() if machine == self.machine)
+        refused = {address: machine for address, machine in sorted(found.items()) if machine != self.machine}
+        if not self._chosen:
+            said = "; ".join(f"{address} has {machine}" for address, machine in refused.items())
+            raise WorkersLost(f"{self.address}: no worker has {self.machine}, as this program does: {said}")
+        for address in refused.keys() - self._refused:
+            self._warn(f"worker {address} takes no part: it has {refused[address]}, this program {self.machine}")
+        self._refused |= refused.keys()
+
+
+# --- clusters --------------------------------------------------------------------------------------------------------
+@contextmanager
+def workers_of(
+    scheduler: str | None = None, count: int | None = None, warn: Warn = lambda _: None
+) -> Iterator[Workers]:
+    """The workers of a scheduler, "tls://HOST:PORT" or "tcp://HOST:PORT"; or `count` processes of this computer, which
+    share its threads and serve nobody but this process. Raises InvalidArgument where there are none."""
+    distributed = _dask()
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # a worker that is lost is no news to users
+    if scheduler is not None:
+        with _connected(distributed, scheduler, warn) as client:
+            yield Workers(client, warn)
+        return
+    with (
+        _local_cluster(distributed, count) as cluster,
+        distributed.Client(cluster, set_as_default=False) as client,
+    ):
+        yield Workers(client, warn)
+
+
+@contextmanager
+def _local_cluster(distributed: Any, count: int | None) -> Iterator[Any]:
+    """Other users of this computer reach its ports, too: every connection needs the credentials, which exist in the
+    memory of these processes only, and nothing is served by HTTP. Dask puts its folder of temporary files first on
+    Python's path, so that this folder is private; by default it belongs to whoever made it first."""
+    from dask import config
+
+    try:
+        credentials = distributed.Security.temporary()
+    except ImportError as error:
+        raise InvalidArgument(f"`workers` needs cryptography (pip install 'stepdiag[dask]'): {error}") from None
+    with TemporaryDirectory(prefix="stepdiag-", ignore_cleanup_errors=True) as folder:
+        options = {
+            "temporary-directory": folder,
+            # Dask's HTTP servers cannot be switched off: they start with nothing to serve, and PRELOAD stops them.
+            "distributed.scheduler.http.routes": [],
+            "distributed.worker.http.routes": [],
+        }
+        try:
+            with (
+                config.set(options),
+                distributed.LocalCluster(
+                    n_workers=count,
+                    threads_per_worker=max(1, (os.cpu_count() or 1) // (count or 1)),
+                    host=LOOPBACK,
+                    security=credentials,
+                    dashboard_address=None,
+                    scheduler_kwargs={"dashboard_address": f"{LOOPBACK}:0", "preload": PRELOAD},  # not port 8787
+                    memory_limit=0,  # what a run takes is known beforehand, and Dask would stop workers
+                    silence_logs=logging.CRITICAL,
+                    preload=PRELOAD,
+                ) as cluster,
+            ):
+                yield cluster
+        finally:
+            sys.path[:] = [entry for entry in sys.path if not entry.startswith(folder)]
+
+
+def check_scheduler(address: str) -> str:
+    """Raises InvalidArgument for what is no address of a scheduler."""
+    kind, separator, rest = address.partition("://")
+    host, _, port = rest.rpartition(":")
+    if kind not in ("tcp", "tls") or not separator or not host or not port.isdecimal() or int(port) > 65535:
+        raise InvalidArgument(f"`scheduler`: expected an address such as tcp://127.0.0.1:8786, got {address!r}")
+    return address
+
+
+@contextmanager
+def _connected(distributed: Any, address: str, warn: Warn) -> Iterator[Any]:
+    check_scheduler(address)
+    security = _configured_credentials(distributed, address)
+    if not address.startswith("tls:") and not _is_loopback(address):
+        warn(f"{address}: anybody who can reach a scheduler without TLS can run code on its workers and here")
+    try:
+        client = distributed.Client(address, security=security, timeout=CONNECT_SECONDS, set_as_default=False)
+    except (OSError, ValueError) as error:
+        said = str(error) or type(error).__name__
+        raise InvalidArgument(f"`scheduler`: {address}: no scheduler answers: {said}") from None
+    with client:
+        yield client
+
+
+def _configured_credentials(distributed: Any, address: str) -> Any:
+    """Those of the user, which are complete where the address is one with TLS; all connections then are."""
+    if not address.startswith("tls:"):
+        security = distributed.Security()
+        if security.require_encryption:
+            raise InvalidArgument(f"`scheduler`: expected tls://, which Dask's configuration requires, got {address!r}")
+        return security
+    security = distributed.Security(require_encryption=True)
+    try:
+        complete = security.get_connection_args("client")["ssl_context"] is not None
+        said = ""
+    except OSError as error:  # says neither which file nor where it is named
+        complete, said = False, f": {error}"
+    if not complete:
+        raise InvalidArgument(f"`scheduler`: {address}: expected {CREDENTIALS}; got {security}{said}")
+    return security
+
+
+def _is_loopback(address: str) -> bool:
+    host = address.partition("://")[2].rpartition(":")[0].strip("[]")
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _dask() -> Any:
+    try:
+        import distributed
+    except ImportError as error:
+        raise InvalidArgument(
+            f"`scheduler` and `workers` need Dask distributed (pip install 'stepdiag[dask]'): {error}"
+        ) from None
+    return distributed

@@ -1,0 +1,265 @@
+"""Runs of the Monte Carlo method (JCGM 101): with progress, checkpoints and resuming, here or by an executor elsewhere.
+
+The bits of a result depend on its set of leaves alone, so a run that was interrupted goes on to the same result.
+"""
+
+import os
+import struct
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Protocol
+
+from stepdiag._core import (
+    AdaptiveProcedure,
+    Bins,
+    InvalidArgument,
+    MonteCarloResult,
+    PartialStatistics,
+    SampleModel,
+    StatisticsOptions,
+    leaf_samples,
+    make_bins,
+    run_ranges,
+)
+from stepdiag.io.file_kind import CHECKPOINT_BEGINS
+from stepdiag.io.outputs import CHECKPOINT, claim
+from stepdiag.io.whole_files import check_output, read_bytes, write_whole
+
+LeafRange = tuple[int, int]  # half-open
+Progress = Callable[[int, int], object]  # samples done, and how many there are to be (at most, of an adaptive run)
+
+SECONDS_BETWEEN_CHECKPOINTS = 10.0
+LEAVES_OF_A_TASK = 5  # of an executor
+MAGIC = f"{CHECKPOINT_BEGINS}1\n".encode()
+
+
+class Executor(Protocol):
+    """Computes ranges of leaves elsewhere: gives the statistics of each, in any order. It takes ranges as it can do
+    with them (there may be no end of them), and gives up those in hand when it is closed."""
+
+    def __call__(self, bins: Bins, ranges: Iterable[LeafRange]) -> Iterator[PartialStatistics]: ...
+
+
+def run_monte_carlo(
+    model: SampleModel,
+    *,
+    samples: int,
+    adaptive: bool = False,
+    options: StatisticsOptions | None = None,
+    threads: int = 0,
+    checkpoint: Path | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+    executor: Executor | None = None,
+) -> MonteCarloResult:
+    """Draws `samples`, rounded up to whole leaves of 2,000; adaptive: whole blocks until all outputs are stable, and at
+    most about that many (result.stability tells). checkpoint: a new file that is written every ten seconds, where the
+    run ends, and where an exception (Ctrl-C) ends it, which goes on then; resume: goes on from there, also to more
+    samples than before. Raises InvalidArgument, also for a checkpoint of another run, and without `resume` for any file
+    that the checkpoint would replace."""
+    if samples < 1:
+        raise InvalidArgument(f"samples: expected 1 or more, got {samples}")
+    if resume and checkpoint is None:
+        raise InvalidArgument("resume: expected a checkpoint to go on from")
+    saved = read_bytes(checkpoint) if resume and checkpoint else None  # before the work
+    if checkpoint and resume:
+        check_output(checkpoint)
+    elif checkpoint:
+        claim(checkpoint, CHECKPOINT)
+    bins = make_bins(model, StatisticsOptions() if options is None else options, threads)
+    run = (_AdaptiveRun if adaptive else _FixedRun)(bins, samples, checkpoint, progress)
+    if saved is not None:
+        run.restore(saved, f"{checkpoint}")
+    run.report()
+    try:
+        if executor is None:
+            run.go_here(model, threads)
+        else:
+            run.go(executor)
+    finally:
+        run.save()
+    return run.result()
+
+
+def plan_ranges(leaves: int, done: Sequence[LeafRange], size: int) -> Iterator[LeafRange]:
+    """What is missing of the leaves 0 ... leaves - 1, in ranges of at most `size`."""
+    for first, end in _missing(leaves, done):
+        for start in range(first, end, size):
+            yield start, min(start + size, end)
+
+
+def _missing(leaves: int, done: Sequence[LeafRange]) -> Iterator[LeafRange]:
+    first = 0
+    for begin, end in [*done, (leaves, leaves)]:
+        if first < min(begin, leaves):
+            yield first, min(begin, leaves)
+        first = max(first, end)
+
+
+def _threads_of(model: SampleModel, threads: int, report: Callable[[int], None]) -> Executor:
+    """Ranges computed here, as many at a time as there are threads. `report` is told the leaves done of those."""
+    at_a_time = threads or os.cpu_count() or 1
+
+    def compute(bins: Bins, ranges: Iterable[LeafRange]) -> Iterator[PartialStatistics]:
+        remaining = iter(ranges)
+        while batch := list(islice(remaining, at_a_time)):
+            yield from run_ranges(model, bins, batch, threads=threads, progress=report)
+
+    return compute
+
+
+class _Run(ABC):
+    """The statistics so far, their checkpoint, and what is told of them."""
+
+    kind = "with a fixed number of samples"
+
+    def __init__(self, bins: Bins, samples: int, checkpoint: Path | None, progress: Progress | None) -> None:
+        self.bins = bins
+        self.statistics = PartialStatistics(bins)
+        self.leaves = -(-samples // leaf_samples)
+        self.checkpoint = checkpoint
+        self.progress = progress
+        self.due = time.monotonic() + SECONDS_BETWEEN_CHECKPOINTS
+
+    def done(self) -> int:
+        return sum(end - first for first, end in self.statistics.leaves)
+
+    def report(self, further_leaves: int = 0) -> None:
+        if self.progress:
+            self.progress(min(self.done() + further_leaves, self.leaves) * leaf_samples, self.leaves * leaf_samples)
+
+    @abstractmethod
+    def go(self, executor: Executor) -> None: ...
+
+    def go_here(self, model: SampleModel, threads: int) -> None:
+        self.go(_threads_of(model, threads, self.report))
+
+    @abstractmethod
+    def result(self) -> MonteCarloResult: ...
+
+    def procedure_bytes(self) -> bytes:
+        return b""
+
+    def restore_procedure(self, saved: bytes) -> None:  # noqa: B027 (a fixed run has none)
+        pass
+
+    def save_if_due(self) -> None:
+        if time.monotonic() >= self.due:
+            self.save()
+
+    def save(self) -> None:
+        if self.checkpoint:
+            parts = self.statistics.to_bytes(), self.procedure_bytes()
+            write_whole(self.checkpoint, MAGIC + b"".join(struct.pack("<Q", len(part)) + part for part in parts))
+        self.due = time.monotonic() + SECONDS_BETWEEN_CHECKPOINTS
+
+    def restore(self, saved: bytes, name: str) -> None:
+        """Raises InvalidArgument for what is no checkpoint of this run."""
+        statistics, procedure = _parts_of(saved, name)
+        its_kind = _AdaptiveRun.kind if procedure else _FixedRun.kind
+        if its_kind != self.kind:
+            raise InvalidArgument(f"{name}: a checkpoint of a run {its_kind}, expected one of a run {self.kind}")
+        try:
+            self.statistics.merge(PartialStatistics.from_bytes(statistics))
+            self.restore_procedure(procedure)
+        except InvalidArgument as error:
+            raise InvalidArgument(f"{name}: {error}") from None
+        if self.done() > self.leaves:
+            raise InvalidArgument(
+                f"{name}: holds {self.done() * leaf_samples} samples, more than the {self.leaves * leaf_samples} "
+                "that are asked for"
+            )
+
+
+class _FixedRun(_Run):
+    def go_here(self, model: SampleModel, threads: int) -> None:
+        """By the threads of this process, leaf by leaf; a pause now and then, to save what is done."""
+        while missing := next(_missing(self.leaves, self.statistics.leaves), None):
+            before = self.done()
+
+            def go_on(leaves_done: int, before: int = before) -> bool:
+                if self.progress:  # the statistics themselves are being added to
+                    self.progress((before + leaves_done) * leaf_samples, self.leaves * leaf_samples)
+                return self.checkpoint is None or time.monotonic() < self.due
+
+            self.statistics.run(model, missing[0], missing[1] - missing[0], threads=threads, progress=go_on)
+            self.save_if_due()
+
+    def go(self, executor: Executor) -> None:
+        parts = executor(self.bins, plan_ranges(self.leaves, self.statistics.leaves, LEAVES_OF_A_TASK))
+        for part in _closing(parts):
+            self.statistics.merge(part)
+            self.report()
+            self.save_if_due()
+
+    def result(self) -> MonteCarloResult:
+        missing = list(_missing(self.leaves, self.statistics.leaves))
+        if missing:
+            raise RuntimeError(f"the executor gave no statistics of the leaves {missing}")
+        return self.statistics.result()
+
+
+class _AdaptiveRun(_Run):
+    """Blocks one after the other: whether a block is the last one depends on those before it alone."""
+
+    kind = "by the adaptive procedure"
+
+    def __init__(self, bins: Bins, samples: int, checkpoint: Path | None, progress: Progress | None) -> None:
+        super().__init__(bins, samples, checkpoint, progress)
+        self.procedure = AdaptiveProcedure(bins)
+        self.size = AdaptiveProcedure.leaves_per_block(bins.options.coverage)
+        self.most = max(2, -(-self.leaves // self.size))  # blocks; the spread of one block is not known
+        self.leaves = self.most * self.size
+
+    def procedure_bytes(self) -> bytes:
+        return self.procedure.to_bytes()
+
+    def restore_procedure(self, saved: bytes) -> None:
+        self.procedure = AdaptiveProcedure.from_bytes(saved)
+
+    def ended(self) -> bool:
+        return self.procedure.blocks >= self.most or self.procedure.stability(self.statistics).stable
+
+    def go(self, executor: Executor) -> None:
+        if self.ended():
+            return
+        blocks = ((k * self.size, (k + 1) * self.size) for k in range(self.procedure.blocks, self.most))
+        waiting: dict[LeafRange, PartialStatistics] = {}
+        for part in _closing(executor(self.bins, blocks)):
+            waiting[part.leaves[0]] = part
+            while block := waiting.pop(self.procedure.next_block, None):
+                self.procedure.add(block, self.statistics)
+                self.report()
+                if self.ended():
+                    return
+            self.save_if_due()
+
+    def result(self) -> MonteCarloResult:
+        return self.procedure.result(self.statistics)
+
+
+def _closing(parts: Iterator[PartialStatistics]) -> Iterator[PartialStatistics]:
+    """The same; what the executor still has in hand is given up when nobody wants more."""
+    try:
+        yield from parts
+    finally:
+        if hasattr(parts, "close"):
+            parts.close()
+
+
+def _parts_of(saved: bytes, name: str) -> tuple[bytes, bytes]:
+    if not saved.startswith(MAGIC):
+        raise InvalidArgument(f"{name}: expected a checkpoint of this version of stepdiag")
+    parts, rest = [], saved[len(MAGIC) :]
+    for _ in range(2):
+        if len(rest) < 8:
+            raise InvalidArgument(f"{name}: the checkpoint is not all there")
+        (size,) = struct.unpack("<Q", rest[:8])
+        parts.append(rest[8 : 8 + size])
+        rest = rest[8 + size :]
+    if rest:
+        raise InvalidArgument(f"{name}: the checkpoint is damaged: {len(rest)} bytes too many")
+    return parts[0], parts[1]

@@ -1,0 +1,63 @@
+"""Virtual calibrations of a scenario: its machine, its head with set-ups, and what `[uncertainty]` says of them."""
+
+from collections.abc import Sequence
+from typing import Any, Final, Literal
+
+from stepdiag import _core
+from stepdiag._core import InvalidArgument
+from stepdiag.config.toml_text import located
+from stepdiag.scenario.description import Scenario, runs_of
+from stepdiag.scenario.heads import of_run
+from stepdiag.scenario.uncertain_inputs import STATE_OF_AIR
+
+Method = Literal["conventional", "enhanced", "adjustment", "one_step"]
+METHODS: Final = ("adjustment", "enhanced", "conventional", "one_step")
+
+
+def virtual_calibrations(
+    scenario: Scenario, *, method: Method = "adjustment", seed: int = 0, derived: Sequence[Any] = ()
+) -> _core.VirtualCalibrations:
+    """The model that draws the scenario's uncertain inputs, traces the run and evaluates it, sample after sample.
+
+    `derived`: quantities to be had of every calibration beside its parameters. Raises InvalidArgument where the
+    scenario cannot be simulated, or not be evaluated by this method."""
+    keys = scenario.keys
+    if not keys.head.tilts:
+        raise InvalidArgument(f"{scenario.path}: head.tilts: virtual calibrations have all readings of their head")
+    environment, assumed = _air(scenario)
+    machine, heads = scenario.machine(), scenario.actual_heads()
+    with located(str(scenario.path)):
+        return _core.VirtualCalibrations(
+            machine,
+            scenario.plan,
+            of_run(heads),
+            scenario.uncertain,
+            calibration_heads=of_run(scenario.heads),
+            method=method,
+            seed=seed,
+            misalignment=dict(scenario.misalignment),
+            environment=environment,
+            assumed_environment=assumed,
+            repeats=runs_of(keys.plan),
+            backward=keys.plan.backward,
+            seconds_per_reading=keys.plan.seconds_per_reading,
+            verified_share=keys.head.verified_share,
+            uncertainty=scenario.uncertainty,
+            setup=scenario.setup,
+            setup_by_line=dict(scenario.setup_by_line),
+            one_setup_per_line=keys.adjustment.one_setup_per_line,
+            reversal=keys.adjustment.reversal,
+            rotations=keys.adjustment.angles == "free",
+            smoothness=scenario.smoothness,
+            derived=list(derived),
+        )
+
+
+def _air(scenario: Scenario) -> tuple[_core.Environment | None, _core.Environment | None]:
+    """The true and the assumed air; where nothing is said of it, but its state is uncertain, that of 20 °C."""
+    section = scenario.keys.uncertainty
+    is_uncertain = any(getattr(section, name) is not None for name in STATE_OF_AIR)
+    if scenario.environment is None and is_uncertain:
+        usual = _core.Environment.from_air()
+        return usual, usual
+    return scenario.environment, scenario.assumed_environment

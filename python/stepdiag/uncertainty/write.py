@@ -1,0 +1,51 @@
+"""The result of an uncertainty evaluation in a file: netCDF, or CSV in the units of reports."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stepdiag._core import InvalidArgument
+from stepdiag.io.data_files import date_of_today, is_netcdf
+from stepdiag.io.netcdf import write_dataset
+from stepdiag.io.whole_files import write_whole
+from stepdiag.uncertainty.result import UncertaintyResult
+from stepdiag.uncertainty.table import ABOUT, UNCERTAINTY_FORMAT, attributes_of, columns_of, uncertainty_table
+from stepdiag.units import report_value
+
+
+def write_uncertainty(result: UncertaintyResult, path: Path) -> None:
+    """Writes a result, CSV or netCDF (.nc). Raises InvalidArgument where it cannot be written."""
+    if is_netcdf(path):
+        write_dataset(uncertainty_table(result), path, ABOUT | {"date": date_of_today()})
+    elif path.suffix.lower() == ".csv":
+        write_whole(path, uncertainty_csv(result))
+    else:
+        raise InvalidArgument(f"{path}: expected a name that ends in .nc or .csv")
+
+
+def uncertainty_csv(result: UncertaintyResult) -> str:
+    """A row an output, µm and µrad, what the table has in words above it as `# key=value`."""
+    columns = columns_of(result)
+    facts = {"format": UNCERTAINTY_FORMAT, "date": date_of_today()} | attributes_of(result)
+    lines = [f"# {name}={_fact(value)}" for name, value in facts.items()]
+    named = [(ending or "_mean").removeprefix("_").replace("_u", "_standard_uncertainty") for ending, *_ in columns]
+    named = ["standard_uncertainty" if name == "u" else name for name in named]
+    lines.append(",".join(["output", "position_mm", "unit", *named]))
+    for k, output in enumerate(result.outputs):
+        unit = {"µm": "um", "µrad": "urad"}.get(report_value(output.unit, 0.0)[1], output.unit)
+        cells = [_quoted(output.name), "" if math.isnan(output.position) else repr(float(output.position)), unit]
+        for ending, _, _, values in columns:
+            value = float(values[k]) if ending == "_freedom" else report_value(output.unit, float(values[k]))[0]
+            cells.append("" if math.isnan(value) else repr(value))
+        lines.append(",".join(cells))
+    return "\n".join(lines) + "\n"
+
+
+def _fact(value: Any) -> str:
+    return " ".join(f"{x:.17g}" for x in value) if isinstance(value, np.ndarray) else str(value)
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"' if "," in name or '"' in name else name

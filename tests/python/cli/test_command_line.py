@@ -1,0 +1,250 @@
+"""The command line: files in, files out, exit codes, and one clear line for a caller's mistake."""
+
+import os
+import resource
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomlkit
+import xarray as xr
+from places import RUNS
+from small_scenario import SCENARIO, of_map
+
+import stepdiag as sd
+from stepdiag.cli import main
+from stepdiag.io.data_files import write_calibration
+
+CASES = sorted(path.name for path in RUNS.iterdir() if path.is_dir())
+
+
+def run(*arguments: str) -> int:
+    return main(list(arguments))
+
+
+@pytest.fixture(autouse=True)
+def one_moment(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Calibrations carry the date of their making."""
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1790000000")
+
+
+# --- the round trip --------------------------------------------------------------------------------------------------
+def test_simulate_writes_what_the_library_simulates(here: Path) -> None:
+    scenario = sd.read_scenario("scenario.toml")
+    sd.simulate_scenario(scenario).write("library.csv")
+    assert Path("run.csv").read_bytes() == Path("library.csv").read_bytes()
+
+
+@pytest.mark.parametrize("method", ["conventional", "enhanced", "adjustment"])
+def test_evaluate_writes_what_the_library_evaluates(
+    here: Path, method: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("evaluate", "scenario.toml", "run.csv", "-m", method, "-o", "calibration.csv") == 0
+    scenario = sd.read_scenario("scenario.toml")
+    calibration = sd.evaluate_scenario(scenario, sd.read_measurement("run.csv"), method=method)
+    write_calibration(calibration, "library.csv")
+    assert Path("calibration.csv").read_bytes() == Path("library.csv").read_bytes()
+    said = capsys.readouterr().out
+    assert f"method: {method}" in said
+    assert "positioning" in said
+
+
+def test_adjustment_is_the_default(here: Path) -> None:
+    run("evaluate", "scenario.toml", "run.csv", "-o", "default.csv")
+    assert sd.read_calibration("default.csv").method == "adjustment"
+
+
+def test_netcdf_keeps_the_covariance_and_the_set_up(here: Path) -> None:
+    assert run("evaluate", "scenario.toml", "run.csv", "--covariance", "-o", "calibration.nc") == 0
+    with xr.open_dataset("calibration.nc") as table:
+        assert table["covariance"].shape == (18 * 6 + 3,) * 2
+        assert "reflector" in table["setup_quantity"].values.tolist()
+        assert table.sizes["reading"] == len(sd.read_measurement("run.csv"))
+
+
+def test_report_counts_lost_readings_and_lost_points(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = Path("run.csv").read_text().splitlines()
+    rows[10] = ",".join([*rows[10].split(",")[:5], "", "", ""])
+    del rows[20]
+    Path("run.csv").write_text("\n".join(rows) + "\n")
+    assert run("evaluate", "scenario.toml", "run.csv", "-o", "calibration.csv") == 0
+    assert "lost: 1 rows without a complete reading, 1 points of the plan without a row" in capsys.readouterr().out
+
+
+def test_report_says_what_is_undetermined(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("no_scales.toml").write_text(SCENARIO.replace('["p00", "0p0", "00p"]', "[]"))
+    assert run("simulate", "no_scales.toml", "-o", "no_scales.csv") == 0
+    assert run("evaluate", "no_scales.toml", "no_scales.csv", "-o", "calibration.csv") == 0
+    assert "undetermined: scale of X: add the line p00" in capsys.readouterr().out
+
+
+# --- an evaluator sees no truth --------------------------------------------------------------------------------------
+def without_truth(scenario: str) -> str:
+    """The scenario with everything deleted that only a simulation may know."""
+    content = tomllib.loads(scenario)
+    content["machine"].pop("errors", None)
+    content["machine"].pop("random", None)
+    content.pop("misalignment", None)
+    content.get("noise", {}).pop("seed", None)
+    return tomlkit.dumps(content)
+
+
+@pytest.mark.parametrize("method", ["conventional", "enhanced", "adjustment"])
+@pytest.mark.parametrize("case", CASES)
+def test_calibration_has_the_same_bytes_when_the_truth_is_deleted(case: str, method: str, tmp_path: Path) -> None:
+    scenario = (RUNS / case / "scenario.toml").read_text()
+    blind, seeing = tmp_path / "blind", tmp_path / "seeing"
+    outcomes = []
+    for folder, text in ((seeing, scenario), (blind, without_truth(scenario))):
+        shutil.copytree(RUNS / case, folder)
+        (folder / "scenario.toml").write_text(text)
+        if folder == blind:
+            (folder / "truth.csv").unlink()
+        arguments = ["evaluate", str(folder / "scenario.toml"), str(folder / "measurement.csv")]
+        code = run(*arguments, "-m", method, "-o", str(folder / "out.csv"))
+        outcomes.append((code, (folder / "out.csv").read_bytes() if code == 0 else b""))
+    assert without_truth(scenario) != scenario
+    assert outcomes[0] == outcomes[1]
+    # Six face diagonals are no body diagonals: the conventional method refuses them.
+    assert outcomes[0][0] == (2 if (case, method) == ("faces", "conventional") else 0)
+
+
+def test_library_evaluates_without_asking_for_the_truth(monkeypatch: pytest.MonkeyPatch) -> None:
+    def forbidden(*_: Any) -> None:
+        raise AssertionError("an evaluation asked for the truth")
+
+    from stepdiag.scenario.description import Scenario, parse_scenario
+
+    scenario = parse_scenario(SCENARIO)
+    measurement = sd.simulate_scenario(scenario)
+    monkeypatch.setattr(Scenario, "machine", forbidden)
+    assert sd.evaluate_scenario(scenario, measurement).method == "adjustment"
+
+
+# --- mistakes --------------------------------------------------------------------------------------------------------
+MISTAKES: list[tuple[list[str], str]] = [
+    (["simulate"], "Missing argument 'SCENARIO'"),
+    (["simulate", "scenario.toml"], "Missing option '-o'"),
+    (["simulat", "scenario.toml"], "No such command 'simulat'"),
+    (["simulate", "scenario.toml", "-o", "out.csv", "--fast"], "No such option"),
+    (["simulate", "no.toml", "-o", "out.csv"], "no.toml: cannot be read: No such file or directory"),
+    (["simulate", "run.csv", "-o", "out.csv"], "run.csv: not valid TOML"),
+    (["simulate", "scenario.toml", "-o", "no/out.csv"], "no/out.csv: cannot be written: the folder no does not exist"),
+    (["simulate", "scenario.toml", "-o", "."], "cannot be written: it is a folder"),
+    (["simulate", "scenario.toml", "-o", "/dev/null"], "/dev/null: cannot be written: expected the name of a file"),
+    (["simulate", "scenario.toml", "-o", "/dev/stdout"], "expected the name of a file, got one under /dev"),
+    (["evaluate", "scenario.toml", "run.csv", "-o", "/dev/fd/1"], "expected the name of a file, got one under /dev"),
+    (["simulate", "scenario.toml", "-o", "run.csv/out.csv"], "the folder run.csv does not exist"),
+    (["simulate", "scenario.toml", "-o", "scenario.toml"], "is also an input"),
+    (["evaluate", "scenario.toml", "run.csv", "-m", "magic", "-o", "out.csv"], "'magic' is not one of"),
+    (["evaluate", "scenario.toml", "scenario.toml", "-o", "out.csv"], "scenario.toml"),
+    (["evaluate", "scenario.toml", "run.csv", "--covariance", "-o", "out.csv"], "expected an output named .nc"),
+    (["evaluate", "scenario.toml", "no.csv", "-o", "out.csv"], "no.csv: cannot be read"),
+    (["evaluate", "scenario.toml", "/dev/zero", "-o", "out.csv"], "/dev/zero: expected a file, got a device"),
+    (["evaluate", "scenario.toml", "run.csv", "-o", "./run.csv"], "is also an input"),
+    (["simulate", "of_map.toml", "-o", "truth.csv"], "is the scenario's machine.errors"),
+    (["evaluate", "of_map.toml", "run.csv", "-o", "./truth.csv"], "is the scenario's machine.errors"),
+    (["evaluate", "no_map.toml", "run.csv", "-o", "missing.csv"], "is the scenario's machine.errors"),
+    (["evaluate", "other.toml", "run.csv", "-o", "out.csv"], "run.csv: "),
+    (["evaluate", "scenario.toml", "run.csv", "-o", "no/out.csv"], "the folder no does not exist"),
+    (["check"], "Missing argument 'FILE...'"),
+    (["check", "no.csv"], "no.csv: cannot be read"),
+    (["check", "."], ".: expected a file, got a folder"),
+    (["check", "notes.txt"], "notes.txt: expected a scenario or a head (TOML), a measurement"),
+    (["init"], "Missing option '-o'"),
+    (["init", "-o", "run.csv"], "run.csv"),
+    (["init", "-o", "."], "scenario.toml: exists already, and is not overwritten"),
+    (["demo", "-o", "run.csv"], "run.csv: the folder cannot be made"),
+    (["demo", "everything"], "unexpected extra argument"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), MISTAKES, ids=[" ".join(arguments) for arguments, _ in MISTAKES])
+def test_mistake_gives_exit_code_2_and_one_line(
+    here: Path, arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("other.toml").write_text(SCENARIO.replace("steps = 5", "steps = 4"))
+    Path("of_map.toml").write_text(of_map("truth.csv"))
+    Path("no_map.toml").write_text(of_map("missing.csv"))
+    sd.ErrorMap().write("truth.csv")
+    Path("notes.txt").write_text("nothing of ours\n")
+    before = {path.name: path.read_bytes() for path in here.iterdir()}
+    capsys.readouterr()
+    assert run(*arguments) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("stepdiag: error: ")
+    assert message in said
+    assert said.count("\n") == 1
+    assert {path.name: path.read_bytes() for path in here.iterdir()} == before, "files were left behind"
+
+
+def test_no_arguments_show_the_help(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run() == 0
+    assert "stepdiag init -o machine" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", ["simulate", "evaluate", "observe", "demo", "check", "init"])
+def test_help_of_every_command_has_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(command, "--help") == 0
+    assert f"Example: stepdiag {command}" in capsys.readouterr().out
+
+
+def test_version_is_that_of_the_library(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("--version") == 0
+    assert capsys.readouterr().out == f"stepdiag {sd.__version__}\n"
+
+
+def test_interruption_gives_130(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("stepdiag.scenario.description.read_scenario", interrupted)
+    assert run("simulate", "scenario.toml", "-o", "out.csv") == 130
+    assert not Path("out.csv").exists()
+
+
+def test_terminal_without_the_micro_sign_gets_its_report(here: Path) -> None:
+    command = [sys.executable, "-m", "stepdiag.cli", "evaluate", "scenario.toml", "run.csv", "-o", "calibration.csv"]
+    environment = {**os.environ, "PYTHONIOENCODING": "iso8859-5"}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=here, env=environment)
+    assert done.returncode == 0
+    assert "?m " in done.stdout
+
+
+# --- whole or not at all ---------------------------------------------------------------------------------------------
+def limit_files(size: int) -> Callable[[], None]:
+    """For a child process: writing more than `size` bytes to a file fails, as on a full disk."""
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["simulate", "scenario.toml", "-o", "out.csv"],
+        ["evaluate", "scenario.toml", "run.csv", "-o", "out.csv"],
+        ["init", "-o", "new"],
+    ],
+)
+def test_full_disk_leaves_no_half_written_file(here: Path, arguments: list[str]) -> None:
+    before = {path.name for path in here.iterdir()}
+    command = [sys.executable, "-m", "stepdiag.cli", *arguments]
+    limit = limit_files(1024)
+    done = subprocess.run(command, preexec_fn=limit, capture_output=True, text=True, check=False, cwd=here)
+    assert done.returncode == 2
+    assert done.stderr.startswith("stepdiag: error: ")
+    assert "cannot be written" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert {path.name for path in here.iterdir()} - {"new"} == before
+    assert not list(here.glob("new/*"))
+
+
+def test_failed_evaluation_leaves_an_older_result_alone(here: Path) -> None:
+    Path("calibration.csv").write_text("older")
+    Path("other.toml").write_text(SCENARIO.replace("steps = 5", "steps = 4"))
+    assert run("evaluate", "other.toml", "run.csv", "-o", "calibration.csv") == 2
+    assert Path("calibration.csv").read_text() == "older"

@@ -1,0 +1,175 @@
+"""The commands check and init: telling files apart, and beginning with new ones."""
+
+from pathlib import Path
+
+import pytest
+from small_scenario import SCENARIO, of_map
+
+import stepdiag as sd
+from stepdiag.cli import main
+
+
+def run(*arguments: str) -> int:
+    return main(list(arguments))
+
+
+def test_check_tells_every_kind(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run("evaluate", "scenario.toml", "run.csv", "-o", "calibration.csv")
+    sd.read_scenario("scenario.toml").machine().errors.write("truth.csv")
+    capsys.readouterr()
+    assert run("check", "scenario.toml", "run.csv", "calibration.csv", "truth.csv") == 0
+    said = capsys.readouterr().out.splitlines()
+    kinds = [line.split(": ")[1] for line in said]
+    assert kinds[:4] == ["scenario", "measurement", "calibration", "error map"]
+    assert all(line.startswith("run.csv with scenario.toml: ") for line in said[4:])
+
+
+def test_check_warns_of_a_map_that_breaks_the_zeros(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("truth.csv").write_text("parameter,position_mm,value,unit,standard_uncertainty\nEYX,0,1.5,um,\nEYX,80,0,um,\n")
+    assert run("check", "truth.csv") == 0
+    assert "truth.csv: warning: EYX is 1.5 um at home" in capsys.readouterr().out
+
+
+COLUMNS = "parameter,position_mm,value,unit,standard_uncertainty\n"
+
+# What an error map says, and what is told of it by simulate and check.
+ODD_MAPS = {
+    "zeros": (f"{COLUMNS}EYX,0,1.5,um,\nEYX,80,0,um,\n", "EYX is 1.5 um at home"),
+    "chain": (f"# chain=[w b X Y Z t]\n{COLUMNS}", "is for the chain [w b X Y Z t], the scenario has [w X' b Y Z t]"),
+    "no chain": (f"# chain=serial\n{COLUMNS}", "is for the chain serial"),
+    "volume": (f"# volume_mm=80 60 40\n{COLUMNS}", "is for the volume 80 60 40 mm, the scenario has 80 60 50 mm"),
+    "no volume": (f"# volume_mm=large\n{COLUMNS}", "is for the volume large mm"),
+    "tool": (f"# tool_mm=0 0 -100\n{COLUMNS}", "is for the tool offset 0 0 -100 mm, the scenario has 0 0 0 mm"),
+}
+
+
+@pytest.mark.parametrize("name", ODD_MAPS)
+def test_odd_map_of_a_scenario_is_used_as_given_with_a_warning(
+    here: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    content, warning = ODD_MAPS[name]
+    Path("truth.csv").write_text(content)
+    Path("scenario.toml").write_text(of_map("truth.csv"))
+    assert run("simulate", "scenario.toml", "-o", "out.csv") == 0
+    said = capsys.readouterr().err
+    assert said.startswith(f"warning: truth.csv: {warning}")
+    assert said.count("\n") == 1
+    assert run("check", "scenario.toml") == 0
+    assert f"scenario.toml: warning: truth.csv: {warning}" in capsys.readouterr().out
+
+
+def test_map_of_the_same_machine_gives_no_warning(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scenario = sd.read_scenario("scenario.toml")
+    errors = scenario.machine().errors
+    errors.write("truth.csv", chain=scenario.chain, volume=scenario.plan.volume, tool=scenario.tool)
+    Path("scenario.toml").write_text(of_map("truth.csv"))
+    assert run("simulate", "scenario.toml", "-o", "out.csv") == 0
+    assert run("check", "scenario.toml") == 0
+    said = capsys.readouterr()
+    assert "warning" not in said.err + said.out
+
+
+def test_calibration_with_open_slopes_says_so(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("no_scales.toml").write_text(SCENARIO.replace('["p00", "0p0", "00p"]', '["p00"]'))
+    run("simulate", "no_scales.toml", "-o", "no_scales.csv")
+    run("evaluate", "no_scales.toml", "no_scales.csv", "-o", "open.csv")
+    slopes = sd.read_calibration("open.csv").undetermined_slopes
+    capsys.readouterr()
+    assert run("check", "open.csv") == 0
+    said = capsys.readouterr().out.splitlines()[0]
+    assert slopes
+    assert said.endswith(f" of 21 parameters, slopes of {', '.join(slopes)} open, fit doubtful")
+    Path("next.toml").write_text(of_map("open.csv"))
+    assert run("simulate", "next.toml", "-o", "next.csv") == 0
+    assert (
+        f"warning: open.csv: is a calibration that leaves the slopes of {', '.join(slopes)}" in capsys.readouterr().err
+    )
+
+
+def test_format_says_what_a_table_is_whatever_else_it_holds(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("map.csv").write_text(f"# method=enhanced\n# format=stepdiag error map 1\n{COLUMNS}C0Y,,1,urad,\n")
+    assert run("check", "map.csv") == 0
+    assert "map.csv: error map: 1 of 21" in capsys.readouterr().out
+    Path("torn.csv").write_text("# format=stepdiag calibration 1\nline,point\n")
+    assert run("check", "torn.csv") == 2
+    assert "parameter" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "the file is empty"),
+        (b"# chain=[w b X Y Z t]\n", "has only comments"),
+        (b"\x7fELF\x00\x01\x02", "expected a scenario"),
+        (b"parameter,position_mm,value,unit,standard_uncertainty\nEXX,0,0,mm,\n", "line 2: unit"),
+        (b"parameter,position_mm,value,unit,standard_uncertainty\nEXQ,0,0,um,\n", "line 2"),
+        (b"# format=stepdiag calibration 1\nparameter,position_mm,value,unit,standard_uncertainty\n", "file"),
+        (b"line,point,x_mm,y_mm,z_mm,distance_mm\nppp,0,0,0,0,1\nppp,0,0,0,0,1\n", "line 3"),
+        (b"line,point,x_mm,y_mm,z_mm,distance_mm\nppp,0,0,0,0,nan\n", "line 2"),
+        (b"line,point,x_mm,y_mm,z_mm,distance_mm\nppp,0,0,0\n", "line 2"),
+        (b"[volume]\nx_mm = 3\n", "volume.y_mm: missing"),
+    ],
+)
+def test_check_refuses_a_file_that_is_not_sound(
+    tmp_path: Path, content: bytes, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "file"
+    file.write_bytes(content)
+    assert run("check", str(file)) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"stepdiag: error: {file}")
+    assert message in said
+    assert said.count("\n") == 1
+
+
+def test_check_goes_on_after_a_bad_file(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("bad.csv").write_text("line,point,x_mm\nppp,0,zero\n")
+    assert run("check", "bad.csv", "run.csv") == 2
+    said = capsys.readouterr()
+    assert "run.csv: measurement" in said.out
+    assert said.err.count("stepdiag: error: bad.csv") == 1
+
+
+def test_check_looks_into_the_map_that_a_scenario_names(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("scenario.toml").write_text(of_map("truth.csv"))
+    assert run("check", "scenario.toml") == 2
+    assert "machine.errors" in capsys.readouterr().err
+
+
+def test_init_makes_a_sheet_with_every_commanded_point(here: Path) -> None:
+    assert run("init", "-o", "machine") == 0
+    scenario = sd.read_scenario("machine/scenario.toml")
+    sheet = sd.read_measurement("machine/measurement.csv")
+    assert len(sheet) == 4 * 31 + 3 * 2
+    assert sheet.channels.keys() == {"distance", "alpha", "beta"}
+    simulated = sd.simulate_scenario(scenario)
+    assert (sheet.line, sheet.point.tolist()) == (simulated.line, simulated.point.tolist())
+    assert sheet.position.tolist() == simulated.position.tolist()
+
+
+def test_sheet_for_a_scenario_has_the_columns_of_its_head(here: Path) -> None:
+    head = 'layout = "psd"\npsd_distance_mm = 50.0'
+    Path("psd.toml").write_text(SCENARIO.replace('layout = "ideal"', head))
+    assert run("init", "-o", "sheets", "--sheet-for", "psd.toml") == 0
+    assert [path.name for path in Path("sheets").iterdir()] == ["measurement.csv"]
+    assert sd.read_measurement("sheets/measurement.csv").channels.keys() == {"distance", "spot_x", "spot_y"}
+
+
+def test_init_never_overwrites(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("machine").mkdir()
+    Path("machine/measurement.csv").write_text("mine")
+    assert run("init", "-o", "machine") == 2
+    assert Path("machine/measurement.csv").read_text() == "mine"
+    assert not Path("machine/scenario.toml").exists()
+
+
+def test_sheet_has_the_runs_of_all_orders_and_directions(here: Path) -> None:
+    keys = 'steps = 5\norder = ["XYZ", "YZX"]\nbackward = true'
+    Path("orders.toml").write_text(SCENARIO.replace("steps = 5", keys))
+    assert run("init", "-o", "sheets", "--sheet-for", "orders.toml") == 0
+    sheet = sd.read_measurement("sheets/measurement.csv")
+    simulated = sd.simulate_scenario(sd.read_scenario("orders.toml"))
+    for name in ("line", "direction"):
+        assert getattr(sheet, name) == getattr(simulated, name)
+    for name in ("run", "point", "position"):
+        assert getattr(sheet, name).tolist() == getattr(simulated, name).tolist()

@@ -1,0 +1,262 @@
+"""`stepdiag plan`: how long plans take, by hand, and that what it says of them is what runs of them give."""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from places import ROOT
+from small_scenario import SCENARIO
+
+import stepdiag as sd
+from stepdiag.calibration.largest_by_kind import largest_uncertainties
+from stepdiag.cli import main
+from stepdiag.figures.plan_by_time import draw_plans
+from stepdiag.planning.measuring_time import Times, measuring_time, times_of
+from stepdiag.planning.plan_by_time import Candidate, Outcome, candidates, choose, complete, front, outcome, outcomes
+from stepdiag.report.plan_by_time import advice, left_out_rows, plan_csv, plan_rows
+from stepdiag.scenario.description import parse_scenario
+
+FEW = """
+[plan_by_time]
+steps = [5, 10]
+repeats = [1, 2]
+line_change_min = 2.0
+"""
+AT_ONCE = Times(feed=100.0, acceleration=math.inf, settle=1.0, measure=2.0, line_change=60.0, scale_line_change=30.0)
+
+
+# --- time ------------------------------------------------------------------------------------------------------------
+def test_short_move_never_reaches_the_feed() -> None:
+    times = Times(feed=100.0, acceleration=1000.0, settle=0.0, measure=0.0, line_change=0.0, scale_line_change=0.0)
+    # Full speed takes 5 mm to reach and 5 mm to leave: 2.5 mm are 2 sqrt(2.5/1000) s, 110 mm are 0.2 s and 1 s.
+    np.testing.assert_allclose(times.move(np.array([0.0, 2.5, 10.0, 110.0])), [0.0, 0.1, 0.2, 1.2], rtol=1e-15)
+
+
+def test_time_of_a_plan_is_that_of_its_set_ups_moves_and_readings() -> None:
+    plan = sd.Plan((800.0, 600.0, 500.0), ["ppp", "npp"], 2, scale_lines=["p00"])
+    seconds, between = measuring_time(plan, AT_ONCE)
+    # Home is the first point of ppp; its end (800, 600, 500) is 781.02 mm from the beginning of npp, (800, 0, 0); the
+    # end of that one, (0, 600, 500), as far from the scale line's.
+    back = 2 * math.hypot(600.0, 500.0) / 100.0
+    moves = (2 * 1900.0 + 800.0) / 100.0
+    assert seconds == pytest.approx(2 * 60.0 + 30.0 + back + moves + (2 * 7 + 2) * 3.0)
+    assert between == pytest.approx((moves + 13 * 3.0) / 13)
+
+
+def test_runs_after_the_first_go_back_to_the_beginning_and_backward_runs_do_not() -> None:
+    plan = sd.Plan((800.0, 600.0, 500.0), ["ppp"], 2)
+    once = measuring_time(plan, AT_ONCE)[0]
+    run = 19.0 + 7 * 3.0
+    assert once == pytest.approx(60.0 + run)
+    assert measuring_time(plan, AT_ONCE, repeats=2)[0] == pytest.approx(60.0 + 2 * run + math.sqrt(1.25e6) / 100.0)
+    assert measuring_time(plan, AT_ONCE, backward=True)[0] == pytest.approx(60.0 + 2 * run)
+
+
+def test_seconds_per_mm_stand_in_place_of_the_feed() -> None:
+    scenario = parse_scenario(SCENARIO + "[plan_by_time]\nseconds_per_mm = 0.02\nline_change_min = 4.0\n")
+    times = times_of(scenario.keys.plan_by_time, "")
+    assert times.move(np.array([100.0])) == pytest.approx(2.0)
+    assert times.scale_line_change == times.line_change == 240.0
+    both = parse_scenario(SCENARIO + "[plan_by_time]\nseconds_per_mm = 0.02\nfeed_mm_per_min = 100.0\n")
+    with pytest.raises(sd.InvalidArgument, match=r"seconds_per_mm: expected it or feed_mm_per_min, got both"):
+        times_of(both.keys.plan_by_time, "")
+
+
+# --- plans -----------------------------------------------------------------------------------------------------------
+def test_plan_of_the_scenario_has_the_uncertainties_of_its_run() -> None:
+    scenario = parse_scenario(SCENARIO)
+    noiseless = parse_scenario(SCENARIO.replace("distance_um = 0.1", "distance_um = 0.0"))
+    plan = scenario.plan
+    found = outcome(scenario, Candidate(tuple(plan.lines), tuple(plan.scale_lines), plan.steps, 1))
+    expected = largest_uncertainties(sd.evaluate_scenario(scenario, sd.simulate_scenario(noiseless)))
+    # A time for each reading has no part in it: the drift is fixed.
+    assert found.largest == {kind: value for kind, (value, _) in expected.items()}
+    assert len(found.determined) == 21
+    assert found.spacing == 16.0
+
+
+def test_uncertainties_are_those_of_a_machine_with_errors() -> None:
+    faces = Candidate(("pp0", "np0", "p0p", "n0p", "0pp", "0np"), (), 10, 1)
+    large = SCENARIO.replace("x_mm = 80.0", "x_mm = 800.0").replace("y_mm = 60.0", "y_mm = 600.0")
+    text = large.replace("z_mm = 50.0", "z_mm = 500.0").split("[misalignment]")[0] + "[noise]\ndistance_um = 0.1\n"
+    perfect = "translation_um = 0.0\nrotation_urad = 0.0\nsquareness_urad = 0.0\n"
+    usual, none = (
+        outcome(parse_scenario(text.replace("[plan]", f"{errors}[plan]")), faces).largest["positioning"]
+        for errors in ("", perfect)
+    )
+    # A beam known to stand in its place to 1 mm reads 0.06 µm more or less for a tilt of 60 µrad. Found: 1.2.
+    assert usual > 1.1 * none
+
+
+def test_drift_counts_by_the_time_that_measuring_takes() -> None:
+    head = "[plan_by_time]\nline_change_min = 0.0\n"
+    drift = SCENARIO.replace("steps = 5", "steps = 5\nseconds_per_reading = 2.0") + (
+        "[uncertainty]\ndistance_um = 0.1\ntilt_urad = 1.0\nmachine_drift_um_per_h = 100.0\nscale_ppm = 1.0\n"
+    )
+    lines = (("ppp", "npp", "pnp", "nnp"), ("p00", "0p0", "00p"))
+    slow, fast, without = (
+        outcome(parse_scenario(text + head + times), Candidate(*lines, 5, 1))
+        for text, times in ((drift, "measure_s = 30.0\n"), (drift, ""), (drift.replace("100.0\nsc", "1e-6\nsc"), ""))
+    )
+    assert slow.seconds > 5.0 * fast.seconds
+    assert slow.worst("length") > 3.0 * fast.worst("length")  # the drift dominates: by the time, 10 times
+    assert fast.worst("length") > 1.2 * without.worst("length")
+    # A plan without scale lines has no use for what is said of them.
+    assert "scale_ppm" not in outcome(parse_scenario(drift + head), Candidate(lines[0], (), 5, 1)).trouble
+
+
+def test_four_runs_halve_what_one_leaves() -> None:
+    scenario = parse_scenario(SCENARIO)
+    lines = (("ppp", "npp", "pnp", "nnp"), ("p00", "0p0", "00p"))
+    one, four = (outcome(scenario, Candidate(*lines, 10, repeats)) for repeats in (1, 4))
+    # Not quite: what is known of roll, gain and beam beforehand is no better known after four runs.
+    assert four.largest["straightness"] == pytest.approx(0.5 * one.largest["straightness"], rel=0.02)
+    assert four.largest["angle"] == pytest.approx(0.5 * one.largest["angle"], rel=0.02)
+    assert four.seconds < 4.0 * one.seconds  # set up once
+
+
+def test_sets_of_lines_named_by_the_scenario_stand_beside_its_own() -> None:
+    text = (
+        FEW + 'line_sets = [["pp0", "np0", "p0p", "n0p", "0pp", "0np"], ["ppp", "npp", "pnp", "p00", "0p0", "00p"]]\n'
+    )
+    plans = candidates(parse_scenario(SCENARIO + text))
+    assert len(plans) == 3 * 2 * 2
+    assert {c.description for c in plans} == {
+        "4 body diagonals, 3 scale lines",
+        "6 face diagonals",
+        "3 body diagonals, 3 scale lines",
+    }
+    assert {(c.steps, c.repeats) for c in plans} == {(5, 1), (5, 2), (10, 1), (10, 2)}
+
+
+def test_what_the_scenario_says_of_lines_that_a_plan_lacks_is_passed_over() -> None:
+    own = '[adjustment.nnp]\nlaser_urad = "fixed"\n[misalignment.nnp]\nlaser_urad = [1.0, 2.0]\n'
+    scenario = parse_scenario(SCENARIO + own)
+    found = outcome(scenario, Candidate(("ppp", "npp", "pnp"), ("p00", "0p0", "00p"), 5, 1))
+    assert not found.trouble
+    assert len(found.determined) == 21
+
+
+def test_plan_that_determines_less_is_left_out_and_said_why() -> None:
+    scenario = parse_scenario(SCENARIO)
+    scales, none = (
+        outcome(scenario, Candidate(("ppp", "npp", "pnp", "nnp"), lines, 5, 1)) for lines in (("p00", "0p0"), ())
+    )
+    assert none.seconds < scales.seconds
+    assert front([none, scales]) == complete([none, scales]) == [scales]
+    assert list(left_out_rows([none, scales])) == [
+        "left out: 4 body diagonals; 5 steps: does not determine EXX, EYY, EZZ"
+    ]
+
+
+def made(minutes: float, spacing: float, u: float) -> Outcome:
+    largest = {"positioning": u, "straightness": u, "angle": u, "squareness": u}
+    return Outcome(
+        Candidate(("ppp",), (), round(800.0 / spacing), 1), minutes * 60.0, spacing, (1.0, 1.0), largest, frozenset("a")
+    )
+
+
+def test_front_keeps_what_is_faster_or_finer_or_better() -> None:
+    fast, fine, better = made(10.0, 80.0, 2.0), made(20.0, 40.0, 3.0), made(20.0, 80.0, 1.0)
+    beaten, hardly = made(15.0, 80.0, 2.5), made(30.0, 80.0, 0.99)
+    assert front([hardly, beaten, better, fine, fast]) == [fast, fine, better]
+
+
+def test_choice_fits_the_time_and_the_nodes_and_says_what_more_time_gives() -> None:
+    plans = [made(10.0, 80.0, 2.0), made(20.0, 80.0, 1.0), made(40.0, 80.0, 0.5), made(25.0, 40.0, 3.0)]
+    choice = choose(plans, 30.0, 80.0)
+    assert choice.taken == plans[1]
+    assert choice.next_better == plans[2]
+    assert choose(plans, 30.0, 40.0).taken == plans[3]
+    none_so_near = choose(plans, 22.0, 40.0)
+    assert (none_so_near.taken, none_so_near.spacing_kept) == (plans[1], False)
+    assert "at most 40 mm apart fits 22 minutes; the fastest takes 25.0" in next(iter(advice(plans, 22.0, 40.0)))
+    assert choose(plans, 5.0, 80.0).taken is None
+    assert list(advice(plans, 5.0, 80.0)) == [
+        "no plan fits 5 minutes; the fastest takes 10.0: 1 body diagonal, 10 steps (80 mm), once"
+    ]
+
+
+def test_same_plans_give_the_same_table_and_picture() -> None:
+    scenario = parse_scenario(SCENARIO + FEW)
+    done: list[int] = []
+    found = outcomes(scenario, lambda count, of: done.append(count))
+    assert done == list(range(1, len(found) + 1))
+    choice = choose(found, 20.0, 16.0)
+    rows = list(plan_rows(found, choice, 20.0))
+    assert sum(row.startswith(" *") for row in rows) == 1
+    assert sum("the time that there is" in row for row in rows) == 1
+    picture = draw_plans(found, choice.taken, 20.0, "svg")
+    assert picture == draw_plans(outcomes(scenario), choice.taken, 20.0, "svg")
+    table = list(csv.DictReader(plan_csv(found).splitlines()))
+    assert len(table) == len(found)
+    assert [float(row["minutes"]) for row in table] == sorted(o.minutes for o in found)
+    assert sum(row["on_front"] == "1" for row in table) == len(front(found))
+
+
+# --- the command -----------------------------------------------------------------------------------------------------
+@pytest.fixture
+def scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.chdir(tmp_path)
+    Path("scenario.toml").write_text(SCENARIO + FEW)
+    return "scenario.toml"
+
+
+def test_command_says_which_plan_to_take(scenario: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", scenario, "--minutes", "20", "-o", "plan.png"]) == 0
+    said = capsys.readouterr().out
+    assert "\ntake: " in said
+    assert Path("plan.png").read_bytes().startswith(b"\x89PNG")
+    (row,) = [line for line in said.splitlines() if line.startswith(" *")]
+    assert float(row.split()[1]) <= 20.0
+
+
+def test_page_has_the_table_of_the_example(capsys: pytest.CaptureFixture[str]) -> None:
+    root = ROOT
+    assert main(["plan", str(root / "examples" / "scenario.toml")]) == 0
+    assert capsys.readouterr().out in (root / "docs" / "study.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--minutes", "0"], "--minutes"),
+        (["--minutes", "nan"], "--minutes"),
+        (["-o", "plan.pdf"], "expected a name that ends in .png, .svg or .csv"),
+        (["-o", "scenario.toml"], "is also an input"),
+        (["-o", "no/plan.png"], "the folder no does not exist"),
+        (["--for", "everything"], "'everything' is not one of"),
+    ],
+)
+def test_mistakes_are_said_in_one_line(
+    scenario: str, arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plan", scenario, *arguments]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("stepdiag: error: ")
+    assert message in said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ("steps = [0]", "plan_by_time.steps: expected a list of integers from 1 to 2000, got [0]"),
+        ("steps = []", "plan_by_time.steps: expected a list of integers from 1 to 2000, got []"),
+        ("feed_mm_per_min = 0.0", "plan_by_time.feed_mm_per_min: expected a positive number, got 0.0"),
+        ("settle_s = -1.0", "plan_by_time.settle_s: expected a time of at least 0, got -1.0"),
+        ('line_sets = [["ppx"]]', "plan_by_time.line_sets: set 1"),
+        ("speed = 1.0", "plan_by_time.speed: unknown key"),
+        (f"steps = {list(range(1, 500))}", "expected at most 2000 plans to choose from"),
+    ],
+)
+def test_keys_that_are_wrong_are_named(
+    scenario: str, keys: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path(scenario).write_text(f"{SCENARIO}[plan_by_time]\n{keys}\n")
+    assert main(["plan", scenario]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("stepdiag: error: scenario.toml: ")
+    assert message in said

@@ -1,0 +1,211 @@
+"""The measuring program goes through the plan's points, in its order, from the stated sides."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gcode import LETTERS, Trace, trace
+
+from stepdiag import InvalidArgument
+from stepdiag.cli import main
+from stepdiag.planning.measuring_time import measuring_time, times_of
+from stepdiag.program.measuring_program import Program, measuring_program
+from stepdiag.program.options import Options
+from stepdiag.scenario.description import Scenario, parse_scenario
+from stepdiag.scenario.order_of_run import visits_of
+
+SCENARIO = """
+[volume]
+x_mm = 800.0
+y_mm = 600.0
+z_mm = 500.0
+[machine]
+chain = "[w X' b Y Z t]"
+tool_mm = [1.0, 2.0, -30.0]
+[plan]
+lines = {lines}
+steps = {steps}
+scale_lines = ["p00", "0n0"]
+{plan}
+[head]
+layout = "ideal"
+[plan_by_time]
+settle_s = 0.5
+measure_s = 0.25
+"""
+BODY, FACES, SINGLE = '["ppp", "npp", "nnp", "ppn"]', '["pp0", "n0p", "0np"]', '["00p", "n00"]'
+PLANS = [
+    (BODY, ""),
+    (FACES, ""),
+    (SINGLE, ""),
+    (BODY, 'order = "ZXY"'),
+    (BODY, 'order = ["XYZ", "YZX"]\nbackward = true'),
+    (FACES, "backward = true\nrepeats = 2"),
+    (BODY, "repeats = 3"),
+]
+CASES = pytest.mark.parametrize(("lines", "plan"), PLANS)
+
+
+def scenario_of(lines: str = BODY, plan: str = "", steps: int = 7) -> Scenario:
+    return parse_scenario(SCENARIO.format(lines=lines, plan=plan, steps=steps))
+
+
+def assert_is_the_plan(program: Program, traced: Trace, scenario: Scenario, origin: object, atol: float) -> None:
+    visits = list(visits_of(scenario))
+    expected = np.concatenate([visit.positions for visit in visits]) + np.asarray(origin)
+    np.testing.assert_allclose([position for _, position in traced.readings], expected, rtol=0.0, atol=atol)
+    assert program.readings == len(expected)
+
+
+@CASES
+def test_a_linuxcnc_program_reads_the_plans_points_in_order(lines: str, plan: str) -> None:
+    scenario = scenario_of(lines, plan)
+    program = measuring_program(scenario, Options())
+    traced = trace(program.text, iso=False)
+    # Half of the last of six decimals.
+    assert_is_the_plan(program, traced, scenario, (0.0, 0.0, 0.0), 0.51e-6)
+    numbers = [(visit.number, int(point)) for visit in visits_of(scenario) for point in visit.points]
+    assert [name for name, _ in traced.readings] == numbers
+
+
+@CASES
+def test_an_iso_program_has_words_of_iso_6983_only_and_the_same_points(lines: str, plan: str) -> None:
+    scenario, origin = scenario_of(lines, plan), (-10.0, 20.5, -500.0)
+    program = measuring_program(scenario, Options(dialect="iso", origin=origin, line_numbers=True))
+    traced = trace(program.text, iso=True, readings_by="G4")
+    assert_is_the_plan(program, traced, scenario, origin, 0.51e-4)
+    coded = measuring_program(scenario, Options(dialect="iso", origin=origin, trigger_code="M80"))
+    again = trace(coded.text, iso=True, readings_by="M80", letters=LETTERS - {"N"})
+    assert_is_the_plan(coded, again, scenario, origin, 0.51e-4)
+
+
+@CASES
+def test_every_axis_comes_to_every_point_from_the_side_that_the_visit_says(lines: str, plan: str) -> None:
+    scenario = scenario_of(lines, plan)
+    traced = trace(measuring_program(scenario, Options()).text, iso=False)
+    expected = [visit.approach for visit in visits_of(scenario) for _ in visit.points]
+    np.testing.assert_array_equal(traced.came, expected)
+
+
+@CASES
+def test_rapids_move_one_axis_at_a_time_within_the_volume(lines: str, plan: str) -> None:
+    scenario = scenario_of(lines, plan)
+    traced = trace(measuring_program(scenario, Options()).text, iso=False)
+    for start, end in traced.rapids[3:]:  # the first three come from wherever the axes were
+        assert np.count_nonzero(start != end) <= 1
+        assert np.all(end >= 0.0)
+        assert np.all(end <= scenario.plan.volume)
+    ways = np.array(traced.ways[3:])
+    assert ways.min() >= -1.0
+    assert np.all(ways.max(axis=0) <= scenario.plan.volume + 1.0)
+
+
+def test_there_are_two_stops_for_a_set_up_or_one_without_alignment() -> None:
+    scenario = scenario_of(BODY, "repeats = 2\nbackward = true")
+    assert trace(measuring_program(scenario, Options()).text, iso=False).stops == 2 * 6
+    traced = trace(measuring_program(scenario, Options(align=False)).text, iso=False)
+    assert traced.stops == 6
+    stops = [message for message in traced.messages if message.startswith("MSG, set-up")]
+    assert stops[1] == "MSG, set-up 2 of 6: head and mirror for line npp, then cycle start"
+
+
+def test_the_head_is_where_the_conventions_put_the_beams_origin() -> None:
+    scenario = scenario_of('["npp"]')
+    text = measuring_program(scenario, Options(origin=(5.0, 0.0, 0.0))).text
+    match = re.search(r"\(beam from (\S+) (\S+) (\S+),", text)
+    assert match
+    first = np.array([800.0 + 5.0 + 1.0, 2.0, -30.0])
+    towards = np.array([-800.0, 600.0, 500.0]) / np.sqrt(800.0**2 + 600.0**2 + 500.0**2)
+    np.testing.assert_allclose([float(value) for value in match.groups()], first - 100.0 * towards, atol=0.51e-3)
+
+
+def test_travel_that_ends_at_the_volume_is_kept_and_what_cannot_be_approached_is_said() -> None:
+    scenario = scenario_of('["ppp"]')
+    program = measuring_program(scenario, Options(limits=(0.0, 800.0, -0.25, 601.0, -5.0, 505.0)))
+    ways = np.array(trace(program.text, iso=False).ways)
+    assert np.all(np.nanmin(ways, axis=0) == (0.0, -0.25, -1.0))
+    assert program.unapproached[0] == (
+        "visit 1, line ppp, point 0: the limits let it be approached in "
+        "X 0 from below by 0 mm only, Y 0 from below by 0.25 mm only"
+    )
+    assert f"({program.unapproached[0][:60]}" in program.text
+    assert not measuring_program(scenario, Options(limits=(-1.0, 801.0, -1.0, 601.0, -1.0, 501.0))).unapproached
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (Options(limits=(0.0, 799.0, -1.0, 601.0, -1.0, 501.0)), "line ppp: X 800 is out of its limits, 0 to 799 mm"),
+        (Options(limits=(5.0, 5.0, -1.0, 601.0, -1.0, 501.0)), "limits of X: expected the lower one first"),
+        (Options(safe=(0.0, 0.0, 900.0), limits=(-1, 801, -1, 601, -1, 501)), "the safe position: Z 900 is out"),
+        (Options(retreat="XXY"), "retreat: expected a permutation of XYZ"),
+        (Options(overrun=-1.0), "overrun: expected a length of at least 0, got -1"),
+        (Options(overrun=float("nan")), "overrun: expected a length of at least 0, got nan"),
+        (Options(origin=(0.0, float("inf"), 0.0)), "origin: expected finite"),
+        (Options(timeout=0.0), "timeout: expected a time above 0"),
+        (Options(decimals=2), "decimals: expected 3 to 12"),
+        (Options(coordinates="G60"), "coordinates: expected one of G53"),
+        (Options(dialect="iso", trigger="handshake"), "trigger: handshake is LinuxCNC's"),
+        (Options(trigger="dwell", trigger_code="M80"), "trigger: expected dwell or the code M80, got both"),
+        (Options(trigger_code="80"), "trigger code: expected an M-code such as M80"),
+        (Options(dwell_word="X"), "dwell word: expected P, or in the dialect iso"),
+    ],
+)
+def test_options_that_make_no_program_are_refused(options: Options, message: str) -> None:
+    with pytest.raises(InvalidArgument, match=re.escape(message)):
+        measuring_program(scenario_of(), options)
+
+
+def test_the_time_is_that_of_the_plan_with_the_ways_to_the_safe_position() -> None:
+    scenario = scenario_of()
+    program = measuring_program(scenario, Options())
+    times = times_of(scenario.keys.plan_by_time, "")
+    bare, _ = measuring_time(scenario.plan, times)
+    # At most the diagonal three axes one by one, there and back, for each of the six set-ups, at 100 mm/s.
+    assert bare - 6 * 12.0 < program.seconds < bare + 6 * 2 * 20.0
+    assert program.set_up_seconds == 6 * 180.0
+
+
+@pytest.mark.parametrize(
+    ("word", "expected"), [("P", "G4 P0.5"), ("X", "G4 X0.5"), ("F", "G4 F0.5"), ("PMS", "G4 P500")]
+)
+def test_dwells_are_written_as_the_controller_takes_them(word: str, expected: str) -> None:
+    options = Options(dialect="iso", trigger_code="M80", dwell_word=word)  # type: ignore[arg-type]
+    assert f"\n{expected}\nM80\nG4 " in measuring_program(scenario_of(), options).text
+
+
+def test_pulses_are_on_output_0_between_settling_and_reading() -> None:
+    program = measuring_program(scenario_of(), Options(trigger="pulse"))
+    assert "G4 P0.5\nM64 P0\nG4 P0.05\nM65 P0\nG4 P0.25\n" in program.text
+    assert len(trace(program.text, iso=False, readings_by="M64").readings) == program.readings
+
+
+def test_the_command_writes_the_program_and_tells_its_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, output = tmp_path / "scenario.toml", tmp_path / "run.ngc"
+    path.write_text(SCENARIO.format(lines='["ppp"]', plan="", steps=3))
+    assert main(["nc", str(path), "-o", str(output), "--limits", *["0", "800", "-1", "601", "-1", "501"]]) == 0
+    out, err = capsys.readouterr()
+    assert "14 readings, about" in out
+    assert "positions are rounded, by up to 0.33 nm" in out
+    assert "warning: visit 1, line ppp, point 0" in err
+    assert (
+        output.read_text()
+        == measuring_program(
+            parse_scenario(path.read_text(), path), Options(limits=(0.0, 800.0, -1.0, 601.0, -1.0, 501.0))
+        ).text
+    )
+    assert main(["nc", str(path), "-o", str(path)]) == 2
+    assert main(["nc", str(path), "-o", str(output), "--trigger", "handshake", "--dialect", "iso"]) == 2
+
+
+def test_a_file_name_cannot_leave_its_comment() -> None:
+    name = "a)b(py,%\n" + "x" * 60 + " py,import os " + "y" * 60 + "µ.toml"
+    scenario = parse_scenario(SCENARIO.format(lines='["ppp"]', plan="", steps=2), name)
+    program = measuring_program(scenario, Options())
+    assert len(trace(program.text, iso=False).readings) == program.readings
+    head = program.text.split("\nG21")[0].splitlines()
+    assert all(line[0] == "(" and line[-1] == ")" and line.isascii() for line in head)
+    assert not any(line.lower().startswith(("(py", "(msg", "(debug")) for line in head)
+    iso = measuring_program(scenario, Options(dialect="iso")).text
+    assert iso.count("%") == 2

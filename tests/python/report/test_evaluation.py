@@ -1,0 +1,120 @@
+"""What `stepdiag evaluate` says of an adjustment: fit, outliers, set-up, and the method's own notes."""
+
+from pathlib import Path
+
+import pytest
+from small_scenario import SCENARIO
+
+import stepdiag as sd
+from stepdiag.cli import main
+from stepdiag.report.setup_table import concise
+
+NOISY = SCENARIO.replace("steps = 5", "steps = 20").replace("seed = 3", "tilt_urad = 1.0\nseed = 3")
+
+
+def report(tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, run: sd.Measurement, *options: str) -> str:
+    (tmp_path / "scenario.toml").write_text(text)
+    run.write(tmp_path / "run.csv")
+    files = [str(tmp_path / name) for name in ("scenario.toml", "run.csv", "calibration.csv")]
+    assert main(["evaluate", *files[:2], "-o", files[2], *options]) == 0
+    return capsys.readouterr().out
+
+
+def simulated(tmp_path: Path, text: str) -> sd.Measurement:
+    (tmp_path / "scenario.toml").write_text(text)
+    return sd.simulate_scenario(sd.read_scenario(tmp_path / "scenario.toml"))
+
+
+def spoilt(run: sd.Measurement, spoils: dict[str, tuple[int, float]]) -> sd.Measurement:
+    channels = {name: values.copy() for name, values in run.channels.items()}
+    for name, (row, size) in spoils.items():
+        channels[name][row] += size
+    return sd.Measurement(run.line, run.point.tolist(), run.position, channels, run=run.run.tolist())
+
+
+@pytest.mark.parametrize(
+    ("value", "uncertainty", "text"),
+    [
+        (12.3456, 0.0567, "12.346(57)"),
+        (-0.0004, 0.21, "0.00(21)"),
+        (100.0, 4.46, "100.0(45)"),
+        (1234.0, 56.0, "1234(56)"),
+        (10780.0, 6822.0, "10800(6800)"),
+        (1.0, 0.0996, "1.00(10)"),
+        (1.0, 0.0, "1"),
+        (2.5, float("inf"), "2.5"),
+    ],
+)
+def test_uncertainty_of_the_last_digits_is_in_brackets(value: float, uncertainty: float, text: str) -> None:
+    assert concise(value, uncertainty) == text
+
+
+def test_set_up_that_was_simulated_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = report(tmp_path, capsys, NOISY, simulated(tmp_path, NOISY))
+    assert "set-up found" in said
+    rows = {
+        line.split()[0]: line.split()[1:] for line in said.split("set-up found")[1].splitlines() if line[:2] == "  "
+    }
+    assert [name for name in rows if len(name) == 3] == ["ppp", "npp", "pnp", "nnp", "p00", "0p0", "00p"]
+    for line in ("ppp", "npp", "pnp", "nnp"):
+        for cell, truth in zip(rows[line][:2], (100.0, 300.0), strict=True):
+            value, digits = cell.rstrip(")").split("(")
+            uncertainty = float(digits) * 10.0 ** -len(value.partition(".")[2])
+            assert abs(float(value) - truth) < 5.0 * uncertainty
+
+
+def test_fit_is_said_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = simulated(tmp_path, NOISY)
+    assert report(tmp_path, capsys, NOISY, run).startswith("fit: accepted: the readings agree")
+    sure = NOISY + "[uncertainty]\ndistance_um = 0.05\ntilt_urad = 0.5\n"
+    assert report(tmp_path, capsys, sure, run).startswith("fit: doubtful: the readings scatter more than")
+
+
+def test_outliers_are_named_with_their_size(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # Of a step's four distances one is more than needed: a second run tells which of them is wrong.
+    twice = NOISY.replace("[plan]", "[plan]\nrepeats = 2")
+    run = simulated(tmp_path, twice)
+    rows = [row for row, line in enumerate(run.line) if line == "npp"]
+    wrong = spoilt(run, {"distance": (rows[7], 3e-3), "alpha": (rows[20], -30e-6)})
+    said = report(tmp_path, capsys, twice, wrong)
+    left_out = [line for line in said.splitlines() if line.startswith("left out: ")]
+    assert len(left_out) == 2
+    by_channel = {line.split(", ")[3].split(":")[0]: line for line in left_out}
+    assert "run 0, line npp, point 7, distance: off by " in by_channel["distance"]
+    assert "µm, " in by_channel["distance"]
+    assert "point 20, alpha: off by -" in by_channel["alpha"]
+    assert "µrad, " in by_channel["alpha"]
+
+
+def test_outlier_that_may_be_another_is_said_to_be_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = simulated(tmp_path, NOISY)
+    rows = [row for row, line in enumerate(run.line) if line == "npp"]
+    said = report(tmp_path, capsys, NOISY, spoilt(run, {"distance": (rows[7], 3e-3)}))
+    (left_out,) = [line for line in said.splitlines() if line.startswith("left out: ")]
+    assert "run 0, line npp, point 7, distance" in left_out
+    assert "instead: no other reading tells" in left_out
+
+
+def test_scale_lines_have_a_word_on_their_cosine_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = simulated(tmp_path, NOISY)
+    said = report(tmp_path, capsys, NOISY + "[adjustment.p00]\nlaser_urad = 1000.0\n", run)
+    assert "scale lines p00: a laser that stands along the axis to 1000 µrad reads too short, never too long" in said
+    assert "scale lines 0p0, 00p: a laser that stands along the axis to 500 µrad" in said
+
+
+def test_smoothness_in_force_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = simulated(tmp_path, NOISY)
+    said = report(tmp_path, capsys, NOISY + "[smoothness]\nrotation_urad = 100.0\n", run)
+    (row,) = [line for line in said.splitlines() if line.startswith("smoothed")]
+    assert "EAX 100 µrad" in row
+    assert "EXX" not in row
+
+
+@pytest.mark.parametrize("method", ["enhanced", "conventional"])
+def test_published_methods_say_that_they_do_not_use_the_section(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], method: str
+) -> None:
+    text = NOISY + '[adjustment]\ngain = "fixed"\n'
+    run = simulated(tmp_path, text)
+    assert f"note: [adjustment] is not used by the method {method}" in report(tmp_path, capsys, text, run, "-m", method)
+    assert "is not used" not in report(tmp_path, capsys, text, run)
