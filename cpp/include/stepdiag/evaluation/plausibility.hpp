@@ -28,8 +28,8 @@ void check(const PlausibleLimits& limits);
 // another unit, not at all, or the wrong way. Single wrong readings do not matter here.
 void refuse_foreign_distances(const Measurement& measurement, const Plan& plan);
 
-// Says which distance stands furthest from where the other readings of its line say, if that is more than a hundredth of
-// the volume's shortest edge; empty where none does.
+// Says which distance stands furthest from where the other readings of its line say, if that is more than a hundredth
+// of the volume's shortest edge; empty where none does.
 std::string far_reading(const Measurement& measurement, const Plan& plan);
 
 // Throws InvalidArgument, after the evaluation, where a value is not finite, or exceeds its limit by more than three
