@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "stepdiag/core/instruction_set.hpp"
 #include "support/batch_runs.hpp"
@@ -20,15 +21,29 @@ std::vector<double> evaluate_batch(const BatchEvaluator& batch, const std::vecto
     return values;
 }
 
-// How far a set may be off its own evaluation. The pattern: sums in another order, of lengths of 1 m. Others: there the
-// weights are those of the set's own tilts, which its noise of 1 to 2 urad turns by some 1e-5 to 1e-4 of the effect
-// that tilts have on lengths, and so moves what redundancy decides by about that share of its uncertainty.
-std::vector<double> tolerances(const Calibration& pattern, bool is_pattern) {
-    std::vector<double> list;
-    const auto add = [&](double u) { list.push_back(3e-12 + (is_pattern ? 0.0 : 5e-4 * u)); };
-    for (const auto& function : pattern.functions)
+// What rounding leaves open of each value: a reading reaches it by its gain, rounded to half an epsilon of itself, or
+// of the 1 of a direction, four times by either of two evaluations: where it is reduced, where it is weighed, in two
+// sums.
+std::vector<double> roundings(const BatchEvaluator& batch, const Measurement& pattern) {
+    Eigen::VectorXd size(Eigen::Index(pattern.size() * signal_count(pattern)));
+    Eigen::Index r = 0;
+    for (std::size_t row = 0; row < pattern.size(); ++row)
+        for (const auto& channel : pattern.channels())
+            size[r++] = std::max(1.0, std::abs(channel.value[row].value_or(0.0)));
+    const Eigen::VectorXd sum = 4.0 * std::numeric_limits<double>::epsilon() * batch.gain().cwiseAbs() * size;
+    return {sum.begin(), sum.end()};
+}
+
+// How far a set that is not the pattern may be off its own evaluation: there the weights are those of the set's own
+// tilts, which its noise of 1 to 2 urad turns by some 1e-5 to 1e-4 of the effect that tilts have on lengths, and so
+// moves what redundancy decides by about that share of its uncertainty.
+std::vector<double> tolerances(const BatchEvaluator& batch, const Measurement& pattern) {
+    std::vector<double> list = roundings(batch, pattern);
+    std::size_t e = 0;
+    const auto add = [&](double u) { list[e++] += 5e-4 * u; };
+    for (const auto& function : batch.of_pattern().functions)
         if (function) std::for_each(function->standard_uncertainty.begin(), function->standard_uncertainty.end(), add);
-    for (const auto& squareness : pattern.squarenesses)
+    for (const auto& squareness : batch.of_pattern().squarenesses)
         if (squareness) add(squareness->standard_uncertainty);
     return list;
 }
@@ -51,10 +66,11 @@ TEST_P(EveryRun, IsEvaluatedAsOneByOne) {
     for (std::uint64_t lane = 0; lane < 32; ++lane) sets.push_back(run.measure(lane));
     const BatchEvaluator batch = run.batch(sets[0], method);
     const std::vector<double> values = evaluate_batch(batch, sets);
+    const std::vector<double> rounding = roundings(batch, sets[0]), noisy = tolerances(batch, sets[0]);
     for (std::size_t lane = 0; lane < sets.size(); ++lane) {
         const std::vector<double> expected = values_of(run.evaluate(sets[lane], method));
         ASSERT_EQ(expected.size(), batch.entries().size());
-        const std::vector<double> tolerance = tolerances(batch.of_pattern(), lane == 0);
+        const std::vector<double>& tolerance = lane == 0 ? rounding : noisy;
         for (std::size_t e = 0; e < expected.size(); ++e)
             ASSERT_NEAR(values[e * sets.size() + lane], expected[e], tolerance[e])
                 << lane << " " << batch.entries()[e].parameter << " " << batch.entries()[e].position;
@@ -78,7 +94,7 @@ TEST_P(EveryRun, GainIsTheDerivativeByEveryReading) {
     const Eigen::MatrixXd gain = batch.gain();
     ASSERT_EQ(gain.rows(), Eigen::Index(batch.entries().size()));
     ASSERT_EQ(gain.cols(), Eigen::Index(pattern.size() * signal_count(pattern)));
-    const std::vector<double> at = values_of(batch.of_pattern());
+    const std::vector<double> at = values_of(batch.of_pattern()), rounding = roundings(batch, pattern);
     for (std::size_t lane = 0; lane < sets.size(); ++lane) {
         Eigen::VectorXd change(gain.cols());
         for (std::size_t row = 0, r = 0; row < pattern.size(); ++row)
@@ -86,7 +102,7 @@ TEST_P(EveryRun, GainIsTheDerivativeByEveryReading) {
                 change[Eigen::Index(r++)] = *sets[lane].channels()[c].value[row] - *pattern.channels()[c].value[row];
         const Eigen::VectorXd expected = gain * change;
         for (std::size_t e = 0; e < at.size(); ++e)
-            ASSERT_NEAR(values[e * sets.size() + lane] - at[e], expected[Eigen::Index(e)], 5e-12)
+            ASSERT_NEAR(values[e * sets.size() + lane] - at[e], expected[Eigen::Index(e)], rounding[e])
                 << batch.entries()[e].parameter << " " << batch.entries()[e].position;
     }
 }
@@ -157,9 +173,10 @@ TEST(Batch, ReadingsThatThePatternLacksDoNotCount) {
             for (std::uint64_t lane = 0; lane < 32; ++lane) sets.push_back(lose(run.measure(lane)));
             const BatchEvaluator batch = run.batch(sets[0], method);
             const std::vector<double> values = evaluate_batch(batch, sets);
+            const std::vector<double> rounding = roundings(batch, sets[0]), noisy = tolerances(batch, sets[0]);
             for (const std::size_t lane : {0, 5, 21}) {
                 const std::vector<double> expected = values_of(run.evaluate(sets[lane], method));
-                const std::vector<double> tolerance = tolerances(batch.of_pattern(), lane == 0);
+                const std::vector<double>& tolerance = lane == 0 ? rounding : noisy;
                 ASSERT_EQ(expected.size(), batch.entries().size());
                 for (std::size_t e = 0; e < expected.size(); ++e)
                     ASSERT_NEAR(values[32 * e + lane], expected[e], tolerance[e]);
@@ -218,9 +235,9 @@ TEST_P(EveryInstructionSet, GivesTheSameValues) {
         const std::vector<Measurement> sets(16, run.measure(3));
         const BatchEvaluator batch = run.batch(sets[0], Method::enhanced);
         const std::vector<double> values = evaluate_batch(batch, sets);
-        const std::vector<double> expected = values_of(batch.of_pattern());
+        const std::vector<double> expected = values_of(batch.of_pattern()), rounding = roundings(batch, sets[0]);
         for (std::size_t e = 0; e < expected.size(); ++e)
-            for (std::size_t lane = 0; lane < 16; ++lane) ASSERT_NEAR(values[16 * e + lane], expected[e], 3e-12);
+            for (std::size_t lane = 0; lane < 16; ++lane) ASSERT_NEAR(values[16 * e + lane], expected[e], rounding[e]);
     }
 }
 

@@ -1,14 +1,31 @@
 // What a reading does to the adjusted values, and the one step that takes them for linear in it.
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <array>
 #include <cmath>
+#include <limits>
 
+#include "batch/prepared_adjustment.hpp"
 #include "support/batch_workshop.hpp"
 
 namespace {
 
 using namespace batch_tests;
+
+// Of the weighted derivatives J at the pattern's solution, columns scaled to 1: the root of that of N = J^T J + P.
+double condition(const Workshop& shop) {
+    const stepdiag::PreparedAdjustment prepared(shop.pattern(), shop.plan(), shop.machine().chain(), shop.tool,
+                                                shop.head.calibration(), shop.options, {});
+    const Eigen::Index unknowns = prepared.start.size();
+    Eigen::MatrixXd n(unknowns, unknowns);
+    for (Eigen::Index j = 0; j < unknowns; ++j)
+        n.col(j) = prepared.solver.equations().product(Eigen::VectorXd::Unit(unknowns, j));
+    const Eigen::VectorXd scale = n.diagonal().cwiseSqrt().cwiseInverse();
+    n = scale.asDiagonal() * n * scale.asDiagonal();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(n, Eigen::EigenvaluesOnly);
+    return std::sqrt(solver.eigenvalues().maxCoeff() / solver.eigenvalues().minCoeff());
+}
 
 TEST(BatchGain, GainIsTheChangeOfTheAdjustedValuesWithEachReading) {
     const Workshop shop = with_psd();
@@ -40,10 +57,18 @@ TEST(BatchGain, OneStepIsTheGainTimesTheChange) {
     const BatchEvaluator evaluator = shop.evaluator(EvaluationMethod::one_step);
     const Measurement run = shop.sample(5);
     const Lanes found = evaluate(evaluator, in_lanes({run}));
-    const Eigen::VectorXd change = evaluator.gain() * (readings(run) - readings(shop.pattern()));
+    const Eigen::VectorXd change = readings(run) - readings(shop.pattern());
+    const Eigen::VectorXd expected = evaluator.gain() * change;
     const auto start = values(evaluator.of_pattern());
-    for (std::size_t e = 0; e < start.size(); ++e)  // sums of a thousand products of 1 mm, rounded to 1e-16
-        EXPECT_NEAR(found(e, 0), start[e].value + change[e], 1e-8 * start[e].standard_uncertainty);
+    // A value changes by at most the norm of all changes in standard uncertainties, times its own (Cauchy and Schwarz).
+    // Either side multiplies by J^T and solves with L and L^T, N = L L^T: six steps of sums that are no longer than the
+    // readings are many. Each product rounds by half an epsilon of that norm, sums add it up as a random walk, and a
+    // solution magnifies it by the condition of J, not by its square: both sides have the same L.
+    const double norm = change.norm() / shop.options.uncertainty.distance;
+    const double rounding =
+        std::numeric_limits<double>::epsilon() / 2.0 * std::sqrt(6.0 * double(change.size())) * condition(shop) * norm;
+    for (std::size_t e = 0; e < start.size(); ++e)
+        EXPECT_NEAR(found(e, 0), start[e].value + expected[e], rounding * start[e].standard_uncertainty);
 }
 
 TEST(BatchGain, OneStepIsOffBySecondOrder) {

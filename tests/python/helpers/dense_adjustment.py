@@ -4,13 +4,14 @@ what controls a reading: all from one singular value decomposition of the column
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 import reference
-from dense_model import SQUARENESS, Array, DenseModel, Setup, Stations, Table, Unknown
+from dense_model import SQUARENESS, Array, DenseModel, Setup, Stations, Table, Unknown, rounding
 from scipy.stats import chi2
 
 import stepdiag as sd
@@ -239,8 +240,8 @@ class DenseAdjustment:
 
     def finish(self) -> None:
         left, values, right, right_side = self.decompose()
-        half = (right.T / values) / self.scale[:, None]
-        self.covariance = half @ half.T
+        self.half = (right.T / values) / self.scale[:, None]  # a column for each principal axis
+        self.covariance = self.half @ self.half.T
         matrix, _ = self.whitened(self.x)
         length = np.linalg.norm(matrix, axis=0)
         shown = np.linalg.svd(matrix / np.where(length > NOTHING, length, 1.0), compute_uv=False)
@@ -253,6 +254,28 @@ class DenseAdjustment:
         self.redundancy[self.used] = 1 - np.sum(left[:readings] ** 2, axis=1)
         self.residuals = np.full(self.read.shape, np.nan)
         self.residuals[self.used] = right_side[:readings] * self.u[self.used]
+
+    # --- how far apart rounding leaves two adjustments of one run ---
+
+    @property
+    def rounding(self) -> float:
+        """The norm of what two models' readings differ by, in standard uncertainties. By Cauchy and Schwarz, no value
+        and no residual moves by more of its own."""
+        size = np.array([2 * rounding(name) for name in self.channels])
+        return float(np.linalg.norm((size[:, None] / self.u)[self.used]))
+
+    def change_of_uncertainties(self, step: float) -> float:
+        """The largest of standard uncertainties (relative) and redundancies where the solution moves by `step` of its
+        uncertainty along every principal axis. With signs at random, the mean square is that of the worst movement of
+        this length."""
+        moved = copy.copy(self)
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], self.half.shape[1])
+        moved.x = self.x.copy()
+        moved.x[self.active] += self.half @ (step * signs)
+        moved.finish()
+        ratio = np.sqrt(np.diag(moved.covariance) / np.diag(self.covariance))
+        redundancy = np.abs(moved.redundancy - self.redundancy)[self.used]
+        return float(max(np.max(np.abs(ratio - 1)), np.max(redundancy)))
 
     # --- what can be asked of it ---
 
