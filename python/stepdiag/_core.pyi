@@ -8,11 +8,26 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'Validation', 'VirtualCalibrations', 'VirtualReadout', 'VolumetricAccuracy', 'adjust', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'volumetric_accuracy', 'with_covariance']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumetricAccuracy', 'adjust', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'volumetric_accuracy', 'with_covariance']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
     """
+class Environment:
+    """
+    The air around machine and head: a constant refractive index.
+    """
+    @staticmethod
+    def from_air(*, temperature: typing.SupportsFloat | typing.SupportsIndex = 20.0, pressure: typing.SupportsFloat | typing.SupportsIndex = 101325.0, relative_humidity: typing.SupportsFloat | typing.SupportsIndex = 0.5, carbon_dioxide: typing.SupportsFloat | typing.SupportsIndex = 450.0, equation: str = 'ciddor') -> Environment:
+        """
+        From the state of the air: degrees Celsius, Pa, 0..1, ppm; equation: "ciddor", "modified_edlen" or "edlen_1966". Raises InvalidArgument outside their ranges.
+        """
+    def __init__(self, refractive_index: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        ...
+    def refractive_index(self, wavelength: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Phase index at a vacuum wavelength (nm).
+        """
 class Chain:
     """
     Kinematic chain in ISO 10791 style, workpiece to tool, such as "[w X' b Y Z t]"; a prime marks an axis before the bed.
@@ -187,37 +202,6 @@ class Measurement:
     @property
     def standard_uncertainty(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
         ...
-class Environment:
-    """
-    The air around machine and head: a constant refractive index.
-    """
-    @staticmethod
-    def from_air(*, temperature: typing.SupportsFloat | typing.SupportsIndex = 20.0, pressure: typing.SupportsFloat | typing.SupportsIndex = 101325.0, relative_humidity: typing.SupportsFloat | typing.SupportsIndex = 0.5, carbon_dioxide: typing.SupportsFloat | typing.SupportsIndex = 450.0, equation: str = 'ciddor') -> Environment:
-        """
-        From the state of the air: degrees Celsius, Pa, 0..1, ppm; equation: "ciddor", "modified_edlen" or "edlen_1966". Raises InvalidArgument outside their ranges.
-        """
-    def __init__(self, refractive_index: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
-        ...
-    def refractive_index(self, wavelength: typing.SupportsFloat | typing.SupportsIndex) -> float:
-        """
-        Phase index at a vacuum wavelength (nm).
-        """
-class HeadCalibration:
-    """
-    What evaluators know of a head: the constants that its readings are reduced with, mm.
-    """
-    @property
-    def beam_offsets(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def head_constants(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def psd_distance(self) -> float | None:
-        ...
-    @property
-    def spot_beam(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
 class HeadBody:
     """
     A body of a head: flat faces in its own frame, placed in the head's. Lengths in mm; rotation: a rotation vector in rad about the body's origin; material: a glass by name or an absolute index; reflectance: share of the power that each of its faces sends back (0: coated so that none is). All raise InvalidArgument.
@@ -283,6 +267,22 @@ class HeadBody:
         """
     @property
     def surfaces(self) -> list[str]:
+        ...
+class HeadCalibration:
+    """
+    What evaluators know of a head: the constants that its readings are reduced with, mm.
+    """
+    @property
+    def beam_offsets(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def head_constants(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def psd_distance(self) -> float | None:
+        ...
+    @property
+    def spot_beam(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
 class HeadBeam:
     """
@@ -423,76 +423,6 @@ class Head:
     @property
     def wavelength(self) -> float:
         ...
-class Misalignment:
-    """
-    How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm, a constant of all distances and one of each beam d1 ... dn in mm, lateral offset of the beam's origin (mm), roll of the head (rad), gain (tilts and spots read 1 + gain times themselves, beams stand at 1 + gain times their offsets), drift of the distances (mm/s).
-    """
-    def __init__(self, reflector: numpy.typing.ArrayLike = (0.0, 0.0), laser: numpy.typing.ArrayLike = (0.0, 0.0), psd_zero: numpy.typing.ArrayLike = (0.0, 0.0), distance_constant: typing.SupportsFloat | typing.SupportsIndex = 0.0, beam_constants: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], *, lateral: numpy.typing.ArrayLike = (0.0, 0.0), roll: typing.SupportsFloat | typing.SupportsIndex = 0.0, gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, drift: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
-        """
-        Raises InvalidArgument for what is no pair of finite numbers.
-        """
-    @property
-    def beam_constants(self) -> list[float]:
-        ...
-    @property
-    def distance_constant(self) -> float:
-        ...
-    @property
-    def drift(self) -> float:
-        ...
-    @property
-    def gain(self) -> float:
-        ...
-    @property
-    def laser(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def lateral(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def psd_zero(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def reflector(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def roll(self) -> float:
-        ...
-class Noise:
-    """
-    Standard deviations of an independent Gaussian per reading: distance (mm; also d1 ...), tilt (rad), spot (mm); common (mm): one draw a row, added to all of its distances.
-    """
-    def __init__(self, distance: typing.SupportsFloat | typing.SupportsIndex = 0.0, tilt: typing.SupportsFloat | typing.SupportsIndex = 0.0, spot: typing.SupportsFloat | typing.SupportsIndex = 0.0, seed: typing.SupportsIndex = 0, common: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
-        """
-        Raises InvalidArgument for a deviation that is negative or not finite, and for a seed outside 0 .. 2^64 - 1.
-        """
-    @property
-    def common(self) -> float:
-        ...
-    @property
-    def distance(self) -> float:
-        ...
-    @property
-    def seed(self) -> int:
-        ...
-    @property
-    def spot(self) -> float:
-        ...
-    @property
-    def tilt(self) -> float:
-        ...
-class VirtualReadout:
-    """
-    The virtual head set up on one line, read with the axes at any position: the row that simulate makes there.
-    """
-    def __init__(self, machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[str, Head], line: str, *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment | None = None, assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> None:
-        """
-        Arguments as those of simulate. Raises InvalidArgument as it does, and for a line that is not in the plan.
-        """
-    def read(self, position: numpy.typing.ArrayLike, approach: str = '+++', *, row: typing.SupportsIndex = 0, elapsed: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        The head's signals (n,), mm and rad, NaN where lost, with the axes at `position` (mm). approach: the directions that the axes came from, + or - of each. row: which draws the noise takes, as the number of a simulated row; elapsed: seconds since the set-up's first reading.
-        """
 class GaussianMode:
     """
     A collimator's Gaussian mode: vacuum wavelength in nm, waist radius (1/e^2 of power) and the waist's place along the beam from the collimator's plane (t/n) in mm.
@@ -706,6 +636,76 @@ class Sensitivity:
     @property
     def unit(self) -> str:
         ...
+class Misalignment:
+    """
+    How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm, a constant of all distances and one of each beam d1 ... dn in mm, lateral offset of the beam's origin (mm), roll of the head (rad), gain (tilts and spots read 1 + gain times themselves, beams stand at 1 + gain times their offsets), drift of the distances (mm/s).
+    """
+    def __init__(self, reflector: numpy.typing.ArrayLike = (0.0, 0.0), laser: numpy.typing.ArrayLike = (0.0, 0.0), psd_zero: numpy.typing.ArrayLike = (0.0, 0.0), distance_constant: typing.SupportsFloat | typing.SupportsIndex = 0.0, beam_constants: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], *, lateral: numpy.typing.ArrayLike = (0.0, 0.0), roll: typing.SupportsFloat | typing.SupportsIndex = 0.0, gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, drift: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        """
+        Raises InvalidArgument for what is no pair of finite numbers.
+        """
+    @property
+    def beam_constants(self) -> list[float]:
+        ...
+    @property
+    def distance_constant(self) -> float:
+        ...
+    @property
+    def drift(self) -> float:
+        ...
+    @property
+    def gain(self) -> float:
+        ...
+    @property
+    def laser(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def lateral(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def psd_zero(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def reflector(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def roll(self) -> float:
+        ...
+class Noise:
+    """
+    Standard deviations of an independent Gaussian per reading: distance (mm; also d1 ...), tilt (rad), spot (mm); common (mm): one draw a row, added to all of its distances.
+    """
+    def __init__(self, distance: typing.SupportsFloat | typing.SupportsIndex = 0.0, tilt: typing.SupportsFloat | typing.SupportsIndex = 0.0, spot: typing.SupportsFloat | typing.SupportsIndex = 0.0, seed: typing.SupportsIndex = 0, common: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        """
+        Raises InvalidArgument for a deviation that is negative or not finite, and for a seed outside 0 .. 2^64 - 1.
+        """
+    @property
+    def common(self) -> float:
+        ...
+    @property
+    def distance(self) -> float:
+        ...
+    @property
+    def seed(self) -> int:
+        ...
+    @property
+    def spot(self) -> float:
+        ...
+    @property
+    def tilt(self) -> float:
+        ...
+class VirtualReadout:
+    """
+    The virtual head set up on one line, read with the axes at any position: the row that simulate makes there.
+    """
+    def __init__(self, machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[str, Head], line: str, *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment | None = None, assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> None:
+        """
+        Arguments as those of simulate. Raises InvalidArgument as it does, and for a line that is not in the plan.
+        """
+    def read(self, position: numpy.typing.ArrayLike, approach: str = '+++', *, row: typing.SupportsIndex = 0, elapsed: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The head's signals (n,), mm and rad, NaN where lost, with the axes at `position` (mm). approach: the directions that the axes came from, + or - of each. row: which draws the noise takes, as the number of a simulated row; elapsed: seconds since the set-up's first reading.
+        """
 class ReadingUncertainty:
     """
     Standard uncertainty of a reading where the run gives none: distance (mm; also d1 ...), tilt (rad), spot (mm).
@@ -723,11 +723,28 @@ class ReadingUncertainty:
     @property
     def tilt(self) -> float:
         ...
+class PlausibleLimits:
+    """
+    What a machine can be: positioning errors by the travel of their axis, positioning errors and straightnesses (translation, mm), angular errors and squarenesses (rotation, rad). A result beyond is an error; inf: no limit.
+    """
+    def __init__(self, *, positioning: typing.SupportsFloat | typing.SupportsIndex = 0.001, translation: typing.SupportsFloat | typing.SupportsIndex = 2.0, rotation: typing.SupportsFloat | typing.SupportsIndex = 0.005) -> None:
+        """
+        Raises InvalidArgument for limits that are not positive.
+        """
+    @property
+    def positioning(self) -> float:
+        ...
+    @property
+    def rotation(self) -> float:
+        ...
+    @property
+    def translation(self) -> float:
+        ...
 class Calibration:
     """
     The 21 parameters as far as the readings determine them, with standard uncertainties; native units (mm, rad).
     """
-    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '') -> None:
+    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         """
         A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises InvalidArgument naming the parameter for what is none: nodes that do not ascend, values that are not finite, a covariance that is not one of these values.
         """
@@ -764,6 +781,11 @@ class Calibration:
     def date(self) -> str:
         """
         When it was evaluated: ISO 8601, UTC; empty where it is not known.
+        """
+    @property
+    def fit(self) -> str | None:
+        """
+        Verdict of the fit: "accepted", "doubtful", "rejected" (not to be used) or "unchecked" (nothing controls the readings); None where it is not known.
         """
     @property
     def functions(self) -> dict[str, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]]:
@@ -810,6 +832,11 @@ class Calibration:
     def undetermined_slopes(self) -> list[str]:
         """
         Functions of which only the shape is known; their values are 0 at both ends.
+        """
+    @property
+    def variance_factor(self) -> float | None:
+        """
+        Of the fit: 1 is expected; None where nothing controls the readings, or it is not known.
         """
     @property
     def volume(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -907,6 +934,48 @@ class Outlier:
     @property
     def run(self) -> int:
         ...
+class FitReason:
+    """
+    Why a fit is not accepted.
+    """
+    @property
+    def channel(self) -> str:
+        """
+        Of an uneven misfit; of a prior the set-up quantity; else empty.
+        """
+    @property
+    def component(self) -> int:
+        """
+        Of a prior: as of SetupEstimate.
+        """
+    @property
+    def finding(self) -> str:
+        """
+        "no_redundancy"; "noise_factor": root of the variance factor; "misfit", "no_misfit": probability of one so large, or so small; "uneven_misfit": noise factor of one line or channel, and as the limit that of the others; "prior": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2).
+        """
+    @property
+    def limit(self) -> float:
+        ...
+    @property
+    def line(self) -> str:
+        """
+        Of an uneven misfit or a prior; else empty.
+        """
+    @property
+    def value(self) -> float:
+        ...
+class Verdict:
+    """
+    Whether the readings of an adjustment agree with each other, with their uncertainties and with the priors. It does not see what the parameters absorb: a wrong wavelength, chain or tool.
+    """
+    @property
+    def fit(self) -> str:
+        """
+        "accepted", "doubtful", "rejected" or "unchecked".
+        """
+    @property
+    def reasons(self) -> list[FitReason]:
+        ...
 class Adjustment:
     """
     What an adjustment found: calibration, set-ups, and how the readings fit.
@@ -965,58 +1034,10 @@ class Adjustment:
     def variance_factor(self) -> float:
         ...
     @property
-    def weighted_square_sum(self) -> float:
+    def verdict(self) -> Verdict:
         ...
-class Compensator:
-    """
-    Volumetric compensation as a controller does it (the C++ library stepdiag::controller): forward(c) = c + error(c) is where the tool is when the axes stand at c, command(t) where they must stand for it to be at t. Positions (n, 3) are axis positions in the controller's coordinates, mm; tool: offset of the functional point (3,), mm, by default that of the calibration. NaN where there is no answer: outside with "refuse", beyond the margin, a position that is not finite, a tool longer than largest_tool.
-    """
-    def __init__(self, table: str | os.PathLike[str] | Calibration | ErrorMap, chain: Chain | str, *, origin: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), outside: str = 'hold', margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, largest_correction: typing.SupportsFloat | typing.SupportsIndex = 1.0, approach: str = 'mean', largest_tool: typing.SupportsFloat | typing.SupportsIndex = 1000.0) -> None:
-        """
-        table: a file, a Calibration or an ErrorMap that carries chain, volume and tool. chain: the controller's. origin: home in the controller's coordinates. outside the calibrated volume: "hold" the error of its nearest point, go on "linear" up to `margin`, or "refuse". largest_correction: command and forward shorten a longer error to this length. approach: "mean", "positive" or "negative", of a table with reversal. Raises InvalidArgument for a table or options that a controller should not use.
-        """
-    def command(self, targets: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Where the axes must stand (n, 3), mm, for the tool to be at the targets (n, 3).
-        """
-    def error(self, positions: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Error of the functional point (n, 3), mm: exact, and the whole of it where corrections are capped.
-        """
-    def forward(self, commands: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Where the tool is (n, 3), mm, when the axes stand at the commands (n, 3).
-        """
-    def orientation(self, positions: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Rotation vectors of the tool (n, 3), rad.
-        """
-    def status(self, positions: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.int32]:
-        """
-        Of the error at positions (n, 3): 0, or the sum of 1 outside the volume, 2 longer than largest_correction, 4 refused; shape (n,).
-        """
     @property
-    def fingerprint(self) -> int:
-        """
-        The table in force: a hash of chain, volume, tool, nodes and values, 64 bit.
-        """
-    @property
-    def inverse_bound(self) -> float:
-        """
-        |forward(command(t)) - t| never exceeds this, mm.
-        """
-    @property
-    def tool(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Of the calibration, mm.
-        """
-    @property
-    def uncompensated(self) -> list[str]:
-        """
-        What the table does not tell: "EXX", "EYX (slope)", "EXX (above 784.0 mm)" ...
-        """
-    @property
-    def volume(self) -> numpy.typing.NDArray[numpy.float64]:
+    def weighted_square_sum(self) -> float:
         ...
 class CalibrationEntry:
     """
@@ -1065,6 +1086,44 @@ class BatchEvaluator:
         """
         The values that a set of readings gives: functions EXX ... ECZ, nodes ascending, then squarenesses.
         """
+class Output:
+    """
+    An output of a sample model. Native units.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def position(self) -> float:
+        """
+        mm; NaN where it has none.
+        """
+    @property
+    def unit(self) -> str:
+        """
+        "mm", "rad", "1"
+        """
+class SampleModel:
+    """
+    A measurement model as the Monte Carlo method sees it (JCGM 101, 5.9): outputs of sample after sample, each a pure function of the seed and the sample's index.
+    """
+    def evaluate(self, first_sample: typing.SupportsIndex, samples: typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Array (outputs, samples); NaN in all outputs of a sample that gave no result. Raises InvalidArgument.
+        """
+    @property
+    def outputs(self) -> list[Output]:
+        ...
+    @property
+    def seed(self) -> int:
+        ...
+    @property
+    def target(self) -> str:
+        """
+        The instruction set, for which the bits of a sample are the same.
+        """
 class Distribution:
     """
     A distribution that JCGM 101 (6.4) assigns to an input quantity: "normal" (spread: standard deviation), "rectangular", "triangular", "arcsine" (half width), "t" (scale; degrees_of_freedom), "curvilinear_trapezoid" (half width, known to plus and minus edge only).
@@ -1091,6 +1150,285 @@ class Distribution:
     @property
     def standard_uncertainty(self) -> float:
         ...
+class FunctionModel(SampleModel):
+    """
+    A model given as a function of its inputs.
+    """
+    def __init__(self, function: collections.abc.Callable[[numpy.typing.NDArray[numpy.float64]], typing.Any], distributions: collections.abc.Sequence[Distribution], outputs: collections.abc.Sequence[str], *, seed: typing.SupportsIndex = 0, correlations: collections.abc.Sequence[tuple[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], numpy.typing.ArrayLike]] = []) -> None:
+        """
+        function: takes an (inputs, n) array, gives an (outputs, n) array; a sample with a value that is not finite is lost. correlations: pairs of indices of normal inputs and their correlation matrix. Raises InvalidArgument.
+        """
+class StatisticsOptions:
+    """
+    What a Monte Carlo run is to find out of its samples.
+    """
+    def __init__(self, *, coverage: typing.SupportsFloat | typing.SupportsIndex = 0.95, digits: typing.SupportsInt | typing.SupportsIndex = 2, covariance: bool = False, kept: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], joint: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]] = []) -> None:
+        """
+        coverage: of intervals; digits: of standard uncertainties that matter, 1 to 3 (bins are a fifth of delta wide, JCGM 101, 7.9.2); covariance: of all outputs; kept: outputs of which every value is kept, 8 bytes each; joint: sets of one to three outputs that get joint coverage regions (JCGM 102, 6.5). make_bins checks them.
+        """
+    @property
+    def covariance(self) -> bool:
+        ...
+    @property
+    def coverage(self) -> float:
+        ...
+    @property
+    def digits(self) -> int:
+        ...
+    @property
+    def joint(self) -> list[list[int]]:
+        ...
+    @property
+    def kept(self) -> list[int]:
+        ...
+class Bins:
+    """
+    What all parts of one Monte Carlo run share, fixed by its pilot run.
+    """
+    @staticmethod
+    def from_bytes(bytes: bytes) -> Bins:
+        """
+        Raises InvalidArgument for damaged bytes.
+        """
+    def to_bytes(self) -> bytes:
+        ...
+    @property
+    def counts(self) -> int:
+        """
+        Bins of all outputs: 6 bytes each, for every thread.
+        """
+    @property
+    def options(self) -> StatisticsOptions:
+        ...
+    @property
+    def outputs(self) -> list[Output]:
+        ...
+    @property
+    def seed(self) -> int:
+        ...
+    @property
+    def target(self) -> str:
+        ...
+class JointRegion:
+    """
+    A region of up to three outputs that holds the coverage (JCGM 102, 6.5): an ellipsoid and a rectangle about the pilot run's mean, of its covariance's shape, and the smallest region made of cells of a grid.
+    """
+    @property
+    def centre(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def covariance(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def ellipsoid_factor(self) -> float:
+        """
+        k_p: (y - centre) covariance^-1 (y - centre) <= k_p^2; nan for a singular covariance
+        """
+    @property
+    def ellipsoid_volume(self) -> float:
+        ...
+    @property
+    def grid_from(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def grid_width(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def outputs(self) -> list[int]:
+        ...
+    @property
+    def rectangle_factor(self) -> float:
+        """
+        k_q: |y_j - centre_j| <= k_q u_j
+        """
+    @property
+    def rectangle_volume(self) -> float:
+        ...
+    @property
+    def smallest(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        1 for each cell of the grid that is in the smallest region
+        """
+    @property
+    def smallest_share(self) -> float:
+        """
+        of all samples
+        """
+    @property
+    def smallest_volume(self) -> float:
+        ...
+class Stability:
+    """
+    How far an adaptive procedure is from its end.
+    """
+    @property
+    def blocks(self) -> int:
+        ...
+    @property
+    def figure(self) -> str:
+        ...
+    @property
+    def output(self) -> int:
+        ...
+    @property
+    def ratio(self) -> float:
+        """
+        Twice the standard deviation of the average over blocks by delta, the largest of all.
+        """
+    @property
+    def stable(self) -> bool:
+        ...
+    @property
+    def unstable(self) -> int:
+        """
+        Outputs with a ratio above 1.
+        """
+class MonteCarloResult:
+    """
+    Figures of every output. Native units.
+    """
+    @property
+    def covariance(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        ...
+    @property
+    def highest(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def joint(self) -> list[JointRegion]:
+        ...
+    @property
+    def kept(self) -> dict[int, numpy.typing.NDArray[numpy.float64]]:
+        """
+        Values by output, in the order of samples; nan for a lost one.
+        """
+    @property
+    def lost(self) -> int:
+        """
+        Samples that gave none: left out.
+        """
+    @property
+    def lowest(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def mean(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def options(self) -> StatisticsOptions:
+        ...
+    @property
+    def outputs(self) -> list[Output]:
+        ...
+    @property
+    def outside(self) -> list[int]:
+        """
+        Values beyond the bins, by output: an interval's end among them is known roughly.
+        """
+    @property
+    def samples(self) -> int:
+        """
+        Samples that gave a result.
+        """
+    @property
+    def seed(self) -> int:
+        ...
+    @property
+    def shortest(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (outputs, 2): ends of the shortest coverage intervals
+        """
+    @property
+    def stability(self) -> Stability | None:
+        """
+        Of an adaptive run; else None.
+        """
+    @property
+    def standard_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def symmetric(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (outputs, 2): ends of the probabilistically symmetric coverage intervals
+        """
+    @property
+    def target(self) -> str:
+        """
+        The instruction set: the same bits for the same one.
+        """
+class PartialStatistics:
+    """
+    Statistics of a set of leaves of 2,000 samples.
+    """
+    @staticmethod
+    def from_bytes(bytes: bytes) -> PartialStatistics:
+        """
+        Raises InvalidArgument for damaged bytes.
+        """
+    def __init__(self, bins: Bins) -> None:
+        """
+        Of no leaves.
+        """
+    def merge(self, other: PartialStatistics) -> None:
+        """
+        Raises InvalidArgument for statistics of another run, saying in what, and for leaves that are in both.
+        """
+    def result(self) -> MonteCarloResult:
+        ...
+    def run(self, model: SampleModel, first_leaf: typing.SupportsIndex, leaves: typing.SupportsIndex, *, threads: typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> None:
+        """
+        Adds these leaves, as run_leaves computes them. Those that are done stay also where progress ends the run, by False or by an exception. progress may not use these statistics.
+        """
+    def to_bytes(self) -> bytes:
+        ...
+    @property
+    def bins(self) -> Bins:
+        ...
+    @property
+    def leaves(self) -> list[tuple[int, int]]:
+        """
+        Half-open ranges, ascending.
+        """
+    @property
+    def lost(self) -> int:
+        ...
+    @property
+    def samples(self) -> int:
+        ...
+class AdaptiveProcedure:
+    """
+    JCGM 101, 7.9.4: blocks of M samples until mean, standard uncertainty and both ends of the symmetric interval of every output are stable to delta.
+    """
+    @staticmethod
+    def from_bytes(bytes: bytes) -> AdaptiveProcedure:
+        """
+        Raises InvalidArgument for damaged bytes.
+        """
+    @staticmethod
+    def leaves_per_block(coverage: typing.SupportsFloat | typing.SupportsIndex) -> int:
+        ...
+    def __init__(self, bins: Bins) -> None:
+        ...
+    def add(self, block: PartialStatistics, all: PartialStatistics) -> None:
+        """
+        The next block, which is also merged into `all`. Raises InvalidArgument for what is not the next block.
+        """
+    def result(self, all: PartialStatistics) -> MonteCarloResult:
+        """
+        That of `all`, with its stability.
+        """
+    def stability(self, all: PartialStatistics) -> Stability:
+        """
+        all: the statistics of all blocks so far.
+        """
+    def to_bytes(self) -> bytes:
+        ...
+    @property
+    def blocks(self) -> int:
+        ...
+    @property
+    def next_block(self) -> tuple[int, int]:
+        """
+        Its leaves, half-open.
+        """
 class UncertainInput:
     """
     An input quantity that is drawn once for each virtual calibration, as a deviation added to what is nominal. quantity: "reflector", "laser" (rad, component a, b: 0, 1), "psd_zero", "lateral" (mm, x, y), "distance_constant" (mm), "beam_constant" (mm, of beam `component`), "roll" (rad), "gain" (1), "drift" (mm/s), "scale_length" (mm), "scale_factor" (1): of a line; "part_shift" (mm), "part_rotation" (rad): of a part of the head; "psd_distance", "beam_offset" (mm), "reading_model" (1): of the head; "temperature" (degrees Celsius), "pressure" (Pa), "humidity" (1), "refractive_index", "wavelength" (1, relative): of the air; "machine_drift" (mm/s, x, y, z).
@@ -1157,44 +1495,6 @@ class UncertainInputs:
     @property
     def noise(self) -> list[ReadingNoise]:
         ...
-class Output:
-    """
-    An output of a sample model. Native units.
-    """
-    def __repr__(self) -> str:
-        ...
-    @property
-    def name(self) -> str:
-        ...
-    @property
-    def position(self) -> float:
-        """
-        mm; NaN where it has none.
-        """
-    @property
-    def unit(self) -> str:
-        """
-        "mm", "rad", "1"
-        """
-class SampleModel:
-    """
-    A measurement model as the Monte Carlo method sees it (JCGM 101, 5.9): outputs of sample after sample, each a pure function of the seed and the sample's index.
-    """
-    def evaluate(self, first_sample: typing.SupportsIndex, samples: typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Array (outputs, samples); NaN in all outputs of a sample that gave no result. Raises InvalidArgument.
-        """
-    @property
-    def outputs(self) -> list[Output]:
-        ...
-    @property
-    def seed(self) -> int:
-        ...
-    @property
-    def target(self) -> str:
-        """
-        The instruction set, for which the bits of a sample are the same.
-        """
 class DerivedOutput:
     """
     A linear combination of a calibration's entries, as an output of virtual calibrations.
@@ -1477,285 +1777,6 @@ class Propagation:
         """
         (m,)
         """
-class FunctionModel(SampleModel):
-    """
-    A model given as a function of its inputs.
-    """
-    def __init__(self, function: collections.abc.Callable[[numpy.typing.NDArray[numpy.float64]], typing.Any], distributions: collections.abc.Sequence[Distribution], outputs: collections.abc.Sequence[str], *, seed: typing.SupportsIndex = 0, correlations: collections.abc.Sequence[tuple[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], numpy.typing.ArrayLike]] = []) -> None:
-        """
-        function: takes an (inputs, n) array, gives an (outputs, n) array; a sample with a value that is not finite is lost. correlations: pairs of indices of normal inputs and their correlation matrix. Raises InvalidArgument.
-        """
-class StatisticsOptions:
-    """
-    What a Monte Carlo run is to find out of its samples.
-    """
-    def __init__(self, *, coverage: typing.SupportsFloat | typing.SupportsIndex = 0.95, digits: typing.SupportsInt | typing.SupportsIndex = 2, covariance: bool = False, kept: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] = [], joint: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]] = []) -> None:
-        """
-        coverage: of intervals; digits: of standard uncertainties that matter, 1 to 3 (bins are a fifth of delta wide, JCGM 101, 7.9.2); covariance: of all outputs; kept: outputs of which every value is kept, 8 bytes each; joint: sets of one to three outputs that get joint coverage regions (JCGM 102, 6.5). make_bins checks them.
-        """
-    @property
-    def covariance(self) -> bool:
-        ...
-    @property
-    def coverage(self) -> float:
-        ...
-    @property
-    def digits(self) -> int:
-        ...
-    @property
-    def joint(self) -> list[list[int]]:
-        ...
-    @property
-    def kept(self) -> list[int]:
-        ...
-class Bins:
-    """
-    What all parts of one Monte Carlo run share, fixed by its pilot run.
-    """
-    @staticmethod
-    def from_bytes(bytes: bytes) -> Bins:
-        """
-        Raises InvalidArgument for damaged bytes.
-        """
-    def to_bytes(self) -> bytes:
-        ...
-    @property
-    def counts(self) -> int:
-        """
-        Bins of all outputs: 6 bytes each, for every thread.
-        """
-    @property
-    def options(self) -> StatisticsOptions:
-        ...
-    @property
-    def outputs(self) -> list[Output]:
-        ...
-    @property
-    def seed(self) -> int:
-        ...
-    @property
-    def target(self) -> str:
-        ...
-class JointRegion:
-    """
-    A region of up to three outputs that holds the coverage (JCGM 102, 6.5): an ellipsoid and a rectangle about the pilot run's mean, of its covariance's shape, and the smallest region made of cells of a grid.
-    """
-    @property
-    def centre(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def covariance(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def ellipsoid_factor(self) -> float:
-        """
-        k_p: (y - centre) covariance^-1 (y - centre) <= k_p^2; nan for a singular covariance
-        """
-    @property
-    def ellipsoid_volume(self) -> float:
-        ...
-    @property
-    def grid_from(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def grid_width(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def outputs(self) -> list[int]:
-        ...
-    @property
-    def rectangle_factor(self) -> float:
-        """
-        k_q: |y_j - centre_j| <= k_q u_j
-        """
-    @property
-    def rectangle_volume(self) -> float:
-        ...
-    @property
-    def smallest(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        1 for each cell of the grid that is in the smallest region
-        """
-    @property
-    def smallest_share(self) -> float:
-        """
-        of all samples
-        """
-    @property
-    def smallest_volume(self) -> float:
-        ...
-class Stability:
-    """
-    How far an adaptive procedure is from its end.
-    """
-    @property
-    def blocks(self) -> int:
-        ...
-    @property
-    def figure(self) -> str:
-        ...
-    @property
-    def output(self) -> int:
-        ...
-    @property
-    def ratio(self) -> float:
-        """
-        Twice the standard deviation of the average over blocks by delta, the largest of all.
-        """
-    @property
-    def stable(self) -> bool:
-        ...
-    @property
-    def unstable(self) -> int:
-        """
-        Outputs with a ratio above 1.
-        """
-class MonteCarloResult:
-    """
-    Figures of every output. Native units.
-    """
-    @property
-    def covariance(self) -> numpy.typing.NDArray[numpy.float64] | None:
-        ...
-    @property
-    def highest(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def joint(self) -> list[JointRegion]:
-        ...
-    @property
-    def kept(self) -> dict[int, numpy.typing.NDArray[numpy.float64]]:
-        """
-        Values by output, in the order of samples; nan for a lost one.
-        """
-    @property
-    def lost(self) -> int:
-        """
-        Samples that gave none: left out.
-        """
-    @property
-    def lowest(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def mean(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def options(self) -> StatisticsOptions:
-        ...
-    @property
-    def outputs(self) -> list[Output]:
-        ...
-    @property
-    def outside(self) -> list[int]:
-        """
-        Values beyond the bins, by output: an interval's end among them is known roughly.
-        """
-    @property
-    def samples(self) -> int:
-        """
-        Samples that gave a result.
-        """
-    @property
-    def seed(self) -> int:
-        ...
-    @property
-    def shortest(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        (outputs, 2): ends of the shortest coverage intervals
-        """
-    @property
-    def stability(self) -> Stability | None:
-        """
-        Of an adaptive run; else None.
-        """
-    @property
-    def standard_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
-    @property
-    def symmetric(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        (outputs, 2): ends of the probabilistically symmetric coverage intervals
-        """
-    @property
-    def target(self) -> str:
-        """
-        The instruction set: the same bits for the same one.
-        """
-class PartialStatistics:
-    """
-    Statistics of a set of leaves of 2,000 samples.
-    """
-    @staticmethod
-    def from_bytes(bytes: bytes) -> PartialStatistics:
-        """
-        Raises InvalidArgument for damaged bytes.
-        """
-    def __init__(self, bins: Bins) -> None:
-        """
-        Of no leaves.
-        """
-    def merge(self, other: PartialStatistics) -> None:
-        """
-        Raises InvalidArgument for statistics of another run, saying in what, and for leaves that are in both.
-        """
-    def result(self) -> MonteCarloResult:
-        ...
-    def run(self, model: SampleModel, first_leaf: typing.SupportsIndex, leaves: typing.SupportsIndex, *, threads: typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> None:
-        """
-        Adds these leaves, as run_leaves computes them. Those that are done stay also where progress ends the run, by False or by an exception. progress may not use these statistics.
-        """
-    def to_bytes(self) -> bytes:
-        ...
-    @property
-    def bins(self) -> Bins:
-        ...
-    @property
-    def leaves(self) -> list[tuple[int, int]]:
-        """
-        Half-open ranges, ascending.
-        """
-    @property
-    def lost(self) -> int:
-        ...
-    @property
-    def samples(self) -> int:
-        ...
-class AdaptiveProcedure:
-    """
-    JCGM 101, 7.9.4: blocks of M samples until mean, standard uncertainty and both ends of the symmetric interval of every output are stable to delta.
-    """
-    @staticmethod
-    def from_bytes(bytes: bytes) -> AdaptiveProcedure:
-        """
-        Raises InvalidArgument for damaged bytes.
-        """
-    @staticmethod
-    def leaves_per_block(coverage: typing.SupportsFloat | typing.SupportsIndex) -> int:
-        ...
-    def __init__(self, bins: Bins) -> None:
-        ...
-    def add(self, block: PartialStatistics, all: PartialStatistics) -> None:
-        """
-        The next block, which is also merged into `all`. Raises InvalidArgument for what is not the next block.
-        """
-    def result(self, all: PartialStatistics) -> MonteCarloResult:
-        """
-        That of `all`, with its stability.
-        """
-    def stability(self, all: PartialStatistics) -> Stability:
-        """
-        all: the statistics of all blocks so far.
-        """
-    def to_bytes(self) -> bytes:
-        ...
-    @property
-    def blocks(self) -> int:
-        ...
-    @property
-    def next_block(self) -> tuple[int, int]:
-        """
-        Its leaves, half-open.
-        """
 class Validation:
     """
     Propagation beside the Monte Carlo method (JCGM 101, 8), arrays in the order of `outputs`, native units: validated where neither end of y -+ U is further than delta from that of the symmetric coverage interval.
@@ -1812,7 +1833,63 @@ class Validation:
     @property
     def validated(self) -> list[bool]:
         ...
-def adjust(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.01, full_covariance: bool = False) -> Adjustment:
+class Compensator:
+    """
+    Volumetric compensation as a controller does it (the C++ library stepdiag::controller): forward(c) = c + error(c) is where the tool is when the axes stand at c, command(t) where they must stand for it to be at t. Positions (n, 3) are axis positions in the controller's coordinates, mm; tool: offset of the functional point (3,), mm, by default that of the calibration. NaN where there is no answer: outside with "refuse", beyond the margin, a position that is not finite, a tool longer than largest_tool.
+    """
+    def __init__(self, table: str | os.PathLike[str] | Calibration | ErrorMap, chain: Chain | str, *, origin: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), outside: str = 'hold', margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, largest_correction: typing.SupportsFloat | typing.SupportsIndex = 1.0, approach: str = 'mean', largest_tool: typing.SupportsFloat | typing.SupportsIndex = 1000.0, accept_rejected: bool = False) -> None:
+        """
+        table: a file, a Calibration or an ErrorMap that carries chain, volume and tool. chain: the controller's. origin: home in the controller's coordinates. outside the calibrated volume: "hold" the error of its nearest point, go on "linear" up to `margin`, or "refuse". largest_correction: command and forward shorten a longer error to this length. approach: "mean", "positive" or "negative", of a table with reversal. accept_rejected: take a table whose fit was rejected. Raises InvalidArgument for a table or options that a controller should not use.
+        """
+    def command(self, targets: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Where the axes must stand (n, 3), mm, for the tool to be at the targets (n, 3).
+        """
+    def error(self, positions: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Error of the functional point (n, 3), mm: exact, and the whole of it where corrections are capped.
+        """
+    def forward(self, commands: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Where the tool is (n, 3), mm, when the axes stand at the commands (n, 3).
+        """
+    def orientation(self, positions: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Rotation vectors of the tool (n, 3), rad.
+        """
+    def status(self, positions: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        Of the error at positions (n, 3): 0, or the sum of 1 outside the volume, 2 longer than largest_correction, 4 refused; shape (n,).
+        """
+    @property
+    def fingerprint(self) -> int:
+        """
+        The table in force: a hash of chain, volume, tool, nodes and values, 64 bit.
+        """
+    @property
+    def fit(self) -> str | None:
+        """
+        Verdict of the table's fit: "accepted", "doubtful", "rejected", "unchecked"; None where it has none.
+        """
+    @property
+    def inverse_bound(self) -> float:
+        """
+        |forward(command(t)) - t| never exceeds this, mm.
+        """
+    @property
+    def tool(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Of the calibration, mm.
+        """
+    @property
+    def uncompensated(self) -> list[str]:
+        """
+        What the table does not tell: "EXX", "EYX (slope)", "EXX (above 784.0 mm)" ...
+        """
+    @property
+    def volume(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+def adjust(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.01, full_covariance: bool = False, plausible: PlausibleLimits = ...) -> Adjustment:
     """
     The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. setup_by_line replaces the quantities that it names. Raises InvalidArgument.
     """
@@ -1856,9 +1933,9 @@ def error_at_point(calibration: Calibration, point: numpy.typing.ArrayLike, *, t
     """
     The error at a commanded point (mm) with a tool offset (mm; none: the calibration's), of axes that came in + direction: e = sum over axes of delta + theta x lever. Raises InvalidArgument for lengths that are not finite.
     """
-def evaluate(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'adjustment', uncertainty: ReadingUncertainty = ..., full_covariance: bool = False) -> Calibration:
+def evaluate(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'adjustment', uncertainty: ReadingUncertainty = ..., full_covariance: bool = False, plausible: PlausibleLimits = ...) -> Calibration:
     """
-    Calibration from a run. Of the head only its calibration is used, of the machine only chain and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan.
+    Calibration from a run. Of the head only its calibration is used, of the machine only chain and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan, and for a result that is not plausible.
     """
 def expose(camera: Camera, spots: collections.abc.Sequence[BeamSpot], *, seed: typing.SupportsIndex = 0, counter: typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
     """

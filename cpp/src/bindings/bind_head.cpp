@@ -541,6 +541,20 @@ static void bind_traced_head(py::module_& m) {
           "The signals of a traced head for one mirror pose, by the trace of all its light; None for a lost one.");
 }
 
+Heads to_heads(const HeadLike& heads, const Plan& plan) {
+    if (py::isinstance<Head>(heads)) return heads.cast<Head>();
+    if (!py::isinstance<py::dict>(heads))
+        throw InvalidArgument("head: expected a Head, or a dict with one for each line, got " +
+                              std::string(py::str(py::type::handle_of(heads))));
+    auto by_line = heads.cast<std::map<std::string, Head>>();
+    std::vector<Line> lines = plan.lines();
+    lines.insert(lines.end(), plan.scale_lines().begin(), plan.scale_lines().end());
+    for (const Line& line : lines)
+        if (!by_line.count(line.name())) throw InvalidArgument("head: line \"" + line.name() + "\" has none");
+    Head first = by_line.begin()->second;
+    return {std::move(first), std::move(by_line)};
+}
+
 void bind_head(py::module_& m) {
     py::class_<HeadCalibration>(m, "HeadCalibration",
                                 "What evaluators know of a head: the constants that its readings are reduced with, mm.")
@@ -578,6 +592,71 @@ void bind_head(py::module_& m) {
         .def_readonly("bodies", &HeadDesign::bodies)
         .def_readonly("beams", &HeadDesign::beams)
         .def_readonly("sensors", &HeadDesign::sensors);
+    py::class_<Head>(
+        m, "Head",
+        "A laser head by the closed definition of its layout's readings: \"ideal\" (ray-traced), \"psd\" or "
+        "\"multi_beam\"; from_design makes a traced one. Lengths in mm, wavelength in nm.")
+        .def(py::init([](const std::string& layout, double standoff, double psd_distance,
+                         const std::vector<ArrayLike>& beam_offsets, double wavelength, double aperture,
+                         const std::optional<ArrayLike>& mirror) {
+                 Head head;
+                 head.layout = parse_head_layout(layout);
+                 head.standoff = standoff;
+                 head.psd_distance = psd_distance;
+                 head.wavelength = wavelength;
+                 head.aperture = aperture;
+                 for (const auto& offset : beam_offsets)
+                     head.beam_offsets.push_back(to_vector2(offset, "beam_offsets"));
+                 if (mirror) head.mirror = to_vector2(*mirror, "mirror");
+                 check_head(head);
+                 return head;
+             }),
+             py::arg("layout") = "ideal", py::kw_only(), py::arg("standoff") = Head{}.standoff,
+             py::arg("psd_distance") = Head{}.psd_distance, py::arg("beam_offsets") = std::vector<ArrayLike>{},
+             py::arg("wavelength") = Head{}.wavelength, py::arg("aperture") = Head{}.aperture,
+             py::arg("mirror") = std::nullopt,
+             "mirror: (width, height); none: as large as the plan needs. Raises InvalidArgument for lengths that are "
+             "not positive and for beams on one line.")
+        .def_static(
+            "from_design",
+            [](const HeadDesign& design, double standoff, const std::optional<ArrayLike>& mirror,
+               const std::map<std::string, std::pair<ArrayLike, ArrayLike>>& pose_errors,
+               const std::optional<std::string>& reading_model) {
+                PoseErrors errors;
+                for (const auto& [component, error] : pose_errors)
+                    errors[component] = {to_vector3(error.first, "pose_errors"),
+                                         to_vector3(error.second, "pose_errors")};
+                return make_head(design, standoff, mirror ? std::optional(to_vector2(*mirror, "mirror")) : std::nullopt,
+                                 std::move(errors),
+                                 reading_model ? std::optional(parse_reading_model(*reading_model)) : std::nullopt);
+            },
+            py::arg("design"), py::kw_only(), py::arg("standoff") = Head{}.standoff, py::arg("mirror") = std::nullopt,
+            py::arg("pose_errors") = py::dict(), py::arg("reading_model") = std::nullopt,
+            "A traced head. pose_errors: component name -> (shift in mm, rotation vector in rad about its own origin), "
+            "both along the head's axes. reading_model: of all interferometers instead of the design's. Raises "
+            "InvalidArgument.")
+        .def_property_readonly(
+            "design",
+            [](const Head& head) { return head.design ? std::optional<HeadDesign>(*head.design) : std::nullopt; })
+        .def_property_readonly("calibration", &Head::calibration,
+                               "What evaluators know of the head, by a nominal trace where it has a design.")
+        .def_property_readonly("layout", [](const Head& head) { return name(head.layout); })
+        .def_readonly("standoff", &Head::standoff)
+        .def_readonly("psd_distance", &Head::psd_distance)
+        .def_property_readonly("beam_offsets",
+                               [](const Head& head) {
+                                   Eigen::MatrixXd offsets(head.beam_offsets.size(), 2);
+                                   for (std::size_t i = 0; i < head.beam_offsets.size(); ++i)
+                                       offsets.row(i) = head.beam_offsets[i].transpose();
+                                   return to_numpy(offsets);
+                               })
+        .def_readonly("wavelength", &Head::wavelength)
+        .def_readonly("aperture", &Head::aperture)
+        .def_property_readonly(
+            "mirror",
+            [](const Head& head) { return head.mirror ? std::optional(to_numpy_vector(*head.mirror)) : std::nullopt; })
+        .def_property_readonly("signals", &signal_names, "Names of the channels that the head reads.");
+
     bind_detectors(m);
     bind_traced_head(m);
 }
