@@ -158,7 +158,7 @@ std::string far_reading(const Measurement& measurement, const Plan& plan) {
             if (!(std::abs(deviations[i]) <= largest)) {
                 largest = std::abs(deviations[i]);
                 place = row_name(measurement, line.row[i]) + ": the distance " + text(line.distance[i]) + " mm is " +
-                        text(deviations[i]) + " mm from where the other readings of its line say";
+                        text(deviations[i]) + " mm from where the other readings of its line put it";
             }
     }
     return place;

@@ -155,9 +155,10 @@ def test_report_of_a_calibration_that_knows_little(tmp_path: Path, capsys: pytes
     sd.write_calibration(little, tmp_path / "little.nc")
     assert main(["report", str(tmp_path / "little.nc")]) == 0
     said = capsys.readouterr().out.splitlines()
-    assert said[0].startswith("method: not known")
-    assert [line.split()[0] for line in said[3:]] == ["positioning", "signs:", "reference:"]
-    assert said[3].endswith("not known")
+    assert said[0] == "fit: not known"
+    assert said[1].startswith("method: not known")
+    assert [line.split()[0] for line in said[4:]] == ["positioning", "signs:", "reference:"]
+    assert said[4].endswith("not known")
 
 
 def test_report_tells_shapes_from_errors_and_what_reversal_there_is(

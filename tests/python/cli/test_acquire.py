@@ -170,10 +170,10 @@ def test_interrupted_commands_end_and_keep_what_they_have(folder: Path) -> None:
         while read.count(": Enter") < 3:
             read += acquire.stdout.read(1)
         acquire.send_signal(signal.SIGINT)
-        assert acquire.wait(10) == 130
+        assert acquire.wait(60) == 130
         assert len(read_measurement(folder / "run.csv")) == 2
         twin.send_signal(signal.SIGINT)
-        assert twin.wait(10) == 0
+        assert twin.wait(60) == 0
     finally:
         for process in (acquire, twin):
             process.kill()

@@ -213,6 +213,6 @@ def test_nothing_is_left_of_workers_that_are_done(temporary: Path, monkeypatch: 
 
 def test_missing_cryptography_is_said_with_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cryptography", None)
-    expected = r"^--workers needs cryptography \(pip install 'stepdiag\[dask\]'\)"
+    expected = r"^`workers` needs cryptography \(pip install 'stepdiag\[dask\]'\)"
     with pytest.raises(InvalidArgument, match=expected), workers_of(count=1):
         pass

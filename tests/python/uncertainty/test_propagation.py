@@ -105,7 +105,7 @@ def test_correlated_inputs_propagate_as_numpy_says() -> None:
     ("arguments", "options", "words"),
     [
         (([1.0], [[1.0, 2.0]], [1.0]), {}, "sensitivity: expected 1 x 1"),
-        (([1.0], [1.0], [1.0]), {}, "sensitivity: expected a matrix"),
+        (([1.0], [1.0], [1.0]), {}, "sensitivity: expected two dimensions"),
         (([1.0], [[1.0]], [-1.0]), {}, "x0: expected a standard uncertainty"),
         (([1.0], [[1.0]], [1.0]), {"names": ["a", "b"]}, "names: expected 1, got 2"),
         (([1.0], [[1.0]], [1.0]), {"degrees_of_freedom": [0.0]}, "x0: expected degrees of freedom"),
