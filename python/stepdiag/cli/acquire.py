@@ -40,13 +40,17 @@ class _Terminal:
     default="key",
     show_default=True,
     metavar="WHAT",
-    help="When to read: key (Enter), settle (at rest a step further), or tcp://HOST:PORT, where a controller asks.",
+    help="When to read: key (Enter), settle (at rest one step on), or tcp://HOST:PORT (a controller asks there).",
 )
 @click.option(
-    "--axes", metavar="N,N,N", help="The instrument's axes of d1, d2, d3 (or of the distance).  [default: 1,2,3]"
+    "--axes", metavar="N,N,N", help="Axes of the instrument that give d1, d2, d3 (or distance).  [default: 1,2,3]"
 )
 @click.option(
-    "--sign", type=click.Choice(["+", "-"]), default="+", show_default=True, help="- if positions fall with distance."
+    "--sign",
+    type=click.Choice(["+", "-"]),
+    default="+",
+    show_default=True,
+    help="Use - if the instrument's positions fall as the distance grows.",
 )
 @click.option(
     "--zero",
@@ -56,34 +60,54 @@ class _Terminal:
     help="first: each set-up's first reading becomes the nominal distance, by a constant of each beam.",
 )
 @click.option("--settle-count", type=click.IntRange(2), default=5, show_default=True, help="Values that must agree.")
-@click.option("--settle-limit-um", type=SECONDS, default=0.5, show_default=True, help="Within this, on every axis.")
 @click.option(
-    "--settle-timeout", type=SECONDS, default=20.0, show_default=True, help="Seconds; then the reading is lost."
+    "--settle-limit-um",
+    type=SECONDS,
+    default=0.5,
+    show_default=True,
+    help="Largest difference between them, on every axis.",
 )
-@click.option("--average", type=click.IntRange(1), default=10, show_default=True, help="Values to average then.")
 @click.option(
-    "--interval-ms", type=click.FloatRange(min=0.0), default=10.0, show_default=True, help="Between two values."
+    "--settle-timeout",
+    type=SECONDS,
+    default=20.0,
+    show_default=True,
+    help="Seconds to wait for rest; after that the reading is lost.",
 )
-@click.option("--retries", type=click.IntRange(0), default=5, show_default=True, help="Values without a beam to bear.")
 @click.option(
-    "--timeout", type=SECONDS, default=2.0, show_default=True, help="Seconds for an answer of the instrument."
+    "--average", type=click.IntRange(1), default=10, show_default=True, help="Values to average after settling."
 )
-@click.option("--wait-timeout", type=SECONDS, default=3600.0, show_default=True, help="Seconds for the next point.")
+@click.option(
+    "--interval-ms", type=click.FloatRange(min=0.0), default=10.0, show_default=True, help="Time between two values."
+)
+@click.option(
+    "--retries",
+    type=click.IntRange(0),
+    default=5,
+    show_default=True,
+    help="Values without a beam before a reading counts as lost.",
+)
+@click.option(
+    "--timeout", type=SECONDS, default=2.0, show_default=True, help="Seconds to wait for an answer of the instrument."
+)
+@click.option(
+    "--wait-timeout", type=SECONDS, default=3600.0, show_default=True, help="Seconds to wait for the next point."
+)
 @click.option(
     "--start",
     type=click.Choice(["auto", "never"]),
     default="auto",
     show_default=True,
-    help="auto: start the instrument's measurement anew at a set-up where it is stopped or warns.",
+    help="auto: restart the instrument's measurement at a set-up if it has stopped or warns.",
 )
 @click.option("--uncertainties", is_flag=True, help="Also write the standard deviation of each mean (u_d1_um ...).")
 @click.option(
     "--raw", type=Writes(RAW), metavar="FILE", help="Raw file (.jsonl).  [default: beside the output, run.raw.jsonl]"
 )
-@click.option("--resume", is_flag=True, help="Go on with the raw file, at the point where it stopped.")
-@click.option("--restart-line", is_flag=True, help="Go on with it, and read its last line once more.")
-@click.option("--restart-set-up", is_flag=True, help="Go on with it, and read all of its last set-up once more.")
-@click.option("--from-raw", type=PATH, metavar="FILE", help="Only make the output, from this raw file.")
+@click.option("--resume", is_flag=True, help="Continue the raw file at the point where it stopped.")
+@click.option("--restart-line", is_flag=True, help="Continue the raw file, but read its last line again.")
+@click.option("--restart-set-up", is_flag=True, help="Continue the raw file, but read all of its last set-up again.")
+@click.option("--from-raw", type=PATH, metavar="FILE", help="Do not measure; make the output from this raw file.")
 @out_file("Measurement to write, CSV or netCDF (.nc).", MEASUREMENT)
 def acquire(scenario: Path | None, output: OutputFile, from_raw: Path | None, **given: Any) -> None:
     """Take the readings of SCENARIO's plan from an attocube IDS3010.
@@ -220,19 +244,34 @@ def _point(context: click.Context, option: click.Parameter, texts: tuple[str, ..
 @click.command(epilog="\b\nExample: stepdiag twin scenario.toml --port 9090 --play 1")
 @click.argument("scenario", type=PATH)
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
-@click.option("--port", type=click.IntRange(0, 65535), default=9090, show_default=True, help="0: any that is free.")
 @click.option(
-    "--play", type=SECONDS, metavar="SECONDS", help="Move through the plan by itself, resting so long at each point."
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=9090,
+    show_default=True,
+    help="Port to listen on; 0: any free port.",
 )
 @click.option(
-    "--settling-ms", type=click.FloatRange(min=0.0), default=0.0, show_default=True, help="Moves ring out in this time."
+    "--play",
+    type=SECONDS,
+    metavar="SECONDS",
+    help="Move through the plan without a client, with this rest at each point.",
 )
 @click.option(
-    "--sampling-noise-um", type=click.FloatRange(min=0.0), default=0.0, show_default=True, help="Of every value."
+    "--settling-ms",
+    type=click.FloatRange(min=0.0),
+    default=0.0,
+    show_default=True,
+    help="Time in which a move rings out.",
 )
-@click.option("--lose", multiple=True, callback=_point, metavar="VISIT:POINT", help="Interrupt the beams there.")
 @click.option(
-    "--latch/--no-latch", default=True, show_default=True, help="Beams stay lost until the measurement starts anew."
+    "--sampling-noise-um", type=click.FloatRange(min=0.0), default=0.0, show_default=True, help="Noise of every value."
+)
+@click.option(
+    "--lose", multiple=True, callback=_point, metavar="VISIT:POINT", help="Interrupt the beams at this point."
+)
+@click.option(
+    "--latch/--no-latch", default=True, show_default=True, help="Beams stay lost until the measurement is restarted."
 )
 @click.option("--interrupt", is_flag=True, help="Interrupt the beams whenever the head moves to another line.")
 def twin(

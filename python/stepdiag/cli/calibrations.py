@@ -16,11 +16,11 @@ from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, OutputFile
     "output",
     type=Writes(FUNCTIONAL_POINT),
     metavar="FILE",
-    help="Straightness of the functional point beside the table's, to write as CSV.",
+    help="Also write the straightness of the functional point beside the table's (CSV).",
 )
 @click.pass_context
 def report(context: click.Context, calibration: Path, output: OutputFile | None) -> None:
-    """Tell what a CALIBRATION (CSV or netCDF) says.
+    """Summarise a CALIBRATION (CSV or netCDF).
 
     Largest values and uncertainties, and the point to which straightness refers: the tables hold that of the axes' own
     frames. For an axis that carries the workpiece, or with a tool offset, the functional point's differs; a netCDF file
@@ -52,7 +52,7 @@ def report(context: click.Context, calibration: Path, output: OutputFile | None)
     default=0.05,
     show_default=True,
     metavar="P",
-    help="Probability of any false alarm among all values compared, at which a difference counts as significant.",
+    help="A difference is significant if chance explains it with less than this probability (for all values together).",
 )
 @click.pass_context
 def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None, limit: float) -> None:

@@ -23,34 +23,34 @@ from stepdiag.cli.study import study
 from stepdiag.cli.uncertainty import uncertainty
 
 EPILOG = """\b
-See it all at once:
+See everything at once:
   stepdiag demo
-A first round trip (uncomment [machine.random] in the scenario for a machine with errors):
+Simulate and evaluate a run (uncomment [machine.random] in the scenario for a machine with errors):
   stepdiag init -o machine
   stepdiag simulate machine/scenario.toml -o run.csv
   stepdiag evaluate machine/scenario.toml run.csv -o calibration.csv
-Your own measurement: fill in machine/measurement.csv, then evaluate it in place of run.csv.
-What a plan would determine, before measuring: stepdiag observe machine/scenario.toml
+For your own measurement fill in machine/measurement.csv and evaluate it instead of run.csv.
+To see what a plan can determine before you measure: stepdiag observe machine/scenario.toml
 """
 
 # In the order in which somebody new needs them.
 COMMANDS = {
-    demo: "Show the method on the machine of its paper.",
-    init: "Begin with your own machine: scenario and sheet.",
-    observe: "Tell what a plan and head can determine, before measuring.",
-    plan: "Tell which plan to measure in the time that there is.",
-    uncertainty: "Tell how uncertain a calibration would be.",
-    study: "Tell the same over a grid of scenarios.",
+    demo: "Simulate and evaluate the machine of the method's paper.",
+    init: "Start with your own machine: a scenario and a sheet of points.",
+    observe: "Report what a plan and a head can determine, before measuring.",
+    plan: "Choose the plan for the available time.",
+    uncertainty: "Report how uncertain a calibration would be.",
+    study: "Report the uncertainty over a grid of scenarios.",
     nc: "Write the measuring program for a controller.",
-    acquire: "Take a run's readings from an IDS3010.",
-    twin: "Simulate the instrument, behind a socket.",
+    acquire: "Record readings from an instrument (IDS3010).",
+    twin: "Simulate the instrument on a socket.",
     simulate: "Simulate the run of a scenario.",
     evaluate: "Calibrate the machine from a run.",
-    report: "Tell what a calibration says.",
-    compare: "Set two calibrations side by side.",
+    report: "Summarise a calibration.",
+    compare: "Compare two calibrations.",
     export: "Write a calibration for a controller.",
-    check: "Tell what a file is, and whether it is sound.",
-    head: "Look at the description of a laser head.",
+    check: "Check files, and whether a scenario and a run belong together.",
+    head: "Draw and check descriptions of laser heads.",
 }
 
 

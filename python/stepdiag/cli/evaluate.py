@@ -19,7 +19,7 @@ from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
     type=click.Choice(["adjustment", "enhanced", "conventional"]),
     default="adjustment",
     show_default=True,
-    help="What to evaluate with; see above.",
+    help="Method of evaluation; see above.",
 )
 @click.option("--covariance", is_flag=True, help="Also write the covariance of all values (netCDF only).")
 @out_file("Calibration to write, CSV or netCDF (.nc, which keeps the set-up and the residuals as well).", CALIBRATION)
@@ -92,11 +92,11 @@ def _step_counts(context: click.Context, option: click.Parameter, text: str | No
     "--steps",
     metavar="N,N,...",
     callback=_step_counts,
-    help="Numbers of steps per axis for the table, beside the scenario's own.  [default: 5,10,20,50,100,200]",
+    help="Numbers of steps per axis in the table; the scenario's own is added.  [default: 5,10,20,50,100,200]",
 )
 @click.option("-o", "output", type=Writes(OBSERVATION), metavar="FILE", help="Also write the table (CSV).")
 def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | None) -> None:
-    """Tell what SCENARIO's plan and head can determine, and how well, before anyone measures.
+    """Report what SCENARIO's plan and head can determine, and how well, before you measure.
 
     Adjusts an error-free run with the scenario's uncertainties and unknowns. Says which of the 21 parameters
     and of the set-up's unknowns the readings determine, with which standard uncertainty, what is missing for the

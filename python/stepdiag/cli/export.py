@@ -29,7 +29,7 @@ MM = "<X Y Z>"
     required=True,
     type=Writes(*KINDS.values()),
     metavar="OUT",
-    help="File to write (.csv); of linuxcnc-comp the folder.",
+    help="File to write (.csv); for linuxcnc-comp a folder.",
 )
 @click.option("--tool", type=float, nargs=3, metavar=MM, help="Tool offset, mm.  [default: the calibration's]")
 @click.option(
@@ -39,27 +39,32 @@ MM = "<X Y Z>"
 @click.option(
     "--approach",
     type=click.Choice(("mean", "positive", "negative")),
-    help="Of tables with two directions of approach, which is compensated (not linuxcnc-comp).  [default: mean]",
+    help="Direction of approach to compensate if the tables have two (not linuxcnc-comp).  [default: mean]",
 )
 @click.option(
     "--at",
     type=float,
     nargs=3,
     metavar=MM,
-    help="Point through which the corrected lines go, mm from home (linuxcnc-comp).  [default: centre of the volume]",
+    help="Point on the corrected lines, mm from home (linuxcnc-comp).  [default: centre of the volume]",
 )
-@click.option("--rows", type=int, metavar="N", help="Most rows of a table (linuxcnc-comp, isg).  [default: 256, 5000]")
+@click.option(
+    "--rows",
+    type=int,
+    metavar="N",
+    help="Largest number of rows in a table (linuxcnc-comp, isg).  [default: 256, 5000]",
+)
 @click.option(
     "--squareness",
     type=click.Choice(("straightness", "parameters")),
-    help="Where squareness is written (isg).  [default: straightness]",
+    help="Where to write squareness (isg).  [default: straightness]",
 )
 @click.option(
     "--nodes", type=int, nargs=3, metavar="<NX NY NZ>", help="Points of the grid (csv-grid).  [default: 11 11 11]"
 )
-@click.option("--step", type=float, metavar="MM", help="Largest spacing of the grid, in place of --nodes (csv-grid).")
+@click.option("--step", type=float, metavar="MM", help="Largest spacing of the grid, instead of --nodes (csv-grid).")
 @click.option("--accept-rejected", is_flag=True, help="Export a calibration although its fit was rejected.")
-@click.option("--orientation", is_flag=True, default=None, help="Rotations of the tool too (csv-grid).")
+@click.option("--orientation", is_flag=True, default=None, help="Also write the rotations of the tool (csv-grid).")
 @click.pass_context
 def export(context: click.Context, /, calibration: Path, to: str, output: OutputFile, **options: Any) -> None:
     """Write a CALIBRATION (CSV or netCDF) for a controller.

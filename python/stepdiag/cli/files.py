@@ -13,7 +13,7 @@ from stepdiag.io.outputs import OutputFile
 @click.argument("files", nargs=-1, required=True, type=PATH, metavar="FILE...")
 @click.pass_context
 def check(context: click.Context, files: tuple[Path, ...]) -> None:
-    """Tell what kind each FILE is, and whether it is sound.
+    """Check each FILE: of what kind it is, and whether it is sound.
 
     Knows scenarios, heads and studies (TOML), measurements and calibrations (CSV or netCDF), error maps (CSV)
     and raw readings (JSON lines). A
@@ -68,7 +68,7 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
     metavar="SCENARIO",
     help="Write only measurement.csv, for the plan and head of this scenario.",
 )
-@click.option("--head", "head_name", metavar="NAME", help="Begin with a copy of this shipped head (see head list).")
+@click.option("--head", "head_name", metavar="NAME", help="Start from a copy of this shipped head (see head list).")
 def init(output: OutputFile, scenario: Path | None, head_name: str | None) -> None:
     """Begin with your own machine: a scenario to edit and a sheet to fill in.
 

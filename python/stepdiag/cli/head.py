@@ -72,7 +72,7 @@ def show(name: str, output: OutputFile, distance: float | None, mirror: tuple[fl
 
 
 @head.command(
-    short_help="Tell where light arrives, and its limits.", epilog="\b\nExample: stepdiag head check beam_and_psd"
+    short_help="Report where light arrives, and its limits.", epilog="\b\nExample: stepdiag head check beam_and_psd"
 )
 @HEAD
 @click.option(
@@ -85,7 +85,7 @@ def show(name: str, output: OutputFile, distance: float | None, mirror: tuple[fl
 )
 @MIRROR
 def check(name: str, distances: tuple[float, ...], mirror: tuple[float, float] | None) -> None:
-    """Tell what HEAD does before an aligned mirror.
+    """Report what HEAD does in front of an aligned mirror.
 
     Its nominal calibration; spot, path and power at every detector; how far the mirror may tilt and travel before
     a reading is lost; the smallest mirror.
@@ -97,7 +97,7 @@ def check(name: str, distances: tuple[float, ...], mirror: tuple[float, float] |
 
 
 @head.command(
-    short_help="Tell what imperfections of a head change.",
+    short_help="Report what imperfections of a head change.",
     epilog="\b\nExample: stepdiag head sensitivity three_beams --distance 600",
 )
 @HEAD

@@ -19,46 +19,54 @@ _AXES = ("X", "Y", "Z")
     type=click.Choice(["linuxcnc", "iso"]),
     default="linuxcnc",
     show_default=True,
-    help="LinuxCNC's G-code, or words of ISO 6983 that most controllers have.",
+    help="LinuxCNC's G-code, or words of ISO 6983 that most controllers understand.",
 )
-@click.option("--origin", nargs=3, type=float, metavar="X Y Z", help="Where home is, in mm.  [default: 0 0 0]")
+@click.option("--origin", nargs=3, type=float, metavar="X Y Z", help="Coordinates of home, mm.  [default: 0 0 0]")
 @click.option(
     "--coordinates",
     metavar="G5x",
-    help="G53, of the machine, or a work offset G54 to G59.  [default: G53 for linuxcnc, G54 for iso]",
+    help="Machine coordinates G53, or a work offset G54 to G59.  [default: G53 for linuxcnc, G54 for iso]",
 )
 @click.option(
     "--limits",
     nargs=6,
     type=float,
     metavar="X X Y Y Z Z",
-    help="Where the travel of X, Y, Z begins and ends, in mm: no move goes further.  [default: unlimited]",
+    help="First and last position of X, Y, Z, mm; no move goes beyond.  [default: unlimited]",
 )
-@click.option(
-    "--overrun", type=float, metavar="MM", help="How far to overrun before a line's first point.  [default: 1]"
-)
+@click.option("--overrun", type=float, metavar="MM", help="Overrun before the first point of a line.  [default: 1]")
 @click.option(
     "--safe",
     nargs=3,
     type=float,
     metavar="X Y Z",
-    help="Where the axes stand for a set-up.  [default: the middle of X and Y, the far end of Z]",
+    help="Position of the axes for a set-up.  [default: the middle of X and Y, the far end of Z]",
 )
-@click.option("--retreat", metavar="ORDER", help="Axes one at a time to the safe position.  [default: ZXY]")
+@click.option(
+    "--retreat",
+    metavar="ORDER",
+    help="Order in which the axes move to the safe position, one at a time.  [default: ZXY]",
+)
 @click.option(
     "--trigger",
     type=click.Choice(["handshake", "pulse", "dwell"]),
-    help="How a reading is asked for (docs/measuring.md).  [default: handshake for linuxcnc, dwell for iso]",
+    help="How the program asks for a reading (docs/measuring.md).  [default: handshake for linuxcnc, dwell for iso]",
 )
-@click.option("--trigger-code", metavar="M80", help="An M-code of yours that asks for a reading.")
-@click.option("--timeout", type=float, metavar="S", help="How long a handshake waits for a reading.  [default: 300]")
+@click.option("--trigger-code", metavar="M80", help="Your own M-code that asks for a reading.")
+@click.option(
+    "--timeout", type=float, metavar="S", help="Seconds that a handshake waits for a reading.  [default: 300]"
+)
 @click.option(
     "--dwell-word",
     type=click.Choice(["P", "X", "F", "PMS"]),
     help="G4 takes seconds as P, X or F, or milliseconds as P (PMS).  [default: P]",
 )
-@click.option("--decimals", type=int, metavar="N", help="Of a millimetre.  [default: 6 for linuxcnc, 4 for iso]")
-@click.option("--align/--no-align", default=None, help="Stop at a line's first point to align the beam.  [default: do]")
+@click.option(
+    "--decimals", type=int, metavar="N", help="Decimal places of positions in mm.  [default: 6 for linuxcnc, 4 for iso]"
+)
+@click.option(
+    "--align/--no-align", default=None, help="Stop at the first point of a line to align the beam.  [default: align]"
+)
 @click.option("--line-numbers", is_flag=True, default=None, help="Number the blocks (iso).")
 def nc(scenario: Path, output: OutputFile, **given: Any) -> None:
     """Write the measuring program of SCENARIO: G-code for the machine's controller.

@@ -32,13 +32,13 @@ _POSITIVE = _Positive(min=0.0, min_open=True, max=1e9)
     "--minutes",
     type=_POSITIVE,
     metavar="T",
-    help="The time that there is.  [default: plan_by_time.minutes of the scenario, 30]",
+    help="Available time.  [default: plan_by_time.minutes of the scenario, 30]",
 )
 @click.option(
     "--spacing",
     type=_POSITIVE,
     metavar="MM",
-    help="Nodes of an axis are to be at most so far apart.  [default: as in the scenario's own plan]",
+    help="Largest distance between the nodes of an axis.  [default: that of the scenario's plan]",
 )
 @click.option(
     "--for",
@@ -46,14 +46,14 @@ _POSITIVE = _Positive(min=0.0, min_open=True, max=1e9)
     type=click.Choice(["length", "angle", "squareness"]),
     default="length",
     show_default=True,
-    help="Whose largest standard uncertainty is to be small; length: positioning errors and straightnesses.",
+    help="Minimise the largest standard uncertainty of these; length: positioning errors and straightnesses.",
 )
 @click.option(
     "-o",
     "output",
     type=Writes(PNG, SVG, PLANS),
     metavar="FILE",
-    help="Also draw the curve (.png, .svg), or write all (.csv).",
+    help="Also draw the curve (.png, .svg) or write all plans (.csv).",
 )
 def plan(
     scenario: Path, minutes: float | None, spacing: float | None, family: Family, output: OutputFile | None

@@ -11,7 +11,7 @@ from stepdiag.io.outputs import MEASUREMENT, OutputFile
 @click.command(epilog="\b\nExample: stepdiag simulate scenario.toml -o run.csv")
 @click.argument("scenario", type=PATH)
 @out_file("Measurement file to write, CSV or netCDF (.nc).", MEASUREMENT)
-@click.option("--overwrite", is_flag=True, help="Also where a measurement has this name: it is lost.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing measurement of this name.")
 def simulate(scenario: Path, output: OutputFile, overwrite: bool) -> None:
     """Simulate the run that SCENARIO (TOML) describes.
 
@@ -36,7 +36,7 @@ def simulate(scenario: Path, output: OutputFile, overwrite: bool) -> None:
     "output",
     type=Writes(),
     metavar="DIR",
-    help="Folder to write, a new one or that of an earlier demo.  [default: demo, or demo-linuxcnc]",
+    help="Folder to write: a new one, or that of an earlier demo.  [default: demo, or demo-linuxcnc]",
 )
 @click.option(
     "--controller",

@@ -13,7 +13,7 @@ from stepdiag.io.outputs import STUDY, OutputFile
 @click.command(epilog="\b\nExample: stepdiag study study.toml -o study.nc --workers 2")
 @click.argument("file", type=PATH, metavar="STUDY")
 @out_file("Result to write, netCDF (.nc).", STUDY)
-@click.option("--resume", is_flag=True, help="Go on with what an interrupted study has done.")
+@click.option("--resume", is_flag=True, help="Continue an interrupted study.")
 @worker_options
 def study(file: Path, output: OutputFile, resume: bool, scheduler: str | None, workers: int | None) -> None:
     """Vary keys of a scenario over a grid, each cell with its virtual calibrations.

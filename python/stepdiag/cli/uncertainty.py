@@ -61,7 +61,7 @@ def _points(context: click.Context, option: click.Parameter, texts: tuple[str, .
     "samples",
     metavar="SAMPLES",
     callback=_sample_count,
-    help="Virtual calibrations of the Monte Carlo method, such as 1e6; with --adaptive at most so many.",
+    help="Number of virtual calibrations (Monte Carlo method), such as 1e6; with --adaptive the largest number.",
 )
 @click.option(
     "-m",
@@ -69,9 +69,9 @@ def _points(context: click.Context, option: click.Parameter, texts: tuple[str, .
     type=click.Choice(["adjustment", "enhanced", "conventional", "one_step"]),
     default="adjustment",
     show_default=True,
-    help="What each of them is evaluated with.",
+    help="Method of evaluation of each calibration; see above.",
 )
-@click.option("--adaptive", is_flag=True, help="As many samples as the digits need (JCGM 101, 7.9).")
+@click.option("--adaptive", is_flag=True, help="Draw as many samples as the digits need (JCGM 101, 7.9).")
 @click.option(
     "--digits",
     type=click.IntRange(1, 3),
@@ -87,9 +87,17 @@ def _points(context: click.Context, option: click.Parameter, texts: tuple[str, .
     metavar="P",
     help="Probability of coverage intervals and expanded uncertainties.",
 )
-@click.option("--seed", type=click.IntRange(0, 2**64 - 1), default=0, show_default=True, help="Of all that is drawn.")
-@click.option("--threads", type=click.IntRange(0), default=0, metavar="N", help="By default all that the computer has.")
-@click.option("--covariance", is_flag=True, help="Also the covariance of all outputs (needs -o with .nc).")
+@click.option(
+    "--seed", type=click.IntRange(0, 2**64 - 1), default=0, show_default=True, help="Seed of all random numbers."
+)
+@click.option(
+    "--threads",
+    type=click.IntRange(0),
+    default=0,
+    metavar="N",
+    help="Number of threads.  [default: all of the computer's]",
+)
+@click.option("--covariance", is_flag=True, help="Also write the covariance of all outputs (needs -o with .nc).")
 @click.option(
     "--keep", multiple=True, metavar="NAME", help="Keep all samples of an output, such as C0Y or EXX@400 (with .nc)."
 )
@@ -103,9 +111,11 @@ def _points(context: click.Context, option: click.Parameter, texts: tuple[str, .
     multiple=True,
     metavar="X,Y,Z[,TOOL]",
     callback=_points,
-    help="Also the error vector there; TOOL: another offset x,y,z than the scenario's.",
+    help="Also report the error vector at this point; TOOL: a tool offset x,y,z other than the scenario's.",
 )
-@click.option("--volume", is_flag=True, help="Also the volumetric accuracy V_XYZ (ISO 230-1) and the body diagonals.")
+@click.option(
+    "--volume", is_flag=True, help="Also report the volumetric accuracy V_XYZ (ISO 230-1) and the body diagonals."
+)
 @click.option(
     "--checkpoint",
     type=Writes(CHECKPOINT),
@@ -113,8 +123,8 @@ def _points(context: click.Context, option: click.Parameter, texts: tuple[str, .
     help="What is done (.checkpoint), every ten seconds and at the end; by default only of a run that was interrupted, "
     "beside -o. One that is there already is never overwritten: --resume, or remove it.",
 )
-@click.option("--resume", is_flag=True, help="Go on from the checkpoint, to the same bits.")
-@click.option("--inputs", "list_inputs", is_flag=True, help="Only list the uncertain inputs by name.")
+@click.option("--resume", is_flag=True, help="Continue from the checkpoint; the result has the same bits.")
+@click.option("--inputs", "list_inputs", is_flag=True, help="List the names of the uncertain inputs and end.")
 @click.option(
     "-o", "output", type=Writes(UNCERTAINTY), metavar="FILE", help="Result to write, netCDF (.nc) or CSV (.csv)."
 )
@@ -141,11 +151,11 @@ def uncertainty(
     scheduler: str | None,
     workers: int | None,
 ) -> None:
-    """Tell how uncertain a calibration of SCENARIO's machine would be, by what its [uncertainty] names.
+    """Report how uncertain a calibration of SCENARIO's machine would be, from the inputs in its [uncertainty].
 
-    Without -n by the law of propagation alone (GUM): tables by family of parameters, and where the largest
-    uncertainties come from. With -n also by the Monte Carlo method (JCGM 101): whole virtual calibrations, each
-    with inputs drawn from their distributions, every pose traced, noise added, and evaluated.
+    Without -n the command uses the law of propagation alone (GUM): it prints tables by family of parameters, and
+    where the largest uncertainties come from. With -n it also uses the Monte Carlo method (JCGM 101): it makes
+    virtual calibrations, each with inputs drawn from their distributions, every pose traced, and noise added.
 
     \b
     adjustment    all readings at once and exactly: what evaluate does

@@ -24,7 +24,7 @@ def worker_options(command: Command) -> Command:
         "--workers",
         type=click.IntRange(1, MOST_WORKERS),
         metavar="N",
-        help="Compute by N worker processes of this computer (Dask, for this run only).",
+        help="Compute with N worker processes on this computer (Dask, for this run only).",
     )
     return scheduler(workers(command))
 
