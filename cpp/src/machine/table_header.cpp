@@ -6,7 +6,7 @@
 namespace stepdiag {
 namespace {
 
-const std::string& header_value(const ParameterTable& table, const std::string& key, const std::string& name) {
+std::string header_value(const ParameterTable& table, const std::string& key, const std::string& name) {
     const auto entry = table.header.find(key);
     if (entry == table.header.end())
         throw InvalidArgument(name + ": the leading line \"# " + key +
@@ -27,7 +27,7 @@ std::vector<std::string> split(std::string_view text, std::string_view separator
 }
 
 Chain chain_of(const ParameterTable& table, const std::string& name) {
-    const std::string& text = header_value(table, "chain", name);
+    const std::string text = header_value(table, "chain", name);
     try {
         return Chain::parse(text);
     } catch (const InvalidArgument& error) {
@@ -36,7 +36,7 @@ Chain chain_of(const ParameterTable& table, const std::string& name) {
 }
 
 Eigen::Vector3d lengths_of(const ParameterTable& table, const std::string& key, const std::string& name) {
-    const std::string& text = header_value(table, key, name);
+    const std::string text = header_value(table, key, name);
     const auto parts = split(text, " ");
     Eigen::Vector3d lengths;
     for (int i = 0; i < 3; ++i) {
