@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from stepdiag._core import (
     Adjustment,
+    AdjustmentOptions,
     BatchEvaluator,
     BeamSegment,
     BeamSpot,
@@ -58,6 +59,7 @@ from stepdiag._core import (
     Sensitivity,
     SetupEstimate,
     SetupPriors,
+    SimulationOptions,
     Smoothness,
     SpotSensor,
     StatisticsOptions,
@@ -136,6 +138,7 @@ if TYPE_CHECKING:
 __all__ = [
     "AcquireOptions",
     "Adjustment",
+    "AdjustmentOptions",
     "BatchEvaluator",
     "BeamSegment",
     "BeamSpot",
@@ -190,6 +193,7 @@ __all__ = [
     "Settling",
     "SetupEstimate",
     "SetupPriors",
+    "SimulationOptions",
     "Smoothness",
     "SpotSensor",
     "StatisticsOptions",

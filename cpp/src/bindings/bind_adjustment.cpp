@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bindings.hpp"
+#include "options.hpp"
 
 namespace stepdiag::bindings {
 namespace {
@@ -107,6 +107,47 @@ void bind_options(py::module_& m) {
         .def_readonly("translation", &Smoothness::translation)
         .def_readonly("rotation", &Smoothness::rotation)
         .def_readonly("cross_validated", &Smoothness::cross_validated);
+
+    const AdjustmentOptions usual;
+    py::class_<AdjustmentOptions>(
+        m, "AdjustmentOptions",
+        "What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all "
+        "lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its "
+        "set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has "
+        "no angular errors. outlier_probability: of any false alarm in a run; 0: no reading is left out. plausible: "
+        "what a machine can be.")
+        .def(py::init([](const ReadingUncertainty& uncertainty, const Priors& setup,
+                         const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
+                         bool rotations, const std::optional<Smoothness>& smoothness, double outlier_probability,
+                         bool full_covariance, const PlausibleLimits& plausible) {
+                 AdjustmentOptions options{uncertainty,     setup.value, {},         one_setup_per_line,
+                                           reversal,        rotations,   smoothness, outlier_probability,
+                                           full_covariance, plausible};
+                 for (const auto& [line, priors] : setup_by_line) options.setup_by_line[line] = priors.value;
+                 return options;
+             }),
+             py::kw_only(), py::arg("uncertainty") = usual.uncertainty, py::arg("setup") = Priors{},
+             py::arg("setup_by_line") = std::map<std::string, Priors>{},
+             py::arg("one_setup_per_line") = usual.one_setup_per_line, py::arg("reversal") = usual.reversal,
+             py::arg("rotations") = usual.rotations, py::arg("smoothness") = std::nullopt,
+             py::arg("outlier_probability") = usual.outlier_probability,
+             py::arg("full_covariance") = usual.full_covariance, py::arg("plausible") = usual.plausible,
+             "adjust() checks them.")
+        .def_readonly("uncertainty", &AdjustmentOptions::uncertainty)
+        .def_property_readonly("setup", [](const AdjustmentOptions& o) { return Priors{o.setup}; })
+        .def_property_readonly("setup_by_line",
+                               [](const AdjustmentOptions& o) {
+                                   std::map<std::string, Priors> by_line;
+                                   for (const auto& [line, priors] : o.setup_by_line) by_line[line] = {priors};
+                                   return by_line;
+                               })
+        .def_readonly("one_setup_per_line", &AdjustmentOptions::one_setup_per_line)
+        .def_readonly("reversal", &AdjustmentOptions::reversal)
+        .def_readonly("rotations", &AdjustmentOptions::rotations)
+        .def_readonly("smoothness", &AdjustmentOptions::smoothness)
+        .def_readonly("outlier_probability", &AdjustmentOptions::outlier_probability)
+        .def_readonly("full_covariance", &AdjustmentOptions::full_covariance)
+        .def_readonly("plausible", &AdjustmentOptions::plausible);
 }
 
 void bind_result(py::module_& m) {
@@ -227,22 +268,9 @@ void bind_result(py::module_& m) {
 }
 
 AdjustmentOfRun adjust_run(const Measurement& measurement, const Plan& plan, const HeadLike& head,
-                           const ChainLike& chain, const ArrayLike& tool, const ReadingUncertainty& uncertainty,
-                           const Priors& setup, const std::map<std::string, Priors>& setup_by_line,
-                           bool one_setup_per_line, bool reversal, bool rotations,
-                           const std::optional<Smoothness>& smoothness, double outlier_probability,
-                           bool full_covariance, const PlausibleLimits& plausible) {
-    AdjustmentOptions options;
-    options.uncertainty = uncertainty;
-    options.setup = setup.value;
-    for (const auto& [line, priors] : setup_by_line) options.setup_by_line[line] = priors.value;
-    options.one_setup_per_line = one_setup_per_line;
-    options.reversal = reversal;
-    options.rotations = rotations;
-    options.smoothness = smoothness;
-    options.outlier_probability = outlier_probability;
-    options.full_covariance = full_covariance;
-    options.plausible = plausible;
+                           const ChainLike& chain, const ArrayLike& tool, const std::optional<AdjustmentOptions>& given,
+                           const py::kwargs& fields) {
+    const AdjustmentOptions options = options_of(given, fields);
     const Eigen::Vector3d offset = to_vector3(tool, "tool");
     const Chain kinematics = to_chain(chain);
     const HeadCalibrations heads = to_heads(head, plan).calibration();
@@ -256,13 +284,9 @@ void bind_adjustment(py::module_& m) {
     bind_options(m);
     bind_result(m);
     m.def("adjust", &adjust_run, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
-          py::arg("tool") = zeros(3), py::kw_only(), py::arg("uncertainty") = ReadingUncertainty{},
-          py::arg("setup") = Priors{}, py::arg("setup_by_line") = std::map<std::string, Priors>{},
-          py::arg("one_setup_per_line") = false, py::arg("reversal") = true, py::arg("rotations") = true,
-          py::arg("smoothness") = std::nullopt, py::arg("outlier_probability") = 0.01,
-          py::arg("full_covariance") = false, py::arg("plausible") = PlausibleLimits{},
+          py::arg("tool") = zeros(3), py::arg("options") = std::nullopt,
           "The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. "
-          "setup_by_line replaces the quantities that it names. Raises InvalidArgument.");
+          "The options are AdjustmentOptions, or its fields by name. Raises InvalidArgument.");
 }
 
 }  // namespace stepdiag::bindings

@@ -5,7 +5,7 @@
 #include <mutex>
 #include <thread>
 
-#include "batch_arguments.hpp"
+#include "batch_options.hpp"
 #include "stepdiag/core/random_blocks.hpp"
 
 namespace stepdiag::bindings {
@@ -29,11 +29,8 @@ std::vector<std::string> signal_names(const Measurement& measurement) {
 
 std::unique_ptr<EvaluatorOfPattern> make(const Measurement& pattern, const Plan& plan, const HeadLike& heads,
                                          const ChainLike& chain, const ArrayLike& tool, const std::string& method,
-                                         const ReadingUncertainty& uncertainty, const Priors& setup,
-                                         const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line,
-                                         bool reversal, bool rotations, const std::optional<Smoothness>& smoothness) {
-    const BatchOptions options = to_batch_options(method, uncertainty, setup, setup_by_line, one_setup_per_line,
-                                                  reversal, rotations, smoothness);
+                                         const std::optional<AdjustmentOptions>& given, const py::kwargs& fields) {
+    const BatchOptions options = to_batch_options(method, options_of(given, fields));
     const HeadCalibrations calibrations = to_heads(heads, plan).calibration();
     const Chain kinematics = to_chain(chain);
     const Eigen::Vector3d offset = to_vector3(tool, "tool");
@@ -115,18 +112,11 @@ EvaluationMethod to_evaluation_method(const std::string& text) {
                           text + "\"");
 }
 
-BatchOptions to_batch_options(const std::string& method, const ReadingUncertainty& uncertainty, const Priors& setup,
-                              const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line,
-                              bool reversal, bool rotations, const std::optional<Smoothness>& smoothness) {
+BatchOptions to_batch_options(const std::string& method, const AdjustmentOptions& adjustment) {
     BatchOptions options;
     options.method = to_evaluation_method(method);
-    options.uncertainty = options.adjustment.uncertainty = uncertainty;
-    options.adjustment.setup = setup.value;
-    for (const auto& [line, priors] : setup_by_line) options.adjustment.setup_by_line[line] = priors.value;
-    options.adjustment.one_setup_per_line = one_setup_per_line;
-    options.adjustment.reversal = reversal;
-    options.adjustment.rotations = rotations;
-    options.adjustment.smoothness = smoothness;
+    options.uncertainty = adjustment.uncertainty;
+    options.adjustment = adjustment;
     return options;
 }
 
@@ -146,13 +136,12 @@ void bind_batch(py::module_& m) {
         .def(
             py::init(&make), py::arg("pattern"), py::arg("plan"), py::arg("heads"), py::arg("chain"),
             py::arg("tool") = zeros(3), py::kw_only(), py::arg("method") = "enhanced",
-            py::arg("uncertainty") = ReadingUncertainty{}, py::arg("setup") = Priors{},
-            py::arg("setup_by_line") = std::map<std::string, Priors>{}, py::arg("one_setup_per_line") = false,
-            py::arg("reversal") = true, py::arg("rotations") = true, py::arg("smoothness") = std::nullopt,
+            py::arg("options") = std::nullopt,
             "pattern: a run whose readings are there; lost ones are not used in any set. method: \"conventional\", "
             "\"enhanced\", \"adjustment\" (each set converged to 1e-4 of its values' standard uncertainties, without a "
             "search for outliers) or \"one_step\" (the pattern's values plus gain times what differs: off by terms of "
-            "second order). setup to smoothness as of adjust(). Raises InvalidArgument.")
+            "second order). The options are AdjustmentOptions, or its fields by name; linear methods take the "
+            "uncertainty alone. Raises InvalidArgument.")
         .def_property_readonly(
             "entries", [](const Evaluator& e) { return e.evaluator.entries(); },
             "The values that a set of readings gives: functions EXX ... ECZ, nodes ascending, then squarenesses.")

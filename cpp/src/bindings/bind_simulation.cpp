@@ -1,4 +1,4 @@
-#include "bindings.hpp"
+#include "options.hpp"
 #include "stepdiag/simulation/simulate.hpp"
 #include "stepdiag/simulation/virtual_readout.hpp"
 
@@ -66,49 +66,61 @@ void bind_simulation(py::module_& m) {
         .def_readonly("seed", &Noise::seed);
 
     m.attr("largest_repeat_count") = SimulationOptions::largest_repeat_count;
+    py::class_<SimulationOptions>(
+        m, "SimulationOptions",
+        "What simulate() takes beside machine, plan and head. misalignment: by line name; a line without an entry is "
+        "aligned. environment: the air of the trace (none: of 20 degrees Celsius for a head with a design, an index of "
+        "1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: "
+        "of a traced head's replayed poses, traced again and compared. repeats: how often each line is measured, runs "
+        "0, 1, 2, ...; backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; "
+        "seconds_per_reading: makes the channel time.")
+        .def(py::init([](const std::map<std::string, Misalignment>& misalignment, const Noise& noise,
+                         const std::optional<Environment>& environment, const std::optional<Environment>& assumed,
+                         double verified_share, const IntegerLike& repeats, bool backward,
+                         const std::optional<double>& seconds_per_reading) {
+                 return SimulationOptions{misalignment,   noise,
+                                          environment,    assumed,
+                                          verified_share, to_int(repeats, "repeats"),
+                                          backward,       seconds_per_reading};
+             }),
+             py::kw_only(), py::arg("misalignment") = std::map<std::string, Misalignment>{}, py::arg("noise") = Noise{},
+             py::arg("environment") = std::nullopt, py::arg("assumed_environment") = std::nullopt,
+             py::arg("verified_share") = SimulationOptions{}.verified_share, py::arg("repeats") = integer(1),
+             py::arg("backward") = false, py::arg("seconds_per_reading") = std::nullopt,
+             "Raises InvalidArgument for repeats that are no small number; simulate() checks the rest.")
+        .def_readonly("misalignment", &SimulationOptions::misalignment)
+        .def_readonly("noise", &SimulationOptions::noise)
+        .def_readonly("environment", &SimulationOptions::environment)
+        .def_readonly("assumed_environment", &SimulationOptions::assumed)
+        .def_readonly("verified_share", &SimulationOptions::verified_share)
+        .def_readonly("repeats", &SimulationOptions::repeats)
+        .def_readonly("backward", &SimulationOptions::backward)
+        .def_readonly("seconds_per_reading", &SimulationOptions::seconds_per_reading);
+
     m.def(
         "simulate",
         [](const Machine& machine, const Plan& plan, const HeadLike& head,
-           const std::map<std::string, Misalignment>& misalignment, const Noise& noise,
-           const std::optional<Environment>& environment, const std::optional<Environment>& assumed,
-           double verified_share, const IntegerLike& repeats, bool backward,
-           const std::optional<double>& seconds_per_reading) {
+           const std::optional<SimulationOptions>& given, const py::kwargs& fields) {
             const Heads heads = to_heads(head, plan);
-            const SimulationOptions options{
-                misalignment,       noise, environment, assumed, verified_share, to_int(repeats, "repeats"), backward,
-                seconds_per_reading};
+            const SimulationOptions options = options_of(given, fields);
             py::gil_scoped_release release;
             return simulate(machine, plan, heads, options);
         },
-        py::arg("machine"), py::arg("plan"), py::arg("head"), py::kw_only(),
-        py::arg("misalignment") = std::map<std::string, Misalignment>{}, py::arg("noise") = Noise{},
-        py::arg("environment") = std::nullopt, py::arg("assumed_environment") = std::nullopt,
-        py::arg("verified_share") = SimulationOptions{}.verified_share, py::arg("repeats") = integer(1),
-        py::arg("backward") = false, py::arg("seconds_per_reading") = std::nullopt,
+        py::arg("machine"), py::arg("plan"), py::arg("head"), py::arg("options") = std::nullopt,
         "A run on the virtual machine: lines of the plan, then its scale lines. head: one, or a dict with one for each "
-        "line. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace "
-        "(none: of 20 degrees Celsius for a head with a design, an index of 1 for the others); "
-        "assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's "
-        "replayed poses, traced again and compared. repeats: how often each line is measured, runs 0, 1, 2, ...; "
-        "backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; seconds_per_reading: makes "
-        "the channel time. Points of a visit are approached in the direction of its own travel. Readings whose beam "
-        "misses the mirror or does not come back are "
-        "lost (NaN). Raises InvalidArgument; RuntimeError where a replay and its trace differ.");
+        "line. The options are SimulationOptions, or its fields by name. Points of a visit are approached in the "
+        "direction of its own travel. Readings whose beam misses the mirror or does not come back are lost (NaN). "
+        "Raises InvalidArgument; RuntimeError where a replay and its trace differ.");
 
     py::class_<VirtualReadout>(
         m, "VirtualReadout",
         "The virtual head set up on one line, read with the axes at any position: the row that simulate makes there.")
         .def(py::init([](const Machine& machine, const Plan& plan, const HeadLike& head, const std::string& line,
-                         const std::map<std::string, Misalignment>& misalignment, const Noise& noise,
-                         const std::optional<Environment>& environment, const std::optional<Environment>& assumed,
-                         double verified_share) {
-                 const SimulationOptions options{misalignment, noise, environment, assumed, verified_share};
-                 return VirtualReadout(machine, plan, to_heads(head, plan), Line::parse(line), options);
+                         const std::optional<SimulationOptions>& given, const py::kwargs& fields) {
+                 return VirtualReadout(machine, plan, to_heads(head, plan), Line::parse(line),
+                                       options_of(given, fields));
              }),
-             py::arg("machine"), py::arg("plan"), py::arg("head"), py::arg("line"), py::kw_only(),
-             py::arg("misalignment") = std::map<std::string, Misalignment>{}, py::arg("noise") = Noise{},
-             py::arg("environment") = std::nullopt, py::arg("assumed_environment") = std::nullopt,
-             py::arg("verified_share") = SimulationOptions{}.verified_share,
+             py::arg("machine"), py::arg("plan"), py::arg("head"), py::arg("line"), py::arg("options") = std::nullopt,
              "Arguments as those of simulate. Raises InvalidArgument as it does, and for a line that is not in the "
              "plan.")
         .def(

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "batch_arguments.hpp"
+#include "batch_options.hpp"
 #include "bindings.hpp"
 #include "stepdiag/uncertainty/inputs.hpp"
 #include "stepdiag/uncertainty/propagation.hpp"
@@ -286,29 +286,32 @@ std::uint64_t to_sample(const IntegerLike& number) {
     return std::uint64_t(to_integer(number, "sample", 0, std::int64_t(1) << 62));
 }
 
-std::unique_ptr<VirtualCalibrations> make(
-    const Machine& machine, const Plan& plan, const HeadLike& heads, const UncertainInputs& inputs,
-    const std::optional<HeadLike>& calibration_heads, const std::string& method, const IntegerLike& seed,
-    const std::map<std::string, Misalignment>& misalignment, const std::optional<Environment>& environment,
-    const std::optional<Environment>& assumed, const IntegerLike& repeats, bool backward,
-    const std::optional<double>& seconds_per_reading, double verified_share, const ReadingUncertainty& uncertainty,
-    const Priors& setup, const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
-    bool rotations, const std::optional<Smoothness>& smoothness, const std::vector<DerivedOutput>& derived) {
+// Fields of both options, by name: those that SimulationOptions has, and the others.
+std::pair<py::kwargs, py::kwargs> split(const py::kwargs& fields) {
+    std::pair<py::kwargs, py::kwargs> parts;
+    for (const auto& [name, value] : fields)
+        (py::hasattr(py::type::of<SimulationOptions>(), name) ? parts.first : parts.second)[name] = value;
+    return parts;
+}
+
+std::unique_ptr<VirtualCalibrations> make(const Machine& machine, const Plan& plan, const HeadLike& heads,
+                                          const UncertainInputs& inputs,
+                                          const std::optional<HeadLike>& calibration_heads, const std::string& method,
+                                          const IntegerLike& seed, const std::vector<DerivedOutput>& derived,
+                                          const std::optional<SimulationOptions>& simulation,
+                                          const std::optional<AdjustmentOptions>& adjustment,
+                                          const py::kwargs& fields) {
+    const auto [of_simulation, of_adjustment] = split(fields);
     const Heads actual = to_heads(heads, plan);
-    SimulationOptions simulation;
-    simulation.misalignment = misalignment;
-    simulation.environment = environment;
-    simulation.assumed = assumed;
-    simulation.repeats = to_int(repeats, "repeats");
-    simulation.backward = backward;
-    simulation.seconds_per_reading = seconds_per_reading;
-    simulation.verified_share = verified_share;
-    const VirtualRun run{
-        machine,    plan,
-        actual,     calibration_heads ? to_heads(*calibration_heads, plan).calibration() : actual.calibration(),
-        simulation, inputs};
-    const BatchOptions evaluation = to_batch_options(method, uncertainty, setup, setup_by_line, one_setup_per_line,
-                                                     reversal, rotations, smoothness);
+    SimulationOptions simulated = options_of(simulation, of_simulation);
+    simulated.noise = {};  // it is drawn with the inputs
+    const VirtualRun run{machine,
+                         plan,
+                         actual,
+                         calibration_heads ? to_heads(*calibration_heads, plan).calibration() : actual.calibration(),
+                         std::move(simulated),
+                         inputs};
+    const BatchOptions evaluation = to_batch_options(method, options_of(adjustment, of_adjustment));
     const std::uint64_t number = to_seed(seed);
     py::gil_scoped_release release;
     return std::make_unique<VirtualCalibrations>(run, evaluation, number, derived);
@@ -323,20 +326,15 @@ static void bind_virtual_calibration(py::module_& m) {
         "the unperturbed calibration. Outputs are the values of the calibration's tables, then those derived.")
         .def(py::init(&make), py::arg("machine"), py::arg("plan"), py::arg("heads"), py::arg("inputs"), py::kw_only(),
              py::arg("calibration_heads") = std::nullopt, py::arg("method") = "enhanced", py::arg("seed") = integer(0),
-             py::arg("misalignment") = std::map<std::string, Misalignment>{}, py::arg("environment") = std::nullopt,
-             py::arg("assumed_environment") = std::nullopt, py::arg("repeats") = integer(1),
-             py::arg("backward") = false, py::arg("seconds_per_reading") = std::nullopt,
-             py::arg("verified_share") = SimulationOptions{}.verified_share,
-             py::arg("uncertainty") = ReadingUncertainty{}, py::arg("setup") = Priors{},
-             py::arg("setup_by_line") = std::map<std::string, Priors>{}, py::arg("one_setup_per_line") = false,
-             py::arg("reversal") = true, py::arg("rotations") = true, py::arg("smoothness") = std::nullopt,
-             py::arg("derived") = std::vector<DerivedOutput>{},
-             "machine to seconds_per_reading as of simulate(); calibration_heads: what the evaluation knows the heads "
-             "as (none: the heads). method: \"conventional\", \"enhanced\", \"adjustment\" or \"one_step\", whose "
-             "options are uncertainty to smoothness, as of evaluate() and adjust(). verified_share: of the samples, in "
-             "each of which one reading of every line is traced again. derived: as derived_at_point gives them, or "
-             "(name, unit, coefficients of the "
-             "values of the tables). Raises InvalidArgument.")
+             py::arg("derived") = std::vector<DerivedOutput>{}, py::arg("simulation") = std::nullopt,
+             py::arg("adjustment") = std::nullopt,
+             "simulation: SimulationOptions as of simulate(); of their noise nothing is used, it is among the inputs. "
+             "calibration_heads: what the evaluation knows the heads as (none: the heads). method: \"conventional\", "
+             "\"enhanced\", \"adjustment\" or \"one_step\". adjustment: AdjustmentOptions as of adjust(); linear "
+             "methods "
+             "take the uncertainty alone. The fields of both may be given by name instead. verified_share: of the "
+             "samples, in each of which one reading of every line is traced again. derived: as derived_at_point gives "
+             "them, or (name, unit, coefficients of the values of the tables). Raises InvalidArgument.")
         .def_property_readonly("nominal", &VirtualCalibrations::nominal,
                                "The run with every input at its expectation, without noise.")
         .def_property_readonly(

@@ -13,7 +13,7 @@ from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.ids3010 import AXES, IDLE, RUNNING
 from stepdiag.acquisition.reading_plan import channels_of, described_plan, digest_of
-from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.description import Scenario, simulation_options
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.order_of_run import visits_of
 
@@ -241,10 +241,6 @@ class TwinInstrument:
                 scenario.plan,
                 self._heads,
                 line,
-                misalignment=dict(scenario.misalignment),
-                noise=scenario.noise,
-                environment=scenario.environment,
-                assumed_environment=scenario.assumed_environment,
-                verified_share=scenario.keys.head.verified_share,
+                simulation_options(scenario),
             )
         return self._readouts[self._set_up]

@@ -88,14 +88,7 @@ def simulate_scenario(scenario: Scenario) -> _core.Measurement:
             machine,
             scenario.plan,
             of_run(heads),
-            misalignment=dict(scenario.misalignment),
-            noise=scenario.noise,
-            environment=scenario.environment,
-            assumed_environment=scenario.assumed_environment,
-            verified_share=scenario.keys.head.verified_share,
-            repeats=runs_of(scenario.keys.plan),
-            backward=scenario.keys.plan.backward,
-            seconds_per_reading=scenario.keys.plan.seconds_per_reading,
+            simulation_options(scenario),
         )
     return only(run, scenario.signals)
 
@@ -128,13 +121,35 @@ def adjust_scenario(
 ) -> _core.Adjustment:
     """The exact adjustment of a run, with the unknowns that the scenario's [adjustment] and [smoothness] name: the
     calibration, and with it the set-up that was found, residuals, outliers and how well it all fits."""
-    keys = scenario.keys.adjustment
     return _core.adjust(
         only(measurement, scenario.signals),
         scenario.plan,
         of_run(scenario.heads),
         scenario.chain,
         scenario.tool,
+        adjustment_options(scenario, full_covariance=full_covariance),
+    )
+
+
+def simulation_options(scenario: Scenario) -> _core.SimulationOptions:
+    """How the scenario's run is simulated."""
+    plan = scenario.keys.plan
+    return _core.SimulationOptions(
+        misalignment=dict(scenario.misalignment),
+        noise=scenario.noise,
+        environment=scenario.environment,
+        assumed_environment=scenario.assumed_environment,
+        verified_share=scenario.keys.head.verified_share,
+        repeats=runs_of(plan),
+        backward=plan.backward,
+        seconds_per_reading=plan.seconds_per_reading,
+    )
+
+
+def adjustment_options(scenario: Scenario, *, full_covariance: bool = False) -> _core.AdjustmentOptions:
+    """What an adjustment of the scenario's runs takes for known and unknown."""
+    keys = scenario.keys.adjustment
+    return _core.AdjustmentOptions(
         uncertainty=scenario.uncertainty,
         setup=scenario.setup,
         setup_by_line=dict(scenario.setup_by_line),

@@ -1,12 +1,13 @@
 """Virtual calibrations of a scenario: its machine, its head with set-ups, and what `[uncertainty]` says of them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Final, Literal
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.config.toml_text import located
-from stepdiag.scenario.description import Scenario, runs_of
+from stepdiag.scenario.description import Scenario, adjustment_options, simulation_options
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.uncertain_inputs import STATE_OF_AIR
 
@@ -21,10 +22,10 @@ def virtual_calibrations(
 
     `derived`: quantities to be had of every calibration beside its parameters. Raises InvalidArgument where the
     scenario cannot be simulated, or not be evaluated by this method."""
-    keys = scenario.keys
-    if not keys.head.tilts:
+    if not scenario.keys.head.tilts:
         raise InvalidArgument(f"{scenario.path}: head.tilts: virtual calibrations have all readings of their head")
     environment, assumed = _air(scenario)
+    in_air = replace(scenario, environment=environment, assumed_environment=assumed)
     machine, heads = scenario.machine(), scenario.actual_heads()
     with located(str(scenario.path)):
         return _core.VirtualCalibrations(
@@ -35,21 +36,9 @@ def virtual_calibrations(
             calibration_heads=of_run(scenario.heads),
             method=method,
             seed=seed,
-            misalignment=dict(scenario.misalignment),
-            environment=environment,
-            assumed_environment=assumed,
-            repeats=runs_of(keys.plan),
-            backward=keys.plan.backward,
-            seconds_per_reading=keys.plan.seconds_per_reading,
-            verified_share=keys.head.verified_share,
-            uncertainty=scenario.uncertainty,
-            setup=scenario.setup,
-            setup_by_line=dict(scenario.setup_by_line),
-            one_setup_per_line=keys.adjustment.one_setup_per_line,
-            reversal=keys.adjustment.reversal,
-            rotations=keys.adjustment.angles == "free",
-            smoothness=scenario.smoothness,
             derived=list(derived),
+            simulation=simulation_options(in_air),
+            adjustment=adjustment_options(scenario),
         )
 
 

@@ -1,0 +1,19 @@
+// Option structs in Python: a verb takes one whole as `options`, or its fields by name, which make one. So the fields
+// are listed where the struct is bound, and nowhere else.
+#pragma once
+
+#include <optional>
+
+#include "bindings.hpp"
+
+namespace stepdiag::bindings {
+
+// Throws InvalidArgument where both are given; a field that there is not is a TypeError, as of any Python function.
+template <class Options>
+Options options_of(const std::optional<Options>& given, const py::kwargs& fields) {
+    if (!given) return py::type::of<Options>()(**fields).template cast<Options>();
+    if (!fields.empty()) throw InvalidArgument("options: expected options or their fields by name, got both");
+    return *given;
+}
+
+}  // namespace stepdiag::bindings
