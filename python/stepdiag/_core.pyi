@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumetricAccuracy', 'adjust', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'volumetric_accuracy', 'with_covariance']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumetricAccuracy', 'adjust', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'volumetric_accuracy', 'with_covariance']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -694,11 +694,43 @@ class Noise:
     @property
     def tilt(self) -> float:
         ...
+class SimulationOptions:
+    """
+    What simulate() takes beside machine, plan and head. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace (none: of 20 degrees Celsius for a head with a design, an index of 1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's replayed poses, traced again and compared. repeats: how often each line is measured, runs 0, 1, 2, ...; backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; seconds_per_reading: makes the channel time.
+    """
+    def __init__(self, *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment | None = None, assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001, repeats: typing.SupportsIndex = 1, backward: bool = False, seconds_per_reading: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        """
+        Raises InvalidArgument for repeats that are no small number; simulate() checks the rest.
+        """
+    @property
+    def assumed_environment(self) -> Environment | None:
+        ...
+    @property
+    def backward(self) -> bool:
+        ...
+    @property
+    def environment(self) -> Environment | None:
+        ...
+    @property
+    def misalignment(self) -> dict[str, Misalignment]:
+        ...
+    @property
+    def noise(self) -> Noise:
+        ...
+    @property
+    def repeats(self) -> int:
+        ...
+    @property
+    def seconds_per_reading(self) -> float | None:
+        ...
+    @property
+    def verified_share(self) -> float:
+        ...
 class VirtualReadout:
     """
     The virtual head set up on one line, read with the axes at any position: the row that simulate makes there.
     """
-    def __init__(self, machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[str, Head], line: str, *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment | None = None, assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> None:
+    def __init__(self, machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[str, Head], line: str, options: SimulationOptions | None = None, **kwargs: typing.Any) -> None:
         """
         Arguments as those of simulate. Raises InvalidArgument as it does, and for a line that is not in the plan.
         """
@@ -863,6 +895,44 @@ class Smoothness:
         ...
     @property
     def translation(self) -> float:
+        ...
+class AdjustmentOptions:
+    """
+    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of any false alarm in a run; 0: no reading is left out. plausible: what a machine can be.
+    """
+    def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.01, full_covariance: bool = False, plausible: PlausibleLimits = ...) -> None:
+        """
+        adjust() checks them.
+        """
+    @property
+    def full_covariance(self) -> bool:
+        ...
+    @property
+    def one_setup_per_line(self) -> bool:
+        ...
+    @property
+    def outlier_probability(self) -> float:
+        ...
+    @property
+    def plausible(self) -> PlausibleLimits:
+        ...
+    @property
+    def reversal(self) -> bool:
+        ...
+    @property
+    def rotations(self) -> bool:
+        ...
+    @property
+    def setup(self) -> SetupPriors:
+        ...
+    @property
+    def setup_by_line(self) -> dict[str, SetupPriors]:
+        ...
+    @property
+    def smoothness(self) -> Smoothness | None:
+        ...
+    @property
+    def uncertainty(self) -> ReadingUncertainty:
         ...
 class SetupEstimate:
     """
@@ -1059,9 +1129,9 @@ class BatchEvaluator:
     """
     One evaluation of many sets of readings of the same plan, heads and pattern of readings; what is known of the pattern serves all of them.
     """
-    def __init__(self, pattern: Measurement, plan: Plan, heads: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'enhanced', uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None) -> None:
+    def __init__(self, pattern: Measurement, plan: Plan, heads: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'enhanced', options: AdjustmentOptions | None = None, **kwargs: typing.Any) -> None:
         """
-        pattern: a run whose readings are there; lost ones are not used in any set. method: "conventional", "enhanced", "adjustment" (each set converged to 1e-4 of its values' standard uncertainties, without a search for outliers) or "one_step" (the pattern's values plus gain times what differs: off by terms of second order). setup to smoothness as of adjust(). Raises InvalidArgument.
+        pattern: a run whose readings are there; lost ones are not used in any set. method: "conventional", "enhanced", "adjustment" (each set converged to 1e-4 of its values' standard uncertainties, without a search for outliers) or "one_step" (the pattern's values plus gain times what differs: off by terms of second order). The options are AdjustmentOptions, or its fields by name; linear methods take the uncertainty alone. Raises InvalidArgument.
         """
     def evaluate(self, readings: numpy.typing.ArrayLike, threads: typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -1659,9 +1729,9 @@ class VirtualCalibrations(SampleModel):
     """
     Whole virtual calibrations: a run with drawn inputs and reading noise, traced by replay and evaluated with the unperturbed calibration. Outputs are the values of the calibration's tables, then those derived.
     """
-    def __init__(self, machine: Machine, plan: Plan, heads: Head | collections.abc.Mapping[str, Head], inputs: UncertainInputs, *, calibration_heads: Head | collections.abc.Mapping[str, Head] | None = None, method: str = 'enhanced', seed: typing.SupportsIndex = 0, misalignment: collections.abc.Mapping[str, Misalignment] = {}, environment: Environment | None = None, assumed_environment: Environment | None = None, repeats: typing.SupportsIndex = 1, backward: bool = False, seconds_per_reading: typing.SupportsFloat | typing.SupportsIndex | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, derived: collections.abc.Sequence[DerivedOutput] = []) -> None:
+    def __init__(self, machine: Machine, plan: Plan, heads: Head | collections.abc.Mapping[str, Head], inputs: UncertainInputs, *, calibration_heads: Head | collections.abc.Mapping[str, Head] | None = None, method: str = 'enhanced', seed: typing.SupportsIndex = 0, derived: collections.abc.Sequence[DerivedOutput] = [], simulation: SimulationOptions | None = None, adjustment: AdjustmentOptions | None = None, **kwargs: typing.Any) -> None:
         """
-        machine to seconds_per_reading as of simulate(); calibration_heads: what the evaluation knows the heads as (none: the heads). method: "conventional", "enhanced", "adjustment" or "one_step", whose options are uncertainty to smoothness, as of evaluate() and adjust(). verified_share: of the samples, in each of which one reading of every line is traced again. derived: as derived_at_point gives them, or (name, unit, coefficients of the values of the tables). Raises InvalidArgument.
+        simulation: SimulationOptions as of simulate(); of their noise nothing is used, it is among the inputs. calibration_heads: what the evaluation knows the heads as (none: the heads). method: "conventional", "enhanced", "adjustment" or "one_step". adjustment: AdjustmentOptions as of adjust(); linear methods take the uncertainty alone. The fields of both may be given by name instead. verified_share: of the samples, in each of which one reading of every line is traced again. derived: as derived_at_point gives them, or (name, unit, coefficients of the values of the tables). Raises InvalidArgument.
         """
     def evaluate_at(self, deviations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -1889,9 +1959,9 @@ class Compensator:
     @property
     def volume(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
-def adjust(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.01, full_covariance: bool = False, plausible: PlausibleLimits = ...) -> Adjustment:
+def adjust(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), options: AdjustmentOptions | None = None, **kwargs: typing.Any) -> Adjustment:
     """
-    The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. setup_by_line replaces the quantities that it names. Raises InvalidArgument.
+    The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. The options are AdjustmentOptions, or its fields by name. Raises InvalidArgument.
     """
 def beam_radius(mode: GaussianMode, reduced_length: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
@@ -2019,9 +2089,9 @@ def run_ranges(model: SampleModel, bins: Bins, ranges: collections.abc.Sequence[
     """
     The same for half-open ranges of leaves, each computed by one thread; those that are whole.
     """
-def simulate(machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[str, Head], *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment | None = None, assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001, repeats: typing.SupportsIndex = 1, backward: bool = False, seconds_per_reading: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Measurement:
+def simulate(machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[str, Head], options: SimulationOptions | None = None, **kwargs: typing.Any) -> Measurement:
     """
-    A run on the virtual machine: lines of the plan, then its scale lines. head: one, or a dict with one for each line. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace (none: of 20 degrees Celsius for a head with a design, an index of 1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's replayed poses, traced again and compared. repeats: how often each line is measured, runs 0, 1, 2, ...; backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; seconds_per_reading: makes the channel time. Points of a visit are approached in the direction of its own travel. Readings whose beam misses the mirror or does not come back are lost (NaN). Raises InvalidArgument; RuntimeError where a replay and its trace differ.
+    A run on the virtual machine: lines of the plan, then its scale lines. head: one, or a dict with one for each line. The options are SimulationOptions, or its fields by name. Points of a visit are approached in the direction of its own travel. Readings whose beam misses the mirror or does not come back are lost (NaN). Raises InvalidArgument; RuntimeError where a replay and its trace differ.
     """
 def straightness_reference(chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0)) -> str:
     """

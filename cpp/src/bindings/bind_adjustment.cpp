@@ -269,7 +269,7 @@ void bind_result(py::module_& m) {
 
 AdjustmentOfRun adjust_run(const Measurement& measurement, const Plan& plan, const HeadLike& head,
                            const ChainLike& chain, const ArrayLike& tool, const std::optional<AdjustmentOptions>& given,
-                           const py::kwargs& fields) {
+                           const Fields& fields) {
     const AdjustmentOptions options = options_of(given, fields);
     const Eigen::Vector3d offset = to_vector3(tool, "tool");
     const Chain kinematics = to_chain(chain);

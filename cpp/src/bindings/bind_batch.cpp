@@ -29,7 +29,7 @@ std::vector<std::string> signal_names(const Measurement& measurement) {
 
 std::unique_ptr<EvaluatorOfPattern> make(const Measurement& pattern, const Plan& plan, const HeadLike& heads,
                                          const ChainLike& chain, const ArrayLike& tool, const std::string& method,
-                                         const std::optional<AdjustmentOptions>& given, const py::kwargs& fields) {
+                                         const std::optional<AdjustmentOptions>& given, const Fields& fields) {
     const BatchOptions options = to_batch_options(method, options_of(given, fields));
     const HeadCalibrations calibrations = to_heads(heads, plan).calibration();
     const Chain kinematics = to_chain(chain);

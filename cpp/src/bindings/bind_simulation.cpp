@@ -100,7 +100,7 @@ void bind_simulation(py::module_& m) {
     m.def(
         "simulate",
         [](const Machine& machine, const Plan& plan, const HeadLike& head,
-           const std::optional<SimulationOptions>& given, const py::kwargs& fields) {
+           const std::optional<SimulationOptions>& given, const Fields& fields) {
             const Heads heads = to_heads(head, plan);
             const SimulationOptions options = options_of(given, fields);
             py::gil_scoped_release release;
@@ -116,7 +116,7 @@ void bind_simulation(py::module_& m) {
         m, "VirtualReadout",
         "The virtual head set up on one line, read with the axes at any position: the row that simulate makes there.")
         .def(py::init([](const Machine& machine, const Plan& plan, const HeadLike& head, const std::string& line,
-                         const std::optional<SimulationOptions>& given, const py::kwargs& fields) {
+                         const std::optional<SimulationOptions>& given, const Fields& fields) {
                  return VirtualReadout(machine, plan, to_heads(head, plan), Line::parse(line),
                                        options_of(given, fields));
              }),

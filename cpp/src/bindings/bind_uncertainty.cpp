@@ -287,8 +287,8 @@ std::uint64_t to_sample(const IntegerLike& number) {
 }
 
 // Fields of both options, by name: those that SimulationOptions has, and the others.
-std::pair<py::kwargs, py::kwargs> split(const py::kwargs& fields) {
-    std::pair<py::kwargs, py::kwargs> parts;
+std::pair<Fields, Fields> split(const Fields& fields) {
+    std::pair<Fields, Fields> parts;
     for (const auto& [name, value] : fields)
         (py::hasattr(py::type::of<SimulationOptions>(), name) ? parts.first : parts.second)[name] = value;
     return parts;
@@ -300,7 +300,7 @@ std::unique_ptr<VirtualCalibrations> make(const Machine& machine, const Plan& pl
                                           const IntegerLike& seed, const std::vector<DerivedOutput>& derived,
                                           const std::optional<SimulationOptions>& simulation,
                                           const std::optional<AdjustmentOptions>& adjustment,
-                                          const py::kwargs& fields) {
+                                          const Fields& fields) {
     const auto [of_simulation, of_adjustment] = split(fields);
     const Heads actual = to_heads(heads, plan);
     SimulationOptions simulated = options_of(simulation, of_simulation);

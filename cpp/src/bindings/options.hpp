@@ -8,9 +8,11 @@
 
 namespace stepdiag::bindings {
 
+using Fields = py::KWArgs<py::object>;
+
 // Throws InvalidArgument where both are given; a field that there is not is a TypeError, as of any Python function.
 template <class Options>
-Options options_of(const std::optional<Options>& given, const py::kwargs& fields) {
+Options options_of(const std::optional<Options>& given, const Fields& fields) {
     if (!given) return py::type::of<Options>()(**fields).template cast<Options>();
     if (!fields.empty()) throw InvalidArgument("options: expected options or their fields by name, got both");
     return *given;

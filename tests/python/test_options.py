@@ -1,0 +1,94 @@
+"""Verbs take their options as one value, or its fields by name."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from refusal import refused
+
+import stepdiag as sd
+
+PLAN = sd.Plan((80, 60, 50), ["ppp", "npp", "pnp", "nnp"], 4, scale_lines=["p00", "0p0", "00p"])
+HEAD, CHAIN = sd.Head(), "[w X' b Y Z t]"
+MACHINE = sd.Machine(CHAIN, sd.random_error_map((80, 60, 50), seed=2))
+SIMULATION: dict[str, Any] = {
+    "misalignment": {"ppp": sd.Misalignment(reflector=(1e-4, 2e-4))},
+    "noise": sd.Noise(distance=1e-4, tilt=1e-6, seed=4),
+    "repeats": 2,
+    "backward": True,
+    "seconds_per_reading": 2.0,
+}
+ADJUSTMENT: dict[str, Any] = {
+    "uncertainty": sd.ReadingUncertainty(distance=2e-4),
+    "setup": sd.SetupPriors(laser=1e-3),
+    "setup_by_line": {"ppp": sd.SetupPriors(reflector="fixed")},
+    "rotations": False,
+    "outlier_probability": 0.0,
+    "full_covariance": True,
+}
+
+
+def run(*options: sd.SimulationOptions, **fields: Any) -> sd.Measurement:
+    return sd.simulate(MACHINE, PLAN, HEAD, *options, **fields)
+
+
+def same_readings(one: sd.Measurement, other: sd.Measurement) -> bool:
+    return all(one.channels[name].tobytes() == other.channels[name].tobytes() for name in one.channels)
+
+
+def test_options_and_their_fields_do_the_same() -> None:
+    measured = run(**SIMULATION)
+    assert same_readings(measured, run(sd.SimulationOptions(**SIMULATION)))
+    by_fields, whole = (
+        sd.adjust(measured, PLAN, HEAD, CHAIN, (0, 0, 0), *options, **fields).calibration
+        for options, fields in (((), ADJUSTMENT), ((sd.AdjustmentOptions(**ADJUSTMENT),), {}))
+    )
+    assert np.array_equal(by_fields.covariance, whole.covariance)
+    assert by_fields.squareness == whole.squareness
+
+
+def test_virtual_calibrations_take_both_options_or_the_fields_of_both() -> None:
+    inputs = sd.UncertainInputs([], [])
+    fields = {"misalignment": SIMULATION["misalignment"], "repeats": 2, "uncertainty": ADJUSTMENT["uncertainty"]}
+    one = sd.VirtualCalibrations(MACHINE, PLAN, HEAD, inputs, **fields)
+    other = sd.VirtualCalibrations(
+        MACHINE,
+        PLAN,
+        HEAD,
+        inputs,
+        # Noise is among the inputs, and not taken from here.
+        simulation=sd.SimulationOptions(misalignment=SIMULATION["misalignment"], repeats=2, noise=SIMULATION["noise"]),
+        adjustment=sd.AdjustmentOptions(uncertainty=ADJUSTMENT["uncertainty"]),
+    )
+    assert same_readings(one.nominal, other.nominal)
+    assert one.calibration.squareness == other.calibration.squareness
+
+
+@pytest.mark.parametrize(
+    ("call", "options", "field"),
+    [
+        (lambda *o, **f: sd.simulate(MACHINE, PLAN, HEAD, *o, **f), sd.SimulationOptions(), {"repeats": 2}),
+        (
+            lambda *o, **f: sd.adjust(run(), PLAN, HEAD, CHAIN, (0, 0, 0), *o, **f),
+            sd.AdjustmentOptions(),
+            {"rotations": False},
+        ),
+    ],
+)
+def test_options_and_fields_together_are_refused(call: Callable[..., Any], options: Any, field: dict[str, Any]) -> None:
+    refused(call, options, names="options: expected options or their fields by name, got both", **field)
+    with pytest.raises(TypeError):
+        call(no_such_field=1)
+
+
+def test_fields_are_those_that_were_given_and_defaults_those_of_the_verbs() -> None:
+    options = sd.AdjustmentOptions(**ADJUSTMENT)
+    for name in ("rotations", "outlier_probability", "full_covariance"):
+        assert getattr(options, name) == ADJUSTMENT[name]
+    assert options.uncertainty.distance == 2e-4
+    assert set(options.setup_by_line) == {"ppp"}
+    simulation = sd.SimulationOptions(**SIMULATION)
+    for name in ("repeats", "backward", "seconds_per_reading"):
+        assert getattr(simulation, name) == SIMULATION[name]
+    assert same_readings(run(), run(sd.SimulationOptions()))
