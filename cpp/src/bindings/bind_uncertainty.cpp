@@ -299,8 +299,7 @@ std::unique_ptr<VirtualCalibrations> make(const Machine& machine, const Plan& pl
                                           const std::optional<HeadLike>& calibration_heads, const std::string& method,
                                           const IntegerLike& seed, const std::vector<DerivedOutput>& derived,
                                           const std::optional<SimulationOptions>& simulation,
-                                          const std::optional<AdjustmentOptions>& adjustment,
-                                          const Fields& fields) {
+                                          const std::optional<AdjustmentOptions>& adjustment, const Fields& fields) {
     const auto [of_simulation, of_adjustment] = split(fields);
     const Heads actual = to_heads(heads, plan);
     SimulationOptions simulated = options_of(simulation, of_simulation);
