@@ -149,8 +149,15 @@ def test_bad_options_of_the_twin_are_refused(
 
 def test_interrupted_commands_end_and_keep_what_they_have(folder: Path) -> None:
     command = [sys.executable, "-m", "stepdiag.cli"]
+
+    def hear() -> None:  # also where the tests run in the background of a shell, which ignores Ctrl-C
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
     twin = subprocess.Popen(
-        [*command, "twin", "scenario.toml", "--port", "0", "--play", "0.02"], stdout=subprocess.PIPE, text=True
+        [*command, "twin", "scenario.toml", "--port", "0", "--play", "0.02"],
+        stdout=subprocess.PIPE,
+        text=True,
+        preexec_fn=hear,
     )
     assert twin.stdout is not None
     address = twin.stdout.readline().split()[2]
@@ -159,6 +166,7 @@ def test_interrupted_commands_end_and_keep_what_they_have(folder: Path) -> None:
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
+        preexec_fn=hear,
     )
     try:
         assert acquire.stdin is not None

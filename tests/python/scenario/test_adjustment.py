@@ -1,7 +1,6 @@
 """[adjustment] and [smoothness]: what they mean in native units, their defaults, and what is refused."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag.scenario.adjustment import QUANTITIES, SCALE_LINE_ANGLE, native
-from stepdiag.scenario.description import Scenario, parse_scenario
+from stepdiag.scenario.description import Scenario, adjustment_options, parse_scenario
 
 PSD = SCENARIO.replace('"ideal"', '"psd"\npsd_distance_mm = 50.0')
 BEAMS = SCENARIO.replace('"ideal"', '"multi_beam"\nbeam_offsets_mm = [[0, 0], [20, 0], [0, 20]]')
@@ -84,24 +83,15 @@ def test_table_for_a_line_replaces_only_the_keys_it_names() -> None:
 
 
 # --- what an adjustment is told beside them --------------------------------------------------------------------------
-def options(text: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """What adjust_scenario hands to the core."""
-    given: dict[str, Any] = {}
-    monkeypatch.setattr("stepdiag._core.adjust", lambda *_, **named: given.update(named))
-    scenario = parse_scenario(text)
-    sd.adjust_scenario(scenario, sd.simulate_scenario(scenario))
-    return given
-
-
-def test_switches_reach_the_core(monkeypatch: pytest.MonkeyPatch) -> None:
-    usual = options(SCENARIO, monkeypatch)
+def test_switches_reach_the_core() -> None:
     names = ("one_setup_per_line", "reversal", "rotations", "outlier_probability", "smoothness", "full_covariance")
-    assert [usual[name] for name in names] == [False, True, True, 0.01, None, False]
+    usual = adjustment_options(parse_scenario(SCENARIO))
+    assert [getattr(usual, name) for name in names] == [False, True, True, 0.01, None, False]
     switches = (
         '[adjustment]\nangles = "fixed"\none_setup_per_line = true\nreversal = false\noutlier_probability = 0.0\n'
     )
-    other = options(SCENARIO + switches, monkeypatch)
-    assert [other[name] for name in names] == [True, False, False, 0.0, None, False]
+    other = adjustment_options(parse_scenario(SCENARIO + switches))
+    assert [getattr(other, name) for name in names] == [True, False, False, 0.0, None, False]
 
 
 def test_smoothness_becomes_native_units() -> None:
