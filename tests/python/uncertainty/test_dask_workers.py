@@ -57,6 +57,7 @@ def test_worker_killed_on_the_way_changes_nothing(three: Workers) -> None:
 
     assert whole(parts()) == expected
     assert victim not in three._client.run(os.getpid).values(), "the worker was not killed"
+    three._client.wait_for_workers(3, timeout=120)  # it is started again, and later tests count on all three
 
 
 def test_adaptive_run_takes_the_blocks_that_it_takes_here(three: Workers) -> None:
