@@ -26,6 +26,7 @@ from stepdiag.uncertainty.monte_carlo import Executor, LeafRange
 
 TASKS_A_THREAD: Final = 2  # under way: one that is computed, one that waits
 CONNECT_SECONDS: Final = 10.0
+START_SECONDS: Final = 120.0
 LOOPBACK: Final = "127.0.0.1"
 PRELOAD: Final = ["stepdiag.uncertainty.dask_preload"]
 CREDENTIALS: Final = "ca-file, client.cert and client.key in Dask's configuration, distributed.comm.tls"
@@ -183,6 +184,7 @@ def workers_of(
         _local_cluster(distributed, count) as cluster,
         distributed.Client(cluster, set_as_default=False) as client,
     ):
+        client.wait_for_workers(count or 1, timeout=START_SECONDS)  # on a busy computer some are there before others
         yield Workers(client, warn)
 
 
