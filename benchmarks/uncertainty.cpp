@@ -64,7 +64,7 @@ VirtualRun run_of(Layout layout) {
                    {}};
     for (const Line& line : run.plan.lines())
         for (int k = 0; k < 2; ++k)
-            for (const InputQuantity quantity : {InputQuantity::reflector, InputQuantity::laser})
+            for (const SetupQuantity quantity : {SetupQuantity::reflector, SetupQuantity::laser})
                 run.inputs.inputs.push_back({quantity, {DistributionKind::normal, 0.0, 100e-6}, line.name(), {}, k});
     for (const std::string& channel : signal_names(heads.head)) {
         const double sigma = channel == "distance" ? 0.1e-3 : channel.front() == 's' ? 1e-3 : 1e-6;
@@ -98,9 +98,9 @@ void check(Layout layout) {
         for (std::size_t i = 0; i < run.inputs.inputs.size(); ++i) {
             const UncertainInput& input = run.inputs.inputs[i];
             Misalignment& misalignment = own.simulation.misalignment[input.line];
-            (input.quantity == InputQuantity::reflector ? misalignment.reflector
-                                                        : misalignment.laser)[input.component] +=
-                deviations[Eigen::Index(i)];
+            (std::get<SetupQuantity>(input.quantity) == SetupQuantity::reflector
+                 ? misalignment.reflector
+                 : misalignment.laser)[input.component] += deviations[Eigen::Index(i)];
         }
         const Measurement clean = simulate(own.machine, own.plan, own.heads, own.simulation);
         std::vector<Channel> channels = clean.channels();

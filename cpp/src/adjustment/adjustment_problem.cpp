@@ -12,15 +12,15 @@
 namespace stepdiag {
 namespace {
 
-ChannelKind kind_of(const Measurement& measurement) {
-    if (measurement.beam_count() > 0) return ChannelKind::multi_beam;
-    return measurement.find("spot_x") ? ChannelKind::psd : ChannelKind::ideal;
+HeadLayout kind_of(const Measurement& measurement) {
+    if (measurement.beam_count() > 0) return HeadLayout::multi_beam;
+    return measurement.find("spot_x") ? HeadLayout::psd : HeadLayout::ideal;
 }
 
-std::string channel_name(ChannelKind kind, int channel) {
-    if (kind == ChannelKind::multi_beam) return "d" + std::to_string(channel + 1);
+std::string channel_name(HeadLayout kind, int channel) {
+    if (kind == HeadLayout::multi_beam) return "d" + std::to_string(channel + 1);
     constexpr const char* names[2][3] = {{"distance", "alpha", "beta"}, {"distance", "spot_x", "spot_y"}};
-    return names[kind == ChannelKind::psd][channel];
+    return names[kind == HeadLayout::psd][channel];
 }
 
 double usual_uncertainty(const ReadingUncertainty& uncertainty, const std::string& channel) {
@@ -87,10 +87,9 @@ void AdjustmentProblem::collect_setups(const Measurement& measurement, const Adj
             const bool scale = plan_.is_scale_line(line);
             const Eigen::Vector3d origin = planned.front().commanded + tool_ - head.standoff * frame.col(2);
             LineSetup setup{entry.first.first, line, scale, ChannelModel(kind_, head, frame, origin), {}, {}, {}};
-            const int columns = setup.model.setup_size();
             setup.prior = setup_priors(options, line.name(), scale, line.moved_axes() == 1,
-                                       kind_ == ChannelKind::multi_beam || has_tilts(measurement), kind_, columns);
-            setup.unknown.assign(columns, no_unknown);
+                                       kind_ == HeadLayout::multi_beam || has_tilts(measurement), setup.model);
+            setup.unknown.assign(setup.prior.size(), no_unknown);
             current[line.name()] = int(setups_.size());
             setups_.push_back(std::move(setup));
         }
@@ -131,7 +130,7 @@ void AdjustmentProblem::collect_points(const Measurement& measurement, const Adj
         const LineSetup& setup = setups_[setup_of_row_[row]];
         // Without a reflector angle of their own the tilts of a scale line would be taken for the machine's.
         const bool distance_only =
-            setup.is_scale_line && kind_ != ChannelKind::multi_beam && setup.prior[setup::reflector] == fixed_unknown;
+            setup.is_scale_line && kind_ != HeadLayout::multi_beam && setup.prior[setup::reflector] == fixed_unknown;
         AdjustedPoint point{setup_of_row_[row], {no_unknown, no_unknown, no_unknown}, {}, int(readings_.size()), 0};
         for (int c = 0; c < int(names.size()) && !(distance_only && c > 0); ++c)
             if (const auto raw =
@@ -273,7 +272,6 @@ void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options) {
 void AdjustmentProblem::weigh_unknowns() {
     constexpr double metre = 1e3;                                 // mm
     constexpr double usual_translation = 0.1, usual_turn = 3e-4;  // of an axis, mm and rad
-    constexpr double usual_angle = 2e-3, usual_psd_zero = 10.0;   // of a set-up, rad and mm
     prior_.assign(size(), free_unknown);
     usual_.assign(size(), usual_translation);
     change_scale_.assign(size(), 1.0 / metre);
@@ -287,20 +285,16 @@ void AdjustmentProblem::weigh_unknowns() {
         for (const int c : setup.active) {
             const int j = setup.unknown[c];
             prior_[j] = setup.prior[c];
-            const bool angle = c < setup::distance_constant;
-            const bool psd_zero = c == setup::psd_zero || c == setup::psd_zero + 1;
-            usual_[j] = angle ? usual_angle : psd_zero ? usual_psd_zero : free_unknown;
-            if (angle || c == setup::roll || c == setup::gain || c == setup::cosine) change_scale_[j] = 1.0;
+            const SetupQuantityRecord& of = record(setup::component(c).quantity);
+            usual_[j] = of.usual;
+            if (of.unit == "rad" || of.unit == "1") change_scale_[j] = 1.0;
         }
 }
 
 int AdjustmentProblem::informative_priors() const {
     int count = 0;
     for (const LineSetup& setup : setups_)
-        for (const int c : setup.active) {
-            const auto of = setup_column_name(c);
-            count += setup.prior[c] < (of ? broadest_prior(of->quantity) : free_unknown);
-        }
+        for (const int c : setup.active) count += setup.prior[c] < record(setup::component(c).quantity).broadest;
     return count;
 }
 

@@ -36,7 +36,7 @@ struct LineSetup {
     Line line;
     bool is_scale_line;
     ChannelModel model;
-    std::vector<PriorUncertainty> prior;  // by setup::Column and beams
+    std::vector<PriorUncertainty> prior;  // by setup::Column
     std::vector<int> unknown;             // likewise
     std::vector<int> active;              // columns that are unknown
     std::optional<double> first_time = {};
@@ -110,7 +110,7 @@ private:
     Chain chain_;
     Eigen::Vector3d tool_;
     std::shared_ptr<const HeadCalibrations> heads_;
-    ChannelKind kind_;
+    HeadLayout kind_;
     bool reversal_ = false, rotations_ = true;
     std::vector<AxisNode> nodes_;
     std::array<std::vector<int>, 6> node_at_;  // by axis and direction: index by node number

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "adjustment/setup_priors.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -121,9 +120,8 @@ std::vector<bool> known_unknowns(const AdjustmentProblem& problem, std::vector<b
                                  const BorderedBand& inverse) {
     for (const LineSetup& setup : problem.setups())
         for (const int column : setup.active) {
-            const auto of = setup_column_name(column);
             const int unknown = setup.unknown[column];
-            if (!of || setup.prior[column] < broadest_prior(of->quantity)) continue;
+            if (setup.prior[column] < record(setup::component(column).quantity).broadest) continue;
             const double u = std::sqrt(element(inverse, unknown, unknown));
             if (u > 0.5 * setup.prior[column]) known[unknown] = false;
         }
@@ -135,9 +133,9 @@ std::vector<SetupEstimate> setup_estimates(const AdjustmentProblem& problem, con
     std::vector<SetupEstimate> estimates;
     for (const LineSetup& setup : problem.setups())
         for (const int column : setup.active) {
-            const auto of = setup_column_name(column);
-            if (!of) continue;  // the cosine error of a scale line
-            SetupEstimate estimate{setup.run, setup.line.name(),  of->quantity, of->component, std::nullopt,
+            const auto [quantity, component] = setup::component(column);
+            if (!is_adjusted(quantity)) continue;  // the cosine error
+            SetupEstimate estimate{setup.run, setup.line.name(),  quantity, component, std::nullopt,
                                    0.0,       setup.prior[column]};
             const int unknown = setup.unknown[column];
             if (known[unknown]) {

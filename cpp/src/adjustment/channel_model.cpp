@@ -40,14 +40,10 @@ struct ChannelModel::Tilt {
     Eigen::Matrix<double, 3, 8> by_setup;  // reflector, laser, lateral, roll: 2, 2, 2, 1; the last column is not used
 };
 
-ChannelModel::ChannelModel(ChannelKind kind, const HeadCalibration& head, const Eigen::Matrix3d& machine_R_line,
+ChannelModel::ChannelModel(HeadLayout kind, const HeadCalibration& head, const Eigen::Matrix3d& machine_R_line,
                            const Eigen::Vector3d& origin)
     : kind_(kind), head_(&head), line_(machine_R_line), origin_(origin) {
     set_up(Eigen::VectorXd::Zero(setup_size()));
-}
-
-int ChannelModel::setup_size(ChannelKind kind, const HeadCalibration& head) {
-    return setup::beam_constants + (kind == ChannelKind::multi_beam ? int(head.beam_offsets.size()) - 1 : 0);
 }
 
 void ChannelModel::set_up(const Eigen::Ref<const Eigen::VectorXd>& values) {
@@ -123,8 +119,8 @@ void ChannelModel::read_channels(const Tilt& tilt, const ReadingPlace& place, Ei
                                  ChannelDerivative* derivative) const {
     const double w = 1.0 - tilt.alpha * tilt.alpha - tilt.beta * tilt.beta;
     const double scale = 1.0 + setup_[setup::gain];
-    const double constant =
-        setup_[setup::distance_constant] + setup_[setup::drift] * place.time - setup_[setup::cosine] * place.travel;
+    const double constant = setup_[setup::distance_constant] + setup_[setup::drift] * place.time +
+                            setup_[setup::scale_factor] * place.travel;
     if (derivative) derivative->setZero();
     // The channel's value, and its gradient by (L, alpha, beta).
     const auto put = [&](int channel, double value, const Eigen::RowVector3d& gradient) {
@@ -147,21 +143,20 @@ void ChannelModel::read_channels(const Tilt& tilt, const ReadingPlace& place, Ei
         auto row = derivative->row(channel);
         row[18 + setup::distance_constant] = 1.0;
         row[18 + setup::drift] = place.time;
-        row[18 + setup::cosine] = -place.travel;
+        row[18 + setup::scale_factor] = place.travel;
         row[18 + setup::gain] = (tilt.alpha * offset.y() - tilt.beta * offset.x()) / w;
     };
 
-    if (kind_ == ChannelKind::multi_beam) {
+    if (kind_ == HeadLayout::multi_beam) {
         for (int i = 0; i < channels(); ++i) {
             put_distance(i, head_->beam_offsets[i]);
-            if (i == 0) continue;
-            reading[i] += setup_[setup::beam_constants + i - 1];
-            if (derivative) (*derivative)(i, 18 + setup::beam_constants + i - 1) = 1.0;
+            reading[i] += setup_[setup::beam_constants + i];
+            if (derivative) (*derivative)(i, 18 + setup::beam_constants + i) = 1.0;
         }
         return;
     }
     put_distance(0, Eigen::Vector2d::Zero());
-    if (kind_ == ChannelKind::ideal) {
+    if (kind_ == HeadLayout::ideal) {
         put(1, scale * tilt.alpha, {0.0, scale, 0.0});
         put(2, scale * tilt.beta, {0.0, 0.0, scale});
         if (derivative) {

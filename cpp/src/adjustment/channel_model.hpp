@@ -11,31 +11,13 @@
 #include "stepdiag/machine/chain.hpp"
 #include "stepdiag/machine/machine.hpp"
 #include "stepdiag/measurement/head_calibration.hpp"
+#include "stepdiag/measurement/setup_quantity.hpp"
 
 namespace stepdiag {
 
 // (delta_a, theta_a) of an axis at a node, squareness terms included: mm, rad.
 using AxisErrors = Eigen::Matrix<double, 6, 1>;
 using MachineErrors = std::array<AxisErrors, 3>;  // by axis
-
-// Where the unknowns of a line's set-up stand in its vector (adjustment.hpp, SetupQuantity). The constants of the beams
-// d2 ... dn against d1 come last.
-namespace setup {
-enum Column : int {
-    reflector = 0,
-    laser = 2,
-    distance_constant = 4,
-    psd_zero = 5,
-    lateral = 7,
-    roll = 9,
-    gain = 10,
-    drift = 11,
-    cosine = 12,  // of scale lines: distances read short by this times the travel
-    beam_constants = 13,
-};
-}  // namespace setup
-
-enum class ChannelKind { ideal, psd, multi_beam };  // channels: distance alpha beta, distance spot_x spot_y, d1 ... dn
 
 // Where and when a reading was made.
 struct ReadingPlace {
@@ -62,13 +44,13 @@ using ChannelDerivative = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 
 class ChannelModel {
 public:
     // `origin`: of the beam on a well aligned line, o = P0 - standoff z, machine frame, mm.
-    ChannelModel(ChannelKind kind, const HeadCalibration& head, const Eigen::Matrix3d& machine_R_line,
+    ChannelModel(HeadLayout kind, const HeadCalibration& head, const Eigen::Matrix3d& machine_R_line,
                  const Eigen::Vector3d& origin);
 
-    int channels() const { return kind_ == ChannelKind::multi_beam ? int(head_->beam_offsets.size()) : 3; }
-    int setup_size() const { return setup_size(kind_, *head_); }
-    static int setup_size(ChannelKind kind, const HeadCalibration& head);
-    ChannelKind kind() const { return kind_; }
+    int channels() const { return kind_ == HeadLayout::multi_beam ? int(head_->beam_offsets.size()) : 3; }
+    int beams() const { return kind_ == HeadLayout::multi_beam ? channels() : 0; }
+    int setup_size() const { return setup::size(beams()); }
+    HeadLayout kind() const { return kind_; }
     const HeadCalibration& head() const { return *head_; }
     const Eigen::Matrix3d& machine_R_line() const { return line_; }
     const Eigen::Vector3d& origin() const { return origin_; }
@@ -85,7 +67,7 @@ private:
     void read_channels(const Tilt& tilt, const ReadingPlace& place, Eigen::Ref<Eigen::VectorXd> reading,
                        ChannelDerivative* derivative) const;
 
-    ChannelKind kind_;
+    HeadLayout kind_;
     const HeadCalibration* head_;
     Eigen::Matrix3d line_;    // machine_R_line
     Eigen::Vector3d origin_;  // nominal

@@ -6,8 +6,6 @@
 #include <map>
 #include <sstream>
 
-#include "adjustment/setup_priors.hpp"
-
 namespace stepdiag {
 namespace {
 
@@ -39,22 +37,21 @@ std::string slope_name(FunctionId id) {
 }
 
 std::string setup_name(int column) {
-    const auto of = setup_column_name(column);
-    if (!of) return "cosine error";
-    const std::string axis = of->component == 0 ? " about local x" : " about local y";
-    const std::string along = of->component == 0 ? " along local x" : " along local y";
-    switch (of->quantity) {
+    const auto [quantity, component] = setup::component(column);
+    const std::string axis = component == 0 ? " about local x" : " about local y";
+    const std::string along = component == 0 ? " along local x" : " along local y";
+    switch (quantity) {
         case SetupQuantity::reflector: return "reflector tilt" + axis;
         case SetupQuantity::laser: return "laser tilt" + axis;
         case SetupQuantity::distance_constant: return "distance constant";
-        case SetupQuantity::beam_constants: return "constant of beam d" + std::to_string(of->component + 1);
+        case SetupQuantity::beam_constants: return "constant of beam d" + std::to_string(component + 1);
         case SetupQuantity::psd_zero: return "zero offset of the position sensing device" + along;
         case SetupQuantity::lateral: return "lateral beam offset" + along;
         case SetupQuantity::roll: return "head roll";
         case SetupQuantity::gain: return "tilt gain";
         case SetupQuantity::drift: return "drift";
+        default: return "cosine error";
     }
-    return "";
 }
 
 std::string place(const LineSetup& setup) {

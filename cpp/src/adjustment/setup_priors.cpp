@@ -6,75 +6,10 @@
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
-namespace {
-
-constexpr PriorUncertainty usual_lateral = 1.0;  // mm
-constexpr PriorUncertainty usual_roll = 20e-3;   // rad
-constexpr PriorUncertainty usual_gain = 0.01;    // 1
-// What "free" means where an unknown acts on tilts only that are 0 on a perfect machine.
-constexpr PriorUncertainty broad_lateral = 1e3;           // mm
-constexpr PriorUncertainty broad_roll = 1.0;              // rad
-constexpr PriorUncertainty broad_gain = 1.0;              // 1
-constexpr PriorUncertainty laser_beside_beams = 2e-3;     // rad, where the constants of the beams are unknown
-constexpr PriorUncertainty usual_laser = 2e-3;            // rad, of a free one that nothing tells
-constexpr PriorUncertainty laser_of_scale_line = 500e-6;  // rad
-
-PriorUncertainty usual_prior(SetupQuantity quantity, bool is_scale_line, bool beams_unknown) {
-    switch (quantity) {
-        case SetupQuantity::reflector: return is_scale_line ? fixed_unknown : free_unknown;
-        case SetupQuantity::laser:
-            return is_scale_line ? laser_of_scale_line : beams_unknown ? laser_beside_beams : free_unknown;
-        case SetupQuantity::distance_constant:
-        case SetupQuantity::beam_constants:
-        case SetupQuantity::psd_zero: return free_unknown;
-        case SetupQuantity::lateral: return usual_lateral;
-        case SetupQuantity::roll: return is_scale_line ? fixed_unknown : usual_roll;
-        case SetupQuantity::gain: return is_scale_line ? fixed_unknown : usual_gain;
-        case SetupQuantity::drift: break;
-    }
-    return fixed_unknown;
-}
-
-}  // namespace
-
-std::string name(SetupQuantity quantity) {
-    constexpr const char* names[setup_quantity_count] = {
-        "reflector", "laser", "distance_constant", "beam_constants", "psd_zero", "lateral", "roll", "gain", "drift"};
-    return names[static_cast<int>(quantity)];
-}
-
-PriorUncertainty broadest_prior(SetupQuantity quantity) {
-    switch (quantity) {
-        case SetupQuantity::lateral: return broad_lateral;
-        case SetupQuantity::roll: return broad_roll;
-        case SetupQuantity::gain: return broad_gain;
-        default: return free_unknown;
-    }
-}
-
-std::optional<SetupColumnName> setup_column_name(int column) {
-    if (column >= setup::beam_constants)
-        return SetupColumnName{SetupQuantity::beam_constants, column - setup::beam_constants + 1};
-    switch (column) {
-        case setup::reflector:
-        case setup::reflector + 1: return SetupColumnName{SetupQuantity::reflector, column - setup::reflector};
-        case setup::laser:
-        case setup::laser + 1: return SetupColumnName{SetupQuantity::laser, column - setup::laser};
-        case setup::distance_constant: return SetupColumnName{SetupQuantity::distance_constant, 0};
-        case setup::psd_zero:
-        case setup::psd_zero + 1: return SetupColumnName{SetupQuantity::psd_zero, column - setup::psd_zero};
-        case setup::lateral:
-        case setup::lateral + 1: return SetupColumnName{SetupQuantity::lateral, column - setup::lateral};
-        case setup::roll: return SetupColumnName{SetupQuantity::roll, 0};
-        case setup::gain: return SetupColumnName{SetupQuantity::gain, 0};
-        case setup::drift: return SetupColumnName{SetupQuantity::drift, 0};
-        default: return std::nullopt;
-    }
-}
 
 std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, const std::string& line,
-                                           bool is_scale_line, bool is_single_axis, bool has_tilts, ChannelKind kind,
-                                           int columns) {
+                                           bool is_scale_line, bool is_single_axis, bool has_tilts,
+                                           const ChannelModel& model) {
     const auto own = options.setup_by_line.find(line);
     const auto given = [&](SetupQuantity quantity) {
         const auto q = static_cast<std::size_t>(quantity);
@@ -91,19 +26,24 @@ std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, con
                                   ": expected free, fixed or a standard uncertainty of 1e-12 to 1e6 mm or rad");
         return prior;
     };
-    const auto beam_prior = given(SetupQuantity::beam_constants);
-    const bool beams_unknown = kind == ChannelKind::multi_beam && beam_prior.value_or(free_unknown) != fixed_unknown;
-    const auto prior = [&](SetupQuantity quantity) {
-        return given(quantity).value_or(usual_prior(quantity, is_scale_line, beams_unknown));
-    };
+    const bool beams_unknown = model.kind() == HeadLayout::multi_beam &&
+                               given(SetupQuantity::beam_constants).value_or(free_unknown) != fixed_unknown;
+    const PriorUncertainty usual_laser = record(SetupQuantity::laser).usual;
 
-    std::vector<PriorUncertainty> priors(columns, fixed_unknown);
-    for (int column = 0; column < columns; ++column)
-        if (const auto of = setup_column_name(column))
-            priors[column] = std::min(prior(of->quantity), broadest_prior(of->quantity));
+    std::vector<PriorUncertainty> priors(model.setup_size(), fixed_unknown);
+    for (int q = 0; q < adjusted_quantity_count; ++q) {
+        const SetupQuantity quantity{q};
+        const SetupQuantityRecord& of = record(quantity);
+        PriorUncertainty usual = is_scale_line ? of.scale_line_prior : of.prior;
+        if (quantity == SetupQuantity::laser && !is_scale_line && beams_unknown) usual = usual_laser;
+        const PriorUncertainty prior = std::min(given(quantity).value_or(usual), of.broadest);
+        const auto [first, count] = setup::columns(quantity, model.beams());
+        if (of.layout.value_or(model.kind()) == model.kind()) std::fill_n(priors.begin() + first, count, prior);
+    }
+    if (model.beams() > 0) priors[setup::beam_constants] = fixed_unknown;  // the others' are against that of d1
     // Without a reflector angle of its own a scale line's spots are not used.
-    const bool has_spots = kind == ChannelKind::psd && !(is_scale_line && priors[setup::reflector] == fixed_unknown);
-    if (!has_spots) priors[setup::psd_zero] = priors[setup::psd_zero + 1] = fixed_unknown;
+    if (is_scale_line && priors[setup::reflector] == fixed_unknown)
+        priors[setup::psd_zero] = priors[setup::psd_zero + 1] = fixed_unknown;
     // E[((a^2 + b^2)/2)^2] = 2 s^4 for two normal angles of standard deviation s.
     const auto cosine_error = [](PriorUncertainty angle) { return std::sqrt(2.0) * angle * angle; };
     if (is_scale_line) {
@@ -112,14 +52,14 @@ std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, con
             throw InvalidArgument("adjustment laser of " + line +
                                   ": a scale line's angle acts at second order only; expected fixed or its standard "
                                   "uncertainty, not free");
-        priors[setup::cosine] = cosine_error(angle);
+        priors[setup::scale_factor] = cosine_error(angle);
         priors[setup::laser] = priors[setup::laser + 1] = fixed_unknown;
     } else if (is_single_axis || !has_tilts) {
         // Tilts tell the laser from a known reflector. Without them mirror and laser stand by themselves, and a laser
         // that turns alone reads long by three times as much as one that the mirror follows reads short.
         const bool tilts_tell = has_tilts && !beams_unknown;
         const PriorUncertainty laser = std::min(priors[setup::laser], usual_laser);
-        priors[setup::cosine] =
+        priors[setup::scale_factor] =
             tilts_tell ? cosine_error(std::min(laser, priors[setup::reflector])) : 3.0 * cosine_error(laser);
     }
     return priors;

@@ -87,7 +87,7 @@ public:
         inverse_w_ = hn::Div(one, w_);
         scale_ = hn::Add(one, value(setup::gain));
         constant_ = hn::MulAdd(value(setup::drift), hn::Set(Tag(), point.time), value(setup::distance_constant));
-        constant_ = hn::NegMulAdd(value(setup::cosine), hn::Set(Tag(), point.travel), constant_);
+        constant_ = hn::MulAdd(value(setup::scale_factor), hn::Set(Tag(), point.travel), constant_);
         tilt_.length_pull = tilt_.alpha_pull = tilt_.beta_pull = hn::Zero(Tag());
     }
 
@@ -97,7 +97,7 @@ public:
         const Vector arm = hn::MulSub(tilt_.alpha, y, hn::Mul(tilt_.beta, x));
         const Vector q = hn::Mul(hn::MulAdd(scale_, arm, tilt_.length), inverse_w_);
         Vector read = hn::Add(q, constant_);
-        if (beam > 0) read = hn::Add(read, value(setup::beam_constants + beam - 1));
+        if (beam > 0) read = hn::Add(read, value(setup::beam_constants + beam));
         const Vector force = chunk_.force(channel, read);
         const Vector by_w = hn::Mul(force, inverse_w_), twice = hn::Add(q, q);
         tilt_.length_pull = hn::Add(tilt_.length_pull, by_w);
@@ -105,9 +105,9 @@ public:
         tilt_.beta_pull = hn::MulAdd(by_w, hn::MulSub(twice, tilt_.beta, hn::Mul(scale_, x)), tilt_.beta_pull);
         pull(setup::distance_constant, force);
         pull(setup::drift, hn::Mul(force, hn::Set(Tag(), point_.time)));
-        pull(setup::cosine, hn::Mul(force, hn::Set(Tag(), -point_.travel)));
+        pull(setup::scale_factor, hn::Mul(force, hn::Set(Tag(), point_.travel)));
         pull(setup::gain, hn::Mul(by_w, arm));
-        if (beam > 0) pull(setup::beam_constants + beam - 1, force);
+        if (beam > 0) pull(setup::beam_constants + beam, force);
     }
 
     HWY_INLINE void pull_tilt(const SimdProblem::Channel& channel, Vector tilt, Vector& tilt_pull) {
@@ -159,13 +159,13 @@ HWY_INLINE void pull_channels(const Chunk& chunk, const SimdProblem::Point& poin
     const SimdProblem::Channel* of = chunk.problem.of_points.data() + point.first_channel;
     const HeadCalibration& head = *chunk.problem.setups[point.setup].head;
     const auto there = [&](int i) { return of[i].reading != SimdProblem::no_reading; };
-    if (chunk.problem.kind == ChannelKind::multi_beam) {
+    if (chunk.problem.kind == HeadLayout::multi_beam) {
         for (int i = 0; i < chunk.problem.channels; ++i)
             if (there(i)) channels.pull_distance(of[i], head.beam_offsets[i], i);
         return;
     }
     if (there(0)) channels.pull_distance(of[0], Eigen::Vector2d::Zero(), 0);
-    if (chunk.problem.kind == ChannelKind::ideal) {
+    if (chunk.problem.kind == HeadLayout::ideal) {
         if (there(1)) channels.pull_tilt(of[1], tilt.alpha, tilt.alpha_pull);
         if (there(2)) channels.pull_tilt(of[2], tilt.beta, tilt.beta_pull);
     } else if (there(1) || there(2)) {

@@ -209,7 +209,7 @@ HWY_EXPORT(scratch_numbers);
 }  // namespace
 
 SimdProblem::SimdProblem(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input)
-    : kind(ChannelKind::ideal), unknowns(problem.size()), channels(0), tool(problem.tool()), setup_size(0) {
+    : kind(HeadLayout::ideal), unknowns(problem.size()), channels(0), tool(problem.tool()), setup_size(0) {
     const auto place = [&](int unknown) { return unknown == no_unknown ? unknowns : unknown; };
     for (const LineSetup& setup : problem.setups()) {
         const ChannelModel& model = setup.model;

@@ -34,14 +34,14 @@ struct SimdProblem {
         std::array<double, 3> position;  // of the axis, as a vector of the machine frame, mm
     };
     struct Setup {
-        std::vector<int> unknown;  // by setup::Column and beams
+        std::vector<int> unknown;  // by setup::Column
         Eigen::Matrix3d machine_R_line;
         Eigen::Vector3d origin;
         const HeadCalibration* head;
     };
     static constexpr int no_reading = -1;
 
-    ChannelKind kind;
+    HeadLayout kind;
     int unknowns;
     int channels;                           // of a point
     std::array<bool, 3> carries_workpiece;  // by place in the chain

@@ -60,8 +60,6 @@ struct AdjustmentOfRun {
 
 using ChannelArrays = py::typing::Dict<py::str, DoubleArray>;
 
-PriorLike none() { return py::reinterpret_borrow<PriorLike>(py::none()); }
-
 }  // namespace
 }  // namespace stepdiag::bindings
 
@@ -80,21 +78,21 @@ void bind_options(py::module_& m) {
                        "How each unknown of a line's set-up is taken: \"free\", \"fixed\" at 0, or the standard "
                        "uncertainty with which it is known to be 0 (rad, mm, 1 for gain, mm/s for drift); None: the "
                        "default.")
-        .def(py::init([](const PriorLike& reflector, const PriorLike& laser, const PriorLike& distance_constant,
-                         const PriorLike& beam_constants, const PriorLike& psd_zero, const PriorLike& lateral,
-                         const PriorLike& roll, const PriorLike& gain, const PriorLike& drift) {
-                 const std::array<const PriorLike*, setup_quantity_count> given = {
-                     &reflector, &laser, &distance_constant, &beam_constants, &psd_zero, &lateral, &roll,
-                     &gain,      &drift};
+        .def(py::init([](const py::KWArgs<PriorLike>& given) {
                  Priors priors;
-                 for (int q = 0; q < setup_quantity_count; ++q)
-                     priors.value[q] = to_prior(*given[q], name(SetupQuantity(q)));
+                 for (const auto& [name, prior] : given) {
+                     const auto quantity = name.cast<std::string>();
+                     const auto found =
+                         std::find_if(setup_quantities.begin(), setup_quantities.begin() + adjusted_quantity_count,
+                                      [&](const SetupQuantityRecord& record) { return record.name == quantity; });
+                     const auto q = std::size_t(found - setup_quantities.begin());
+                     if (q == priors.value.size())
+                         throw py::type_error("SetupPriors: no unknown \"" + quantity + "\"; see setup_quantities()");
+                     priors.value[q] = to_prior(py::reinterpret_borrow<PriorLike>(prior), quantity);
+                 }
                  return priors;
              }),
-             py::kw_only(), py::arg("reflector") = none(), py::arg("laser") = none(),
-             py::arg("distance_constant") = none(), py::arg("beam_constants") = none(), py::arg("psd_zero") = none(),
-             py::arg("lateral") = none(), py::arg("roll") = none(), py::arg("gain") = none(), py::arg("drift") = none(),
-             "Raises InvalidArgument.");
+             "By name, as setup_quantities() lists them. Raises InvalidArgument.");
 
     py::class_<Smoothness>(m, "Smoothness",
                            "Standard deviations with which second differences of neighbouring nodes are known to be 0: "

@@ -15,12 +15,29 @@ namespace stepdiag::bindings {
 // --- uncertain inputs ---
 
 static void bind_uncertain_inputs(py::module_& m) {
+    using Quantity = UncertainQuantity;
+    py::class_<Quantity>(m, "UncertainQuantity", "What may be uncertain about a virtual calibration.")
+        .def_readonly("name", &Quantity::name)
+        .def_readonly("key", &Quantity::key, "In scenarios, with its unit; empty: it has others.")
+        .def_property_readonly(
+            "of",
+            [](const Quantity& q) {
+                constexpr const char* names[] = {"line", "part", "head", "air", "machine", "noise"};
+                return names[int(q.of)];
+            },
+            "\"line\", \"part\" (of the head), \"head\", \"air\", \"machine\" or \"noise\".")
+        .def_property_readonly(
+            "layout", [](const Quantity& q) { return q.layout ? std::optional(name(*q.layout)) : std::nullopt; },
+            "The only layout of heads that has it.")
+        .def("count", &Quantity::count, py::arg("beams"), "Of components, with so many beams.");
+    m.def(
+        "uncertain_quantities", [] { return to_tuple(uncertain_quantities()); },
+        "The set-up quantities, what lines share, and the noises.");
+
     py::class_<UncertainInput>(
         m, "UncertainInput",
         "An input quantity that is drawn once for each virtual calibration, as a deviation added to what is nominal. "
-        "quantity: \"reflector\", \"laser\" (rad, component a, b: 0, 1), \"psd_zero\", \"lateral\" (mm, x, y), "
-        "\"distance_constant\" (mm), \"beam_constant\" (mm, of beam `component`), \"roll\" (rad), \"gain\" (1), "
-        "\"drift\" (mm/s), \"scale_length\" (mm), \"scale_factor\" (1): of a line; \"part_shift\" (mm), "
+        "quantity: one of setup_quantities(), of a line (component 0, 1: a, b or x, y); \"part_shift\" (mm), "
         "\"part_rotation\" (rad): of a part of the head; \"psd_distance\", \"beam_offset\" (mm), \"reading_model\" "
         "(1): of the head; \"temperature\" (degrees Celsius), \"pressure\" (Pa), \"humidity\" (1), "
         "\"refractive_index\", \"wavelength\" (1, relative): of the air; \"machine_drift\" (mm/s, x, y, z).")

@@ -4,6 +4,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
+#include <pybind11/typing.h>
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -69,6 +70,13 @@ DoubleArray to_numpy(const std::vector<double>& values);
 DoubleArray to_numpy(const std::vector<std::optional<double>>& values);  // NaN where there is none
 DoubleArray to_numpy(const Eigen::MatrixXd& matrix);
 DoubleArray to_numpy_vector(const Eigen::VectorXd& vector);
+
+template <class Records>
+py::typing::Tuple<typename Records::value_type, py::ellipsis> to_tuple(const Records& records) {
+    py::tuple tuple(records.size());
+    for (std::size_t i = 0; i < records.size(); ++i) tuple[i] = records[i];
+    return tuple;
+}
 
 inline IntegerLike integer(int number) { return py::reinterpret_steal<IntegerLike>(py::int_(number).release()); }
 inline ArrayLike zeros(int size) {

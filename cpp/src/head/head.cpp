@@ -1,5 +1,6 @@
 #include "stepdiag/head/head.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "head/assembly.hpp"
@@ -64,6 +65,37 @@ Head make_head(HeadDesign design, double standoff, const std::optional<Eigen::Ve
 }
 
 Environment usual_environment(const Head& head) { return head.design ? Environment{Air{}} : Environment{}; }
+
+// `visit` takes each quantity's first column, its numbers and how many there are.
+template <class Misaligned, class Visit>
+static void for_each_quantity(Misaligned& misalignment, Visit&& visit) {
+    visit(setup::reflector, misalignment.reflector.data(), 2);
+    visit(setup::laser, misalignment.laser.data(), 2);
+    visit(setup::distance_constant, &misalignment.distance_constant, 1);
+    visit(setup::psd_zero, misalignment.psd_zero.data(), 2);
+    visit(setup::lateral, misalignment.lateral.data(), 2);
+    visit(setup::roll, &misalignment.roll, 1);
+    visit(setup::gain, &misalignment.gain, 1);
+    visit(setup::drift, &misalignment.drift, 1);
+    visit(setup::beam_constants, misalignment.beam_constants.data(), int(misalignment.beam_constants.size()));
+}
+
+std::vector<double> setup_numbers(const Misalignment& misalignment, int beams) {
+    std::vector<double> numbers(std::size_t(setup::size(beams)), 0.0);
+    for_each_quantity(misalignment, [&](int column, const double* from, int count) {
+        std::copy_n(from, count, numbers.begin() + column);
+    });
+    return numbers;
+}
+
+Misalignment misalignment_of(const std::vector<double>& setup_numbers) {
+    Misalignment misalignment;
+    misalignment.beam_constants.resize(setup_numbers.size() - setup::beam_constants);
+    for_each_quantity(misalignment, [&](int column, double* to, int count) {
+        std::copy_n(setup_numbers.begin() + column, count, to);
+    });
+    return misalignment;
+}
 
 HeadSetup set_up(const Head& head, const Eigen::Matrix3d& machine_R_line, const Eigen::Vector3d& first_point,
                  const Eigen::Vector2d& mirror, const Misalignment& misalignment) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <sstream>
 
 #include "stepdiag/core/error.hpp"
@@ -14,16 +15,14 @@ void check_options(const Plan& plan, const SimulationOptions& options) {
     for (const auto& [line, misalignment] : options.misalignment) {
         if (!plan.contains(Line::parse(line)))
             throw InvalidArgument("misalignment: line \"" + line + "\" is not in the plan");
-        const auto small = [](const Eigen::Vector2d& angles) {
-            return angles.allFinite() && angles.cwiseAbs().maxCoeff() < 0.1;
-        };
-        bool finite = misalignment.psd_zero.allFinite() && misalignment.lateral.allFinite() &&
-                      std::isfinite(misalignment.distance_constant) && std::isfinite(misalignment.drift);
-        for (const double constant : misalignment.beam_constants) finite = finite && std::isfinite(constant);
-        if (!small(misalignment.reflector) || !small(misalignment.laser) || !small({misalignment.roll, 0.0}) || !finite)
-            throw InvalidArgument("misalignment of " + line + ": expected angles below 0.1 rad and finite lengths");
         if (!(std::abs(misalignment.gain) <= 0.5))
             throw InvalidArgument("misalignment of " + line + ": gain: expected a number from -0.5 to 0.5");
+        const std::vector<double> numbers = setup_numbers(misalignment, int(misalignment.beam_constants.size()));
+        for (int column = 0; column < int(numbers.size()); ++column) {
+            const bool angle = record(setup::component(column).quantity).unit == "rad";
+            if (!(std::abs(numbers[column]) < (angle ? 0.1 : std::numeric_limits<double>::infinity())))
+                throw InvalidArgument("misalignment of " + line + ": expected angles below 0.1 rad and finite lengths");
+        }
         if (misalignment.drift != 0.0 && !options.seconds_per_reading)
             throw InvalidArgument("misalignment of " + line + ": drift: expected seconds_per_reading as well");
     }

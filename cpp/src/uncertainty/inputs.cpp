@@ -10,88 +10,62 @@
 namespace stepdiag {
 namespace {
 
-enum class Of { line, part, head, air, machine };
+using Of = UncertainQuantity::Of;
 
-struct InputKind {
-    const char* name;  // of the quantity
-    const char* text;  // what reports call it
-    Of of;
-    const char* components;  // a letter each; "" for one without
-};
-
-// Order of InputQuantity. Beams are counted, not lettered.
-constexpr std::array<InputKind, 22> input_kinds = {{
-    {"reflector", "reflector", Of::line, "ab"},
-    {"laser", "laser", Of::line, "ab"},
-    {"psd_zero", "PSD zero", Of::line, "xy"},
-    {"distance_constant", "distance constant", Of::line, ""},
-    {"beam_constant", "beam constant", Of::line, "d"},
-    {"lateral", "lateral", Of::line, "xy"},
-    {"roll", "roll", Of::line, ""},
-    {"gain", "gain", Of::line, ""},
-    {"drift", "drift", Of::line, ""},
-    {"scale_length", "scale length", Of::line, ""},
-    {"scale_factor", "scale factor", Of::line, ""},
-    {"part_shift", "shift", Of::part, "xyz"},
-    {"part_rotation", "rotation", Of::part, "xyz"},
-    {"psd_distance", "PSD distance", Of::head, ""},
-    {"beam_offset", "beam offset", Of::head, "uv"},
-    {"reading_model", "reading model", Of::head, ""},
-    {"temperature", "temperature", Of::air, ""},
-    {"pressure", "pressure", Of::air, ""},
-    {"humidity", "humidity", Of::air, ""},
-    {"refractive_index", "refractive index", Of::air, ""},
-    {"wavelength", "wavelength", Of::air, ""},
-    {"machine_drift", "machine drift", Of::machine, "xyz"},
+// Order of SharedQuantity.
+constexpr std::array<UncertainQuantity, 11> shared_quantities = {{
+    {"part_shift", "shift_um", "shift", Of::part, "xyz"},
+    {"part_rotation", "rotation_urad", "rotation", Of::part, "xyz"},
+    {"psd_distance", "psd_distance_mm", "PSD distance", Of::head, "", false, HeadLayout::psd},
+    {"beam_offset", "beam_offsets_um", "beam offset", Of::head, "uv", true, HeadLayout::multi_beam},
+    {"reading_model", "reading_model", "reading model", Of::head},
+    {"temperature", "temperature_c", "temperature", Of::air},
+    {"pressure", "pressure_hpa", "pressure", Of::air},
+    {"humidity", "humidity_percent", "humidity", Of::air},
+    {"refractive_index", "refractive_index_ppm", "refractive index", Of::air},
+    {"wavelength", "wavelength_ppm", "wavelength", Of::air},
+    {"machine_drift", "machine_drift_um_per_h", "machine drift", Of::machine, "xyz"},
 }};
-static_assert(input_kinds.size() == std::size_t(InputQuantity::machine_drift) + 1);
-
-struct NoiseKind {
-    const char* name;
-    const char* text;
-    const char* components;
-};
+static_assert(shared_quantities.size() == std::size_t(SharedQuantity::machine_drift) + 1);
 
 // Order of NoiseQuantity.
-constexpr std::array<NoiseKind, 6> noise_kinds = {{
-    {"channel", "noise", ""},
-    {"common", "common noise", ""},
-    {"head_walk", "head walk", ""},
-    {"machine_walk", "machine walk", "xyz"},
-    {"position", "position", "xyz"},
-    {"orientation", "orientation", "xyz"},
+constexpr std::array<UncertainQuantity, 6> noise_quantities = {{
+    {"channel", "", "noise", Of::noise},
+    {"common", "common_um", "common noise", Of::noise},
+    {"head_walk", "head_walk_um_per_sqrt_h", "head walk", Of::noise},
+    {"machine_walk", "machine_walk_um_per_sqrt_h", "machine walk", Of::noise, "xyz"},
+    {"position", "repeatability_um", "position", Of::noise, "xyz"},
+    {"orientation", "repeatability_urad", "orientation", Of::noise, "xyz"},
 }};
-static_assert(noise_kinds.size() == std::size_t(NoiseQuantity::orientation) + 1);
+static_assert(noise_quantities.size() == std::size_t(NoiseQuantity::orientation) + 1);
 
-const InputKind& kind_of(InputQuantity quantity) { return input_kinds[std::size_t(quantity)]; }
-const NoiseKind& kind_of(NoiseQuantity quantity) { return noise_kinds[std::size_t(quantity)]; }
-
-// Beams have any number of components: 0, 1, ... for their constants, two a beam for their offsets.
-bool counts_beams(InputQuantity quantity) {
-    return quantity == InputQuantity::beam_constant || quantity == InputQuantity::beam_offset;
-}
-
-std::string component_text(const std::string& components, int component) {
-    return component >= 0 && component < int(components.size()) ? " " + components.substr(std::size_t(component), 1)
-           : component == 0                                     ? ""
-                                                                : " " + std::to_string(component);
+// " x", " d1", " v of d2"
+std::string component_text(const UncertainQuantity& quantity, int component) {
+    const int letters = int(quantity.components.size());
+    if (component < 0 || (!quantity.of_beams && component >= quantity.count(0))) return " " + std::to_string(component);
+    std::string text;
+    if (letters > 0) text += {' ', quantity.components[std::size_t(component % letters)]};
+    if (quantity.of_beams)
+        text += (letters > 0 ? " of d" : " d") + std::to_string(component / std::max(1, letters) + 1);
+    return text;
 }
 
 template <class Kinds>
-std::size_t parse(const Kinds& kinds, const char* what, const std::string& name) {
+std::size_t parse(const Kinds& kinds, std::size_t count, const char* what, const std::string& name) {
     std::string known;
-    for (std::size_t i = 0; i < kinds.size(); ++i) {
+    for (std::size_t i = 0; i < count; ++i) {
         if (name == kinds[i].name) return i;
-        known += std::string(i ? ", \"" : "\"") + kinds[i].name + "\"";
+        known += (i ? ", \"" : "\"") + std::string(kinds[i].name) + "\"";
     }
     throw InvalidArgument(std::string(what) + ": expected one of " + known + ", got \"" + name + "\"");
 }
 
-void check_component(const std::string& name, const std::string& components, int component, bool any) {
-    const int last = any ? std::numeric_limits<int>::max() : std::max(0, int(components.size()) - 1);
+void check_component(const UncertainQuantity& quantity, int component) {
+    const bool any = quantity.of_beams;
+    const int last = any ? std::numeric_limits<int>::max() : quantity.count(0) - 1;
     if (component >= 0 && component <= last) return;
-    throw InvalidArgument(name + ", component: expected " + (any ? "0 or more" : "0 to " + std::to_string(last)) +
-                          ", got " + std::to_string(component));
+    throw InvalidArgument(std::string(quantity.text) + ", component: expected " +
+                          (any ? "0 or more" : "0 to " + std::to_string(last)) + ", got " + std::to_string(component));
 }
 
 void check_place(const std::string& name, const char* what, bool wanted, const std::string& got) {
@@ -100,17 +74,17 @@ void check_place(const std::string& name, const char* what, bool wanted, const s
 }
 
 void check_input(const UncertainInput& input) {
-    const InputKind& kind = kind_of(input.quantity);
-    check_place(kind.text, "line", kind.of == Of::line, input.line);
-    check_place(kind.text, "part", kind.of == Of::part, input.part);
-    check_component(kind.text, kind.components, input.component, counts_beams(input.quantity));
+    const UncertainQuantity& quantity = record(input.quantity);
+    check_place(std::string(quantity.text), "line", quantity.of == Of::line, input.line);
+    check_place(std::string(quantity.text), "part", quantity.of == Of::part, input.part);
+    check_component(quantity, input.component);
     check(input.distribution, name(input));
 }
 
 void check_noise(const ReadingNoise& noise) {
-    const NoiseKind& kind = kind_of(noise.quantity);
-    check_place(kind.text, "channel", noise.quantity == NoiseQuantity::channel, noise.channel);
-    check_component(kind.text, kind.components, noise.component, false);
+    const UncertainQuantity& quantity = record(noise.quantity);
+    check_place(std::string(quantity.text), "channel", noise.quantity == NoiseQuantity::channel, noise.channel);
+    check_component(quantity, noise.component);
     check(noise.distribution, name(noise));
     const bool walks = noise.quantity == NoiseQuantity::head_walk || noise.quantity == NoiseQuantity::machine_walk;
     if (walks && noise.distribution.kind != DistributionKind::normal)
@@ -137,29 +111,50 @@ void check_members(const UncertainInputs& inputs, const CorrelatedInputs& correl
 
 }  // namespace
 
-std::string name(InputQuantity quantity) { return kind_of(quantity).name; }
-std::string name(NoiseQuantity quantity) { return kind_of(quantity).name; }
+int UncertainQuantity::count(int beams) const { return std::max(1, int(components.size())) * (of_beams ? beams : 1); }
+
+const std::vector<UncertainQuantity>& uncertain_quantities() {
+    static const std::vector<UncertainQuantity> all = [] {
+        std::vector<UncertainQuantity> list;
+        for (const SetupQuantityRecord& r : setup_quantities)
+            list.push_back({r.name, r.key, r.text, Of::line, r.components, r.of_beams, r.layout});
+        list.insert(list.end(), shared_quantities.begin(), shared_quantities.end());
+        list.insert(list.end(), noise_quantities.begin(), noise_quantities.end());
+        return list;
+    }();
+    return all;
+}
+
+const UncertainQuantity& record(InputQuantity quantity) {
+    if (const auto* setup = std::get_if<SetupQuantity>(&quantity)) return uncertain_quantities()[std::size_t(*setup)];
+    return shared_quantities[std::size_t(std::get<SharedQuantity>(quantity))];
+}
+const UncertainQuantity& record(NoiseQuantity quantity) { return noise_quantities[std::size_t(quantity)]; }
+
+std::string name(InputQuantity quantity) { return std::string(record(quantity).name); }
+std::string name(NoiseQuantity quantity) { return std::string(record(quantity).name); }
 
 InputQuantity parse_input_quantity(const std::string& name) {
-    return InputQuantity(parse(input_kinds, "quantity", name));
+    const std::size_t count = setup_quantities.size() + shared_quantities.size();
+    const std::size_t found = parse(uncertain_quantities(), count, "quantity", name);
+    if (found < setup_quantities.size()) return SetupQuantity(found);
+    return SharedQuantity(found - setup_quantities.size());
 }
-NoiseQuantity parse_noise_quantity(const std::string& name) { return NoiseQuantity(parse(noise_kinds, "noise", name)); }
+NoiseQuantity parse_noise_quantity(const std::string& name) {
+    return NoiseQuantity(parse(noise_quantities, noise_quantities.size(), "noise", name));
+}
 
 std::string name(const UncertainInput& input) {
-    const InputKind& kind = kind_of(input.quantity);
-    std::string text = kind.text;
-    if (input.quantity == InputQuantity::beam_constant) text += " d" + std::to_string(input.component + 1);
-    else if (input.quantity == InputQuantity::beam_offset)
-        text += std::string(input.component % 2 ? " v" : " u") + " of d" + std::to_string(input.component / 2 + 1);
-    else text += component_text(kind.components, input.component);
-    const std::string& place = kind.of == Of::part ? input.part : input.line;
+    const UncertainQuantity& quantity = record(input.quantity);
+    const std::string text = std::string(quantity.text) + component_text(quantity, input.component);
+    const std::string& place = quantity.of == Of::part ? input.part : input.line;
     return place.empty() ? text : text + " of " + place;
 }
 
 std::string name(const ReadingNoise& noise) {
-    const NoiseKind& kind = kind_of(noise.quantity);
-    if (noise.quantity == NoiseQuantity::channel) return std::string(kind.text) + " of " + noise.channel;
-    return kind.text + component_text(kind.components, noise.component);
+    const UncertainQuantity& quantity = record(noise.quantity);
+    if (noise.quantity == NoiseQuantity::channel) return std::string(quantity.text) + " of " + noise.channel;
+    return std::string(quantity.text) + component_text(quantity, noise.component);
 }
 
 void check(const UncertainInputs& inputs) {

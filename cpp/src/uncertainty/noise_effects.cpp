@@ -182,15 +182,15 @@ MatrixXd NoiseEffects::of(const ReadingNoise& noise) const {
 }
 
 std::string budget_group(const UncertainInput& input) {
-    switch (input.quantity) {
-        case InputQuantity::part_shift:
-        case InputQuantity::part_rotation: return "head part " + input.part;
-        case InputQuantity::temperature:
-        case InputQuantity::pressure:
-        case InputQuantity::humidity:
-        case InputQuantity::refractive_index: return "air";
-        case InputQuantity::scale_length:
-        case InputQuantity::scale_factor: return "scale lines";
+    if (const auto* quantity = std::get_if<SetupQuantity>(&input.quantity))
+        return is_adjusted(*quantity) ? name(*quantity) : "scale lines";
+    switch (std::get<SharedQuantity>(input.quantity)) {
+        case SharedQuantity::part_shift:
+        case SharedQuantity::part_rotation: return "head part " + input.part;
+        case SharedQuantity::temperature:
+        case SharedQuantity::pressure:
+        case SharedQuantity::humidity:
+        case SharedQuantity::refractive_index: return "air";
         default: return name(input.quantity);
     }
 }

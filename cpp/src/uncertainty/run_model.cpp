@@ -9,56 +9,18 @@
 namespace stepdiag {
 namespace {
 
-std::vector<double> numbers_of(const Misalignment& misalignment, std::size_t beams) {
-    std::vector<double> numbers(field::beam_constant + beams, 0.0);
-    for (int k = 0; k < 2; ++k) {
-        numbers[field::reflector + k] = misalignment.reflector[k];
-        numbers[field::laser + k] = misalignment.laser[k];
-        numbers[field::lateral + k] = misalignment.lateral[k];
-        numbers[field::psd_zero + k] = misalignment.psd_zero[k];
-    }
-    numbers[field::roll] = misalignment.roll;
-    numbers[field::gain] = misalignment.gain;
-    numbers[field::distance_constant] = misalignment.distance_constant;
-    numbers[field::drift] = misalignment.drift;
-    std::copy(misalignment.beam_constants.begin(), misalignment.beam_constants.end(),
-              numbers.begin() + field::beam_constant);
-    return numbers;
-}
-
-// Where a quantity of a line's set-up stands, and how many components it has; none for other quantities.
-struct Place {
-    int first;
-    int count;
-};
-std::optional<Place> place_in_line(InputQuantity quantity, int beams) {
+// Where a quantity begins among the shared numbers; none for those of parts.
+std::optional<int> shared_column(SharedQuantity quantity) {
     switch (quantity) {
-        case InputQuantity::reflector: return Place{field::reflector, 2};
-        case InputQuantity::laser: return Place{field::laser, 2};
-        case InputQuantity::psd_zero: return Place{field::psd_zero, 2};
-        case InputQuantity::distance_constant: return Place{field::distance_constant, 1};
-        case InputQuantity::beam_constant: return Place{field::beam_constant, beams};
-        case InputQuantity::lateral: return Place{field::lateral, 2};
-        case InputQuantity::roll: return Place{field::roll, 1};
-        case InputQuantity::gain: return Place{field::gain, 1};
-        case InputQuantity::drift: return Place{field::drift, 1};
-        case InputQuantity::scale_length: return Place{field::scale_length, 1};
-        case InputQuantity::scale_factor: return Place{field::scale_factor, 1};
-        default: return std::nullopt;
-    }
-}
-
-std::optional<Place> place_in_shared(InputQuantity quantity, int beams) {
-    switch (quantity) {
-        case InputQuantity::psd_distance: return Place{shared_field::psd_distance, 1};
-        case InputQuantity::beam_offset: return Place{shared_field::beam_offset, 2 * beams};
-        case InputQuantity::reading_model: return Place{shared_field::reading_model, 1};
-        case InputQuantity::temperature: return Place{shared_field::temperature, 1};
-        case InputQuantity::pressure: return Place{shared_field::pressure, 1};
-        case InputQuantity::humidity: return Place{shared_field::humidity, 1};
-        case InputQuantity::refractive_index: return Place{shared_field::refractive_index, 1};
-        case InputQuantity::wavelength: return Place{shared_field::wavelength, 1};
-        case InputQuantity::machine_drift: return Place{shared_field::machine_drift, 3};
+        case SharedQuantity::psd_distance: return shared_field::psd_distance;
+        case SharedQuantity::beam_offset: return shared_field::beam_offset;
+        case SharedQuantity::reading_model: return shared_field::reading_model;
+        case SharedQuantity::temperature: return shared_field::temperature;
+        case SharedQuantity::pressure: return shared_field::pressure;
+        case SharedQuantity::humidity: return shared_field::humidity;
+        case SharedQuantity::refractive_index: return shared_field::refractive_index;
+        case SharedQuantity::wavelength: return shared_field::wavelength;
+        case SharedQuantity::machine_drift: return shared_field::machine_drift;
         default: return std::nullopt;
     }
 }
@@ -94,25 +56,13 @@ std::vector<double> Fields::with(const Eigen::VectorXd& deviations) const {
     return numbers;
 }
 
-Misalignment misalignment_of(const std::vector<double>& n) {
-    return {{n[field::reflector], n[field::reflector + 1]},
-            {n[field::laser], n[field::laser + 1]},
-            {n[field::psd_zero], n[field::psd_zero + 1]},
-            n[field::distance_constant],
-            {n.begin() + field::beam_constant, n.end()},
-            {n[field::lateral], n[field::lateral + 1]},
-            n[field::roll],
-            n[field::gain],
-            n[field::drift]};
-}
-
 RunModel::RunModel(const VirtualRun& given, std::uint64_t seed) : run(given), draws(run.inputs, seed) {
     if (!(std::isfinite(run.seconds_per_reading) && run.seconds_per_reading > 0.0))
         throw InvalidArgument("seconds_per_reading: expected a finite time above 0");
     seconds = run.simulation.seconds_per_reading.value_or(run.seconds_per_reading);
     check_run(run.plan, run.heads, with_times(run.simulation, seconds));
     channels = signal_names(run.heads.head);
-    const int beams = run.heads.head.layout == HeadLayout::multi_beam ? int(channels.size()) : 0;
+    beams = run.heads.head.layout == HeadLayout::multi_beam ? int(channels.size()) : 0;
 
     for (const PlannedPass& pass : planned_passes(run.plan, run.simulation.repeats, run.simulation.backward)) {
         const Line& line = pass.line;
@@ -120,7 +70,7 @@ RunModel::RunModel(const VirtualRun& given, std::uint64_t seed) : run(given), dr
         const Misalignment misalignment = stepdiag::misalignment_of(run.simulation, line);
         check_misalignment(misalignment, head, line);
         if (passes.empty() || passes.back().planned.line.name() != line.name())
-            lines.push_back({numbers_of(misalignment, std::size_t(beams)), {}});
+            lines.push_back({setup_numbers(misalignment, beams), {}});
         const std::vector<PlanPoint> points = points_of(run.plan, pass);
         const Eigen::Vector3d first = run.plan.points(line, pass.run).front().commanded;
         const Eigen::Matrix3d frame = run.plan.frame(line);
@@ -144,38 +94,38 @@ RunModel::RunModel(const VirtualRun& given, std::uint64_t seed) : run(given), dr
 
 void RunModel::add_input(const UncertainInput& input, int index) {
     const std::string what = name(input);
-    const int beams = run.heads.head.layout == HeadLayout::multi_beam ? int(channels.size()) : 0;
-    if (const auto place = place_in_line(input.quantity, beams)) {
-        check_component(what, input.component, place->count);
+    if (const auto* quantity = std::get_if<SetupQuantity>(&input.quantity)) {
+        const auto [first, count] = setup::columns(*quantity, beams);
+        check_component(what, input.component, count);
         const auto pass = std::find_if(passes.begin(), passes.end(),
                                        [&](const RunPass& v) { return v.planned.line.name() == input.line; });
         if (pass == passes.end()) throw InvalidArgument(what + ": line \"" + input.line + "\" is not in the plan");
-        if (input.quantity == InputQuantity::psd_zero && pass->head->layout != HeadLayout::psd)
+        if (*quantity == SetupQuantity::psd_zero && pass->head->layout != HeadLayout::psd)
             throw InvalidArgument(what + ": expected a head of layout psd");
-        if (input.quantity == InputQuantity::gain && pass->head->design && beams > 0)
+        if (*quantity == SetupQuantity::gain && pass->head->design && beams > 0)
             throw InvalidArgument(what +
                                   ": the beams of a traced head stand where its design and its pose errors put "
                                   "them");
-        lines[pass->line].uncertain.push_back({place->first + input.component, index});
+        lines[pass->line].uncertain.push_back({first + input.component, index});
         return;
     }
-    if (const auto place = place_in_shared(input.quantity, beams)) {
-        check_component(what, input.component, place->count);
-        const bool of_closed_head =
-            input.quantity == InputQuantity::psd_distance || input.quantity == InputQuantity::beam_offset;
-        const bool of_air = input.quantity == InputQuantity::temperature || input.quantity == InputQuantity::pressure ||
-                            input.quantity == InputQuantity::humidity;
+    const SharedQuantity quantity = std::get<SharedQuantity>(input.quantity);
+    if (const auto column = shared_column(quantity)) {
+        check_component(what, input.component, record(quantity).count(beams));
+        const bool of_closed_head = quantity == SharedQuantity::psd_distance || quantity == SharedQuantity::beam_offset;
+        const bool of_air = quantity == SharedQuantity::temperature || quantity == SharedQuantity::pressure ||
+                            quantity == SharedQuantity::humidity;
         for (const RunPass& pass : passes) {
             if (of_closed_head && pass.head->design)
                 throw InvalidArgument(what +
                                       ": expected a head without a design; components of a design are moved by "
                                       "part_shift and part_rotation");
-            if (input.quantity == InputQuantity::psd_distance && pass.head->layout != HeadLayout::psd)
+            if (quantity == SharedQuantity::psd_distance && pass.head->layout != HeadLayout::psd)
                 throw InvalidArgument(what + ": expected a head of layout psd");
             if (of_air && !std::holds_alternative<Air>(true_environment(*pass.head, run.simulation).air))
                 throw InvalidArgument(what + ": expected a state of the air as environment, got a constant index");
         }
-        shared.uncertain.push_back({place->first + input.component, index});
+        shared.uncertain.push_back({*column + input.component, index});
         return;
     }
     check_component(what, input.component, 3);
@@ -186,7 +136,7 @@ void RunModel::add_input(const UncertainInput& input, int index) {
     };
     if (std::none_of(passes.begin(), passes.end(), has_part))
         throw InvalidArgument(what + ": no head of this run has a component \"" + input.part + "\"");
-    const int turned = input.quantity == InputQuantity::part_rotation ? 3 : 0;
+    const int turned = quantity == SharedQuantity::part_rotation ? 3 : 0;
     moved_parts.push_back({input.part, turned + input.component, index});
 }
 

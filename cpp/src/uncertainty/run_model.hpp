@@ -11,22 +11,6 @@
 
 namespace stepdiag {
 
-// The numbers of a line's set-up, nominal or with deviations: those of Misalignment, and of its scale.
-namespace field {
-enum : int {
-    reflector = 0,  // a, b
-    laser = 2,      // a, b
-    lateral = 4,    // x, y
-    roll = 6,
-    gain = 7,
-    psd_zero = 8,  // x, y
-    distance_constant = 10,
-    drift = 11,
-    scale_length = 12,
-    scale_factor = 13,
-    beam_constant = 14,  // d1 ... dn
-};
-}
 // The numbers that all lines share.
 namespace shared_field {
 enum : int {
@@ -47,6 +31,7 @@ struct Deviating {
     int field;
     int input;
 };
+// Numbers of a line's set-up (setup::Column), or shared ones.
 struct Fields {
     std::vector<double> nominal;
     std::vector<Deviating> uncertain;
@@ -94,6 +79,7 @@ struct RunModel {
     const Draws draws;
     double seconds;
     std::vector<std::string> channels;
+    int beams;  // d1 ... dn
     std::vector<RunPass> passes;
     std::vector<RunRow> rows;
     std::vector<Pose> poses;    // nominal tool, by row
@@ -111,12 +97,8 @@ struct RunModel {
     Head head(const Head& nominal, const std::vector<double>& shared_numbers, const Eigen::VectorXd& deviations) const;
 
 private:
-    void add_inputs();
     void add_input(const UncertainInput& input, int index);
     void check_noises() const;
 };
-
-// As Misalignment, of `beams` beam constants.
-Misalignment misalignment_of(const std::vector<double>& numbers);
 
 }  // namespace stepdiag

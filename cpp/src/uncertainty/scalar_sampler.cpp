@@ -115,8 +115,8 @@ Eigen::MatrixXd ScalarSampler::read(const Eigen::VectorXd& deviations, std::opti
             double value = *signals[k][c];
             if (is_distance(model_.channels[c]))
                 value = (value + model_error) / (1.0 + shared[shared_field::wavelength]) +
-                        numbers[field::scale_factor] * row.travel +
-                        (row.is_last_point ? numbers[field::scale_length] : 0.0);
+                        numbers[setup::scale_factor] * row.travel +
+                        (row.is_last_point ? numbers[setup::scale_length] : 0.0);
             readings(Eigen::Index(k), Eigen::Index(c)) = value;
         }
     }

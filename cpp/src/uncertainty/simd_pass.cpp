@@ -275,16 +275,16 @@ void place_head_and_mirror(const LineFrame& line, const SimdRow* fields, SimdSet
         const Pair zero = common(0.0);
         MaskPair followed = all_true();
         Pair turned[9], rolled[9], tilted[9], sensor[9], mirror[9];
-        exponential(number(field::laser), number(field::laser + 1), zero, turned, followed);
+        exponential(number(setup::laser), number(setup::laser + 1), zero, turned, followed);
         product(frame, turned, tilted);
-        exponential(zero, zero, number(field::roll), rolled, followed);
+        exponential(zero, zero, number(setup::roll), rolled, followed);
         product([&](int k) HWY_ATTR { return tilted[k]; }, rolled, sensor);
-        exponential(number(field::reflector), number(field::reflector + 1), zero, turned, followed);
+        exponential(number(setup::reflector), number(setup::reflector + 1), zero, turned, followed);
         product(frame, turned, mirror);
         Pair origin[3];
         for (int k = 0; k < 3; ++k)
-            origin[k] = mul_add(frame(3 * k), number(field::lateral),
-                                mul_add(frame(3 * k + 1), number(field::lateral + 1), common(line.origin[k])));
+            origin[k] = mul_add(frame(3 * k), number(setup::lateral),
+                                mul_add(frame(3 * k + 1), number(setup::lateral + 1), common(line.origin[k])));
         for (int i = 0; i < 3; ++i) {  // rows of sensor_R_machine are columns of machine_R_sensor
             for (int j = 0; j < 3; ++j) store(sensor[3 * j + i], setup.sensor_R_machine[3 * i + j].value + lane);
             const auto in_sensor = [&](Pair x, Pair y, Pair z) HWY_ATTR {

@@ -32,10 +32,16 @@ std::unique_ptr<const SimdSampler> SimdSampler::make(const RunModel& model) {
         Eigen::Vector3d::Map(line.frame.origin) = origin;
         line.head = std::size_t(head - run->heads_.begin());
         const Fields& fields = model.lines[pass.line];
-        line.setup_varies = fields.is_uncertain(field::reflector, field::gain);
-        const bool gain_corrects = pass.head->layout != HeadLayout::multi_beam && fields.acts(field::gain);
-        line.corrects = gain_corrects || fields.acts(field::psd_zero, int(fields.nominal.size()) - field::psd_zero) ||
-                        model.shared.acts(shared_field::reading_model) || model.shared.acts(shared_field::wavelength);
+        for (int column = 0; column < int(fields.nominal.size()); ++column) {
+            const SetupQuantity quantity = setup::component(column).quantity;
+            const bool stands = quantity == SetupQuantity::reflector || quantity == SetupQuantity::laser ||
+                                quantity == SetupQuantity::lateral || quantity == SetupQuantity::roll;
+            const bool of_beams = quantity == SetupQuantity::gain && pass.head->layout == HeadLayout::multi_beam;
+            if (stands) line.setup_varies = line.setup_varies || fields.is_uncertain(column);
+            else if (!of_beams) line.corrects = line.corrects || fields.acts(column);
+        }
+        line.corrects = line.corrects || model.shared.acts(shared_field::reading_model) ||
+                        model.shared.acts(shared_field::wavelength);
         run->lines_.push_back(line);
     }
     for (const Pose& pose : model.poses) {
@@ -121,22 +127,22 @@ void SimdSampler::correct(const RunPass& pass, const SimdPass& lanes, const Scra
     std::vector<SimdRow> constant(lanes.channels);
     SimdRow gain, wavelength;
     for (std::size_t lane = 0; lane < lane_group; ++lane) {
-        gain.value[lane] = 1.0 + fields[field::gain].value[lane];
+        gain.value[lane] = 1.0 + fields[setup::gain].value[lane];
         wavelength.value[lane] = 1.0 / (1.0 + scratch.shared[shared_field::wavelength].value[lane]);
         for (std::size_t c = 0; c < lanes.channels; ++c) {
             double& to = constant[c].value[lane];
             to = 0.0;
-            if (is_distance_[c]) to = fields[field::distance_constant].value[lane];
-            if (is_distance_[c] && field::beam_constant + c < fields.size())
-                to += fields[field::beam_constant + c].value[lane];
+            if (is_distance_[c]) to = fields[setup::distance_constant].value[lane];
+            if (is_distance_[c] && setup::beam_constants + c < fields.size())
+                to += fields[setup::beam_constants + c].value[lane];
             if (model_.channels[c] == "spot_x" || model_.channels[c] == "spot_y")
-                to = fields[field::psd_zero + (model_.channels[c] == "spot_y")].value[lane];
+                to = fields[setup::psd_zero + (model_.channels[c] == "spot_y")].value[lane];
         }
     }
     const std::size_t first = std::size_t(pass.planned.first_row);
     correct_pass(lanes, {&elapsed_[first], &travel_[first], &is_last_[first], constant.data(), &gain,
-                         &fields[field::drift], &scratch.shared[shared_field::reading_model], &wavelength,
-                         &fields[field::scale_factor], &fields[field::scale_length], is_distance_.data()});
+                         &fields[setup::drift], &scratch.shared[shared_field::reading_model], &wavelength,
+                         &fields[setup::scale_factor], &fields[setup::scale_length], is_distance_.data()});
 }
 
 void SimdSampler::trace(const double* deviations, std::optional<std::uint64_t> first_sample, Scratch& scratch,
@@ -152,7 +158,7 @@ void SimdSampler::trace(const double* deviations, std::optional<std::uint64_t> f
             for (std::size_t i = 0; i < scratch.closed_beams[l].size(); ++i)
                 for (std::size_t lane = 0; lane < lane_group; ++lane)
                     scratch.closed_beams[l][i].value[lane] =
-                        offsets[i].value[lane] * (1.0 + scratch.fields[l][field::gain].value[lane]);
+                        offsets[i].value[lane] * (1.0 + scratch.fields[l][setup::gain].value[lane]);
     }
     if (!scratch.displaced.empty()) displace(first_sample, scratch);
 

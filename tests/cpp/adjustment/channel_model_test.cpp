@@ -17,9 +17,9 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using stepdiag::Chain;
 using stepdiag::ChannelDerivative;
-using stepdiag::ChannelKind;
 using stepdiag::ChannelModel;
 using stepdiag::HeadCalibration;
+using stepdiag::HeadLayout;
 using stepdiag::MachineErrors;
 using stepdiag::ReadingPlace;
 
@@ -28,7 +28,7 @@ const char* const chains[] = {"[w X' b Y Z t]", "[w b Z X Y t]", "[w Y' Z' X' b 
 const char* const lines[] = {"ppp", "npn", "0p0", "00n"};
 
 struct Case {
-    ChannelKind kind;
+    HeadLayout kind;
     HeadCalibration head;
 };
 
@@ -37,7 +37,7 @@ std::vector<Case> cases() {
     psd.psd_distance = 70.0;
     psd.spot_beam = {25.0, -3.0};
     beams.beam_offsets = {{0.0, 0.0}, {20.0, 1.0}, {-2.0, 20.0}, {-9.0, -9.0}};
-    return {{ChannelKind::ideal, {}}, {ChannelKind::psd, psd}, {ChannelKind::multi_beam, beams}};
+    return {{HeadLayout::ideal, {}}, {HeadLayout::psd, psd}, {HeadLayout::multi_beam, beams}};
 }
 
 // Everything that a reading depends on, as one vector: 18 errors of the axes, then the set-up.
@@ -72,7 +72,7 @@ std::vector<Point> random_points() {
     for (const Case& head : cases())
         for (const char* chain : chains)
             for (const char* line : lines) {
-                const int setup = ChannelModel::setup_size(head.kind, head.head);
+                const int setup = stepdiag::setup::size(int(head.head.beam_offsets.size()));
                 VectorXd parameters(18 + setup);
                 for (double& p : parameters) p = normal(generator);
                 for (int a = 0; a < 3; ++a) {
@@ -84,7 +84,7 @@ std::vector<Point> random_points() {
                 of_line[stepdiag::setup::roll] *= 0.02;
                 of_line[stepdiag::setup::gain] *= 0.01;
                 of_line[stepdiag::setup::drift] *= 1e-6;
-                of_line[stepdiag::setup::cosine] *= 1e-6;
+                of_line[stepdiag::setup::scale_factor] *= 1e-6;
                 points.push_back(
                     {Chain::parse(chain), head, stepdiag::line_frame(stepdiag::Line::parse(line), volume), parameters});
             }
@@ -108,19 +108,19 @@ TEST(ChannelModel, ReadsWhatTheDefinitionsSay) {
             stepdiag::read_mirror(sensor.transpose() * (pose.position - origin), sensor.transpose() * normal);
         ASSERT_TRUE(exact);
         const double scale = 1.0 + at(stepdiag::setup::gain);
-        const double constant = at(stepdiag::setup::distance_constant) + Point::time * at(stepdiag::setup::drift) -
-                                point.travel() * at(stepdiag::setup::cosine);
+        const double constant = at(stepdiag::setup::distance_constant) + Point::time * at(stepdiag::setup::drift) +
+                                point.travel() * at(stepdiag::setup::scale_factor);
         VectorXd expected(3);
         expected << exact->distance + constant, scale * exact->alpha, scale * exact->beta;
-        if (point.head.kind == ChannelKind::psd)
+        if (point.head.kind == HeadLayout::psd)
             expected.tail<2>() =
                 scale * stepdiag::spot_position(*exact, *point.head.head.psd_distance, point.head.head.spot_beam) +
                 pair(stepdiag::setup::psd_zero);
-        if (point.head.kind == ChannelKind::multi_beam) {
+        if (point.head.kind == HeadLayout::multi_beam) {
             auto offsets = point.head.head.beam_offsets;
             for (Vector2d& offset : offsets) offset *= scale;
             expected = stepdiag::beam_distances(*exact, offsets).array() + constant;
-            expected.tail(3) += point.parameters.tail(3);
+            expected += point.parameters.tail(expected.size());
         }
         // A metre, rounded a few times; spots are distances times tilts.
         EXPECT_LE((point.read() - expected).cwiseAbs().maxCoeff(), 2e-12);

@@ -58,19 +58,19 @@ inline std::vector<UncertainInput> setup_inputs(Kind kind) {
         for (int k = 0; k < 2; ++k) inputs.push_back(normal(quantity, spread, line, "", k));
     };
     for (const char* line : {"ppp", "npp", "nnp"}) {
-        pair(InputQuantity::reflector, 200e-6, line);
-        pair(InputQuantity::laser, 150e-6, line);
+        pair(SetupQuantity::reflector, 200e-6, line);
+        pair(SetupQuantity::laser, 150e-6, line);
     }
-    pair(InputQuantity::lateral, 0.2, "npp");
-    inputs.push_back(normal(InputQuantity::roll, 2e-3, "npp"));
-    inputs.push_back(normal(InputQuantity::distance_constant, 0.01, "pnp"));
-    inputs.push_back(normal(InputQuantity::drift, 1e-6, "ppp"));
-    inputs.push_back(normal(InputQuantity::drift, 1e-6, "0p0"));
-    if (kind != Kind::multi_beam_traced) inputs.push_back(normal(InputQuantity::gain, 0.01, "nnp"));
-    if (kind == Kind::psd || kind == Kind::psd_traced) pair(InputQuantity::psd_zero, 0.01, "pnp");
+    pair(SetupQuantity::lateral, 0.2, "npp");
+    inputs.push_back(normal(SetupQuantity::roll, 2e-3, "npp"));
+    inputs.push_back(normal(SetupQuantity::distance_constant, 0.01, "pnp"));
+    inputs.push_back(normal(SetupQuantity::drift, 1e-6, "ppp"));
+    inputs.push_back(normal(SetupQuantity::drift, 1e-6, "0p0"));
+    if (kind != Kind::multi_beam_traced) inputs.push_back(normal(SetupQuantity::gain, 0.01, "nnp"));
+    if (kind == Kind::psd || kind == Kind::psd_traced) pair(SetupQuantity::psd_zero, 0.01, "pnp");
     if (kind == Kind::multi_beam || kind == Kind::multi_beam_traced)
         for (int beam = 0; beam < 3; ++beam)
-            inputs.push_back(normal(InputQuantity::beam_constant, 1e-4, "pnp", "", beam));
+            inputs.push_back(normal(SetupQuantity::beam_constants, 1e-4, "pnp", "", beam));
     return inputs;
 }
 
@@ -81,28 +81,28 @@ inline UncertainInputs everything(Kind kind) {
         for (int k = 0; k < components; ++k) all.inputs.push_back(normal(quantity, spread, "", part, k));
     };
     for (const char* line : {"p00", "0p0"}) {
-        all.inputs.push_back(normal(InputQuantity::scale_length, 1e-3, line));
-        all.inputs.push_back(normal(InputQuantity::scale_factor, 1e-6, line));
+        all.inputs.push_back(normal(SetupQuantity::scale_length, 1e-3, line));
+        all.inputs.push_back(normal(SetupQuantity::scale_factor, 1e-6, line));
     }
-    add_all(InputQuantity::reading_model, 1.5, 1);
-    add_all(InputQuantity::temperature, 0.5, 1);
-    add_all(InputQuantity::pressure, 100.0, 1);
-    add_all(InputQuantity::humidity, 0.05, 1);
-    add_all(InputQuantity::refractive_index, 1e-7, 1);
-    add_all(InputQuantity::wavelength, 1e-7, 1);
-    add_all(InputQuantity::machine_drift, 1e-6, 3);
-    if (kind == Kind::psd) add_all(InputQuantity::psd_distance, 0.5, 1);
-    if (kind == Kind::multi_beam) add_all(InputQuantity::beam_offset, 0.05, 6);
+    add_all(SharedQuantity::reading_model, 1.5, 1);
+    add_all(SharedQuantity::temperature, 0.5, 1);
+    add_all(SharedQuantity::pressure, 100.0, 1);
+    add_all(SharedQuantity::humidity, 0.05, 1);
+    add_all(SharedQuantity::refractive_index, 1e-7, 1);
+    add_all(SharedQuantity::wavelength, 1e-7, 1);
+    add_all(SharedQuantity::machine_drift, 1e-6, 3);
+    if (kind == Kind::psd) add_all(SharedQuantity::psd_distance, 0.5, 1);
+    if (kind == Kind::multi_beam) add_all(SharedQuantity::beam_offset, 0.05, 6);
     const HeadDesign design = kind == Kind::psd_traced ? beam_and_psd() : three_beams();
     if (kind == Kind::psd_traced || kind == Kind::multi_beam_traced) {
         for (const auto& body : design.bodies) {
-            add_all(InputQuantity::part_shift, 0.05, 3, body.name);
-            add_all(InputQuantity::part_rotation, 1e-4, 3, body.name);
+            add_all(SharedQuantity::part_shift, 0.05, 3, body.name);
+            add_all(SharedQuantity::part_rotation, 1e-4, 3, body.name);
         }
-        add_all(InputQuantity::part_shift, 0.05, 3, design.beams.back().name);
-        add_all(InputQuantity::part_rotation, 1e-4, 3, design.beams.back().name);
-        if (kind == Kind::psd_traced) add_all(InputQuantity::part_shift, 0.05, 3, "psd");
-        if (kind == Kind::psd_traced) add_all(InputQuantity::part_rotation, 1e-3, 3, "psd");
+        add_all(SharedQuantity::part_shift, 0.05, 3, design.beams.back().name);
+        add_all(SharedQuantity::part_rotation, 1e-4, 3, design.beams.back().name);
+        if (kind == Kind::psd_traced) add_all(SharedQuantity::part_shift, 0.05, 3, "psd");
+        if (kind == Kind::psd_traced) add_all(SharedQuantity::part_rotation, 1e-3, 3, "psd");
     }
     for (const std::string& channel : signal_names(head_of(kind))) {
         const bool tilt = channel == "alpha" || channel == "beta";

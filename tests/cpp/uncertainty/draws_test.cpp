@@ -17,7 +17,7 @@ UncertainInput input(DistributionKind kind, const std::string& line, int compone
     Distribution distribution{kind, 0.5, 2.0};
     if (kind == DistributionKind::student_t) distribution.degrees_of_freedom = 5.0;
     if (kind == DistributionKind::curvilinear_trapezoid) distribution.edge = 0.5;
-    return {InputQuantity::reflector, distribution, line, {}, component};
+    return {SetupQuantity::reflector, distribution, line, {}, component};
 }
 
 UncertainInputs all_kinds() {

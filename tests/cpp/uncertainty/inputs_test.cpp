@@ -15,9 +15,9 @@ UncertainInputs with(std::vector<UncertainInput> inputs) { return {std::move(inp
 UncertainInputs with(std::vector<ReadingNoise> noise) { return {{}, std::move(noise)}; }
 
 UncertainInputs correlated(std::vector<int> members, const Eigen::MatrixXd& matrix) {
-    return {{{InputQuantity::roll, normal, "ppp"},
-             {InputQuantity::gain, normal, "ppp"},
-             {InputQuantity::drift, rectangular, "ppp"}},
+    return {{{SetupQuantity::roll, normal, "ppp"},
+             {SetupQuantity::gain, normal, "ppp"},
+             {SetupQuantity::drift, rectangular, "ppp"}},
             {},
             {{std::move(members), matrix}}};
 }
@@ -27,21 +27,23 @@ Eigen::MatrixXd pair(double r) { return (Eigen::Matrix2d() << 1.0, r, r, 1.0).fi
 }  // namespace
 
 TEST(UncertainInputs, NamesSayQuantityComponentAndPlace) {
-    EXPECT_EQ(name(UncertainInput{InputQuantity::reflector, normal, "ppp", "", 0}), "reflector a of ppp");
-    EXPECT_EQ(name(UncertainInput{InputQuantity::psd_zero, normal, "npp", "", 1}), "PSD zero y of npp");
-    EXPECT_EQ(name(UncertainInput{InputQuantity::beam_constant, normal, "ppp", "", 2}), "beam constant d3 of ppp");
-    EXPECT_EQ(name(UncertainInput{InputQuantity::beam_offset, normal, "", "", 3}), "beam offset v of d2");
-    EXPECT_EQ(name(UncertainInput{InputQuantity::part_shift, normal, "", "splitter", 0}), "shift x of splitter");
-    EXPECT_EQ(name(UncertainInput{InputQuantity::refractive_index, normal}), "refractive index");
-    EXPECT_EQ(name(UncertainInput{InputQuantity::machine_drift, normal, "", "", 2}), "machine drift z");
+    EXPECT_EQ(name(UncertainInput{SetupQuantity::reflector, normal, "ppp", "", 0}), "reflector a of ppp");
+    EXPECT_EQ(name(UncertainInput{SetupQuantity::psd_zero, normal, "npp", "", 1}), "PSD zero y of npp");
+    EXPECT_EQ(name(UncertainInput{SetupQuantity::beam_constants, normal, "ppp", "", 2}), "beam constant d3 of ppp");
+    EXPECT_EQ(name(UncertainInput{SharedQuantity::beam_offset, normal, "", "", 3}), "beam offset v of d2");
+    EXPECT_EQ(name(UncertainInput{SharedQuantity::part_shift, normal, "", "splitter", 0}), "shift x of splitter");
+    EXPECT_EQ(name(UncertainInput{SharedQuantity::refractive_index, normal}), "refractive index");
+    EXPECT_EQ(name(UncertainInput{SharedQuantity::machine_drift, normal, "", "", 2}), "machine drift z");
     EXPECT_EQ(name(ReadingNoise{NoiseQuantity::channel, normal, "distance"}), "noise of distance");
     EXPECT_EQ(name(ReadingNoise{NoiseQuantity::head_walk, normal}), "head walk");
     EXPECT_EQ(name(ReadingNoise{NoiseQuantity::orientation, normal, "", 1}), "orientation y");
 }
 
 TEST(UncertainInputs, QuantitiesAreReadBackByName) {
-    for (int i = 0; i <= int(InputQuantity::machine_drift); ++i)
-        EXPECT_EQ(parse_input_quantity(name(InputQuantity(i))), InputQuantity(i));
+    for (int i = 0; i < setup_quantity_count; ++i)
+        EXPECT_EQ(parse_input_quantity(name(SetupQuantity(i))), InputQuantity(SetupQuantity(i)));
+    for (int i = 0; i <= int(SharedQuantity::machine_drift); ++i)
+        EXPECT_EQ(parse_input_quantity(name(SharedQuantity(i))), InputQuantity(SharedQuantity(i)));
     for (int i = 0; i <= int(NoiseQuantity::orientation); ++i)
         EXPECT_EQ(parse_noise_quantity(name(NoiseQuantity(i))), NoiseQuantity(i));
     expect_refused([] { parse_input_quantity("tilt"); }, "\"tilt\"");
@@ -51,12 +53,12 @@ TEST(UncertainInputs, QuantitiesAreReadBackByName) {
 TEST(UncertainInputs, WhatAQuantityDoesNotHaveIsRefused) {
     using Inputs = std::vector<UncertainInput>;
     using Noise = std::vector<ReadingNoise>;
-    expect_refused([] { check(with(Inputs{{InputQuantity::reflector, normal}})); }, "reflector: expected the name");
-    expect_refused([] { check(with(Inputs{{InputQuantity::pressure, normal, "ppp"}})); }, "pressure: has no line");
-    expect_refused([] { check(with(Inputs{{InputQuantity::part_shift, normal}})); }, "name of its part");
-    expect_refused([] { check(with(Inputs{{InputQuantity::laser, normal, "ppp", "", 2}})); }, "laser, component");
-    expect_refused([] { check(with(Inputs{{InputQuantity::roll, normal, "ppp", "", 1}})); }, "roll, component");
-    expect_refused([] { check(with(Inputs{{InputQuantity::beam_offset, normal, "", "", -1}})); }, "0 or more");
+    expect_refused([] { check(with(Inputs{{SetupQuantity::reflector, normal}})); }, "reflector: expected the name");
+    expect_refused([] { check(with(Inputs{{SharedQuantity::pressure, normal, "ppp"}})); }, "pressure: has no line");
+    expect_refused([] { check(with(Inputs{{SharedQuantity::part_shift, normal}})); }, "name of its part");
+    expect_refused([] { check(with(Inputs{{SetupQuantity::laser, normal, "ppp", "", 2}})); }, "laser, component");
+    expect_refused([] { check(with(Inputs{{SetupQuantity::roll, normal, "ppp", "", 1}})); }, "roll, component");
+    expect_refused([] { check(with(Inputs{{SharedQuantity::beam_offset, normal, "", "", -1}})); }, "0 or more");
     expect_refused([] { check(with(Noise{{NoiseQuantity::channel, normal}})); }, "name of its channel");
     expect_refused([] { check(with(Noise{{NoiseQuantity::common, normal, "d1"}})); }, "has no channel");
     expect_refused([] { check(with(Noise{{NoiseQuantity::position, normal, "", 3}})); }, "position, component");
@@ -64,13 +66,13 @@ TEST(UncertainInputs, WhatAQuantityDoesNotHaveIsRefused) {
 }
 
 TEST(UncertainInputs, GivenTwiceOrWithoutSenseIsRefusedByName) {
-    const UncertainInput roll{InputQuantity::roll, normal, "ppp"};
+    const UncertainInput roll{SetupQuantity::roll, normal, "ppp"};
     expect_refused([&] { check(with({roll, roll})); }, "\"roll of ppp\" is given twice");
     const ReadingNoise common{NoiseQuantity::common, normal};
     expect_refused([&] { check(with({common, common})); }, "\"common noise\" is given twice");
     const Distribution negative{DistributionKind::normal, 0.0, -1.0};
-    expect_refused([&] { check(with({UncertainInput{InputQuantity::roll, negative, "ppp"}})); }, "roll of ppp, spread");
-    EXPECT_NO_THROW(check(with({roll, UncertainInput{InputQuantity::roll, normal, "npp"}})));
+    expect_refused([&] { check(with({UncertainInput{SetupQuantity::roll, negative, "ppp"}})); }, "roll of ppp, spread");
+    EXPECT_NO_THROW(check(with({roll, UncertainInput{SetupQuantity::roll, normal, "npp"}})));
 }
 
 TEST(UncertainInputs, CorrelationsAreOfNormalInputsAndOnceEach) {

@@ -18,19 +18,19 @@ constexpr std::uint64_t seed = 5;
 
 // What the misalignment of a line is about, by component.
 void add(Misalignment& misalignment, const UncertainInput& input, double x) {
-    switch (input.quantity) {
-        case InputQuantity::reflector: misalignment.reflector[input.component] += x; break;
-        case InputQuantity::laser: misalignment.laser[input.component] += x; break;
-        case InputQuantity::psd_zero: misalignment.psd_zero[input.component] += x; break;
-        case InputQuantity::distance_constant: misalignment.distance_constant += x; break;
-        case InputQuantity::beam_constant:
+    switch (std::get<SetupQuantity>(input.quantity)) {
+        case SetupQuantity::reflector: misalignment.reflector[input.component] += x; break;
+        case SetupQuantity::laser: misalignment.laser[input.component] += x; break;
+        case SetupQuantity::psd_zero: misalignment.psd_zero[input.component] += x; break;
+        case SetupQuantity::distance_constant: misalignment.distance_constant += x; break;
+        case SetupQuantity::beam_constants:
             misalignment.beam_constants.resize(3);
             misalignment.beam_constants[std::size_t(input.component)] += x;
             break;
-        case InputQuantity::lateral: misalignment.lateral[input.component] += x; break;
-        case InputQuantity::roll: misalignment.roll += x; break;
-        case InputQuantity::gain: misalignment.gain += x; break;
-        case InputQuantity::drift: misalignment.drift += x; break;
+        case SetupQuantity::lateral: misalignment.lateral[input.component] += x; break;
+        case SetupQuantity::roll: misalignment.roll += x; break;
+        case SetupQuantity::gain: misalignment.gain += x; break;
+        case SetupQuantity::drift: misalignment.drift += x; break;
         default: FAIL() << "no quantity of a set-up";
     }
 }
@@ -182,7 +182,7 @@ TEST(VirtualCalibration, SampleWithALostReadingHasNoResultAndIsTracedWhole) {
     HeadDesign design = beam_and_psd();
     design.sensors[0].device = LateralEffect{{2.0, 2.0}};
     run.heads = make_head(design, 100.0);
-    run.inputs.inputs = {normal(InputQuantity::laser, 0.2e-3, "ppp")};
+    run.inputs.inputs = {normal(SetupQuantity::laser, 0.2e-3, "ppp")};
     const VirtualCalibrations model(run, {}, seed);
     const Eigen::MatrixXd outputs = outputs_of(model, 64);
     int lost = 0;
@@ -209,7 +209,7 @@ TEST(VirtualCalibration, FaceThatOnlyAFarSampleMeetsIsAnError) {
                                  {{side * 6.75, 0.0, 5.0}, Eigen::Matrix3d::Identity()}});
     VirtualRun run = run_of(Kind::multi_beam_traced);
     run.heads = make_head(design, 100.0);
-    run.inputs.inputs = {{InputQuantity::laser, {DistributionKind::student_t, 0.0, 20e-6, 2.1}, "ppp", "", 1}};
+    run.inputs.inputs = {{SetupQuantity::laser, {DistributionKind::student_t, 0.0, 20e-6, 2.1}, "ppp", "", 1}};
     run.simulation.verified_share = 0.999;
     const VirtualCalibrations model(run, {}, seed);
     ASSERT_TRUE(model.is_in_lanes());
@@ -235,7 +235,7 @@ TEST(VirtualCalibration, AirOutOfRangeIsASampleWithoutResult) {
     VirtualRun run = run_of(Kind::psd);
     run.simulation.environment = Environment{Air{}};
     run.simulation.verified_share = 0.5;
-    run.inputs.inputs = {normal(InputQuantity::humidity, 0.5)};  // of 0.5: below 0 or above 1 in a third of the cases
+    run.inputs.inputs = {normal(SharedQuantity::humidity, 0.5)};  // of 0.5: below 0 or above 1 in a third of the cases
     const VirtualCalibrations model(run, {}, seed);
     const Eigen::MatrixXd outputs = outputs_of(model, 64);
     for (std::uint64_t sample = 0; sample < 64; ++sample) {
@@ -247,7 +247,7 @@ TEST(VirtualCalibration, AirOutOfRangeIsASampleWithoutResult) {
 TEST(VirtualCalibration, HeadThatCannotBeReplayedIsTracedWhole) {
     VirtualRun run = run_of(Kind::psd_traced);
     run.heads = make_head(beam_and_psd(), 100.0, std::nullopt, {}, ReadingModel::coupled_mode);
-    run.inputs.inputs = {normal(InputQuantity::reflector, 1e-4, "ppp")};
+    run.inputs.inputs = {normal(SetupQuantity::reflector, 1e-4, "ppp")};
     const VirtualCalibrations model(run, {}, seed);
     EXPECT_FALSE(model.is_in_lanes());
     const Eigen::MatrixXd outputs = outputs_of(model);
@@ -260,7 +260,7 @@ TEST(VirtualCalibration, HeadThatCannotBeReplayedIsTracedWhole) {
 
 TEST(VirtualCalibration, DerivedOutputsAreCombinationsOfTheValues) {
     VirtualRun run = run_of(Kind::ideal);
-    run.inputs.inputs = {normal(InputQuantity::reflector, 1e-4, "ppp")};
+    run.inputs.inputs = {normal(SetupQuantity::reflector, 1e-4, "ppp")};
     const std::size_t entries = VirtualCalibrations(run, {}, seed).evaluator().entries().size();
     Eigen::VectorXd row = Eigen::VectorXd::Zero(Eigen::Index(entries));
     row[1] = 2.0, row[Eigen::Index(entries) - 1] = -3.0;
@@ -279,13 +279,13 @@ TEST(VirtualCalibration, RefusesWhatTheRunDoesNotHave) {
         run.inputs.inputs = {input};
         expect_refused([&] { VirtualCalibrations(run, {}, seed); }, what);
     };
-    refused(Kind::ideal, normal(InputQuantity::reflector, 1e-4, "pp0"), "pp0");
-    refused(Kind::ideal, normal(InputQuantity::psd_zero, 1e-4, "ppp"), "psd");
-    refused(Kind::psd_traced, normal(InputQuantity::psd_distance, 1.0), "design");
-    refused(Kind::psd_traced, normal(InputQuantity::part_shift, 1.0, "", "prism"), "prism");
-    refused(Kind::psd, normal(InputQuantity::temperature, 1.0), "state of the air");
-    refused(Kind::multi_beam_traced, normal(InputQuantity::gain, 0.01, "ppp"), "gain");
-    refused(Kind::multi_beam, normal(InputQuantity::beam_constant, 0.01, "ppp", "", 3), "0 to 2");
+    refused(Kind::ideal, normal(SetupQuantity::reflector, 1e-4, "pp0"), "pp0");
+    refused(Kind::ideal, normal(SetupQuantity::psd_zero, 1e-4, "ppp"), "psd");
+    refused(Kind::psd_traced, normal(SharedQuantity::psd_distance, 1.0), "design");
+    refused(Kind::psd_traced, normal(SharedQuantity::part_shift, 1.0, "", "prism"), "prism");
+    refused(Kind::psd, normal(SharedQuantity::temperature, 1.0), "state of the air");
+    refused(Kind::multi_beam_traced, normal(SetupQuantity::gain, 0.01, "ppp"), "gain");
+    refused(Kind::multi_beam, normal(SetupQuantity::beam_constants, 0.01, "ppp", "", 3), "0 to 2");
     VirtualRun run = run_of(Kind::ideal);
     run.inputs.noise = {{NoiseQuantity::channel, {DistributionKind::normal, 0.0, 1.0}, "spot_x"}};
     expect_refused([&] { VirtualCalibrations(run, {}, seed); }, "spot_x");

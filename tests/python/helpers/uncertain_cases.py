@@ -56,7 +56,7 @@ def all_inputs(scenario: reference.Scenario, air: bool = True, angles: float = 4
             add("psd_zero", 0.05, 2, line)
         add("distance_constant", 1e-2, 1, line)
         if scenario.layout == "multi_beam":
-            add("beam_constant", 1e-2, 3, line)
+            add("beam_constants", 1e-2, 3, line)
         add("lateral", 0.5, 2, line)
         add("roll", 5e-3, 1, line)
         add("gain", 3e-3, 1, line)

@@ -107,7 +107,7 @@ class Sample:
                 setup[name] = nominal.get(name, 0.0) + self._of(name, line)
             if self.given.layout == "multi_beam":
                 beams = nominal.get("beam_constants") or [0.0] * len(self.given.beam_offsets)
-                setup["beam_constants"] = [b + self._of("beam_constant", line, i) for i, b in enumerate(beams)]
+                setup["beam_constants"] = [b + self._of("beam_constants", line, i) for i, b in enumerate(beams)]
             setups[line] = setup
         offsets = [
             [offset + self._of("beam_offset", component=2 * i + j) for j, offset in enumerate(pair)]

@@ -103,7 +103,7 @@ def test_scale_lines_have_the_scale_and_what_their_own_tables_name() -> None:
 
 def test_each_beam_has_a_constant_and_a_place_of_its_own() -> None:
     found = inputs_of("beam_constants_um = 1.0\nbeam_offsets_um = 2.0", BEAMS)
-    assert [component for quantity, line, _, component in found if (quantity, line) == ("beam_constant", "npp")] == [
+    assert [component for quantity, line, _, component in found if (quantity, line) == ("beam_constants", "npp")] == [
         0,
         1,
         2,

@@ -150,7 +150,7 @@ def test_inputs_act_as_differences_of_whole_calibrations_say(layout: str, method
     left_out: tuple[str, ...] = ()
     if method == "enhanced":  # of what it does not know its nominal weights make something else than its own
         scenario = replace(scenario, misalignment={})
-        left_out = ("psd_zero", "beam_constant")
+        left_out = ("psd_zero", "beam_constants")
     every = [one for one in all_inputs(scenario, angles=1e-4) if one.line in ("", "ppp", "00p")]
     inputs = centred([one for one in every if one.quantity not in left_out])
     calibrations = calibrations_of(scenario, table, _core.UncertainInputs(inputs), method=method, air=AIR)

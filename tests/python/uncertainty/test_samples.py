@@ -129,7 +129,7 @@ def test_outputs_are_those_of_an_evaluation_of_the_readings(layout: str, method:
         scenario = replace(scenario, misalignment=aligned)
     # What the evaluation takes for known is known.
     unknown = ("roll", "gain", "lateral", "psd_distance") + (
-        ("psd_zero", "beam_constant") if method == "enhanced" else ()
+        ("psd_zero", "beam_constants") if method == "enhanced" else ()
     )
     angles = 5e-5 if method == "enhanced" else 4e-4
     known = [one for one in all_inputs(scenario, False, angles) if one.quantity not in unknown]

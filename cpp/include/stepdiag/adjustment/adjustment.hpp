@@ -8,48 +8,26 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <limits>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "stepdiag/evaluation/evaluation.hpp"
+#include "stepdiag/measurement/setup_quantity.hpp"
 
 namespace stepdiag {
 
-// What is unknown of a line's set-up. Units: rad, mm, 1 (gain), mm/s (drift).
-enum class SetupQuantity {
-    reflector,          // (a, b): mirror normal R_tool F Exp(a, b, 0) z
-    laser,              // (a, b): sensor axes F Exp(a, b, 0)
-    distance_constant,  // what every distance reads too much
-    beam_constants,     // layout multi_beam: what d2 ... dn read too much, against d1
-    psd_zero,           // layout psd: what a centred spot reads
-    lateral,            // the beam's origin beside its nominal place, along local x and y
-    roll,               // of the head about its beam: sensor axes F Exp(a, b, 0) Exp(0, 0, roll)
-    gain,               // tilts read 1 + gain times themselves; layout psd: spots; multi_beam: the beams' offsets
-    drift,              // distances read too much by drift times the time since the set-up's first reading
-};
-inline constexpr int setup_quantity_count = 9;
-std::string name(SetupQuantity quantity);  // "reflector", ...
-
-// How an unknown is taken: infinite: free; 0: fixed at 0; else the standard uncertainty with which it is known to be 0.
-using PriorUncertainty = double;
-inline constexpr PriorUncertainty free_unknown = std::numeric_limits<double>::infinity();
-inline constexpr PriorUncertainty fixed_unknown = 0.0;
-
-// By SetupQuantity; none: the default. Defaults of measured lines: reflector, distance_constant, beam_constants and
-// psd_zero free; laser free, but known to 2000 urad where the constants of the layout's beams are not fixed; lateral
-// known to 1 mm, roll to 20,000 urad, gain to 0.01; drift fixed. A lateral offset, roll or gain acts by the tilts only,
-// which are 0 on a perfect machine: free means known to 1 m, 1 rad, 1, and one whose uncertainty stays above half of
-// that is not determined. Where no tilt tells the laser's angles from the mirror's (lines of a single axis, distances
+// By SetupQuantity (measurement/setup_quantity.hpp); none: the table's default, but a laser on a measured line is known
+// to 2000 urad where the constants of the layout's beams are not fixed. A lateral offset, roll or gain acts by the tilts
+// only, which are 0 on a perfect machine: free means known to 1 m, 1 rad, 1, and one whose uncertainty stays above half
+// of that is not determined. Where no tilt tells the laser's angles from the mirror's (lines of a single axis, distances
 // alone) they act at second order only, and the distances get a cosine error of theirs.
-// Defaults of scale lines: reflector fixed, and their tilts and spots then are not used; beams have a constant each;
-// the laser's angles are fixed at 0, and what is given as their standard uncertainty (500 urad) makes the cosine error
-// travel (a^2 + b^2)/2 by which, with a mirror that is square to the beam, their distances read short; roll and gain
-// fixed; the others as on measured lines. What is said of all lines reaches scale lines for distance_constant and
-// lateral only; the rest of a scale line's set-up is said by its own name.
-using SetupPriors = std::array<std::optional<PriorUncertainty>, setup_quantity_count>;
+// On scale lines a fixed reflector means that tilts and spots are not used. The laser's angles are fixed at 0 there, and
+// what is given as their standard uncertainty makes the cosine error travel (a^2 + b^2)/2 by which, with a mirror that is
+// square to the beam, their distances read short. What is said of all lines reaches scale lines for distance_constant
+// and lateral only; the rest of a scale line's set-up is said by its own name.
+using SetupPriors = std::array<std::optional<PriorUncertainty>, adjusted_quantity_count>;
 
 // Standard deviation with which the second difference of neighbouring nodes is known to be 0: real axes are smooth.
 struct Smoothness {

@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "stepdiag/head/head_layout.hpp"
+#include "stepdiag/measurement/head_layout.hpp"
 #include "stepdiag/head/interferometer.hpp"
 #include "stepdiag/head/spot_sensor.hpp"
 #include "stepdiag/optics/body.hpp"

@@ -13,10 +13,10 @@
 
 #include "stepdiag/core/air.hpp"
 #include "stepdiag/head/design.hpp"
-#include "stepdiag/head/head_layout.hpp"
 #include "stepdiag/head/traced_head.hpp"
 #include "stepdiag/measurement/head_calibration.hpp"
 #include "stepdiag/measurement/reading.hpp"
+#include "stepdiag/measurement/setup_quantity.hpp"
 #include "stepdiag/optics/medium.hpp"
 
 namespace stepdiag {
@@ -73,6 +73,9 @@ struct Misalignment {
     double gain = 0.0;   // tilts read 1 + gain times themselves; psd: spots; multi_beam: beams stand there
     double drift = 0.0;  // mm/s: of all distances since the set-up's first reading
 };
+// The same numbers by setup::Column, of a head with so many beams; and back again.
+std::vector<double> setup_numbers(const Misalignment& misalignment, int beams);
+Misalignment misalignment_of(const std::vector<double>& setup_numbers);
 
 // A head and its mirror set up on one line.
 struct HeadSetup {

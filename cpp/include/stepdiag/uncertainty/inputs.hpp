@@ -4,26 +4,19 @@
 // Signs and frames as those of the nominal quantity: Misalignment, PoseError, Environment (CONVENTIONS).
 #pragma once
 
+#include <optional>
 #include <string>
+#include <string_view>
+#include <variant>
 #include <vector>
 
+#include "stepdiag/measurement/setup_quantity.hpp"
 #include "stepdiag/monte_carlo/distribution.hpp"
 
 namespace stepdiag {
 
-enum class InputQuantity {
-    // of the set-up of one line (`line`), components a, b or x, y; beam_constant: component counts d1 ... dn from 0
-    reflector,          // rad
-    laser,              // rad
-    psd_zero,           // mm
-    distance_constant,  // mm
-    beam_constant,      // mm
-    lateral,            // mm
-    roll,               // rad
-    gain,               // 1
-    drift,              // mm/s, of the line's distances since its first reading
-    scale_length,       // mm: what the distances of the line's last point read too much (a scale line's standard)
-    scale_factor,       // 1: distances read 1 + this times their travel from the line's first reading
+// Beside the set-up of each line (measurement/setup_quantity.hpp; `line`): what lines share.
+enum class SharedQuantity {
     // of the head (`part`: a component of its design, by name; of all lines that have it)
     part_shift,     // mm, component x, y, z
     part_rotation,  // rad, component about x, y, z
@@ -40,6 +33,7 @@ enum class InputQuantity {
     machine_drift,  // mm/s, component x, y, z, of the functional point since the first reading of the run
 };
 
+using InputQuantity = std::variant<SetupQuantity, SharedQuantity>;
 std::string name(InputQuantity quantity);  // "reflector", ..., "machine_drift"
 InputQuantity parse_input_quantity(const std::string& name);
 
@@ -73,6 +67,23 @@ struct ReadingNoise {
 };
 // "noise of distance", "common noise", "head walk", "machine walk x", "position x", "orientation x".
 std::string name(const ReadingNoise& noise);
+
+// What there is to be uncertain: the set-up quantities, then the shared ones and the noises.
+struct UncertainQuantity {
+    enum class Of { line, part, head, air, machine, noise };
+    std::string_view name;
+    std::string_view key;   // in scenarios, with its unit; empty: it has others
+    std::string_view text;  // what reports call it
+    Of of;
+    std::string_view components = {};       // a letter each; empty: a single one without a letter
+    bool of_beams = false;                  // all of them for each of d1 ... dn
+    std::optional<HeadLayout> layout = {};  // the only one that has it
+
+    int count(int beams) const;  // of components, with so many beams
+};
+const std::vector<UncertainQuantity>& uncertain_quantities();
+const UncertainQuantity& record(InputQuantity quantity);
+const UncertainQuantity& record(NoiseQuantity quantity);
 
 struct UncertainInputs {
     std::vector<UncertainInput> inputs = {};

@@ -1,4 +1,4 @@
-#include "stepdiag/head/head_layout.hpp"
+#include "stepdiag/measurement/head_layout.hpp"
 
 #include "stepdiag/core/error.hpp"
 

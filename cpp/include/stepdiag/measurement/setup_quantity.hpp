@@ -1,0 +1,140 @@
+// What a line's set-up is made of: how head and mirror stand, and what is wrong with their readings. The one table of
+// these quantities. What is unknown of an adjustment, misaligned in a simulation and uncertain in a virtual calibration
+// is a row of it; keys of scenarios, columns of files and reports derive from it.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "stepdiag/measurement/head_layout.hpp"
+
+namespace stepdiag {
+
+// How an unknown is taken: infinite: free; 0: fixed at 0; else the standard uncertainty with which it is known to be 0.
+using PriorUncertainty = double;
+inline constexpr PriorUncertainty free_unknown = std::numeric_limits<double>::infinity();
+inline constexpr PriorUncertainty fixed_unknown = 0.0;
+
+enum class SetupQuantity {
+    reflector,          // (a, b): mirror normal R_tool F Exp(a, b, 0) z
+    laser,              // (a, b): sensor axes F Exp(a, b, 0)
+    distance_constant,  // what every distance reads too much
+    beam_constants,     // layout multi_beam: what each of d1 ... dn reads too much; of an adjustment: d2 ... against d1
+    psd_zero,           // layout psd: what a centred spot reads
+    lateral,            // the beam's origin beside its nominal place, along local x and y
+    roll,               // of the head about its beam: sensor axes F Exp(a, b, 0) Exp(0, 0, roll)
+    gain,               // tilts read 1 + gain times themselves; layout psd: spots; multi_beam: the beams' offsets
+    drift,              // distances read too much by drift times the time since the set-up's first reading
+    // No unknowns of an adjustment:
+    scale_length,  // what the distances of the line's last point read too much: a length standard's error
+    scale_factor,  // distances read too much by this times their travel from the line's first point
+};
+inline constexpr int setup_quantity_count = 11;
+inline constexpr int adjusted_quantity_count = 9;  // the first ones
+
+struct SetupQuantityRecord {
+    std::string_view name;             // in options and files
+    std::string_view key;              // in scenarios, with their unit
+    std::string_view text;             // in the name of an uncertain input
+    std::string_view symbol;           // over a column of a report
+    std::string_view unit;             // of the library
+    std::string_view report_unit;      // as in keys
+    std::string_view components;       // a letter each; empty: a single one without a letter
+    bool of_beams;                     // one for each of d1 ... dn
+    std::optional<HeadLayout> layout;  // the only one that has it
+    // What an adjustment takes it for by default, on measured lines and on scale lines.
+    PriorUncertainty prior, scale_line_prior;
+    // What "free" means: infinite but for what acts by tilts only, which are 0 on a perfect machine.
+    PriorUncertainty broadest;
+    double usual;  // how far from 0 it usually is, where readings do not tell; infinite: they always do
+    std::string_view meaning;
+};
+
+// clang-format off
+inline constexpr std::array<SetupQuantityRecord, setup_quantity_count> setup_quantities = {{
+    {"reflector", "reflector_urad", "reflector", "reflector", "rad", "urad", "ab", false, std::nullopt,
+     free_unknown, fixed_unknown, free_unknown, 2e-3, "tilt (a, b) of the mirror about local x and y"},
+    {"laser", "laser_urad", "laser", "laser", "rad", "urad", "ab", false, std::nullopt,
+     free_unknown, 500e-6, free_unknown, 2e-3, "tilt (a, b) of the beam and the sensor's axes"},
+    {"distance_constant", "distance_constant_mm", "distance constant", "constant", "mm", "um", "", false, std::nullopt,
+     free_unknown, free_unknown, free_unknown, free_unknown, "what every distance of a line reads too much"},
+    {"beam_constants", "beam_constants_um", "beam constant", "beam", "mm", "um", "", true, HeadLayout::multi_beam,
+     free_unknown, free_unknown, free_unknown, free_unknown, "what d2, d3, ... read too much, against d1"},
+    {"psd_zero", "psd_zero_mm", "PSD zero", "psd zero", "mm", "um", "xy", false, HeadLayout::psd,
+     free_unknown, free_unknown, free_unknown, 10.0, "what a centred spot reads"},
+    {"lateral", "lateral_mm", "lateral", "lateral", "mm", "mm", "xy", false, std::nullopt,
+     1.0, 1.0, 1e3, free_unknown, "the beam's origin beside its nominal place, along local x and y"},
+    {"roll", "roll_urad", "roll", "roll", "rad", "urad", "", false, std::nullopt,
+     20e-3, fixed_unknown, 1.0, free_unknown, "roll of the head about its beam"},
+    {"gain", "gain", "gain", "gain", "1", "ppm", "", false, std::nullopt,
+     0.01, fixed_unknown, 1.0, free_unknown, "tilts (spots; the beams' offsets) read 1 + gain times themselves"},
+    {"drift", "drift_um_per_h", "drift", "drift", "mm s-1", "um_per_h", "", false, std::nullopt,
+     fixed_unknown, fixed_unknown, free_unknown, free_unknown,
+     "what distances read too much for every hour since the set-up's first reading"},
+    {"scale_length", "scale_um", "scale length", "scale length", "mm", "um", "", false, std::nullopt,
+     fixed_unknown, fixed_unknown, free_unknown, free_unknown,
+     "what the distances of the line's last point read too much"},
+    {"scale_factor", "scale_ppm", "scale factor", "scale factor", "1", "ppm", "", false, std::nullopt,
+     fixed_unknown, fixed_unknown, free_unknown, free_unknown, "what distances read too much, by their travel"},
+}};
+// clang-format on
+
+constexpr const SetupQuantityRecord& record(SetupQuantity quantity) {
+    return setup_quantities[static_cast<std::size_t>(quantity)];
+}
+constexpr bool is_adjusted(SetupQuantity quantity) { return static_cast<int>(quantity) < adjusted_quantity_count; }
+inline std::string name(SetupQuantity quantity) { return std::string(record(quantity).name); }
+
+// The numbers of a line's set-up, in vectors: component by component in the order of the table, those of beams last.
+namespace setup {
+
+struct Columns {
+    int first, count;
+};
+// Of a head with so many beams d1 ... dn.
+constexpr Columns columns(SetupQuantity quantity, int beams) {
+    const auto count = [](const SetupQuantityRecord& record) {
+        return record.components.empty() ? 1 : static_cast<int>(record.components.size());
+    };
+    int first = 0;
+    for (int q = 0; q < setup_quantity_count; ++q) {
+        const SetupQuantityRecord& other = setup_quantities[static_cast<std::size_t>(q)];
+        const bool before = q < static_cast<int>(quantity) || record(quantity).of_beams;
+        if (before && !other.of_beams) first += count(other);
+    }
+    return {first, record(quantity).of_beams ? beams : count(record(quantity))};
+}
+constexpr int first_column(SetupQuantity quantity) { return columns(quantity, 0).first; }
+
+enum Column : int {
+    reflector = first_column(SetupQuantity::reflector),
+    laser = first_column(SetupQuantity::laser),
+    distance_constant = first_column(SetupQuantity::distance_constant),
+    psd_zero = first_column(SetupQuantity::psd_zero),
+    lateral = first_column(SetupQuantity::lateral),
+    roll = first_column(SetupQuantity::roll),
+    gain = first_column(SetupQuantity::gain),
+    drift = first_column(SetupQuantity::drift),
+    scale_length = first_column(SetupQuantity::scale_length),
+    scale_factor = first_column(SetupQuantity::scale_factor),
+    beam_constants = first_column(SetupQuantity::beam_constants),
+};
+constexpr int size(int beams) { return beam_constants + beams; }
+
+struct Component {
+    SetupQuantity quantity;
+    int number;  // of beams: 0 for d1
+};
+constexpr Component component(int column) {
+    for (int q = 0; q < setup_quantity_count; ++q) {
+        const Columns of = columns(SetupQuantity(q), column + 1);
+        if (column >= of.first && column < of.first + of.count) return {SetupQuantity(q), column - of.first};
+    }
+    return {SetupQuantity::beam_constants, 0};  // no such column
+}
+
+}  // namespace setup
+}  // namespace stepdiag
