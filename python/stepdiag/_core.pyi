@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumetricAccuracy', 'adjust', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'volumetric_accuracy', 'with_covariance']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'uncertain_quantities', 'volumetric_accuracy', 'with_covariance']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -163,6 +163,63 @@ class Plan:
     @property
     def volume(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
+class SetupQuantity:
+    """
+    What a line's set-up is made of: a row of setup_quantities().
+    """
+    @property
+    def components(self) -> str:
+        """
+        A letter each; empty: a single one without a letter.
+        """
+    @property
+    def key(self) -> str:
+        """
+        In scenarios, with its unit.
+        """
+    @property
+    def layout(self) -> str | None:
+        """
+        The only layout of heads that has it.
+        """
+    @property
+    def meaning(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        """
+        In options and files.
+        """
+    @property
+    def of_beams(self) -> bool:
+        """
+        Whether there is one for each of d1 ... dn.
+        """
+    @property
+    def prior(self) -> float:
+        """
+        What an adjustment takes it for by default: infinite: free; 0: fixed at 0; else the standard uncertainty with which it is known to be 0.
+        """
+    @property
+    def report_unit(self) -> str:
+        """
+        As in keys.
+        """
+    @property
+    def scale_line_prior(self) -> float:
+        """
+        The same on scale lines.
+        """
+    @property
+    def symbol(self) -> str:
+        """
+        Over a column of a report.
+        """
+    @property
+    def unit(self) -> str:
+        """
+        Of the library: rad, mm, 1, mm s-1.
+        """
 class Measurement:
     """
     A run's readings, row by row: line, point, run, direction, commanded position (mm), and channels in native units (mm, rad; NaN where a reading was lost).
@@ -1499,9 +1556,35 @@ class AdaptiveProcedure:
         """
         Its leaves, half-open.
         """
+class UncertainQuantity:
+    """
+    What may be uncertain about a virtual calibration.
+    """
+    def count(self, beams: typing.SupportsInt | typing.SupportsIndex) -> int:
+        """
+        Of components, with so many beams.
+        """
+    @property
+    def key(self) -> str:
+        """
+        In scenarios, with its unit; empty: it has others.
+        """
+    @property
+    def layout(self) -> str | None:
+        """
+        The only layout of heads that has it.
+        """
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def of(self) -> str:
+        """
+        "line", "part" (of the head), "head", "air", "machine" or "noise".
+        """
 class UncertainInput:
     """
-    An input quantity that is drawn once for each virtual calibration, as a deviation added to what is nominal. quantity: "reflector", "laser" (rad, component a, b: 0, 1), "psd_zero", "lateral" (mm, x, y), "distance_constant" (mm), "beam_constant" (mm, of beam `component`), "roll" (rad), "gain" (1), "drift" (mm/s), "scale_length" (mm), "scale_factor" (1): of a line; "part_shift" (mm), "part_rotation" (rad): of a part of the head; "psd_distance", "beam_offset" (mm), "reading_model" (1): of the head; "temperature" (degrees Celsius), "pressure" (Pa), "humidity" (1), "refractive_index", "wavelength" (1, relative): of the air; "machine_drift" (mm/s, x, y, z).
+    An input quantity that is drawn once for each virtual calibration, as a deviation added to what is nominal. quantity: one of setup_quantities(), of a line (component 0, 1: a, b or x, y); "part_shift" (mm), "part_rotation" (rad): of a part of the head; "psd_distance", "beam_offset" (mm), "reading_model" (1): of the head; "temperature" (degrees Celsius), "pressure" (Pa), "humidity" (1), "refractive_index", "wavelength" (1, relative): of the air; "machine_drift" (mm/s, x, y, z).
     """
     def __init__(self, quantity: str, distribution: Distribution, *, line: str = '', part: str = '', component: typing.SupportsIndex = 0) -> None:
         """
@@ -2089,6 +2172,10 @@ def run_ranges(model: SampleModel, bins: Bins, ranges: collections.abc.Sequence[
     """
     The same for half-open ranges of leaves, each computed by one thread; those that are whole.
     """
+def setup_quantities() -> tuple[SetupQuantity, ...]:
+    """
+    The table of set-up quantities. The first adjusted_quantity_count of them are unknowns of an adjustment.
+    """
 def simulate(machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[str, Head], options: SimulationOptions | None = None, **kwargs: typing.Any) -> Measurement:
     """
     A run on the virtual machine: lines of the plan, then its scale lines. head: one, or a dict with one for each line. The options are SimulationOptions, or its fields by name. Points of a visit are approached in the direction of its own travel. Readings whose beam misses the mirror or does not come back are lost (NaN). Raises InvalidArgument; RuntimeError where a replay and its trace differ.
@@ -2105,6 +2192,10 @@ def trace_beams(head: Head, *, distance: typing.SupportsFloat | typing.SupportsI
     """
     All light of a traced head, as segments: the mirror's centre at (lateral, distance) in the sensor frame, mm, its tilts (alpha, beta) in rad. A parent stands before its children. Raises InvalidArgument.
     """
+def uncertain_quantities() -> tuple[UncertainQuantity, ...]:
+    """
+    The set-up quantities, what lines share, and the noises.
+    """
 def volumetric_accuracy(calibration: Calibration, *, tool: numpy.typing.ArrayLike | None = None, coverage: typing.SupportsFloat | typing.SupportsIndex = 0.95, samples: typing.SupportsIndex = 10000, seed: typing.SupportsIndex = 0) -> VolumetricAccuracy:
     """
     By draws from the joint normal distribution of a calibration evaluated with full_covariance. tool: offset (mm); none: the calibration's. Raises InvalidArgument without a covariance and for fewer samples than 100/(1 - coverage).
@@ -2114,6 +2205,7 @@ def with_covariance(calibration: Calibration, covariance: numpy.typing.ArrayLike
     The calibration with another covariance of its values, such as Propagation.covariance of its entries, and the standard uncertainties that go with it. Raises InvalidArgument for what is no covariance of these values.
     """
 __version__: str = '0.1.0'
+adjusted_quantity_count: int = 9
 largest_repeat_count: int = 1000
 leaf_samples: int = 2000
 pilot_samples: int = 10000

@@ -14,9 +14,10 @@ PYTHON = Path(__file__).parents[2] / "python"
 BELOW: dict[str, set[str]] = {
     "units": set(),
     "parameters": {"units"},
+    "setup_quantities": {"units"},
     "style": set(),
-    "config": {"units"},
-    "calibration": {"parameters"},
+    "config": {"setup_quantities"},
+    "calibration": {"parameters", "setup_quantities"},
     "io": {"config", "calibration"},
     "head": {"io", "style"},
     "scenario": {"head"},

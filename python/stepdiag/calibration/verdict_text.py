@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from stepdiag._core import Adjustment, Calibration, FitReason
+from stepdiag.setup_quantities import SETUP_QUANTITIES, component_name
 
 # Of a calibration whose reasons are not at hand.
 MEANING: Final = {
@@ -69,10 +70,8 @@ def reason_text(reason: FitReason) -> str:
 
 
 def _component(reason: FitReason) -> str:
-    pairs = ("reflector", "laser", "psd_zero", "lateral")
-    if reason.channel in pairs:
-        return " " + ("a" if reason.component == 0 else "b")
-    return f" of d{reason.component + 1}" if reason.channel == "beam_constants" else ""
+    quantity = SETUP_QUANTITIES[reason.channel]
+    return f"{' of' if quantity.of_beams else ''} {component_name(quantity, reason.component)}".rstrip()
 
 
 def _shown(fit: str) -> str:

@@ -1,10 +1,13 @@
 """The keys of a scenario that say what an adjustment takes for unknown: `[adjustment]`, `[smoothness]`."""
 
-from typing import Annotated, Literal
+import math
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
 from stepdiag.config.key_types import AMPLITUDE, Amplitude, Section, key, tables
+from stepdiag.setup_quantities import SETUP_QUANTITIES
+from stepdiag.units import unit_of
 
 
 def _weighs(choice: str | float) -> str | float:
@@ -18,43 +21,31 @@ Choice = Annotated[Literal["free", "fixed"] | float, AfterValidator(_weighs)]
 _choice = '"free", "fixed" or a positive standard uncertainty'
 
 
+def _prior(name: str, but: str = "") -> Any:
+    """The key of a set-up unknown, with the meaning and the default that the core's table gives it."""
+    quantity = SETUP_QUANTITIES[name]
+    number = float(f"{quantity.prior / unit_of(quantity.key).native:.12g}")
+    default = {math.inf: "free", 0.0: "fixed"}.get(quantity.prior, number)
+    where = f"Layout `{quantity.layout}`: " if quantity.layout else ""
+    meaning = where + quantity.meaning if where else quantity.meaning[0].upper() + quantity.meaning[1:]
+    shown = default if isinstance(default, str) else f"{default:g}"
+    return key(_choice, f"{meaning}; by default {shown}{but}.", None, default)
+
+
 class AdjustmentKeys(Section):
     """What an adjustment takes each unknown of a line's set-up for."""
 
-    reflector_urad: Choice | None = key(
-        _choice, "Tilt (a, b) of the mirror about local x and y; by default free.", None, "free"
+    reflector_urad: Choice | None = _prior("reflector")
+    laser_urad: Choice | None = _prior(
+        "laser", ", but 2000 for a layout `multi_beam` whose `beam_constants_um` are not fixed"
     )
-    laser_urad: Choice | None = key(
-        _choice,
-        "Tilt (a, b) of the beam and the sensor's axes; by default free, but 2000 for a layout `multi_beam` whose "
-        "`beam_constants_um` are not fixed.",
-        None,
-        "free",
-    )
-    distance_constant_mm: Choice | None = key(
-        _choice, "What every distance of a line reads too much; by default free.", None, "free"
-    )
-    beam_constants_um: Choice | None = key(
-        _choice, "Layout `multi_beam`: what d2, d3, ... read too much, against d1; by default free.", None, "free"
-    )
-    psd_zero_mm: Choice | None = key(_choice, "Layout `psd`: what a centred spot reads; by default free.", None, "free")
-    lateral_mm: Choice | None = key(
-        _choice, "The beam's origin beside its nominal place, along local x and y; by default 1.", None, 1.0
-    )
-    roll_urad: Choice | None = key(_choice, "Roll of the head about its beam; by default 20000.", None, 20000.0)
-    gain: Choice | None = key(
-        _choice,
-        "Tilts (spots; the beams' offsets) read 1 + gain times themselves; by default 0.01.",
-        None,
-        0.01,
-    )
-    drift_um_per_h: Choice | None = key(
-        _choice,
-        "What distances read too much for every hour since the set-up's first reading; by default fixed. It takes "
-        "the column `time_s` of the measurement.",
-        None,
-        "fixed",
-    )
+    distance_constant_mm: Choice | None = _prior("distance_constant")
+    beam_constants_um: Choice | None = _prior("beam_constants")
+    psd_zero_mm: Choice | None = _prior("psd_zero")
+    lateral_mm: Choice | None = _prior("lateral")
+    roll_urad: Choice | None = _prior("roll")
+    gain: Choice | None = _prior("gain")
+    drift_um_per_h: Choice | None = _prior("drift", ". It takes the column `time_s` of the measurement")
 
 
 class AdjustmentSection(AdjustmentKeys):

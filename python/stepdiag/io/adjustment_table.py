@@ -1,6 +1,6 @@
 """An adjustment as a labelled table: its calibration's, and how set-ups and readings fit."""
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -8,18 +8,7 @@ import xarray as xr
 from stepdiag._core import Adjustment, Measurement, Outlier, SetupEstimate
 from stepdiag.calibration.verdict_text import reason_text
 from stepdiag.io.labelled_tables import calibration_table, channel_units
-
-_SETUP_UNITS: Final = {
-    "reflector": "rad",
-    "laser": "rad",
-    "distance_constant": "mm",
-    "beam_constants": "mm",
-    "psd_zero": "mm",
-    "lateral": "mm",
-    "roll": "rad",
-    "gain": "1",
-    "drift": "mm s-1",
-}
+from stepdiag.setup_quantities import SETUP_QUANTITIES
 
 
 def adjustment_table(adjustment: Adjustment, measurement: Measurement | None = None) -> xr.Dataset:
@@ -132,7 +121,7 @@ def _setup(setup: list[SetupEstimate]) -> dict[str, Any]:
         ),
         "setup_units": (
             "setup",
-            np.array([_SETUP_UNITS.get(unknown.quantity, "") for unknown in setup]),
+            np.array([SETUP_QUANTITIES[unknown.quantity].unit for unknown in setup]),
             {"long_name": "units of value, standard uncertainty and prior"},
         ),
         "setup_value": (

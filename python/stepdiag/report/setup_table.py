@@ -1,31 +1,11 @@
 """How head and mirror were set up, as an adjustment found it: one row a set-up, one column an unknown."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Final
 
-from stepdiag._core import SetupEstimate
-from stepdiag.units import HOUR
-
-# Of each quantity: its unit in reports, that unit in native ones, and what its components are called.
-UNITS: Final[Mapping[str, tuple[str, float]]] = {
-    "reflector": ("µrad", 1e-6),
-    "laser": ("µrad", 1e-6),
-    "distance_constant": ("µm", 1e-3),
-    "beam_constants": ("µm", 1e-3),
-    "psd_zero": ("µm", 1e-3),
-    "lateral": ("mm", 1.0),
-    "roll": ("µrad", 1e-6),
-    "gain": ("ppm", 1e-6),
-    "drift": ("µm/h", 1e-3 / HOUR),
-}
-COMPONENTS: Final[Mapping[str, Sequence[str]]] = {
-    "reflector": ("reflector a", "reflector b"),
-    "laser": ("laser a", "laser b"),
-    "distance_constant": ("constant",),
-    "psd_zero": ("psd zero x", "psd zero y"),
-    "lateral": ("lateral x", "lateral y"),
-}
+from stepdiag._core import SetupEstimate, SetupQuantity
+from stepdiag.setup_quantities import SETUP_QUANTITIES, component_name, report_unit
 
 # Above this share of its prior uncertainty an unknown is as good as unread.
 NOTHING_LEARNT: Final = 0.9
@@ -38,7 +18,7 @@ def setup_rows(estimates: Sequence[SetupEstimate], lines: Sequence[str], *, valu
     told = sorted((e for e in estimates if e.prior > 0.0), key=lambda e: (e.run, lines.index(e.line)))
     learnt = [e for e in told if e.value is None or e.standard_uncertainty < NOTHING_LEARNT * e.prior]
     found = {(e.quantity, e.component) for e in learnt if e.value is not None}
-    columns = sorted(found, key=lambda column: (list(UNITS).index(column[0]), column[1]))
+    columns = sorted(found, key=lambda column: (list(SETUP_QUANTITIES).index(column[0]), column[1]))
     if columns:
         write = _value if values else _uncertainty
         yield from _table(learnt, columns, write)
@@ -47,7 +27,7 @@ def setup_rows(estimates: Sequence[SetupEstimate], lines: Sequence[str], *, valu
         if estimate not in learnt:
             prior.setdefault(estimate.quantity, []).append(estimate)
     for quantity, known in prior.items():
-        unit, native = UNITS[quantity]
+        unit, native = report_unit(SETUP_QUANTITIES[quantity])
         everywhere = len(known) == sum(e.quantity == quantity for e in told)
         places = "every line" if everywhere else ", ".join(dict.fromkeys(e.line for e in known))
         widths = ", ".join(dict.fromkeys(f"{e.prior / native:g}" for e in known))
@@ -65,7 +45,7 @@ def concise(value: float, uncertainty: float) -> str:
 
 
 def _value(estimate: SetupEstimate) -> str:
-    native = UNITS[estimate.quantity][1]
+    native = report_unit(SETUP_QUANTITIES[estimate.quantity]).native
     if estimate.value is None:
         return "-"
     return concise(estimate.value / native, estimate.standard_uncertainty / native)
@@ -74,7 +54,7 @@ def _value(estimate: SetupEstimate) -> str:
 def _uncertainty(estimate: SetupEstimate) -> str:
     if estimate.value is None:
         return "-"
-    size = estimate.standard_uncertainty / UNITS[estimate.quantity][1]
+    size = estimate.standard_uncertainty / report_unit(SETUP_QUANTITIES[estimate.quantity]).native
     return f"{size:#.3g}" if size < 100.0 else f"{size:.0f}"
 
 
@@ -86,8 +66,8 @@ def _table(
         row = rows.setdefault((estimate.run, estimate.line), {})
         row[estimate.quantity, estimate.component] = write(estimate)
     several_runs = len({run for run, _ in rows}) > 1
-    heading = ["", *(_heading(quantity, component) for quantity, component in columns)]
-    units = ["", *(UNITS[quantity][0] for quantity, _ in columns)]
+    heading = ["", *(_heading(SETUP_QUANTITIES[quantity], component) for quantity, component in columns)]
+    units = ["", *(report_unit(SETUP_QUANTITIES[quantity]).name for quantity, _ in columns)]
     body = [
         [f"{line} run {run}" if several_runs else line, *(row.get(column, "") for column in columns)]
         for (run, line), row in rows.items()
@@ -98,8 +78,5 @@ def _table(
         yield f"  {cells[0].ljust(len(first))}  {'  '.join(others)}".rstrip()
 
 
-def _heading(quantity: str, component: int) -> str:
-    if quantity == "beam_constants":
-        return f"beam d{component + 1}"
-    names = COMPONENTS.get(quantity, (quantity,))
-    return names[component]
+def _heading(quantity: SetupQuantity, component: int) -> str:
+    return f"{quantity.symbol} {component_name(quantity, component)}".rstrip()

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag import _core
-from stepdiag.scenario.uncertain_inputs import key_units
+from stepdiag.scenario.uncertain_inputs import key_unit
 from stepdiag.uncertainty.result import FloatArray, UncertaintyResult, label, volume_units
 from stepdiag.units import report_value
 
@@ -23,7 +23,7 @@ def input_rows(inputs: _core.UncertainInputs) -> Iterator[str]:
     everything: list[_core.UncertainInput | _core.ReadingNoise] = [*inputs.inputs, *inputs.noise]
     width = max((len(one.name) for one in everything), default=0)
     for one in everything:
-        yield f"  {one.name:<{width}}  {_distribution(one.distribution, *key_units(one))}"
+        yield f"  {one.name:<{width}}  {_distribution(one.distribution, *key_unit(one))}"
 
 
 def _distribution(distribution: _core.Distribution, name: str, unit: float) -> str:

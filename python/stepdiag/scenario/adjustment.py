@@ -1,8 +1,7 @@
 """A scenario's `[adjustment]` and `[smoothness]` in native units (mm, rad, s): what an adjustment takes for unknown."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
@@ -10,29 +9,13 @@ from stepdiag.config.adjustment_keys import AdjustmentKeys, AdjustmentSection, S
 from stepdiag.config.key_errors import show
 from stepdiag.config.scenario_keys import PlausibleSection, ScenarioKeys
 from stepdiag.config.toml_text import located
-from stepdiag.units import MICROMETRE, MICRORADIAN
+from stepdiag.setup_quantities import ADJUSTED, SETUP_QUANTITIES
+from stepdiag.units import MICROMETRE, MICRORADIAN, native
 
-HOUR: Final = 3600.0  # s
 METRE: Final = 1000.0  # mm
 
-# Of each key: the core's quantity, and its unit in native ones.
-QUANTITIES: Final[Mapping[str, tuple[str, float]]] = {
-    "reflector_urad": ("reflector", MICRORADIAN),
-    "laser_urad": ("laser", MICRORADIAN),
-    "distance_constant_mm": ("distance_constant", 1.0),
-    "beam_constants_um": ("beam_constants", MICROMETRE),
-    "psd_zero_mm": ("psd_zero", 1.0),
-    "lateral_mm": ("lateral", 1.0),
-    "roll_urad": ("roll", MICRORADIAN),
-    "gain": ("gain", 1.0),
-    "drift_um_per_h": ("drift", MICROMETRE / HOUR),
-}
-
-# How well a scale line's laser stands along its axis, where nothing is said (the core's default).
-SCALE_LINE_ANGLE: Final = 500.0 * MICRORADIAN
-
-# Keys that only one layout of heads has a meaning for: the layout, and what the others lack.
-LAYOUT_OF: Final = {"psd_zero_mm": ("psd", "no spot"), "beam_constants_um": ("multi_beam", "no beams d1, d2, ...")}
+# What heads of other layouts lack.
+LACKING: Final = {"psd": "no spot", "multi_beam": "no beams d1, d2, ..."}
 
 
 def setup_priors(keys: ScenarioKeys, layout: str, path: Path) -> tuple[_core.SetupPriors, dict[str, _core.SetupPriors]]:
@@ -51,24 +34,16 @@ def setup_priors(keys: ScenarioKeys, layout: str, path: Path) -> tuple[_core.Set
 
 
 def _priors(keys: AdjustmentKeys, layout: str, place: str) -> _core.SetupPriors:
-    choices = {name: getattr(keys, name) for name in keys.model_fields_set & QUANTITIES.keys()}
-    for name, (needed, lack) in LAYOUT_OF.items():
-        if layout != needed and choices.get(name, "fixed") != "fixed":
+    choices = {q.name: getattr(keys, q.key) for q in ADJUSTED if q.key in keys.model_fields_set}
+    for quantity in ADJUSTED:
+        choice, needed = choices.get(quantity.name, "fixed"), quantity.layout
+        if needed not in (None, layout) and choice != "fixed":
             raise InvalidArgument(
-                f"{place}.{name}: goes with the layout {show(needed)}; a head {show(layout)} has {lack}, "
-                f"got {show(choices[name])}"
+                f"{place}.{quantity.key}: goes with the layout {show(needed)}; a head {show(layout)} has "
+                f"{LACKING[needed]}, got {show(choice)}"
             )
     with located(place):
-        return _core.SetupPriors(**native(choices))
-
-
-def native(choices: Mapping[str, Any]) -> dict[str, Any]:
-    """By the core's names: "free", "fixed", or a standard uncertainty in native units."""
-    result = {}
-    for key, choice in choices.items():
-        quantity, unit = QUANTITIES[key]
-        result[quantity] = choice if isinstance(choice, str) else choice * unit
-    return result
+        return _core.SetupPriors(**{q.name: native(q.key, choices[q.name]) for q in ADJUSTED if q.name in choices})
 
 
 def smoothness_of(keys: SmoothnessSection, path: Path) -> _core.Smoothness | None:
@@ -96,5 +71,5 @@ def scale_line_angle(keys: AdjustmentSection, line: str) -> float:
     """The standard uncertainty of each of the laser's angles on a scale line, rad; 0: fixed."""
     own = keys.by_line[line].laser_urad if line in keys.by_line else None
     if own is None:
-        return SCALE_LINE_ANGLE
+        return SETUP_QUANTITIES["laser"].scale_line_prior
     return 0.0 if isinstance(own, str) else own * MICRORADIAN

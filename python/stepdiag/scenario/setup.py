@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Final
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
@@ -9,7 +10,11 @@ from stepdiag.config.key_errors import BY_LINE, show, suggest
 from stepdiag.config.scenario_head_keys import AirKeys, EnvironmentSection
 from stepdiag.config.scenario_keys import SECTIONS_BY_LINE, MisalignmentKeys, NoiseSection, ScenarioKeys
 from stepdiag.config.toml_text import located
-from stepdiag.units import HECTOPASCAL, HOUR, MICROMETRE, MICRORADIAN, PERCENT
+from stepdiag.setup_quantities import ADJUSTED
+from stepdiag.units import HECTOPASCAL, MICROMETRE, PERCENT, native, unit_of
+
+# Of the kinds of readings: the key of their noise.
+KEY_OF_READING: Final = {"distance": "distance_um", "tilt": "tilt_urad", "spot": "spot_um"}
 
 
 def misalignments(keys: ScenarioKeys, heads: Mapping[str, _core.Head], path: Path) -> dict[str, _core.Misalignment]:
@@ -27,17 +32,9 @@ def misalignments(keys: ScenarioKeys, heads: Mapping[str, _core.Head], path: Pat
         shared = MisalignmentKeys() if line in keys.plan.scale_lines else keys.misalignment
         values = shared.model_dump(exclude={BY_LINE}) | (own.model_dump(exclude_unset=True) if own else {})
         place = f"misalignment.{line}" if own and own.beam_constants_um is not None else "misalignment"
-        result[line] = _core.Misalignment(
-            reflector=_scaled(values["reflector_urad"]),
-            laser=_scaled(values["laser_urad"]),
-            psd_zero=values["psd_zero_mm"],
-            distance_constant=values["distance_constant_mm"],
-            beam_constants=_beam_constants(values["beam_constants_um"], heads[line], f"{path}: {place}"),
-            lateral=values["lateral_mm"],
-            roll=values["roll_urad"] * MICRORADIAN,
-            gain=values["gain"],
-            drift=values["drift_um_per_h"] * MICROMETRE / HOUR,
-        )
+        _check_beam_constants(values["beam_constants_um"], heads[line], f"{path}: {place}")
+        given = {q.name: native(q.key, values[q.key]) for q in ADJUSTED if values[q.key] is not None}
+        result[line] = _core.Misalignment(**given)
         if values["drift_um_per_h"] != 0.0 and keys.plan.seconds_per_reading is None:
             place = f"misalignment.{line}" if own and "drift_um_per_h" in own.model_fields_set else "misalignment"
             raise InvalidArgument(
@@ -46,28 +43,16 @@ def misalignments(keys: ScenarioKeys, heads: Mapping[str, _core.Head], path: Pat
     return result
 
 
-def _beam_constants(constants: tuple[float, ...] | None, head: _core.Head, where: str) -> list[float]:
-    if constants is None:
-        return []
+def _check_beam_constants(constants: tuple[float, ...] | None, head: _core.Head, where: str) -> None:
     count = len(head.signals) if head.layout == "multi_beam" else 0
-    if len(constants) != count:
+    if constants is not None and len(constants) != count:
         expected = f"{count} constants, one for each beam" if count else f"none, for the layout {show(head.layout)}"
         raise InvalidArgument(f"{where}.beam_constants_um: expected {expected}, got {show(constants)}")
-    return [constant * MICROMETRE for constant in constants]
-
-
-def _scaled(angles: tuple[float, float]) -> tuple[float, float]:
-    return angles[0] * MICRORADIAN, angles[1] * MICRORADIAN
 
 
 def noise_of(keys: NoiseSection) -> _core.Noise:
-    return _core.Noise(
-        distance=keys.distance_um * MICROMETRE,
-        tilt=keys.tilt_urad * MICRORADIAN,
-        spot=keys.spot_um * MICROMETRE,
-        seed=keys.seed,
-        common=keys.common_um * MICROMETRE,
-    )
+    deviations = {name: native(key, getattr(keys, key)) for name, key in KEY_OF_READING.items()}
+    return _core.Noise(**deviations, seed=keys.seed, common=keys.common_um * MICROMETRE)
 
 
 Air = _core.Environment | None
@@ -107,15 +92,11 @@ def environment(keys: AirKeys, place: str) -> Air:
 def weights(keys: ScenarioKeys) -> _core.ReadingUncertainty:
     """[uncertainty], else the positive deviations of [noise], else the core's defaults; key by key."""
     given = {}
-    for name, key, unit in (
-        ("distance", "distance_um", MICROMETRE),
-        ("tilt", "tilt_urad", MICRORADIAN),
-        ("spot", "spot_um", MICROMETRE),
-    ):
+    for name, key in KEY_OF_READING.items():
         # A standard deviation of 0 makes a perfect simulation; it is no statement about readings.
         stated, deviation = getattr(keys.uncertainty, key), getattr(keys.noise, key)
         if stated is not None:
-            given[name] = stated.native(unit).standard_uncertainty
+            given[name] = stated.native(unit_of(key).native).standard_uncertainty
         elif deviation > 0.0:
-            given[name] = deviation * unit
+            given[name] = native(key, deviation)
     return _core.ReadingUncertainty(**given)

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -13,74 +13,16 @@ from stepdiag.config.distribution_keys import StatedDistribution
 from stepdiag.config.key_errors import show, suggest
 from stepdiag.config.scenario_keys import ScenarioKeys
 from stepdiag.config.toml_text import located
-from stepdiag.config.uncertainty_keys import SetupUncertaintyKeys, UncertaintySection
+from stepdiag.config.uncertainty_keys import ComponentUncertaintyKeys, SetupUncertaintyKeys, UncertaintySection
 from stepdiag.head.description import components
 from stepdiag.scenario.heads import DescribedHead
-from stepdiag.scenario.setup import weights
-from stepdiag.units import HECTOPASCAL, HOUR, MICROMETRE, MICRORADIAN, PERCENT
+from stepdiag.scenario.setup import KEY_OF_READING, weights
+from stepdiag.units import MICROMETRE, Unit, unit_of
 
-PPM: Final = 1e-6
-
-
-class Meaning(NamedTuple):
-    """Of a key: the core's quantity, the key's unit in native ones, and how many components it has."""
-
-    quantity: str
-    unit: float
-    components: int = 1
-
-
-OF_SETUP: Final[Mapping[str, Meaning]] = {
-    "reflector_urad": Meaning("reflector", MICRORADIAN, 2),
-    "laser_urad": Meaning("laser", MICRORADIAN, 2),
-    "psd_zero_mm": Meaning("psd_zero", 1.0, 2),
-    "distance_constant_mm": Meaning("distance_constant", 1.0),
-    "beam_constants_um": Meaning("beam_constant", MICROMETRE),  # one for each beam
-    "lateral_mm": Meaning("lateral", 1.0, 2),
-    "roll_urad": Meaning("roll", MICRORADIAN),
-    "gain": Meaning("gain", 1.0),
-    "drift_um_per_h": Meaning("drift", MICROMETRE / HOUR),
-    "scale_um": Meaning("scale_length", MICROMETRE),
-    "scale_ppm": Meaning("scale_factor", PPM),
-}
+# The core's quantities by their keys. A channel's noise has others: [noise] and uncertainty.channel.
+QUANTITIES: Final[Mapping[str, _core.UncertainQuantity]] = {q.key: q for q in _core.uncertain_quantities() if q.key}
 OF_SCALE_LINES: Final = ("scale_um", "scale_ppm")
-OF_COMPONENT: Final[Mapping[str, Meaning]] = {
-    "shift_um": Meaning("part_shift", MICROMETRE, 3),
-    "rotation_urad": Meaning("part_rotation", MICRORADIAN, 3),
-}
-OF_ALL: Final[Mapping[str, Meaning]] = {
-    "psd_distance_mm": Meaning("psd_distance", 1.0),
-    "beam_offsets_um": Meaning("beam_offset", MICROMETRE),  # two for each beam
-    "reading_model": Meaning("reading_model", 1.0),
-    "temperature_c": Meaning("temperature", 1.0),
-    "pressure_hpa": Meaning("pressure", HECTOPASCAL),
-    "humidity_percent": Meaning("humidity", PERCENT),
-    "refractive_index_ppm": Meaning("refractive_index", PPM),
-    "wavelength_ppm": Meaning("wavelength", PPM),
-    "machine_drift_um_per_h": Meaning("machine_drift", MICROMETRE / HOUR, 3),
-}
-OF_NOISE: Final[Mapping[str, Meaning]] = {
-    "head_walk_um_per_sqrt_h": Meaning("head_walk", MICROMETRE / HOUR**0.5),
-    "machine_walk_um_per_sqrt_h": Meaning("machine_walk", MICROMETRE / HOUR**0.5, 3),
-    "repeatability_um": Meaning("position", MICROMETRE, 3),
-    "repeatability_urad": Meaning("orientation", MICRORADIAN, 3),
-}
 STATE_OF_AIR: Final = ("temperature_c", "pressure_hpa", "humidity_percent")
-WALKS: Final = ("head_walk_um_per_sqrt_h", "machine_walk_um_per_sqrt_h")
-TIMED: Final = (*WALKS, "drift_um_per_h", "machine_drift_um_per_h")
-
-# Keys that only one layout of heads has a meaning for.
-LAYOUT_OF: Final = {
-    "psd_zero_mm": "psd",
-    "psd_distance_mm": "psd",
-    "beam_constants_um": "multi_beam",
-    "beam_offsets_um": "multi_beam",
-}
-BY_LAYOUT: Final = ("psd_distance_mm", "beam_offsets_um")  # a description has components in their place
-_UNIT_NAMES: Final = {
-    "um_per_sqrt_h": "µm/√h", "um_per_h": "µm/h", "um": "µm", "urad": "µrad", "mm": "mm", "ppm": "ppm", "c": "°C",
-    "hpa": "hPa", "percent": "%",
-}  # fmt: skip
 
 
 def uncertain_inputs(
@@ -93,7 +35,7 @@ def uncertain_inputs(
     _check_fit(section, keys, described, head, place)
     for line, own in section.by_line.items():
         _check_fit(own, keys, {line: described[line]}, head, f"{place}.{line}")
-    inputs = [*_of_lines(keys, head), *_of_components(section, described, place), *_of_all(section, head)]
+    inputs = [*_of_lines(keys, head), *_of_components(section, described, head, place), *_of_all(section, head)]
     noise, correlations = list(_noise(keys, head, place)), list(_correlations(section, inputs, place))
     with located(place):
         return _core.UncertainInputs(inputs, noise, correlations)
@@ -116,27 +58,28 @@ def _check_fit(
     place: str,
 ) -> None:
     """Whether head and plan have what the keys are about."""
-    stated = {
-        name: getattr(section, name) for name in section.model_fields_set if name in {*OF_SETUP, *OF_ALL, *OF_NOISE}
-    }
+    stated = {name: getattr(section, name) for name in section.model_fields_set & QUANTITIES.keys()}
     designed = any(one.design is not None for one in described.values())
     for name, value in stated.items():
         if isinstance(value, StatedDistribution) and value.is_certain:
             continue
-        needed = LAYOUT_OF.get(name, head.layout)
-        if head.layout != needed:
-            raise InvalidArgument(f"{place}.{name}: goes with the layout {show(needed)}, got {show(head.layout)}")
-        if name in BY_LAYOUT and designed:
+        quantity, walks = QUANTITIES[name], name.endswith("_per_sqrt_h")
+        if quantity.layout not in (None, head.layout):
+            raise InvalidArgument(
+                f"{place}.{name}: goes with the layout {show(quantity.layout)}, got {show(head.layout)}"
+            )
+        # A description has components in its place.
+        if quantity.of == "head" and quantity.layout is not None and designed:
             raise InvalidArgument(
                 f"{place}.{name}: goes with a head by its layout; a description has [uncertainty.head.COMPONENT]"
             )
         if name == "gain" and designed and head.layout == "multi_beam":
             raise InvalidArgument(f"{place}.gain: the beams of a described head stand where its design says")
-        if name in TIMED and keys.plan.seconds_per_reading is None:
+        if name.endswith("_h") and keys.plan.seconds_per_reading is None:
             raise InvalidArgument(f"{place}.{name}: expected plan.seconds_per_reading as well, got none")
-        if name in WALKS and value.kind != "normal":
+        if walks and value.kind != "normal":
             raise InvalidArgument(f'{place}.{name}: a random walk is normal, got the distribution "{value.kind}"')
-        if name in WALKS and value.expectation != 0.0:
+        if walks and value.expectation != 0.0:
             raise InvalidArgument(f"{place}.{name}.expectation: a random walk has none; a drift is linear in time")
         if name in OF_SCALE_LINES and isinstance(section, UncertaintySection) and not keys.plan.scale_lines:
             raise InvalidArgument(f"{place}.{name}: goes with plan.scale_lines, got none")
@@ -151,15 +94,14 @@ def _of_lines(keys: ScenarioKeys, head: _core.Head) -> Iterator[_core.UncertainI
     shared = keys.uncertainty
     for line in [*keys.plan.lines, *keys.plan.scale_lines]:
         own = shared.by_line.get(line, SetupUncertaintyKeys())
-        for name, meaning in OF_SETUP.items():
+        for name in SetupUncertaintyKeys.model_fields:
             of_all = (name in OF_SCALE_LINES) == (line in keys.plan.scale_lines)
             stated = getattr(own, name) or (getattr(shared, name) if of_all else None)
-            count = len(head.signals) if name == "beam_constants_um" else meaning.components
-            yield from _inputs(stated, meaning, count, line=line)
+            yield from _inputs(stated, name, head, line=line)
 
 
 def _of_components(
-    section: UncertaintySection, described: Mapping[str, DescribedHead], place: str
+    section: UncertaintySection, described: Mapping[str, DescribedHead], head: _core.Head, place: str
 ) -> Iterator[_core.UncertainInput]:
     designs = {head.place: head.design for head in described.values() if head.design is not None}
     known = list(dict.fromkeys(name for design in designs.values() for name in components(design)))
@@ -168,24 +110,24 @@ def _of_components(
             raise InvalidArgument(f"{place}.head.{part}: goes with a described head; a layout has no components")
         if part not in known:
             raise InvalidArgument(f"{place}.head.{part}: no component of the head; {suggest(part, known)}")
-        for name, meaning in OF_COMPONENT.items():
-            yield from _inputs(getattr(own, name), meaning, meaning.components, part=part)
+        for name in ComponentUncertaintyKeys.model_fields:
+            yield from _inputs(getattr(own, name), name, head, part=part)
 
 
 def _of_all(section: UncertaintySection, head: _core.Head) -> Iterator[_core.UncertainInput]:
-    for name, meaning in OF_ALL.items():
-        count = 2 * len(head.signals) if name == "beam_offsets_um" else meaning.components
-        yield from _inputs(getattr(section, name), meaning, count)
+    for name, quantity in QUANTITIES.items():
+        if quantity.of in ("head", "air", "machine"):
+            yield from _inputs(getattr(section, name), name, head)
 
 
 def _inputs(
-    stated: StatedDistribution | None, meaning: Meaning, count: int, *, line: str = "", part: str = ""
+    stated: StatedDistribution | None, key: str, head: _core.Head, *, line: str = "", part: str = ""
 ) -> Iterator[_core.UncertainInput]:
     if stated is None or stated.is_certain:
         return
-    distribution = stated.native(meaning.unit)
-    for component in range(count):
-        yield _core.UncertainInput(meaning.quantity, distribution, line=line, part=part, component=component)
+    quantity, distribution = QUANTITIES[key], stated.native(unit_of(key).native)
+    for component in range(quantity.count(len(head.signals))):
+        yield _core.UncertainInput(quantity.name, distribution, line=line, part=part, component=component)
 
 
 def _noise(keys: ScenarioKeys, head: _core.Head, place: str) -> Iterator[_core.ReadingNoise]:
@@ -195,24 +137,22 @@ def _noise(keys: ScenarioKeys, head: _core.Head, place: str) -> Iterator[_core.R
     own = _own_noise(section, channels, place)
     for channel in channels:
         kind = kind_of_channel(channel)
-        key, unit = {"distance": ("distance_um", MICROMETRE), "tilt": ("tilt_urad", MICRORADIAN)}.get(
-            kind, ("spot_um", MICROMETRE)
-        )
+        key = KEY_OF_READING[kind]
         stated = own.get(channel) or getattr(section, key)
         if stated is None:
             distribution = _core.Distribution("normal", spread=getattr(weight, kind))
         else:
-            distribution = stated.native(unit)
+            distribution = stated.native(unit_of(key).native)
         if distribution.spread > 0.0 or distribution.expectation != 0.0:
             yield _core.ReadingNoise("channel", distribution, channel=channel)
     common = section.common_um or StatedDistribution("normal", keys.noise.common_um)
     if not common.is_certain:
         yield _core.ReadingNoise("common", common.native(MICROMETRE))
-    for name, meaning in OF_NOISE.items():
-        stated = getattr(section, name)
+    for name, quantity in QUANTITIES.items():
+        stated = getattr(section, name) if quantity.of == "noise" and quantity.name != "common" else None
         if stated is not None and not stated.is_certain:
-            for component in range(meaning.components):
-                yield _core.ReadingNoise(meaning.quantity, stated.native(meaning.unit), component=component)
+            for component in range(quantity.count(len(channels))):
+                yield _core.ReadingNoise(quantity.name, stated.native(unit_of(name).native), component=component)
 
 
 def kind_of_channel(channel: str) -> str:
@@ -246,10 +186,8 @@ def _correlations(
         yield [names.index(name) for name in correlated.names], np.array(correlated.correlation)
 
 
-def key_units(one: _core.UncertainInput | _core.ReadingNoise) -> tuple[str, float]:
-    """The unit of the key that an input or noise comes from: what it is called, and what it is in native ones."""
-    if isinstance(one, _core.ReadingNoise) and one.quantity in ("channel", "common"):
-        return ("µrad", MICRORADIAN) if kind_of_channel(one.channel) == "tilt" else ("µm", MICROMETRE)
-    everything = {**OF_SETUP, **OF_COMPONENT, **OF_ALL, **OF_NOISE}
-    key, meaning = next((k, m) for k, m in everything.items() if m.quantity == one.quantity)
-    return next((name for ending, name in _UNIT_NAMES.items() if key.endswith(f"_{ending}")), ""), meaning.unit
+def key_unit(one: _core.UncertainInput | _core.ReadingNoise) -> Unit:
+    """The unit of the key that an input or noise comes from."""
+    if isinstance(one, _core.ReadingNoise) and one.channel:
+        return unit_of(KEY_OF_READING[kind_of_channel(one.channel)])
+    return unit_of(next(key for key, quantity in QUANTITIES.items() if quantity.name == one.quantity))

@@ -7,8 +7,9 @@ import pytest
 from small_scenario import SCENARIO
 
 import stepdiag as sd
-from stepdiag.scenario.adjustment import QUANTITIES, SCALE_LINE_ANGLE, native
 from stepdiag.scenario.description import Scenario, adjustment_options, parse_scenario
+from stepdiag.setup_quantities import ADJUSTED, SETUP_QUANTITIES
+from stepdiag.units import native
 
 PSD = SCENARIO.replace('"ideal"', '"psd"\npsd_distance_mm = 50.0')
 BEAMS = SCENARIO.replace('"ideal"', '"multi_beam"\nbeam_offsets_mm = [[0, 0], [20, 0], [0, 20]]')
@@ -26,22 +27,20 @@ def priors(text: str, line: str) -> dict[str, float]:
 
 # --- units and defaults ----------------------------------------------------------------------------------------------
 def test_choices_become_native_units() -> None:
-    assert native({"reflector_urad": "free", "gain": "fixed"}) == {"reflector": "free", "gain": "fixed"}
-    assert native({"lateral_mm": 2.0, "gain": 0.5}) == {"lateral": 2.0, "gain": 0.5}
-    numbers = native({"laser_urad": 500, "beam_constants_um": 3.0, "drift_um_per_h": 3.6})
-    # A product of two rounded numbers.
-    assert numbers == pytest.approx({"laser": 500e-6, "beam_constants": 3e-3, "drift": 1e-6}, rel=1e-15)
+    assert (native("reflector_urad", "free"), native("gain", "fixed")) == ("free", "fixed")
+    assert (native("lateral_mm", 2.0), native("gain", 0.5)) == (2.0, 0.5)
+    numbers = [native("laser_urad", 500), native("beam_constants_um", 3.0), native("drift_um_per_h", 3.6)]
+    assert numbers == pytest.approx([500e-6, 3e-3, 1e-6], rel=1e-15)  # a product of two rounded numbers
 
 
 def test_every_key_reaches_the_core() -> None:
-    numbers = "\n".join(f"{key} = 0.5" for key in QUANTITIES if key != "beam_constants_um")
+    stated = [quantity for quantity in ADJUSTED if quantity.name != "beam_constants"]
+    numbers = "\n".join(f"{quantity.key} = 0.5" for quantity in stated)
     text = (
         PSD.split("[misalignment]")[0].replace("[plan]", "[plan]\nseconds_per_reading = 1.0")
         + f"[adjustment]\n{numbers}\n"
     )
-    known = priors(text, "npp")
-    assert known == pytest.approx({name: 0.5 * unit for name, unit in QUANTITIES.values() if name in known}, rel=1e-15)
-    assert known.keys() == {name for name, _ in QUANTITIES.values()} - {"beam_constants"}
+    assert priors(text, "npp") == pytest.approx({q.name: native(q.key, 0.5) for q in stated}, rel=1e-15)
     assert priors(BEAMS + "[adjustment]\nbeam_constants_um = 7.0\n", "npp")["beam_constants"] == pytest.approx(7e-3)
 
 
@@ -67,10 +66,11 @@ def test_defaults_are_the_documented_ones(text: str, line: str, expected: dict[s
 
 
 def test_stated_default_of_scale_lines_is_that_of_the_core() -> None:
-    stated = "".join(f"[adjustment.{line}]\nlaser_urad = {SCALE_LINE_ANGLE * 1e6}\n" for line in ("p00", "0p0", "00p"))
+    angle = f"{SETUP_QUANTITIES['laser'].scale_line_prior * 1e6}"
+    stated = "".join(f"[adjustment.{line}]\nlaser_urad = {angle}\n" for line in ("p00", "0p0", "00p"))
     one, other = (adjusted(text).calibration for text in (SCENARIO, SCENARIO + stated))
     assert one.functions["EXX"][2].tobytes() == other.functions["EXX"][2].tobytes()
-    tight = adjusted(SCENARIO + stated.replace(f"{SCALE_LINE_ANGLE * 1e6}", '"fixed"')).calibration
+    tight = adjusted(SCENARIO + stated.replace(angle, '"fixed"')).calibration
     # The cosine error of 500 µrad over 80 mm is 20 nm, beside 0.1 µm a reading.
     assert tight.functions["EXX"][2][-1] < one.functions["EXX"][2][-1]
 

@@ -13,9 +13,9 @@ from small_scenario import SCENARIO
 import stepdiag as sd
 from stepdiag import _core
 from stepdiag.config.distribution_keys import WIDTHS
-from stepdiag.config.uncertainty_keys import SetupUncertaintyKeys, UncertaintySection
+from stepdiag.config.uncertainty_keys import ComponentUncertaintyKeys, SetupUncertaintyKeys, UncertaintySection
 from stepdiag.scenario.description import parse_scenario
-from stepdiag.scenario.uncertain_inputs import OF_ALL, OF_COMPONENT, OF_NOISE, OF_SETUP, kind_of_channel
+from stepdiag.scenario.uncertain_inputs import QUANTITIES, kind_of_channel
 
 TIMED = SCENARIO.replace("[plan]", "[plan]\nseconds_per_reading = 2.0")
 PSD = TIMED.replace('"ideal"', '"psd"\npsd_distance_mm = 50.0')
@@ -119,17 +119,14 @@ def test_components_of_a_described_head_shift_and_turn() -> None:
     assert (found[0].distribution.spread, found[3].distribution.spread) == pytest.approx((1e-2, 5e-5), rel=1e-15)
 
 
-EVERYTHING = {
-    **dict.fromkeys(OF_SETUP, 3.6), **dict.fromkeys(OF_ALL, 3.6), **dict.fromkeys(OF_NOISE, 3.6)
-}  # fmt: skip
+EVERYTHING = [key for key, quantity in QUANTITIES.items() if quantity.of != "part" and quantity.name != "common"]
 
 
 @pytest.mark.parametrize("key", EVERYTHING)
 def test_every_key_reaches_the_core_in_native_units(key: str) -> None:
     text = BEAMS if "beam" in key else PSD
     found = uncertain(f"{key} = 3.6", text)
-    meaning = {**OF_SETUP, **OF_ALL, **OF_NOISE}[key]
-    ours = [one for one in [*found.inputs, *found.noise] if one.quantity == meaning.quantity]
+    ours = [one for one in [*found.inputs, *found.noise] if one.quantity == QUANTITIES[key].name]
     assert ours
     unit = {  # written out, so that a wrong factor is not compared with itself
         "um": 1e-3, "mm": 1.0, "urad": 1e-6, "ppm": 1e-6, "c": 1.0, "hpa": 100.0, "percent": 0.01, "um_per_h": 1e-3 / 3600,
@@ -141,10 +138,12 @@ def test_every_key_reaches_the_core_in_native_units(key: str) -> None:
 
 
 def test_every_key_of_the_models_has_a_use() -> None:
-    used = {*OF_SETUP, *OF_ALL, *OF_NOISE, "distance_um", "tilt_urad", "spot_um", "common_um", "channel", "correlated"}
-    assert set(UncertaintySection.model_fields) == used | {"head", "by_line"}
-    assert set(SetupUncertaintyKeys.model_fields) == set(OF_SETUP)
-    assert set(OF_COMPONENT) == {"shift_um", "rotation_urad"}
+    of = {place: {key for key, quantity in QUANTITIES.items() if quantity.of == place} for place in ("line", "part")}
+    noise = {"distance_um", "tilt_urad", "spot_um", "channel"}
+    used = QUANTITIES.keys() - of["part"] | noise | {"correlated", "head", "by_line"}
+    assert set(UncertaintySection.model_fields) == used
+    assert set(SetupUncertaintyKeys.model_fields) == of["line"]
+    assert set(ComponentUncertaintyKeys.model_fields) == of["part"]
 
 
 def test_correlated_inputs_are_found_by_their_names() -> None:

@@ -1,0 +1,24 @@
+"""The set-up quantities of a line: the core's table, by name."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from stepdiag._core import SetupQuantity, adjusted_quantity_count, setup_quantities
+from stepdiag.units import UNITS, Unit
+
+SETUP_QUANTITIES: Final[Mapping[str, SetupQuantity]] = {quantity.name: quantity for quantity in setup_quantities()}
+
+# The unknowns of an adjustment, and what a scenario misaligns.
+ADJUSTED: Final[tuple[SetupQuantity, ...]] = setup_quantities()[:adjusted_quantity_count]
+
+
+def report_unit(quantity: SetupQuantity) -> Unit:
+    """The unit in which reports show it."""
+    return UNITS[quantity.report_unit]
+
+
+def component_name(quantity: SetupQuantity, component: int) -> str:
+    """What tells a component from the others: "a" or "b", "x" or "y", "d2"; empty for a single one."""
+    if quantity.of_beams:
+        return f"d{component + 1}"
+    return quantity.components[component] if quantity.components else ""
