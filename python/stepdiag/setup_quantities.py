@@ -12,13 +12,14 @@ SETUP_QUANTITIES: Final[Mapping[str, SetupQuantity]] = {quantity.name: quantity 
 ADJUSTED: Final[tuple[SetupQuantity, ...]] = setup_quantities()[:adjusted_quantity_count]
 
 
-def report_unit(quantity: SetupQuantity) -> Unit:
-    """The unit in which reports show it."""
-    return UNITS[quantity.report_unit]
+def report_unit(name: str) -> Unit:
+    """The unit in which reports show a quantity."""
+    return UNITS[SETUP_QUANTITIES[name].report_unit]
 
 
-def component_name(quantity: SetupQuantity, component: int) -> str:
+def component_name(name: str, component: int) -> str:
     """What tells a component from the others: "a" or "b", "x" or "y", "d2"; empty for a single one."""
+    quantity = SETUP_QUANTITIES[name]
     if quantity.of_beams:
         return f"d{component + 1}"
     return quantity.components[component] if quantity.components else ""

@@ -60,6 +60,8 @@ struct AdjustmentOfRun {
 
 using ChannelArrays = py::typing::Dict<py::str, DoubleArray>;
 
+PriorLike none() { return py::reinterpret_borrow<PriorLike>(py::none()); }
+
 }  // namespace
 }  // namespace stepdiag::bindings
 
@@ -73,26 +75,21 @@ struct handle_type_name<stepdiag::bindings::PriorLike> {
 namespace stepdiag::bindings {
 namespace {
 
-void bind_options(py::module_& m) {
+// A keyword for each unknown, named by the table.
+template <std::size_t... quantity>
+void bind_priors(py::module_& m, std::index_sequence<quantity...>) {
     py::class_<Priors>(m, "SetupPriors",
                        "How each unknown of a line's set-up is taken: \"free\", \"fixed\" at 0, or the standard "
                        "uncertainty with which it is known to be 0 (rad, mm, 1 for gain, mm/s for drift); None: the "
                        "default.")
-        .def(py::init([](const py::KWArgs<PriorLike>& given) {
-                 Priors priors;
-                 for (const auto& [name, prior] : given) {
-                     const auto quantity = name.cast<std::string>();
-                     const auto found =
-                         std::find_if(setup_quantities.begin(), setup_quantities.begin() + adjusted_quantity_count,
-                                      [&](const SetupQuantityRecord& record) { return record.name == quantity; });
-                     const auto q = std::size_t(found - setup_quantities.begin());
-                     if (q == priors.value.size())
-                         throw py::type_error("SetupPriors: no unknown \"" + quantity + "\"; see setup_quantities()");
-                     priors.value[q] = to_prior(py::reinterpret_borrow<PriorLike>(prior), quantity);
-                 }
-                 return priors;
+        .def(py::init([](const decltype(quantity, PriorLike())&... given) {
+                 return Priors{{to_prior(given, name(SetupQuantity(quantity)))...}};
              }),
-             "By name, as setup_quantities() lists them. Raises InvalidArgument.");
+             py::kw_only(), (py::arg(setup_quantities[quantity].name.data()) = none())..., "Raises InvalidArgument.");
+}
+
+void bind_options(py::module_& m) {
+    bind_priors(m, std::make_index_sequence<adjusted_quantity_count>());
 
     py::class_<Smoothness>(m, "Smoothness",
                            "Standard deviations with which second differences of neighbouring nodes are known to be 0: "

@@ -70,8 +70,8 @@ def reason_text(reason: FitReason) -> str:
 
 
 def _component(reason: FitReason) -> str:
-    quantity = SETUP_QUANTITIES[reason.channel]
-    return f"{' of' if quantity.of_beams else ''} {component_name(quantity, reason.component)}".rstrip()
+    of = " of" if SETUP_QUANTITIES[reason.channel].of_beams else ""
+    return f"{of} {component_name(reason.channel, reason.component)}".rstrip()
 
 
 def _shown(fit: str) -> str:

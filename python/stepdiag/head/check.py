@@ -15,8 +15,8 @@ from stepdiag.head.trace import (
     tilt_limits,
     travel_limits,
 )
+from stepdiag.units import MICRO
 
-MICRO = 1e6
 SQUARE = 1e-9  # rad: what rounding leaves
 
 

@@ -39,9 +39,8 @@ from stepdiag.config.head_keys import (
 from stepdiag.config.key_errors import show, suggest
 from stepdiag.config.toml_text import check_keys, located, parse_toml
 from stepdiag.io.whole_files import read_text
-from stepdiag.units import MICROMETRE, MILLIRADIAN, NANOMETRE
+from stepdiag.units import MICROMETRE, MILLIRADIAN, NANOMETRE, PPM
 
-PPM: Final = 1e-6
 ROOM: Final = 100.0  # mm between a head that is looked at by itself and its mirror
 FOLDER: Final = Path(str(resource_files("stepdiag.head") / "shipped"))
 

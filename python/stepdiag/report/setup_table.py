@@ -4,7 +4,8 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Final
 
-from stepdiag._core import SetupEstimate, SetupQuantity
+from stepdiag._core import SetupEstimate
+from stepdiag.report.text_columns import text_columns
 from stepdiag.setup_quantities import SETUP_QUANTITIES, component_name, report_unit
 
 # Above this share of its prior uncertainty an unknown is as good as unread.
@@ -27,7 +28,7 @@ def setup_rows(estimates: Sequence[SetupEstimate], lines: Sequence[str], *, valu
         if estimate not in learnt:
             prior.setdefault(estimate.quantity, []).append(estimate)
     for quantity, known in prior.items():
-        unit, native = report_unit(SETUP_QUANTITIES[quantity])
+        unit, native = report_unit(quantity)
         everywhere = len(known) == sum(e.quantity == quantity for e in told)
         places = "every line" if everywhere else ", ".join(dict.fromkeys(e.line for e in known))
         widths = ", ".join(dict.fromkeys(f"{e.prior / native:g}" for e in known))
@@ -45,7 +46,7 @@ def concise(value: float, uncertainty: float) -> str:
 
 
 def _value(estimate: SetupEstimate) -> str:
-    native = report_unit(SETUP_QUANTITIES[estimate.quantity]).native
+    native = report_unit(estimate.quantity).native
     if estimate.value is None:
         return "-"
     return concise(estimate.value / native, estimate.standard_uncertainty / native)
@@ -54,7 +55,7 @@ def _value(estimate: SetupEstimate) -> str:
 def _uncertainty(estimate: SetupEstimate) -> str:
     if estimate.value is None:
         return "-"
-    size = estimate.standard_uncertainty / report_unit(SETUP_QUANTITIES[estimate.quantity]).native
+    size = estimate.standard_uncertainty / report_unit(estimate.quantity).native
     return f"{size:#.3g}" if size < 100.0 else f"{size:.0f}"
 
 
@@ -66,17 +67,14 @@ def _table(
         row = rows.setdefault((estimate.run, estimate.line), {})
         row[estimate.quantity, estimate.component] = write(estimate)
     several_runs = len({run for run, _ in rows}) > 1
-    heading = ["", *(_heading(SETUP_QUANTITIES[quantity], component) for quantity, component in columns)]
-    units = ["", *(report_unit(SETUP_QUANTITIES[quantity]).name for quantity, _ in columns)]
+    heading = ["", *(_heading(quantity, component) for quantity, component in columns)]
+    units = ["", *(report_unit(quantity).name for quantity, _ in columns)]
     body = [
         [f"{line} run {run}" if several_runs else line, *(row.get(column, "") for column in columns)]
         for (run, line), row in rows.items()
     ]
-    widths = [max(map(len, column)) for column in zip(heading, units, *body, strict=True)]
-    for cells in (heading, units, *body):
-        first, *others = (cell.rjust(width) for cell, width in zip(cells, widths, strict=True))
-        yield f"  {cells[0].ljust(len(first))}  {'  '.join(others)}".rstrip()
+    yield from text_columns([heading, units, *body])
 
 
-def _heading(quantity: SetupQuantity, component: int) -> str:
-    return f"{quantity.symbol} {component_name(quantity, component)}".rstrip()
+def _heading(quantity: str, component: int) -> str:
+    return f"{SETUP_QUANTITIES[quantity].symbol} {component_name(quantity, component)}".rstrip()

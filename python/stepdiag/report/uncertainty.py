@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag import _core
+from stepdiag.report.text_columns import text_columns
 from stepdiag.scenario.uncertain_inputs import key_unit
 from stepdiag.uncertainty.result import FloatArray, UncertaintyResult, label, volume_units
 from stepdiag.units import report_value
@@ -236,11 +237,5 @@ def _percent(result: UncertaintyResult) -> str:
 
 def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
     """Columns of text, the first and a last one of words to the left, numbers to the right."""
-    lines = [heading, *rows]
-    widths = [max(len(line[k]) for line in lines) for k in range(len(heading))]
-    for line in lines:
-        cells = [
-            cell.ljust(width) if k == 0 or heading[k] == "where" else cell.rjust(width)
-            for k, (cell, width) in enumerate(zip(line, widths, strict=True))
-        ]
-        yield f"  {'  '.join(cells)}".rstrip()
+    left = (0, len(heading) - 1) if heading[-1] == "where" else (0,)
+    yield from text_columns([heading, *rows], left)
