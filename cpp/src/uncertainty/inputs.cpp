@@ -16,8 +16,8 @@ using Of = UncertainQuantity::Of;
 constexpr std::array<UncertainQuantity, 11> shared_quantities = {{
     {"part_shift", "shift_um", "shift", Of::part, "xyz"},
     {"part_rotation", "rotation_urad", "rotation", Of::part, "xyz"},
-    {"psd_distance", "psd_distance_mm", "PSD distance", Of::head, "", false, HeadLayout::psd},
-    {"beam_offset", "beam_offsets_um", "beam offset", Of::head, "uv", true, HeadLayout::multi_beam},
+    {"psd_distance", "psd_distance_mm", "PSD distance", Of::head, "", HeadLayout::psd},
+    {"beam_offset", "beam_offsets_um", "beam offset", Of::head, "uv", HeadLayout::multi_beam, true},
     {"reading_model", "reading_model", "reading model", Of::head},
     {"temperature", "temperature_c", "temperature", Of::air},
     {"pressure", "pressure_hpa", "pressure", Of::air},
@@ -117,7 +117,7 @@ const std::vector<UncertainQuantity>& uncertain_quantities() {
     static const std::vector<UncertainQuantity> all = [] {
         std::vector<UncertainQuantity> list;
         for (const SetupQuantityRecord& r : setup_quantities)
-            list.push_back({r.name, r.key, r.text, Of::line, r.components, r.of_beams, r.layout});
+            list.push_back({r.name, r.key, r.text, Of::line, r.components, r.layout, r.of_beams});
         list.insert(list.end(), shared_quantities.begin(), shared_quantities.end());
         list.insert(list.end(), noise_quantities.begin(), noise_quantities.end());
         return list;

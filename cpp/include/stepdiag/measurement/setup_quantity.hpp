@@ -36,49 +36,47 @@ inline constexpr int setup_quantity_count = 11;
 inline constexpr int adjusted_quantity_count = 9;  // the first ones
 
 struct SetupQuantityRecord {
-    std::string_view name;             // in options and files
-    std::string_view key;              // in scenarios, with their unit
-    std::string_view text;             // in the name of an uncertain input
-    std::string_view symbol;           // over a column of a report
-    std::string_view unit;             // of the library
-    std::string_view report_unit;      // as in keys
-    std::string_view components;       // a letter each; empty: a single one without a letter
-    bool of_beams;                     // one for each of d1 ... dn
-    std::optional<HeadLayout> layout;  // the only one that has it
+    std::string_view name;         // in options and files
+    std::string_view key;          // in scenarios, with their unit
+    std::string_view text;         // in the name of an uncertain input
+    std::string_view symbol;       // over a column of a report
+    std::string_view unit;         // of the library
+    std::string_view report_unit;  // as in keys
+    std::string_view meaning;
     // What an adjustment takes it for by default, on measured lines and on scale lines.
     PriorUncertainty prior, scale_line_prior;
+    std::string_view components = {};       // a letter each; empty: a single one without a letter
+    std::optional<HeadLayout> layout = {};  // the only one that has it
+    bool of_beams = false;                  // one for each of d1 ... dn
     // What "free" means: infinite but for what acts by tilts only, which are 0 on a perfect machine.
-    PriorUncertainty broadest;
-    double usual;  // how far from 0 it usually is, where readings do not tell; infinite: they always do
-    std::string_view meaning;
+    PriorUncertainty broadest = free_unknown;
+    double usual = free_unknown;  // how far from 0 it usually is, where readings do not tell; infinite: they always do
 };
 
 // clang-format off
 inline constexpr std::array<SetupQuantityRecord, setup_quantity_count> setup_quantities = {{
-    {"reflector", "reflector_urad", "reflector", "reflector", "rad", "urad", "ab", false, std::nullopt,
-     free_unknown, fixed_unknown, free_unknown, 2e-3, "tilt (a, b) of the mirror about local x and y"},
-    {"laser", "laser_urad", "laser", "laser", "rad", "urad", "ab", false, std::nullopt,
-     free_unknown, 500e-6, free_unknown, 2e-3, "tilt (a, b) of the beam and the sensor's axes"},
-    {"distance_constant", "distance_constant_mm", "distance constant", "constant", "mm", "um", "", false, std::nullopt,
-     free_unknown, free_unknown, free_unknown, free_unknown, "what every distance of a line reads too much"},
-    {"beam_constants", "beam_constants_um", "beam constant", "beam", "mm", "um", "", true, HeadLayout::multi_beam,
-     free_unknown, free_unknown, free_unknown, free_unknown, "what d2, d3, ... read too much, against d1"},
-    {"psd_zero", "psd_zero_mm", "PSD zero", "psd zero", "mm", "um", "xy", false, HeadLayout::psd,
-     free_unknown, free_unknown, free_unknown, 10.0, "what a centred spot reads"},
-    {"lateral", "lateral_mm", "lateral", "lateral", "mm", "mm", "xy", false, std::nullopt,
-     1.0, 1.0, 1e3, free_unknown, "the beam's origin beside its nominal place, along local x and y"},
-    {"roll", "roll_urad", "roll", "roll", "rad", "urad", "", false, std::nullopt,
-     20e-3, fixed_unknown, 1.0, free_unknown, "roll of the head about its beam"},
-    {"gain", "gain", "gain", "gain", "1", "ppm", "", false, std::nullopt,
-     0.01, fixed_unknown, 1.0, free_unknown, "tilts (spots; the beams' offsets) read 1 + gain times themselves"},
-    {"drift", "drift_um_per_h", "drift", "drift", "mm s-1", "um_per_h", "", false, std::nullopt,
-     fixed_unknown, fixed_unknown, free_unknown, free_unknown,
-     "what distances read too much for every hour since the set-up's first reading"},
-    {"scale_length", "scale_um", "scale length", "scale length", "mm", "um", "", false, std::nullopt,
-     fixed_unknown, fixed_unknown, free_unknown, free_unknown,
-     "what the distances of the line's last point read too much"},
-    {"scale_factor", "scale_ppm", "scale factor", "scale factor", "1", "ppm", "", false, std::nullopt,
-     fixed_unknown, fixed_unknown, free_unknown, free_unknown, "what distances read too much, by their travel"},
+    {"reflector", "reflector_urad", "reflector", "reflector", "rad", "urad",
+     "tilt (a, b) of the mirror about local x and y", free_unknown, fixed_unknown, "ab", {}, false, free_unknown, 2e-3},
+    {"laser", "laser_urad", "laser", "laser", "rad", "urad",
+     "tilt (a, b) of the beam and the sensor's axes", free_unknown, 500e-6, "ab", {}, false, free_unknown, 2e-3},
+    {"distance_constant", "distance_constant_mm", "distance constant", "constant", "mm", "um",
+     "what every distance of a line reads too much", free_unknown, free_unknown},
+    {"beam_constants", "beam_constants_um", "beam constant", "beam", "mm", "um",
+     "what d2, d3, ... read too much, against d1", free_unknown, free_unknown, "", HeadLayout::multi_beam, true},
+    {"psd_zero", "psd_zero_mm", "PSD zero", "psd zero", "mm", "um",
+     "what a centred spot reads", free_unknown, free_unknown, "xy", HeadLayout::psd, false, free_unknown, 10.0},
+    {"lateral", "lateral_mm", "lateral", "lateral", "mm", "mm",
+     "the beam's origin beside its nominal place, along local x and y", 1.0, 1.0, "xy", {}, false, 1e3},
+    {"roll", "roll_urad", "roll", "roll", "rad", "urad",
+     "roll of the head about its beam", 20e-3, fixed_unknown, "", {}, false, 1.0},
+    {"gain", "gain", "gain", "gain", "1", "ppm",
+     "tilts (spots; the beams' offsets) read 1 + gain times themselves", 0.01, fixed_unknown, "", {}, false, 1.0},
+    {"drift", "drift_um_per_h", "drift", "drift", "mm s-1", "um_per_h",
+     "what distances read too much for every hour since the set-up's first reading", fixed_unknown, fixed_unknown},
+    {"scale_length", "scale_um", "scale length", "scale length", "mm", "um",
+     "what the distances of the line's last point read too much", fixed_unknown, fixed_unknown},
+    {"scale_factor", "scale_ppm", "scale factor", "scale factor", "1", "ppm",
+     "what distances read too much, by their travel", fixed_unknown, fixed_unknown},
 }};
 // clang-format on
 

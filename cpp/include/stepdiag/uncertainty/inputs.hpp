@@ -76,8 +76,8 @@ struct UncertainQuantity {
     std::string_view text;  // what reports call it
     Of of;
     std::string_view components = {};       // a letter each; empty: a single one without a letter
-    bool of_beams = false;                  // all of them for each of d1 ... dn
     std::optional<HeadLayout> layout = {};  // the only one that has it
+    bool of_beams = false;                  // all of them for each of d1 ... dn
 
     int count(int beams) const;  // of components, with so many beams
 };
