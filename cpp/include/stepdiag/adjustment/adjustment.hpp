@@ -19,14 +19,14 @@
 namespace stepdiag {
 
 // By SetupQuantity (measurement/setup_quantity.hpp); none: the table's default, but a laser on a measured line is known
-// to 2000 urad where the constants of the layout's beams are not fixed. A lateral offset, roll or gain acts by the tilts
-// only, which are 0 on a perfect machine: free means known to 1 m, 1 rad, 1, and one whose uncertainty stays above half
-// of that is not determined. Where no tilt tells the laser's angles from the mirror's (lines of a single axis, distances
-// alone) they act at second order only, and the distances get a cosine error of theirs.
-// On scale lines a fixed reflector means that tilts and spots are not used. The laser's angles are fixed at 0 there, and
-// what is given as their standard uncertainty makes the cosine error travel (a^2 + b^2)/2 by which, with a mirror that is
-// square to the beam, their distances read short. What is said of all lines reaches scale lines for distance_constant
-// and lateral only; the rest of a scale line's set-up is said by its own name.
+// to 2000 urad where the constants of the layout's beams are not fixed. A lateral offset, roll or gain acts by the
+// tilts only, which are 0 on a perfect machine: free means known to 1 m, 1 rad, 1, and one whose uncertainty stays
+// above half of that is not determined. Where no tilt tells the laser's angles from the mirror's (lines of a single
+// axis, distances alone) they act at second order only, and the distances get a cosine error of theirs. On scale lines
+// a fixed reflector means that tilts and spots are not used. The laser's angles are fixed at 0 there, and what is given
+// as their standard uncertainty makes the cosine error travel (a^2 + b^2)/2 by which, with a mirror that is square to
+// the beam, their distances read short. What is said of all lines reaches scale lines for distance_constant and lateral
+// only; the rest of a scale line's set-up is said by its own name.
 using SetupPriors = std::array<std::optional<PriorUncertainty>, adjusted_quantity_count>;
 
 // Standard deviation with which the second difference of neighbouring nodes is known to be 0: real axes are smooth.
