@@ -1,6 +1,6 @@
 """What the keys of our TOML files (scenarios, heads) are made of: sections, and the kinds of values that keys take."""
 
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -52,3 +52,19 @@ def key(expected: str, meaning: str, default: Any = ..., example: Any = None) ->
 def tables(placeholder: str) -> Any:
     """Tables with names of the user's own, by default none; documentation writes [section.PLACEHOLDER]."""
     return Field({}, json_schema_extra={"placeholder": placeholder})
+
+
+Narrow = TypeVar("Narrow", bound=Section)
+
+
+def narrowed(section: Section, model: type[Narrow]) -> Narrow:
+    """The keys that `model` has, of a section that has others beside them."""
+
+    def of(value: Any, annotation: Any) -> Any:
+        is_section = isinstance(annotation, type) and issubclass(annotation, Section)
+        return narrowed(value, annotation) if is_section else value
+
+    names = section.model_fields_set & model.model_fields.keys()
+    return model.model_construct(
+        **{name: of(getattr(section, name), model.model_fields[name].annotation) for name in names}
+    )
