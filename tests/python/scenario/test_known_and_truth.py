@@ -95,6 +95,7 @@ def told(value: Any) -> set[str]:
 def test_no_attribute_of_what_is_known_reaches_the_truth(text: str, first: set[str]) -> None:
     scenario = parse_scenario(text)
     assert told(scenario.truth) == {*NUMBERS} | first  # so that a walk that sees nothing proves nothing
+    assert 400.0 in reached(scenario.known)
     assert told(scenario.known) == set()
 
 
