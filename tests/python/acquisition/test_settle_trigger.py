@@ -305,7 +305,7 @@ def test_mirror_at_rest_elsewhere_waits_for_the_point(tmp_path: Path) -> None:
 
 def test_program_that_takes_up_backlash_is_followed(tmp_path: Path) -> None:
     described = scenario(plan=LINE + "\nbackward = true")
-    space = space_of(described, Options(dialect="iso"))
+    space = space_of(described.known, Options(dialect="iso"))
     aligned = threading.Event()
 
     class Waiting(Listener):
