@@ -241,4 +241,5 @@ class ScenarioKeys(TruthKeys, KnownKeys):
 
 
 # Sections that may hold tables of the user's own names, and where these are kept.
+SECTIONS_BY_LINE: Final = ("misalignment", "adjustment", "uncertainty")
 TABLES_BY_NAME: Final = {"misalignment": BY_LINE, "adjustment": BY_LINE, "uncertainty": BY_LINE, "head": BY_HEAD}

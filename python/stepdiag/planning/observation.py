@@ -4,16 +4,15 @@ An error-free run of the scenario's plan (perfect machine, nothing out of true, 
 scenario's weights and unknowns: uncertainties and rank depend on where is read what, hardly on what is read."""
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import Adjustment, Calibration, InvalidArgument
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
-from stepdiag.config.key_types import Section
 from stepdiag.config.toml_text import located
 from stepdiag.config.uncertainty_keys import UncertaintySection
 from stepdiag.parameters import Kind
@@ -22,7 +21,6 @@ from stepdiag.scenario.known import Known, known_of
 from stepdiag.scenario.truth import Truth
 from stepdiag.scenario.uncertain_inputs import OF_SCALE_LINES
 
-AnyKeys = TypeVar("AnyKeys", bound=Section)
 USUAL_STEPS: Final = (5, 10, 20, 50, 100, 200)
 
 
@@ -77,28 +75,16 @@ def extents(calibration: Calibration, plan: _core.Plan) -> tuple[list[str], list
 
 def not_measured(known: Known, plan: Mapping[str, Any] | None = None) -> Known:
     """The same for a run that nobody has measured: with these keys of [plan] in place of its own, and no reading left
-    out. What is said of lines that are not measured is passed over."""
-    keys = known.keys
+    out."""
+    keys, uncertainty = known.keys, known.keys.uncertainty
     planned = keys.plan.model_copy(update=plan)
-    lines = {*planned.lines, *planned.scale_lines}
-    uncertainty = keys.uncertainty
     if not planned.scale_lines:  # then there is nothing that these could be about
         stated = {name: getattr(uncertainty, name) for name in uncertainty.model_fields_set - {*OF_SCALE_LINES}}
         uncertainty = UncertaintySection.model_construct(**stated)
-    changes = {
-        "plan": planned,
-        "line": of_lines(keys.line, lines),
-        "adjustment": keys.adjustment.model_copy(
-            update={"outlier_probability": 0.0, "by_line": of_lines(keys.adjustment.by_line, lines)}
-        ),
-        "uncertainty": uncertainty.model_copy(update={"by_line": of_lines(uncertainty.by_line, lines)}),
-    }
+    adjustment = keys.adjustment.model_copy(update={"outlier_probability": 0.0})
+    of_lines = {line: own for line, own in keys.line.items() if line in (*planned.lines, *planned.scale_lines)}
+    changes = {"plan": planned, "line": of_lines, "adjustment": adjustment, "uncertainty": uncertainty}
     return known_of(keys.model_copy(update=changes), known.described, known.path)
-
-
-def of_lines(by_line: Mapping[str, AnyKeys], lines: Collection[str]) -> dict[str, AnyKeys]:
-    """The tables of these lines."""
-    return {line: own for line, own in by_line.items() if line in lines}
 
 
 def growth(found: Sequence[Prospect], kind: Kind) -> float | None:

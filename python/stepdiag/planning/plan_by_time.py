@@ -14,7 +14,7 @@ from stepdiag.config.scenario_keys import MachineErrorsKeys, RandomSection, Trut
 from stepdiag.config.toml_text import located
 from stepdiag.parameters import KINDS, Kind, kind_of
 from stepdiag.planning.measuring_time import measuring_time, times_of
-from stepdiag.planning.observation import extents, not_measured, of_lines
+from stepdiag.planning.observation import extents, not_measured
 from stepdiag.scenario.description import Scenario, adjust_scenario, simulate_scenario
 from stepdiag.scenario.known import Known, runs_of
 from stepdiag.scenario.truth import Truth, truth_of
@@ -164,12 +164,8 @@ def outcome(scenario: Scenario, candidate: Candidate) -> Outcome:
 
 def _usual_truth(truth: Truth, planned: Known) -> Truth:
     """Of a machine with the errors of [machine.random], else of that section's defaults, with the [misalignment]."""
-    section, lines = truth.keys.misalignment, {*planned.plan.lines, *planned.plan.scale_lines}
-    keys = TruthKeys(
-        machine=MachineErrorsKeys(random=truth.keys.machine.random or RandomSection(seed=0)),
-        misalignment=section.model_copy(update={"by_line": of_lines(section.by_line, lines)}),
-    )
-    return truth_of(keys, {}, planned)
+    machine = MachineErrorsKeys(random=truth.keys.machine.random or RandomSection(seed=0))
+    return truth_of(TruthKeys(machine=machine, misalignment=truth.keys.misalignment), {}, planned)
 
 
 def _says_more(known: Known) -> bool:

@@ -12,9 +12,9 @@ from typing import Any, Literal
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.config.key_errors import models_of
+from stepdiag.config.key_errors import models_of, suggest
 from stepdiag.config.key_types import narrowed
-from stepdiag.config.scenario_keys import TABLES_BY_NAME, KnownKeys, ScenarioKeys, TruthKeys
+from stepdiag.config.scenario_keys import SECTIONS_BY_LINE, TABLES_BY_NAME, KnownKeys, ScenarioKeys, TruthKeys
 from stepdiag.config.toml_text import check_keys, located, parse_toml
 from stepdiag.io.whole_files import read_text
 from stepdiag.scenario.heads import describe_heads, make_heads, of_run
@@ -167,4 +167,9 @@ def _is_table(value: Any) -> bool:
 def _build(keys: ScenarioKeys, path: Path) -> Scenario:
     described, pose_errors = describe_heads(keys.head, path)
     known = known_of(narrowed(keys, KnownKeys), described, path)
+    lines = list(known.heads)
+    for section in SECTIONS_BY_LINE:
+        for line in getattr(keys, section).by_line:
+            if line not in lines:
+                raise InvalidArgument(f"{path}: {section}.{line}: not a line of the plan; {suggest(line, lines)}")
     return Scenario(known, truth_of(narrowed(keys, TruthKeys), pose_errors, known))

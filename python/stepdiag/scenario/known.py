@@ -10,7 +10,7 @@ from stepdiag.config.scenario_keys import KnownKeys, PlanSection
 from stepdiag.config.toml_text import located
 from stepdiag.scenario.adjustment import plausible_limits, setup_priors, smoothness_of
 from stepdiag.scenario.heads import DescribedHead, check_alike, check_mirrors, heads_by_line, make_heads, signals_of
-from stepdiag.scenario.setup import check_lines, weights
+from stepdiag.scenario.setup import weights
 from stepdiag.scenario.uncertain_inputs import uncertain_inputs
 
 
@@ -52,7 +52,8 @@ class Known:
 
 
 def known_of(keys: KnownKeys, described: Mapping[str, DescribedHead], path: Path) -> Known:
-    """Makes the core's types, whose own checks get file and section put in front."""
+    """Makes the core's types, whose own checks get file and section put in front. Weights and unknowns of lines that are
+    not measured are passed over."""
     with located(f"{path}: machine.chain"):
         chain = _core.Chain(keys.machine.chain)
     with located(f"{path}: plan"):
@@ -72,8 +73,6 @@ def known_of(keys: KnownKeys, described: Mapping[str, DescribedHead], path: Path
         uncertainty = weights(keys)
     signals = signals_of(keys, head, path)
     setup, setup_by_line = setup_priors(keys, head.layout, path)
-    for name, section in (("adjustment", keys.adjustment), ("uncertainty", keys.uncertainty)):
-        check_lines(section.by_line, plan, f"{path}: {name}")
     return Known(
         path=path,
         keys=keys,
@@ -86,7 +85,7 @@ def known_of(keys: KnownKeys, described: Mapping[str, DescribedHead], path: Path
         signals=tuple(signals),
         uncertainty=uncertainty,
         setup=setup,
-        setup_by_line=MappingProxyType(setup_by_line),
+        setup_by_line=MappingProxyType({line: own for line, own in setup_by_line.items() if line in heads}),
         smoothness=smoothness_of(keys.smoothness, path),
         plausible=plausible_limits(keys.plausible),
         uncertain=uncertain_inputs(keys, described_heads, heads, path),

@@ -1,23 +1,15 @@
 """A scenario's set-up in native units: misalignments, constants, noise, air and weights."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.config.key_errors import BY_LINE, show, suggest
+from stepdiag.config.key_errors import BY_LINE, show
 from stepdiag.config.scenario_head_keys import AirKeys, EnvironmentSection
 from stepdiag.config.scenario_keys import KnownKeys, MisalignmentKeys, MisalignmentSection, NoiseSection, PlanSection
 from stepdiag.config.toml_text import located
 from stepdiag.units import HECTOPASCAL, HOUR, MICROMETRE, MICRORADIAN, PERCENT
-
-
-def check_lines(by_line: Iterable[str], plan: _core.Plan, place: str) -> None:
-    """Raises InvalidArgument where a section has a table for what is no line of the plan."""
-    lines = [*plan.lines, *plan.scale_lines]
-    for line in by_line:
-        if line not in lines:
-            raise InvalidArgument(f"{place}.{line}: not a line of the plan; {suggest(line, lines)}")
 
 
 def misalignments(

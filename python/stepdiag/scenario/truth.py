@@ -13,7 +13,7 @@ from stepdiag.config.toml_text import located
 from stepdiag.io.whole_files import check_input
 from stepdiag.scenario.heads import PoseErrors
 from stepdiag.scenario.known import Known
-from stepdiag.scenario.setup import check_lines, environments, misalignments, noise_of
+from stepdiag.scenario.setup import environments, misalignments, noise_of
 from stepdiag.scenario.uncertain_inputs import STATE_OF_AIR
 from stepdiag.units import MICROMETRE, MICRORADIAN
 
@@ -42,7 +42,6 @@ def truth_of(keys: TruthKeys, pose_errors: Mapping[str, PoseErrors], known: Know
         raise InvalidArgument(f"{path}: machine: expected errors or [machine.random], got both")
     if errors is not None and "\0" in errors:
         raise InvalidArgument(f"{path}: machine.errors: expected the path of a file, got {show(errors)}")
-    check_lines(keys.misalignment.by_line, known.plan, f"{path}: misalignment")
     environment, assumed = environments(keys.environment, path)
     _check_air(keys, known)
     return Truth(

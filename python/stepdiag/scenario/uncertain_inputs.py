@@ -91,7 +91,8 @@ def uncertain_inputs(
     head = next(iter(heads.values()))
     _check_fit(section, keys, described, head, place)
     for line, own in section.by_line.items():
-        _check_fit(own, keys, {line: described[line]}, head, f"{place}.{line}")
+        if line in described:
+            _check_fit(own, keys, {line: described[line]}, head, f"{place}.{line}")
     inputs = [*_of_lines(keys, head), *_of_components(section, described, place), *_of_all(section, head)]
     noise, correlations = list(_noise(keys, head, place)), list(_correlations(section, inputs, place))
     with located(place):

@@ -64,7 +64,7 @@ def test_the_place_along_the_beam_is_that_of_the_functional_point(tmp_path: Path
     )
     scenario = _read(clean.scenario.path.with_name("true.toml"), text)
     run = simulate_scenario(scenario)
-    place = along_beam(scenario, run)
+    place = along_beam(scenario.known, run)
     lines = np.array(run.line)
     for line in scenario.known.plan.lines:
         rows = lines == line
