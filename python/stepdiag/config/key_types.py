@@ -1,6 +1,6 @@
 """What the keys of our TOML files (scenarios, heads) are made of: sections, and the kinds of values that keys take."""
 
-from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar, cast
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -58,13 +58,9 @@ Narrow = TypeVar("Narrow", bound=Section)
 
 
 def narrowed(section: Section, model: type[Narrow]) -> Narrow:
-    """The keys that `model` has, of a section that has others beside them."""
-
-    def of(value: Any, annotation: Any) -> Any:
-        is_section = isinstance(annotation, type) and issubclass(annotation, Section)
-        return narrowed(value, annotation) if is_section else value
-
-    names = section.model_fields_set & model.model_fields.keys()
-    return model.model_construct(
-        **{name: of(getattr(section, name), model.model_fields[name].annotation) for name in names}
-    )
+    """The keys that `model` has, of a section that has others beside them; so of the sections in it."""
+    kept = {}
+    for name in section.model_fields_set & model.model_fields.keys():
+        value, narrow = getattr(section, name), cast(Any, model.model_fields[name].annotation)
+        kept[name] = narrowed(value, narrow) if isinstance(narrow, type) and issubclass(narrow, Section) else value
+    return model.model_construct(**kept)

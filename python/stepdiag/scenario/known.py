@@ -52,8 +52,8 @@ class Known:
 
 
 def known_of(keys: KnownKeys, described: Mapping[str, DescribedHead], path: Path) -> Known:
-    """Makes the core's types, whose own checks get file and section put in front. Weights and unknowns of lines that are
-    not measured are passed over."""
+    """Makes the core's types, whose own checks get file and section put in front. What is said of the set-up of lines
+    that are not measured is passed over."""
     with located(f"{path}: machine.chain"):
         chain = _core.Chain(keys.machine.chain)
     with located(f"{path}: plan"):

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.config.key_errors import show
-from stepdiag.config.scenario_keys import RandomSection, TruthKeys
+from stepdiag.config.scenario_keys import TruthKeys
 from stepdiag.config.toml_text import located
 from stepdiag.io.whole_files import check_input
 from stepdiag.scenario.heads import PoseErrors
@@ -23,8 +23,8 @@ class Truth:
     """What a run is simulated with beside what is known, checked and in native units.
 
     Truth() is that of a perfect machine and a perfect set-up, read without noise. `error_map`: the file that [machine]
-    names, read when the machine is simulated. `pose_errors`: by the place of a head's keys. `assumed_environment`:
-    what the instrument takes the air for; the readings of a run are reduced with it when they are evaluated."""
+    names, read when the machine is simulated. `pose_errors`: by the place of a head's keys. `assumed_environment`: what
+    the instrument takes the air for, with which it reduces its readings; the true air, where nothing else is said."""
 
     keys: TruthKeys = field(default_factory=TruthKeys)
     error_map: Path | None = None
@@ -57,10 +57,9 @@ def truth_of(keys: TruthKeys, pose_errors: Mapping[str, PoseErrors], known: Know
 
 def _check_air(keys: TruthKeys, known: Known) -> None:
     """Whether air whose state is uncertain has one."""
-    for name in STATE_OF_AIR:
+    for name in STATE_OF_AIR if "refractive_index" in keys.environment.model_fields_set else ():
         stated = getattr(known.keys.uncertainty, name)
-        is_uncertain = stated is not None and not stated.is_certain
-        if is_uncertain and "refractive_index" in keys.environment.model_fields_set:
+        if stated is not None and not stated.is_certain:
             raise InvalidArgument(
                 f"{known.path}: uncertainty.{name}: goes with a state of the air; [environment] has a "
                 "refractive_index, for which there is refractive_index_ppm"
@@ -74,20 +73,16 @@ def errors_of(truth: Truth, known: Known) -> _core.ErrorMap:
         with located(f"{known.path}: machine.errors"):
             check_input(truth.error_map)
             return _core.read_error_map(truth.error_map)
-    if random is not None:
-        with located(f"{known.path}: machine.random"):
-            return _random_errors(random, known.plan)
-    return _core.ErrorMap()
-
-
-def _random_errors(random: RandomSection, plan: _core.Plan) -> _core.ErrorMap:
-    return _core.random_error_map(
-        plan.volume,
-        seed=random.seed,
-        translation=random.translation_um * MICROMETRE,
-        rotation=random.rotation_urad * MICRORADIAN,
-        squareness=random.squareness_urad * MICRORADIAN,
-        intervals=random.intervals or max(2, plan.steps),
-        screw_pitch=random.screw_pitch_mm,
-        screw_amplitude=random.screw_amplitude_um * MICROMETRE,
-    )
+    if random is None:
+        return _core.ErrorMap()
+    with located(f"{known.path}: machine.random"):
+        return _core.random_error_map(
+            known.plan.volume,
+            seed=random.seed,
+            translation=random.translation_um * MICROMETRE,
+            rotation=random.rotation_urad * MICRORADIAN,
+            squareness=random.squareness_urad * MICRORADIAN,
+            intervals=random.intervals or max(2, known.plan.steps),
+            screw_pitch=random.screw_pitch_mm,
+            screw_amplitude=random.screw_amplitude_um * MICROMETRE,
+        )
