@@ -7,7 +7,7 @@ from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.config.adjustment_keys import AdjustmentKeys, AdjustmentSection, SmoothnessSection
 from stepdiag.config.key_errors import show
-from stepdiag.config.scenario_keys import PlausibleSection, ScenarioKeys
+from stepdiag.config.scenario_keys import KnownKeys, PlausibleSection
 from stepdiag.config.toml_text import located
 from stepdiag.setup_quantities import ADJUSTED, SETUP_QUANTITIES
 from stepdiag.units import MICROMETRE, MICRORADIAN, native
@@ -18,7 +18,7 @@ METRE: Final = 1000.0  # mm
 LACKING: Final = {"psd": "no spot", "multi_beam": "no beams d1, d2, ..."}
 
 
-def setup_priors(keys: ScenarioKeys, layout: str, path: Path) -> tuple[_core.SetupPriors, dict[str, _core.SetupPriors]]:
+def setup_priors(keys: KnownKeys, layout: str, path: Path) -> tuple[_core.SetupPriors, dict[str, _core.SetupPriors]]:
     """Of all lines, and of the lines that have a table of their own."""
     shared = _priors(keys.adjustment, layout, f"{path}: adjustment")
     by_line = {}

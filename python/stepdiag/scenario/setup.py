@@ -6,9 +6,9 @@ from typing import Final
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.config.key_errors import BY_LINE, show, suggest
+from stepdiag.config.key_errors import BY_LINE, show
 from stepdiag.config.scenario_head_keys import AirKeys, EnvironmentSection
-from stepdiag.config.scenario_keys import SECTIONS_BY_LINE, MisalignmentKeys, NoiseSection, ScenarioKeys
+from stepdiag.config.scenario_keys import KnownKeys, MisalignmentKeys, MisalignmentSection, NoiseSection, PlanSection
 from stepdiag.config.toml_text import located
 from stepdiag.setup_quantities import ADJUSTED
 from stepdiag.units import HECTOPASCAL, MICROMETRE, PERCENT, native, unit_of
@@ -17,25 +17,22 @@ from stepdiag.units import HECTOPASCAL, MICROMETRE, PERCENT, native, unit_of
 KEY_OF_READING: Final = {"distance": "distance_um", "tilt": "tilt_urad", "spot": "spot_um"}
 
 
-def misalignments(keys: ScenarioKeys, heads: Mapping[str, _core.Head], path: Path) -> dict[str, _core.Misalignment]:
+def misalignments(
+    section: MisalignmentSection, plan: PlanSection, heads: Mapping[str, _core.Head], path: Path
+) -> dict[str, _core.Misalignment]:
     """By line. A line that is missing is aligned."""
-    lines = [*keys.plan.lines, *keys.plan.scale_lines]
-    for section in SECTIONS_BY_LINE:
-        for line in getattr(keys, section).by_line:
-            if line not in lines:
-                raise InvalidArgument(f"{path}: {section}.{line}: not a line of the plan; {suggest(line, lines)}")
     result = {}
-    for line in lines:
-        own = keys.misalignment.by_line.get(line)
-        if line in keys.plan.scale_lines and own is None:
+    for line in [*plan.lines, *plan.scale_lines]:
+        own = section.by_line.get(line)
+        if line in plan.scale_lines and own is None:
             continue
-        shared = MisalignmentKeys() if line in keys.plan.scale_lines else keys.misalignment
+        shared = MisalignmentKeys() if line in plan.scale_lines else section
         values = shared.model_dump(exclude={BY_LINE}) | (own.model_dump(exclude_unset=True) if own else {})
         place = f"misalignment.{line}" if own and own.beam_constants_um is not None else "misalignment"
         _check_beam_constants(values["beam_constants_um"], heads[line], f"{path}: {place}")
         given = {q.name: native(q.key, values[q.key]) for q in ADJUSTED if values[q.key] is not None}
         result[line] = _core.Misalignment(**given)
-        if values["drift_um_per_h"] != 0.0 and keys.plan.seconds_per_reading is None:
+        if values["drift_um_per_h"] != 0.0 and plan.seconds_per_reading is None:
             place = f"misalignment.{line}" if own and "drift_um_per_h" in own.model_fields_set else "misalignment"
             raise InvalidArgument(
                 f"{path}: {place}.drift_um_per_h: expected plan.seconds_per_reading as well, got none"
@@ -89,7 +86,7 @@ def environment(keys: AirKeys, place: str) -> Air:
         return _core.Environment.from_air(equation=keys.equation or "ciddor", **given)
 
 
-def weights(keys: ScenarioKeys) -> _core.ReadingUncertainty:
+def weights(keys: KnownKeys) -> _core.ReadingUncertainty:
     """[uncertainty], else the positive deviations of [noise], else the core's defaults; key by key."""
     given = {}
     for name, key in KEY_OF_READING.items():
