@@ -4,6 +4,8 @@
 
 namespace stepdiag {
 
+const char* name(Direction direction) { return direction == Direction::forward ? "forward" : "backward"; }
+
 Approaches approaches(const Line& line, Direction direction) {
     const int travel = direction == Direction::forward ? 1 : -1;
     Approaches approaches = all_positive;

@@ -10,6 +10,7 @@ namespace stepdiag {
 
 // A backward run passes a line's points in reverse order, with head and mirror as they are.
 enum class Direction { forward, backward };
+const char* name(Direction direction);  // as files write it
 
 // How the axes come to each point of a pass, its first included: in the direction of the pass's own travel, because a
 // measuring program overruns the start and comes back, so that backlash is taken up. An axis that the line does not
