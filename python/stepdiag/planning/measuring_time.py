@@ -63,4 +63,3 @@ def measuring_time(plan: Plan, times: Times, *, repeats: int = 1, backward: bool
         gaps += len(way) - 1
         place = way[-1]
     return total, on_lines / gaps
-
