@@ -228,6 +228,7 @@ void trace(const SimdPass& pass, const Outline& outline, const std::vector<SimdB
     }
 }
 
+// Follows where every beam is read by the rules of define_signals and a little to spare.
 void define(const SimdPass& pass, const SimdClosed& closed) {
     const Pair zero = common(0.0), one = common(1.0), aside = common(0.25 * closed.aperture);
     const Pair half_mirror[2] = {common(closed.half_mirror[0]), common(closed.half_mirror[1])};
@@ -246,29 +247,33 @@ void define(const SimdPass& pass, const SimdClosed& closed) {
             const Pair by_w = one / w;
             const Pair distance = length * by_w;
             followed = both(followed, both(both(mirror.normal[2] > zero, w > zero), length > zero));
-            // Of the beam from (u, v), which is `longer` than that from o: whether it meets the mirror and comes back.
-            const auto check = [&](Pair u, Pair v, Pair longer, Pair beam_distance) HWY_ATTR {
-                const Pair met[3] = {u - mirror.centre[0], v - mirror.centre[1], length + longer - mirror.centre[2]};
+            // The beam from (u, v) meets the mirror's plane at (u, v, alpha v - beta u) and a constant.
+            Pair along[2][2];
+            for (int axis = 0; axis < 2; ++axis) {
+                const Pair z = at(axes[3 * axis + 2], lane);
+                along[axis][0] = sub_mul(z, beta, at(axes[3 * axis], lane));
+                along[axis][1] = mul_add(z, alpha, at(axes[3 * axis + 1], lane));
+            }
+            const Pair tilt = magnitude(alpha) + magnitude(beta);  // at least the larger one
+            const auto check = [&](Pair u, Pair v, Pair beam_distance) HWY_ATTR {
+                const Pair x = u - mirror.centre[0], y = v - mirror.centre[1];
                 for (int axis = 0; axis < 2; ++axis) {
-                    const Pair along[3] = {at(axes[3 * axis], lane), at(axes[3 * axis + 1], lane),
-                                           at(axes[3 * axis + 2], lane)};
-                    followed = both(followed, magnitude(dot_add(along, met, zero)) <= half_mirror[axis]);
-                    followed = both(followed, magnitude(beam_distance * (axis == 0 ? alpha : beta)) <= aside);
+                    const Pair met = mul_add(along[axis][0], x, along[axis][1] * y);
+                    followed = both(followed, magnitude(met) <= half_mirror[axis]);
                 }
-                followed = both(followed, beam_distance > zero);
+                followed = both(followed, both(beam_distance > zero, beam_distance * tilt <= aside));
             };
             double* const to = pass.readings + row * pass.channels * lane_group + lane;
             if (closed.layout == HeadLayout::multi_beam) {
                 for (std::size_t i = 0; i < pass.channels; ++i) {
                     const Pair u = at(closed.beams[2 * i], lane), v = at(closed.beams[2 * i + 1], lane);
-                    const Pair longer = sub_mul(beta, u, alpha * v);
-                    const Pair beam_distance = mul_add(longer, by_w, distance);
-                    check(u, v, longer, beam_distance);
+                    const Pair beam_distance = mul_add(sub_mul(beta, u, alpha * v), by_w, distance);
+                    check(u, v, beam_distance);
                     store(beam_distance * ratio, to + i * lane_group);
                 }
                 continue;
             }
-            check(zero, zero, zero, distance);
+            check(zero, zero, distance);
             store(distance * ratio, to);
             if (closed.layout == HeadLayout::psd) {
                 const Pair reach = mul_add(at(*closed.psd_distance, lane), by_w, distance);
