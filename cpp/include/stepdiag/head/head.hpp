@@ -25,8 +25,7 @@ struct Head {
     double psd_distance = 0.0;                  // layout psd, mm
     std::vector<Eigen::Vector2d> beam_offsets;  // layout multi_beam, mm
     double wavelength = 1530.0;                 // vacuum, nm
-    double aperture =
-        50.0;  // edge of the square in the reference plane that takes each beam back, around its start, mm
+    double aperture = 50.0;                     // mm: edge of the square around a beam's start that takes it back
     std::optional<Eigen::Vector2d> mirror;  // width and height, mm; none: as large as the plan needs, and mirror_margin
 
     static constexpr double mirror_margin = 25.0;  // on every side, mm
