@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from stepdiag.scenario.description import Scenario, runs_of
+from stepdiag.scenario.known import Known, runs_of
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Visit:
     approach: npt.NDArray[np.int_]  # (3,) +1 or -1: how the axes come to every point, the first included
 
 
-def visits_of(scenario: Scenario) -> Iterator[Visit]:
+def visits_of(known: Known) -> Iterator[Visit]:
     """The passes of a scenario's plan (`Plan.passes`), numbered."""
-    keys, plan = scenario.keys.plan, scenario.plan
+    keys, plan = known.keys.plan, known.plan
     for number, planned in enumerate(plan.passes(runs_of(keys), backward=keys.backward), start=1):
         yield Visit(
             number=number,

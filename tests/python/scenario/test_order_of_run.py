@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stepdiag.scenario.description import Scenario, read_scenario, runs_of, simulate_scenario
+from stepdiag.scenario.description import Scenario, read_scenario, simulate_scenario
+from stepdiag.scenario.known import runs_of
 from stepdiag.scenario.order_of_run import visits_of
 from stepdiag.scenario.planned_readings import empty_sheet
 
@@ -103,7 +104,7 @@ def scenario_of(tmp_path: Path, plan: str) -> Scenario:
 def test_a_run_goes_in_the_order_of_the_list(tmp_path: Path, plan: str, written: str) -> None:
     scenario = scenario_of(tmp_path, plan)
     expected = rows_of(written)
-    visits = list(visits_of(scenario))
+    visits = list(visits_of(scenario.known))
     assert [visit.number for visit in visits] == list(range(1, len(expected) + 1))
     assert [visit.set_up for visit in visits] == [["ppp", "n0p", "0n0"].index(visit.line) + 1 for visit in visits]
     assert [visit.is_scale_line for visit in visits] == [visit.line == "0n0" for visit in visits]
@@ -117,8 +118,9 @@ def test_a_run_goes_in_the_order_of_the_list(tmp_path: Path, plan: str, written:
     assert found == expected
 
     rows = [row for rows in expected for row in rows]
-    keys = scenario.keys.plan
-    sheet = empty_sheet(scenario.plan, scenario.signals, repeats=runs_of(keys), backward=keys.backward)
+    known = scenario.known
+    keys = known.keys.plan
+    sheet = empty_sheet(known.plan, known.signals, repeats=runs_of(keys), backward=keys.backward)
     for run in (simulate_scenario(scenario), sheet):
         assert run.line == [row[0] for row in rows]
         assert list(run.run) == [row[1] for row in rows]
@@ -128,7 +130,9 @@ def test_a_run_goes_in_the_order_of_the_list(tmp_path: Path, plan: str, written:
 
 
 def test_axes_come_to_a_point_as_the_line_travels(tmp_path: Path) -> None:
-    approach = {(v.line, v.direction): list(v.approach) for v in visits_of(scenario_of(tmp_path, "backward = true"))}
+    approach = {
+        (v.line, v.direction): list(v.approach) for v in visits_of(scenario_of(tmp_path, "backward = true").known)
+    }
     assert approach["n0p", "forward"] == [-1, 1, 1]
     assert approach["n0p", "backward"] == [1, 1, -1]
     assert approach["0n0", "backward"] == [1, 1, 1]
