@@ -1,4 +1,4 @@
-// Vectors of lanes as a number type, two at a time.
+// Vectors of lanes as a number type (number.hpp), one or two at a time.
 #if defined(STEPDIAG_SIMD_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef STEPDIAG_SIMD_INL
 #undef STEPDIAG_SIMD_INL
@@ -10,7 +10,7 @@
 
 #include <cstdint>
 
-#include "core/number.hpp"
+#include "core/number.hpp"  // which looks whether Highway is there
 
 HWY_BEFORE_NAMESPACE();
 namespace stepdiag {
@@ -28,6 +28,7 @@ STEPDIAG_INLINE Vector magnitude(Vector a) { return hn::Abs(a); }
 STEPDIAG_INLINE Vector negative(Vector a) { return hn::Neg(a); }
 STEPDIAG_INLINE Vector with_sign(Vector a, Vector sign) { return hn::CopySignToAbs(a, sign); }
 STEPDIAG_INLINE Mask both(Mask a, Mask b) { return hn::And(a, b); }
+STEPDIAG_INLINE Vector broadcast(Type<Vector>, double value) { return hn::Set(Tag(), value); }
 STEPDIAG_INLINE void store(Mask a, std::uint8_t* to) {
     std::uint8_t bits[8] = {};  // what Highway writes at least
     hn::StoreMaskBits(Tag(), a, bits);

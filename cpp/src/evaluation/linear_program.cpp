@@ -5,27 +5,15 @@
 #include <map>
 #include <tuple>
 
-// Not those instruction sets that differ from another one only in what is not used here.
-#include <hwy/detect_targets.h>
-#undef HWY_DISABLED_TARGETS
-#ifdef HWY_AVX3_ZEN4  // since Highway 1.1
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4 | HWY_AVX3_SPR)
-#else
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
-#endif
-#undef HWY_TARGET_INCLUDE
+#include "core/simd_targets.hpp"
 #define HWY_TARGET_INCLUDE "evaluation/linear_program.cpp"
 #include <hwy/foreach_target.h>  // compiles this file once for every instruction set
 //
-#include <hwy/highway.h>
+#include "core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace stepdiag {
 namespace HWY_NAMESPACE {
-
-namespace hn = hwy::HWY_NAMESPACE;
-using Tag = hn::ScalableTag<double>;
-using Vector = hn::Vec<Tag>;
 
 // Where the program has come to.
 struct Place {
@@ -36,8 +24,8 @@ struct Place {
 
 // Blocks of one shape for the lanes of `Vectors` vectors: sums stay in registers.
 template <std::size_t Rows, bool OfDifferences, std::size_t Vectors>
-HWY_INLINE void run_blocks(const LinearProgram::Blocks& blocks, Place& at, double* registers, double* values,
-                           std::size_t stride) {
+STEPDIAG_INLINE void run_blocks(const LinearProgram::Blocks& blocks, Place& at, double* registers, double* values,
+                                std::size_t stride) {
     const Tag tag;
     const std::size_t width = hn::Lanes(tag);
     const auto load = [&](std::size_t place, std::size_t v)
@@ -73,8 +61,8 @@ HWY_INLINE void run_blocks(const LinearProgram::Blocks& blocks, Place& at, doubl
 }
 
 template <bool OfDifferences, std::size_t Vectors>
-HWY_INLINE void run_blocks_of(const LinearProgram::Blocks& blocks, Place& at, double* registers, double* values,
-                              std::size_t stride) {
+STEPDIAG_INLINE void run_blocks_of(const LinearProgram::Blocks& blocks, Place& at, double* registers, double* values,
+                                   std::size_t stride) {
     if (blocks.shape.rows == 3) run_blocks<3, OfDifferences, Vectors>(blocks, at, registers, values, stride);
     else if (blocks.shape.rows == 2) run_blocks<2, OfDifferences, Vectors>(blocks, at, registers, values, stride);
     else run_blocks<1, OfDifferences, Vectors>(blocks, at, registers, values, stride);

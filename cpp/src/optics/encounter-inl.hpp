@@ -1,5 +1,5 @@
 // What a face does to light on a known way: one text for vectors of lanes (replay.cpp) and for numbers that carry their
-// derivative (replay_derivative.cpp). Highway compiles it anew for every instruction set, hence the guard.
+// derivative (replay_derivative.cpp).
 #if defined(STEPDIAG_ENCOUNTER_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef STEPDIAG_ENCOUNTER_INL
 #undef STEPDIAG_ENCOUNTER_INL
@@ -7,15 +7,13 @@
 #define STEPDIAG_ENCOUNTER_INL
 #endif
 
-#include <hwy/highway.h>
-
-#include "optics/number.hpp"
+#include "core/number.hpp"
 #include "stepdiag/optics/path.hpp"
 #include "stepdiag/optics/replay.hpp"
 
-HWY_BEFORE_NAMESPACE();
+STEPDIAG_BEFORE_NAMESPACE();
 namespace stepdiag {
-namespace HWY_NAMESPACE {
+namespace STEPDIAG_NAMESPACE {
 
 template <class N>
 struct Light {
@@ -103,8 +101,8 @@ STEPDIAG_INLINE void check_end(Light<N>& light) {
     }
 }
 
-}  // namespace HWY_NAMESPACE
+}  // namespace STEPDIAG_NAMESPACE
 }  // namespace stepdiag
-HWY_AFTER_NAMESPACE();
+STEPDIAG_AFTER_NAMESPACE();
 
 #endif

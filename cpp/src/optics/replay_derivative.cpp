@@ -2,9 +2,6 @@
 
 #include <Eigen/Geometry>
 
-// Numbers before the physics that is calculated with them:
-#include "optics/number.hpp"
-//
 #include "optics/encounter-inl.hpp"
 
 namespace stepdiag {
@@ -48,7 +45,7 @@ DualRay moving(const Ray& ray, const RigidRate& rate) {
 }
 
 std::optional<DualRay> replay(const std::vector<DualEncounter>& route, const DualRay& ray, double gap) {
-    using namespace HWY_NAMESPACE;
+    using namespace STEPDIAG_NAMESPACE;
     Light<Dual> light{{ray.point[0], ray.point[1], ray.point[2]},
                       {ray.direction[0], ray.direction[1], ray.direction[2]},
                       ray.optical_length,

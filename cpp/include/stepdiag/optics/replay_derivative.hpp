@@ -10,7 +10,7 @@
 #include <optional>
 #include <vector>
 
-#include "stepdiag/optics/dual.hpp"
+#include "stepdiag/core/dual.hpp"
 #include "stepdiag/optics/path.hpp"
 #include "stepdiag/optics/replay.hpp"
 #include "stepdiag/optics/scene.hpp"

@@ -23,6 +23,8 @@ inline Dual sqrt(Dual a) {
     const double root = std::sqrt(a.value);
     return {root, 0.5 * a.slope / root};
 }
+inline Dual sin(Dual a) { return {std::sin(a.value), std::cos(a.value) * a.slope}; }
+inline Dual cos(Dual a) { return {std::cos(a.value), -std::sin(a.value) * a.slope}; }
 inline Dual abs(Dual a) { return std::signbit(a.value) ? -a : a; }
 inline bool operator>(Dual a, Dual b) { return a.value > b.value; }
 inline bool operator<=(Dual a, Dual b) { return a.value <= b.value; }
