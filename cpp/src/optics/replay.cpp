@@ -22,14 +22,13 @@ struct CommonFace {
     const PreparedEncounter& encounter;
     std::size_t lane;
 
-    STEPDIAG_INLINE Pair common(double value) const { return broadcast(Type<Pair>(), value); }
     STEPDIAG_INLINE Pair by_lane(const LaneSource& source) const { return load(source.from + (lane & source.mask)); }
-    STEPDIAG_INLINE Pair rotation(int k) const { return common(encounter.plane[k]); }
-    STEPDIAG_INLINE Pair translation(int k) const { return common(encounter.plane[9 + k]); }
-    STEPDIAG_INLINE Pair index() const { return common(encounter.index_before); }
-    STEPDIAG_INLINE Pair inverse_index() const { return common(encounter.inverse_index); }
-    STEPDIAG_INLINE Pair index_ratio() const { return common(encounter.index_ratio); }
-    STEPDIAG_INLINE Pair one_less_ratio2() const { return common(encounter.one_less_ratio2); }
+    STEPDIAG_INLINE Pair rotation(int k) const { return all(encounter.plane[k]); }
+    STEPDIAG_INLINE Pair translation(int k) const { return all(encounter.plane[9 + k]); }
+    STEPDIAG_INLINE Pair index() const { return all(encounter.index_before); }
+    STEPDIAG_INLINE Pair inverse_index() const { return all(encounter.inverse_index); }
+    STEPDIAG_INLINE Pair index_ratio() const { return all(encounter.index_ratio); }
+    STEPDIAG_INLINE Pair one_less_ratio2() const { return all(encounter.one_less_ratio2); }
 };
 
 // ... where the plane is that of each lane ...
@@ -41,9 +40,9 @@ struct PlaneByLane : CommonFace {
 // ... and where the indices are as well.
 struct FaceByLane : PlaneByLane {
     STEPDIAG_INLINE Pair index() const { return by_lane(encounter.index_before_from); }
-    STEPDIAG_INLINE Pair inverse_index() const { return common(1.0) / index(); }
+    STEPDIAG_INLINE Pair inverse_index() const { return all(1.0) / index(); }
     STEPDIAG_INLINE Pair index_ratio() const { return index() / by_lane(encounter.index_after_from); }
-    STEPDIAG_INLINE Pair one_less_ratio2() const { return sub_mul(index_ratio(), index_ratio(), common(1.0)); }
+    STEPDIAG_INLINE Pair one_less_ratio2() const { return sub_mul(index_ratio(), index_ratio(), all(1.0)); }
 };
 
 // By the operation that FaceByLane takes, so that the bits are the same.
@@ -58,8 +57,8 @@ void prepare_indices(const PreparedRoute& route) {
 // The lanes from `lane` on that a pair of vectors holds; results go to to.point[0][at] and on.
 void follow(const PreparedRoute& route, std::size_t lane, double gap, const LaneResults& to, std::size_t at) {
     const auto start = [&](int k) HWY_ATTR { return load(route.start[k].from + (lane & route.start[k].mask)); };
-    const Pair zero = broadcast(Type<Pair>(), 0.0), nearest = broadcast(Type<Pair>(), gap);
-    Light<Pair> light{{start(0), start(1), start(2)}, {start(3), start(4), start(5)}, start(6), start(7), zero <= zero};
+    const Pair nearest = all(gap);
+    Light<Pair> light{{start(0), start(1), start(2)}, {start(3), start(4), start(5)}, start(6), start(7), all_true()};
     for (const PreparedEncounter& encounter : route) {
         const CommonFace face{encounter, lane};
         if (encounter.indices_by_lane) meet(encounter, FaceByLane{{face}}, nearest, light);

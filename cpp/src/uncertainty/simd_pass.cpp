@@ -25,10 +25,6 @@ STEPDIAG_INLINE Vector3<Pair> at3(const SimdRow* rows, std::size_t lane) {
 STEPDIAG_INLINE Matrix3<Pair> at9(const SimdRow* rows, std::size_t lane) {
     return {at3(rows, lane), at3(rows + 3, lane), at3(rows + 6, lane)};
 }
-STEPDIAG_INLINE MaskPair all_true() {
-    const Pair zero = all(0.0);
-    return zero <= zero;
-}
 STEPDIAG_INLINE void keep(MaskPair followed, std::uint8_t* to) {
     std::uint8_t here[2 * hn::MaxLanes(Tag())];
     store(followed, here);
