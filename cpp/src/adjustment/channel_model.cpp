@@ -2,8 +2,8 @@
 
 #include <Eigen/Geometry>
 
-#include "adjustment/channels-inl.hpp"
 #include "machine/pose-inl.hpp"
+#include "measurement/reading-inl.hpp"
 
 namespace stepdiag {
 
@@ -140,7 +140,7 @@ void ChannelModel::read_channels(const Tilt& tilt, const ReadingPlace& place, Ei
     };
     const auto put_distance = [&](int channel, const Eigen::Vector2d& offset) {
         const double arm = beam_arm(mirror, offset.x(), offset.y());
-        const double distance = scaled_distance(mirror, scale, arm), twice = 2.0 * distance;
+        const double distance = beam_distance(mirror, scale * arm), twice = 2.0 * distance;
         put(channel, distance + added,
             Eigen::RowVector3d(1.0, scale * offset.y() + twice * mirror.alpha,
                                -scale * offset.x() + twice * mirror.beta) *
@@ -177,7 +177,7 @@ void ChannelModel::read_channels(const Tilt& tilt, const ReadingPlace& place, Ei
     const Eigen::RowVector3d lever_gradient =
         2.0 * mirror.inverse_w *
         Eigen::RowVector3d(1.0, beam.y() + mirror.alpha * lever, -beam.x() + mirror.beta * lever);
-    const auto spot = raw_spot(mirror, scale * lever, setup_[setup::psd_zero], setup_[setup::psd_zero + 1]);
+    const auto spot = spot_reading(mirror, scale * lever, setup_[setup::psd_zero], setup_[setup::psd_zero + 1]);
     put(1, spot.x, scale * (-mirror.beta * lever_gradient - Eigen::RowVector3d(0.0, 0.0, lever)));
     put(2, spot.y, scale * (mirror.alpha * lever_gradient + Eigen::RowVector3d(0.0, lever, 0.0)));
     if (!derivative) return;

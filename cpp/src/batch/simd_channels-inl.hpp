@@ -11,7 +11,7 @@
 // Vectors before the text that is calculated with them:
 #include "core/simd-inl.hpp"
 //
-#include "adjustment/channels-inl.hpp"
+#include "measurement/reading-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace stepdiag {
@@ -103,7 +103,7 @@ public:
     // `beam`: number of d1 ... dn, from 0.
     STEPDIAG_INLINE void pull_distance(const SimdProblem::Channel& channel, const Eigen::Vector2d& offset, int beam) {
         const Vector x = hn::Set(Tag(), offset.x()), y = hn::Set(Tag(), offset.y());
-        const Vector arm = beam_arm(mirror_, x, y), distance = scaled_distance(mirror_, scale_, arm);
+        const Vector arm = beam_arm(mirror_, x, y), distance = beam_distance(mirror_, scale_ * arm);
         Vector read = distance + added_;
         if (beam > 0) read = read + value(setup::beam_constants + beam - 1);
         const Vector force = chunk_.force(channel, read);
@@ -130,7 +130,7 @@ public:
         const Vector bx = hn::Set(Tag(), head.spot_beam.x()), by = hn::Set(Tag(), head.spot_beam.y());
         const Vector lever = spot_lever(mirror_, beam_arm(mirror_, bx, by), hn::Set(Tag(), *head.psd_distance));
         const Vector scaled = scale_ * lever;
-        const auto spot = raw_spot(mirror_, scaled, value(setup::psd_zero), value(setup::psd_zero + 1));
+        const auto spot = spot_reading(mirror_, scaled, value(setup::psd_zero), value(setup::psd_zero + 1));
         Vector force_x = hn::Zero(Tag()), force_y = hn::Zero(Tag());
         if (x) force_x = chunk_.force(*x, spot.x);
         if (y) force_y = chunk_.force(*y, spot.y);

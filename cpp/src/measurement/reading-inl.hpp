@@ -63,6 +63,20 @@ STEPDIAG_INLINE N spot_lever(const MirrorReading<N>& reading, N arm, N psd_dista
     const N half = mul_add(psd_distance + arm, reading.inverse_w, reading.distance);
     return half + half;
 }
+template <class N>
+struct Spot {
+    N x, y;
+};
+// `zero`: what a centred spot reads.
+template <class N>
+STEPDIAG_INLINE Spot<N> spot_reading(const MirrorReading<N>& reading, N lever, N zero_x, N zero_y) {
+    return {sub_mul(lever, reading.beta, zero_x), mul_add(lever, reading.alpha, zero_y)};
+}
+// What a set-up adds to its distances: constant, drift, and a factor of their travel.
+template <class N>
+STEPDIAG_INLINE N distance_added(N constant, N drift, N time, N factor, N travel) {
+    return mul_add(factor, travel, mul_add(drift, time, constant));
+}
 
 }  // namespace STEPDIAG_NAMESPACE
 }  // namespace stepdiag

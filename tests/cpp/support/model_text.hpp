@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "adjustment/channel_model.hpp"
-#include "adjustment/channels-inl.hpp"
 #include "machine/pose-inl.hpp"
+#include "measurement/reading-inl.hpp"
 
 namespace stepdiag {
 
@@ -46,7 +46,7 @@ std::vector<N> read_channels(const KnownPoint& point, const std::vector<N>& para
                                    negative(setup(setup::cosine)), constant(point.place.travel));
     const HeadCalibration& head = point.model.head();
     const auto distance = [&](const Eigen::Vector2d& offset) {
-        return scaled_distance(mirror, scale, beam_arm(mirror, constant(offset.x()), constant(offset.y()))) + added;
+        return beam_distance(mirror, scale * beam_arm(mirror, constant(offset.x()), constant(offset.y()))) + added;
     };
     if (point.model.kind() == ChannelKind::multi_beam) {
         std::vector<N> distances;
@@ -60,8 +60,8 @@ std::vector<N> read_channels(const KnownPoint& point, const std::vector<N>& para
     if (point.model.kind() == ChannelKind::ideal)
         return {distance(Eigen::Vector2d::Zero()), scale * mirror.alpha, scale * mirror.beta};
     const N arm = beam_arm(mirror, constant(head.spot_beam.x()), constant(head.spot_beam.y()));
-    const auto spot = raw_spot(mirror, scale * spot_lever(mirror, arm, constant(*head.psd_distance)),
-                               setup(setup::psd_zero), setup(setup::psd_zero + 1));
+    const auto spot = spot_reading(mirror, scale * spot_lever(mirror, arm, constant(*head.psd_distance)),
+                                   setup(setup::psd_zero), setup(setup::psd_zero + 1));
     return {distance(Eigen::Vector2d::Zero()), spot.x, spot.y};
 }
 
