@@ -95,7 +95,7 @@ void bind_measurement(py::module_& m) {
                                [](const Measurement& run) {
                                    std::vector<std::string> names;
                                    for (const Station& s : run.stations())
-                                       names.push_back(s.direction == Direction::forward ? "forward" : "backward");
+                                       names.push_back(name(s.direction));
                                    return names;
                                })
         .def_property_readonly("position",

@@ -135,12 +135,6 @@ STEPDIAG_INLINE void detect(const SimdBeam& beam, std::size_t lane, Light<Pair>&
     const Pair distance = mul_add(all(beam.scale), light.optical_length, at(*beam.offset, lane));
     store(distance, to + lane);
     light.followed = both(light.followed, is_finite(distance));
-    if (beam.detector == SimdDetector::ideal) {
-        const Pair half = all(1.0) / (all(1.0) - light.direction[2]);
-        store(light.direction[1] * half, to + lane_group + lane);
-        store(negative(light.direction[0] * half), to + 2 * lane_group + lane);
-        return;
-    }
     const SimdRow* const axis = beam.detector_rows;
     const Pair along = mul_add(at(axis[0], lane), light.direction[0],
                                mul_add(at(axis[1], lane), light.direction[1], at(axis[2], lane) * light.direction[2]));
@@ -187,9 +181,13 @@ void trace(const SimdPass& pass, const Outline& outline, const std::vector<SimdB
     }
 }
 
+// Follows where every beam is read by the rules of define_signals and a little to spare.
 void define(const SimdPass& pass, const SimdClosed& closed) {
+    const Pair zero = all(0.0), aside = all(0.25 * closed.aperture);
+    const Pair half_mirror[2] = {all(closed.half_mirror[0]), all(closed.half_mirror[1])};
+    const SimdRow* const axes = pass.setup->mirror_axes;
     for (std::size_t lane = 0; lane < lane_group; lane += 2 * hn::Lanes(Tag())) {
-        const Pair ratio = at(*closed.index_ratio, lane), zero = all(0.0);
+        const Pair ratio = at(*closed.index_ratio, lane);
         MaskPair followed = is_finite(ratio);  // else the air is out of its equation's range
         for (std::size_t row = 0; row < pass.rows; ++row) {
             Mirror mirror{*pass.setup, lane, {}, {}, {}, {}};
@@ -197,17 +195,41 @@ void define(const SimdPass& pass, const SimdClosed& closed) {
             if (pass.excess) store(excess_of(mirror), pass.excess[row].value + lane);
             const MirrorReading<Pair> reading = read(mirror);
             followed = both(followed, both(both(mirror.normal.z > zero, reading.w > zero), reading.length > zero));
+            // The beam from (u, v) meets the mirror's plane at (u, v, alpha v - beta u) and a constant.
+            Pair along[2][2];
+            for (int axis = 0; axis < 2; ++axis) {
+                const Pair z = at(axes[3 * axis + 2], lane);
+                along[axis][0] = sub_mul(z, reading.beta, at(axes[3 * axis], lane));
+                along[axis][1] = mul_add(z, reading.alpha, at(axes[3 * axis + 1], lane));
+            }
+            const Pair tilt = magnitude(reading.alpha) + magnitude(reading.beta);  // at least the larger one
+            const auto check = [&](Pair u, Pair v, Pair distance) HWY_ATTR {
+                const Pair x = u - mirror.centre.x, y = v - mirror.centre.y;
+                for (int axis = 0; axis < 2; ++axis) {
+                    const Pair met = mul_add(along[axis][0], x, along[axis][1] * y);
+                    followed = both(followed, magnitude(met) <= half_mirror[axis]);
+                }
+                followed = both(followed, both(distance > zero, distance * tilt <= aside));
+            };
             double* const to = pass.readings + row * pass.channels * lane_group + lane;
-            if (closed.psd_distance) {
+            if (closed.layout == HeadLayout::multi_beam) {
+                for (std::size_t i = 0; i < pass.channels; ++i) {
+                    const Pair u = at(closed.beams[2 * i], lane), v = at(closed.beams[2 * i + 1], lane);
+                    const Pair distance = beam_distance(reading, beam_arm(reading, u, v));
+                    check(u, v, distance);
+                    store(distance * ratio, to + i * lane_group);
+                }
+                continue;
+            }
+            check(zero, zero, reading.distance);
+            store(reading.distance * ratio, to);
+            if (closed.layout == HeadLayout::psd) {
                 const Pair lever = spot_lever(reading, zero, at(*closed.psd_distance, lane));
-                store(reading.distance * ratio, to);
                 store(negative(lever * reading.beta), to + lane_group);
                 store(lever * reading.alpha, to + 2 * lane_group);
             } else {
-                for (std::size_t i = 0; i < pass.channels; ++i) {
-                    const Pair u = at(closed.beams[2 * i], lane), v = at(closed.beams[2 * i + 1], lane);
-                    store(beam_distance(reading, beam_arm(reading, u, v)) * ratio, to + i * lane_group);
-                }
+                store(reading.alpha, to + lane_group);
+                store(reading.beta, to + 2 * lane_group);
             }
         }
         keep(followed, pass.followed + lane);
