@@ -20,6 +20,7 @@ using stepdiag::no_unknown;
 
 AdjustmentProblem make_problem(Workshop shop) {
     shop.seconds = 3.0;
+    shop.head.nominal.spot_beam = {25.0, -3.0};
     for (auto& prior : shop.options.setup) prior = stepdiag::free_unknown;
     return {shop.pattern(), shop.plan(), shop.machine().chain(), shop.tool, shop.head.calibration(), shop.options};
 }
