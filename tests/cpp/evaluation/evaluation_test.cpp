@@ -81,7 +81,7 @@ TEST(Evaluation, EnhancedReducesThreeBeams) {
         evaluate_enhanced(run, plan(lines({"ppp", "npp", "pnp"}), 12), Chain::parse("[w b Z X Y t]"), no_tool, head);
     EXPECT_LE(worst(calibration, truth).position, 2.5e-3);  // laser angles of 1.2 mrad
     EXPECT_LE(worst(calibration, truth).angle, 50e-9);
-    EXPECT_TRUE(calibration.undetermined.empty());
+    EXPECT_TRUE(calibration.findings.empty());
 }
 
 TEST(Evaluation, LostReadingIsBridgedByFourLinesAndSaidByThree) {
@@ -92,7 +92,7 @@ TEST(Evaluation, LostReadingIsBridgedByFourLinesAndSaidByThree) {
         const auto calibration = evaluate_enhanced(run, p, chain, no_tool, {});
         EXPECT_LE(worst(calibration, truth).position, 20e-6);
         EXPECT_LE(worst(calibration, truth).angle, 10e-9);
-        EXPECT_EQ(calibration.undetermined.empty(), diagonals.size() == 4);
+        EXPECT_EQ(calibration.findings.empty(), diagonals.size() == 4);
         EXPECT_EQ(calibration.functions[0].has_value(), diagonals.size() == 4);
     }
 }
