@@ -8,6 +8,7 @@
 
 #include "stepdiag/simulation/simulate.hpp"
 #include "support/refuses.hpp"
+#include "support/usual.hpp"
 
 namespace {
 
@@ -21,26 +22,19 @@ using stepdiag::SetupQuantity;
 
 constexpr double micro = 1e-6;
 
-std::vector<Line> parse(std::initializer_list<const char*> names) {
-    std::vector<Line> lines;
-    for (const char* name : names) lines.push_back(Line::parse(name));
-    return lines;
-}
-
 // A machine, its plan and its head, every measured line misaligned by up to 1 mrad.
 struct Workshop {
     int steps = 8;
-    std::vector<Line> lines = parse({"ppp", "npp", "pnp", "nnp"});
-    std::vector<Line> scale_lines = parse({"p00", "0p0", "00p"});
+    std::vector<Line> lines = stepdiag::test::diagonals, scale_lines = stepdiag::test::scale_lines;
     stepdiag::Head head = {};
-    Vector3d volume{800.0, 600.0, 500.0}, tool{20.0, -10.0, 50.0};
+    Vector3d volume = stepdiag::test::volume, tool{20.0, -10.0, 50.0};
 
     stepdiag::Plan plan() const { return {volume, lines, steps, stepdiag::all_axes, scale_lines}; }
     stepdiag::Machine machine() const {
         stepdiag::RandomErrorMap errors;
         errors.intervals = steps;
         errors.seed = 3;
-        return {stepdiag::Chain::parse("[w X' b Y Z t]"), make_random_error_map(volume, errors), tool};
+        return {stepdiag::test::chain, make_random_error_map(volume, errors), tool};
     }
     stepdiag::SimulationOptions simulation() const {
         stepdiag::SimulationOptions options;

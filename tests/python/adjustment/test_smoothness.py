@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import reference
-from adjusted import FUNCTIONS, adjust, assert_as_dense
+from adjusted import adjust, assert_as_dense
 from dense_adjustment import DenseAdjustment, Knowledge
-from virtual_runs import DIAGONALS, measured, noisy, random_scenario, random_table
+from usual import DIAGONALS
+from virtual_runs import measured, noisy, random_scenario, random_table
 
 import stepdiag as sd
+from stepdiag.parameters import FUNCTIONS
 
 
 @pytest.mark.parametrize(("translation", "rotation"), [(1e-3, 3e-6), (5e-3, 0.0), (0.0, 1e-6)])

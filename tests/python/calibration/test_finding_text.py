@@ -4,13 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from calibrations import CHAIN, LINES, PLAN, TOOL, VOLUME, simulate
+from calibrations import PLAN, TOOL, VOLUME, simulate
+from usual import CHAIN, DIAGONALS
 
 import stepdiag as sd
 from stepdiag.calibration import finding_text
 from stepdiag.calibration.finding_text import combination_text, undetermined_text
 
-NO_SCALE_LINES = sd.Plan(VOLUME, LINES, 5)
+NO_SCALE_LINES = sd.Plan(VOLUME, DIAGONALS, 5)
 
 
 def without(run: sd.Measurement, lost: list[bool]) -> sd.Measurement:
@@ -38,7 +39,7 @@ def test_open_scales_are_records_with_the_line_that_helps(method: str, remedy: s
 
 
 def test_a_step_that_was_read_on_too_few_lines_is_said_with_its_place() -> None:
-    three = sd.Plan(VOLUME, LINES[:3], 5, scale_lines=PLAN.scale_lines)
+    three = sd.Plan(VOLUME, DIAGONALS[:3], 5, scale_lines=PLAN.scale_lines)
     run = simulate(1, plan=three)
     lost = [(line, point) == ("npp", 4) for line, point in zip(run.line, run.point, strict=True)]
     calibration = sd.evaluate(without(run, lost), three, sd.Head(), CHAIN, TOOL, method="conventional")

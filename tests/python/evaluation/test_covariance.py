@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth import DIAGONALS, FACES, SCALE_LINES, Setup, changed, without
+from truth import Setup, changed, without
+from usual import DIAGONALS, FACES, SCALE_LINES
 
 import stepdiag as sd
 

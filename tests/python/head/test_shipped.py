@@ -16,7 +16,8 @@ from reference_optics import (
 )
 from shipped_heads import ASSUMED_AIR, SHIPPED, TRUE_AIR, Errors, Reference, Shipped
 from simulated_runs import table_of, with_reversal
-from truth import DIAGONALS, VOLUME, Setup
+from truth import Setup
+from usual import DIAGONALS, VOLUME
 
 import stepdiag as sd
 

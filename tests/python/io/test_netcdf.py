@@ -10,7 +10,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 import xarray as xr
-from calibrations import CHAIN, PLAN, TOOL, VOLUME, calibrate, full_run, same_calibration, same_run, simulate
+from calibrations import PLAN, TOOL, VOLUME, calibrate, full_run, same_calibration, same_run, simulate
+from usual import CHAIN, DIAGONALS
 
 import stepdiag as sd
 from stepdiag.calibration.finding_text import combination_text
@@ -48,7 +49,7 @@ CALIBRATIONS: dict[str, dict[str, Any]] = {
     "adjustment": {"method": "adjustment"},
     "enhanced": {"method": "enhanced", "full_covariance": True},
     "conventional": {"method": "conventional"},
-    "without scales": {"method": "enhanced", "plan": sd.Plan(VOLUME, ["ppp", "npp", "pnp", "nnp"], 5)},
+    "without scales": {"method": "enhanced", "plan": sd.Plan(VOLUME, DIAGONALS, 5)},
 }
 
 
