@@ -1,21 +1,17 @@
 #include "batch/linear_batch.hpp"
 
-#include <hwy/aligned_allocator.h>
-
 #include <algorithm>
 #include <limits>
 
 #include "batch/simd_reduction.hpp"
-#include "evaluation/linear_evaluation.hpp"
-#include "evaluation/linear_maps.hpp"
-#include "stepdiag/core/random_blocks.hpp"
+#include "evaluation/lane_maps.hpp"
 #include "stepdiag/evaluation/conventional.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
 
 namespace stepdiag {
 namespace {
 
-static_assert(lane_group % program_lanes == 0);
+static_assert(sizeof(LaneRow) == lane_group * sizeof(double));  // so that rows make one array of numbers
 
 bool is_enhanced(const BatchPattern& pattern) { return pattern.options.method == EvaluationMethod::enhanced; }
 
@@ -43,33 +39,31 @@ Measurement without_uncertainties(const Measurement& measurement) {
 
 class LinearBatch : public BatchMethod {
 public:
-    LinearBatch(const BatchPattern& pattern, const std::vector<Pass>& passes)
+    LinearBatch(const BatchPattern& pattern, std::vector<Pass> passes)
         : BatchMethod(evaluate(pattern)),
-          reduction_(pattern.measurement, pattern.heads, passes, length_kind(pattern)),
-          program_(is_enhanced(pattern) ? enhanced_program(passes, pattern.plan, pattern.chain, pattern.tool)
-                                        : conventional_program(passes, pattern.plan)),
+          passes_(std::move(passes)),
+          reduction_(pattern.measurement, pattern.heads, passes_, length_kind(pattern)),
+          map_(is_enhanced(pattern) ? enhanced_map(passes_, pattern.plan, pattern.chain, pattern.tool)
+                                    : conventional_map(passes_, pattern.plan)),
           effects_(effects_of_raw_channels(pattern)) {}
+    LinearBatch(const LinearBatch&) = delete;
 
     std::unique_ptr<Worker> worker() const override { return std::make_unique<LinearWorker>(*this); }
 
     Eigen::MatrixXd gain() const override {
         const auto raws = Eigen::Index(effects_.size());
-        Eigen::MatrixXd gain(program_.outputs(), raws);
-        std::vector<double> registers(program_.registers() * program_lanes);
-        std::vector<double> values(program_.outputs() * program_lanes);
-        for (Eigen::Index begin = 0; begin < raws; begin += program_lanes) {
-            const Eigen::Index lanes = std::min<Eigen::Index>(program_lanes, raws - begin);
-            std::fill(registers.begin(), registers.end(), 0.0);
+        Eigen::MatrixXd gain(entries.size(), raws);
+        Eigen::Matrix<double, lane_group, Eigen::Dynamic> values(lane_group, entries.size());
+        for (Eigen::Index begin = 0; begin < raws; begin += lane_group) {
+            const Eigen::Index lanes = std::min<Eigen::Index>(lane_group, raws - begin);
+            ReadingRows<LaneRow> readings = no_readings();
             for (Eigen::Index lane = 0; lane < lanes; ++lane)
                 for (int c = 0; c < values_per_reading; ++c) {
                     const RawEffect& effect = effects_[begin + lane];
-                    registers[(effect.place + c) * program_lanes + lane] = effect.by_channel[c];
+                    readings.values[effect.place + c].lane[lane] = effect.by_channel[c];
                 }
-            program_.run(registers.data(), values.data(), program_lanes);
-            gain.middleCols(begin, lanes) = Eigen::Map<const Eigen::Matrix<double, program_lanes, Eigen::Dynamic>>(
-                                                values.data(), program_lanes, Eigen::Index(program_.outputs()))
-                                                .topRows(lanes)
-                                                .transpose();
+            map_(readings, values.data(), lane_group);
+            gain.middleCols(begin, lanes) = values.topRows(lanes).transpose();
         }
         return gain;
     }
@@ -83,25 +77,29 @@ private:
 
     class LinearWorker : public Worker {
     public:
-        explicit LinearWorker(const LinearBatch& batch)
-            : batch_(batch), registers_(hwy::AllocateAligned<double>(batch.program_.registers() * program_lanes)) {
-            std::fill_n(registers_.get(), batch.program_.registers() * program_lanes, 0.0);
-        }
+        explicit LinearWorker(const LinearBatch& batch) : batch_(batch), readings_(batch.no_readings()) {}
 
         void evaluate(const double* readings, std::size_t lanes, double* values, std::size_t stride) override {
-            for (std::size_t lane = 0; lane < lanes; lane += program_lanes) {
-                const SimdReduction::Lost lost = batch_.reduction_.reduce(readings + lane, lanes, registers_.get());
-                batch_.program_.run(registers_.get(), values + lane, stride);
-                for (std::size_t k = 0; k < program_lanes; ++k)
-                    for (std::size_t output = 0; lost[k] && output < batch_.program_.outputs(); ++output)
+            for (std::size_t lane = 0; lane < lanes; lane += lane_group) {
+                const SimdReduction::Lost lost =
+                    batch_.reduction_.reduce(readings + lane, lanes, readings_.values.front().lane);
+                batch_.map_(readings_, values + lane, stride);
+                for (std::size_t k = 0; k < lane_group; ++k)
+                    for (std::size_t output = 0; lost[k] && output < batch_.entries.size(); ++output)
                         values[output * stride + lane + k] = std::numeric_limits<double>::quiet_NaN();
             }
         }
 
     private:
         const LinearBatch& batch_;
-        hwy::AlignedFreeUniquePtr<double[]> registers_;
+        ReadingRows<LaneRow> readings_;
     };
+
+    ReadingRows<LaneRow> no_readings() const {
+        const Pass& last = passes_.back();
+        const std::size_t readings = std::size_t(last.first_reading) + last.points.size();
+        return {std::vector<LaneRow>(values_per_reading * readings, LaneRow::Zero())};
+    }
 
     std::vector<RawEffect> effects_of_raw_channels(const BatchPattern& pattern) const {
         const Measurement measurement = without_uncertainties(pattern.measurement);
@@ -119,8 +117,9 @@ private:
         return effects;
     }
 
+    std::vector<Pass> passes_;
     SimdReduction reduction_;
-    LinearProgram program_;
+    LaneMap map_;
     std::vector<RawEffect> effects_;  // by raw channel: row * channels + channel
 };
 

@@ -109,7 +109,7 @@ public:
     }
 
     STEPDIAG_INLINE void report(bool* lost) const {
-        double number[program_lanes];
+        double number[lane_group];
         store((lengths_ + tilts_) * all(0.0), number);  // NaN, or 0
         for (std::size_t lane = 0; lane < 2 * hn::Lanes(Tag()); ++lane) lost[lane] = !(number[lane] == 0.0);
     }
@@ -134,7 +134,7 @@ private:
     }
     STEPDIAG_INLINE void put_length(const ReducedRow& row, Pair length) {
         lengths_ = lengths_ + length;
-        store(length - all(row.travel), inputs_ + row.place * program_lanes);
+        store(length - all(row.travel), inputs_ + row.place * lane_group);
     }
     STEPDIAG_INLINE void put_tilts(const ReducedRow& row, Pair alpha, Pair beta) {
         put_tilts(row, {alpha, beta}, square_sum(alpha, beta));
@@ -142,8 +142,8 @@ private:
     // Tilts of 45 degrees and more send no beam back.
     STEPDIAG_INLINE void put_tilts(const ReducedRow& row, Tilts tilts, Pair t) {
         tilts_ = tilts_ + select(all(1.0) > t, t, none());
-        store(tilts.alpha, inputs_ + (row.place + 1) * program_lanes);
-        store(tilts.beta, inputs_ + (row.place + 2) * program_lanes);
+        store(tilts.alpha, inputs_ + (row.place + 1) * lane_group);
+        store(tilts.beta, inputs_ + (row.place + 2) * lane_group);
     }
 
     const double* readings_;
@@ -158,7 +158,7 @@ private:
 SimdReduction::Lost reduce_lanes(const SimdReduction& reduction, const double* readings, std::size_t stride,
                                  double* inputs) {
     SimdReduction::Lost lost;
-    for (std::size_t lane = 0; lane < program_lanes; lane += 2 * hn::Lanes(Tag())) {
+    for (std::size_t lane = 0; lane < lane_group; lane += 2 * hn::Lanes(Tag())) {
         Reducer reducer(readings + lane, stride, inputs + lane);
         const std::uint32_t* raws = reduction.raws();
         const double* solution = reduction.solutions();

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "evaluation/linear_program.hpp"
 #include "evaluation/passes.hpp"
+#include "stepdiag/core/random_blocks.hpp"
 
 namespace stepdiag {
 
@@ -29,9 +29,9 @@ public:
     SimdReduction(const Measurement& pattern, const HeadCalibrations& heads, const std::vector<Pass>& passes,
                   LengthKind kind);
 
-    // program_lanes sets, from readings[raw * stride + lane] to inputs[place * program_lanes + lane]. `lost`: the lanes
+    // lane_group sets, from readings[raw * stride + lane] to inputs[place * lane_group + lane]. `lost`: the lanes
     // that no mirror gives, or with a reading that counts and is not finite.
-    using Lost = std::array<bool, program_lanes>;
+    using Lost = std::array<bool, lane_group>;
     Lost reduce(const double* readings, std::size_t stride, double* inputs) const;
 
     // --- for the code that runs it

@@ -3,13 +3,12 @@
 // A map applies itself to "rows": each reading's length, alpha and beta is a row of numbers, one for each of several
 // sets of readings evaluated at once. One set gives the values. A set that holds the effect of one raw channel alone
 // gives that channel's share of every parameter, and the shares make eq. 6: Cov(x) = sum over raw channels of share
-// share^T. Rows that are Traced write the map down as a program for many sets.
+// share^T. Rows of lanes evaluate many runs of one pattern (lane_maps.hpp).
 #pragma once
 
 #include <Eigen/Core>
 #include <vector>
 
-#include "evaluation/linear_program.hpp"
 #include "evaluation/step_systems.hpp"
 #include "stepdiag/core/error.hpp"
 
@@ -53,7 +52,6 @@ template <class Number>
 void take_off_trend(Number* function, int nodes, const Number& end) {
     for (int k = 1; k < nodes; ++k) {
         function[k] -= double(k) / (nodes - 1) * end;
-        settle(function[k]);
     }
 }
 
@@ -117,21 +115,6 @@ std::vector<int> determined_rows(const Map& map, const ParameterLayout& layout) 
     for (const Squareness s : all_squarenesses)
         if (map.is_determined(s)) rows.push_back(layout.row(s));
     return rows;
-}
-
-// The map from the readings' lengths and tilts (values_per_reading each) to the parameters that are determined.
-template <class Map>
-LinearProgram write_down(const Map& map, const std::vector<Pass>& passes, const ParameterLayout& layout) {
-    ProgramBuilder builder(readings_of(passes).size());
-    ReadingRows<Traced> readings;
-    for (std::size_t i = 0; i < builder.inputs(); ++i) readings.values.emplace_back(builder, int(i));
-    std::vector<Traced> parameters = map.template apply<Traced>(readings);
-    std::vector<int> outputs;
-    for (const int row : determined_rows(map, layout)) {
-        parameters[row].settle();
-        outputs.push_back(parameters[row].place());
-    }
-    return builder.build(outputs);
 }
 
 // Fills functions, squarenesses and covariance of the calibration with what `map.is_determined` names.
@@ -198,7 +181,6 @@ void add_up_steps(const AxisSystem& system, const std::vector<Number>& lengths, 
             y += share[1] * increment;
             z += share[2] * increment;
         }
-        settle(x), settle(y), settle(z);
         out[0][i + 1] = x;
         out[1][i + 1] = y;
         out[2][i + 1] = z;

@@ -31,13 +31,11 @@ public:
         for (const auto& terms : sums_) {
             Number sum = Number::Zero();
             for (const auto& [reading, coefficient] : terms) sum += coefficient * lengths[reading];
-            settle(sum);
             sums.push_back(sum);
         }
         std::vector<Number> slopes(inverse_.rows(), Number::Zero());
         for (Eigen::Index j = 0; j < inverse_.rows(); ++j)
             for (Eigen::Index i = 0; i < inverse_.cols(); ++i) slopes[j] += inverse_(j, i) * sums[i];
-        for (Number& slope : slopes) settle(slope);
         return slopes;
     }
 
@@ -49,7 +47,6 @@ public:
                 const Eigen::Vector2d lateral = passes[v].points[k].lateral;
                 Number& length = lengths[passes[v].first_reading + k];
                 length += lateral.y() * slopes[laser_angle(int(v), 0)] - lateral.x() * slopes[laser_angle(int(v), 1)];
-                settle(length);
             }
     }
 
