@@ -157,6 +157,7 @@ def test_lost_points_lines_and_nodes(lines: list[str], gone: tuple[tuple[str, in
         assert_rank(adjustment, dense)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(data=st.data())
 def test_any_plan_with_any_losses_claims_what_the_rank_allows(data: st.DataObject) -> None:

@@ -70,6 +70,7 @@ def test_cross_validation_finds_smooth_axes_and_keeps_the_screw() -> None:
         assert np.mean(smooth.calibration.functions[name][2]) < np.mean(rough.calibration.functions[name][2]), name
 
 
+@pytest.mark.slow
 def test_cross_validation_claims_no_more_than_it_knows() -> None:
     """Errors in units of the stated uncertainties stay of the size of one."""
     ratios = []

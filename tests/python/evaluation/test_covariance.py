@@ -43,6 +43,7 @@ def repeated(setup: Setup, run: sd.Measurement, method: str) -> np.ndarray:
     return np.array(results)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("layout", "method", "lines", "lost"),
     [

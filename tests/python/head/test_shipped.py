@@ -35,6 +35,7 @@ def errors_of(description: Description, seed: int) -> Errors:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("steps", "backward"), [(50, False), (8, True)], ids=["forward", "backward"])
 @pytest.mark.parametrize("shipped", SHIPPED, ids=lambda shipped: shipped.file)
 def test_signals_of_a_whole_run_hold_against_forty_digits(shipped: Shipped, steps: int, backward: bool) -> None:
