@@ -59,13 +59,13 @@ class ErrorMap:
         """
         functions: name -> (position, value), one-dimensional and of one length, positions ascending. negative_functions: the same of the - direction, where it has others. Raises InvalidArgument.
         """
+    def frame_deviations(self, volume: numpy.typing.ArrayLike) -> list[tuple[str, float, float]]:
+        """
+        Where the map breaks the frame choice (0 at home, straightness 0 at both ends of travel, approached in + direction): (function, position in mm, value in mm or rad) each.
+        """
     def function(self, name: str, position: numpy.typing.ArrayLike, approach: str = '+') -> numpy.typing.NDArray[numpy.float64]:
         """
         Values (mm or rad) of one error function at positions (mm), shape (n,), approached in the direction "+" or "-".
-        """
-    def warnings(self, volume: numpy.typing.ArrayLike) -> list[str]:
-        """
-        Where the map breaks the frame choice (0 at home, straightness 0 at both ends of travel, approached in + direction); one sentence each.
         """
     def write(self, path: str | os.PathLike[str], *, chain: Chain | str | None = None, volume: numpy.typing.ArrayLike | None = None, tool: numpy.typing.ArrayLike | None = None) -> None:
         """

@@ -1,12 +1,15 @@
 """The core's findings in words: what the readings leave open (`Undetermined`, `KnownCombination`) and the verdict of a
-fit (`FitReason`; docs/conventions.md, "Verdict of a fit"). All sentences about them are here."""
+fit (`FitReason`; docs/conventions.md, "Verdict of a fit"), and where an error map breaks the frame choice. All
+sentences about them are here."""
 
 from collections.abc import Iterator
 from typing import Final
 
-from stepdiag._core import Adjustment, Calibration, FitReason, KnownCombination, Undetermined
-from stepdiag.parameters import kind_of
-from stepdiag.units import MICRO
+import numpy.typing as npt
+
+from stepdiag._core import Adjustment, Calibration, ErrorMap, FitReason, KnownCombination, Undetermined
+from stepdiag.parameters import kind_of, units_of
+from stepdiag.units import MICRO, report_value
 
 # By Undetermined.reasons(); empty where "undetermined" says it all.
 REASONS: Final = {
@@ -124,6 +127,14 @@ def combination_text(known: KnownCombination, *, value: bool = True) -> str:
     unit = "µrad" if known.line else "µm/m"
     shown = f" = {known.value * MICRO:.4g} ±" if value else ", ±"
     return f"{what}{shown} {known.standard_uncertainty * MICRO:.4g} {unit}"
+
+
+def frame_deviation_texts(errors: ErrorMap, volume: npt.ArrayLike) -> Iterator[str]:
+    """Where an error map breaks the frame choice."""
+    for name, position, value in errors.frame_deviations(volume):
+        shown, unit = report_value(units_of(name), value)
+        place = "at home" if position == 0.0 else "at the end of travel"
+        yield f"{name} is {shown:g} {unit} {place}, where the frame choice has 0; used as given"
 
 
 def fit_row(calibration: Calibration) -> str:

@@ -83,3 +83,13 @@ def test_files_keep_findings_in_words(tmp_path: Path) -> None:
     again = sd.read_calibration(tmp_path / "open.csv")
     assert again.undetermined == calibration.undetermined
     assert again.findings == []
+
+
+def test_where_an_error_map_breaks_the_frame_choice_is_said_in_units_of_reports() -> None:
+    errors = sd.ErrorMap({"EYX": ([0.0, 80.0], [1e-3, 2e-3]), "EAX": ([0.0, 80.0], [3e-6, 0.0])})
+    assert errors.frame_deviations(VOLUME) == [("EYX", 0.0, 1e-3), ("EYX", 80.0, 2e-3), ("EAX", 0.0, 3e-6)]
+    assert [text.partition(",")[0] for text in finding_text.frame_deviation_texts(errors, VOLUME)] == [
+        "EYX is 1 µm at home",
+        "EYX is 2 µm at the end of travel",
+        "EAX is 3 µrad at home",
+    ]
