@@ -129,6 +129,8 @@ if TYPE_CHECKING:
         read_scenario,
         simulate_scenario,
     )
+    from stepdiag.scenario.known import Known
+    from stepdiag.scenario.truth import Truth
     from stepdiag.uncertainty.dask_workers import workers_of
     from stepdiag.uncertainty.model_source import ModelSource
     from stepdiag.uncertainty.monte_carlo import run_monte_carlo
@@ -172,6 +174,7 @@ __all__ = [
     "Interferometer",
     "InvalidArgument",
     "KeyTrigger",
+    "Known",
     "KnownCombination",
     "LateralEffect",
     "LinuxcncError",
@@ -203,6 +206,7 @@ __all__ = [
     "SpotSensor",
     "StatisticsOptions",
     "TcpTrigger",
+    "Truth",
     "Twin",
     "UncertainInput",
     "UncertainInputs",
@@ -321,6 +325,8 @@ _LATER = {
         "read_scenario",
         "simulate_scenario",
     ),
+    "scenario.known": ("Known",),
+    "scenario.truth": ("Truth",),
     "uncertainty.dask_workers": ("workers_of",),
     "uncertainty.model_source": ("ModelSource",),
     "uncertainty.monte_carlo": ("run_monte_carlo",),

@@ -131,8 +131,8 @@ def test_error_map_is_not_asked_for_what_makes_no_sense() -> None:
     refused(ERRORS.function, "EXX", "far", names="position")
     refused(ERRORS.function, "EXX", [0.0, NAN], names="position")
     refused(ERRORS.function, "EXX", [INF], names="position")
-    refused(ERRORS.warnings, (1.0, 2.0), names="volume")
-    refused(ERRORS.warnings, (1.0, 2.0, NAN), names="volume")
+    refused(ERRORS.frame_deviations, (1.0, 2.0), names="volume")
+    refused(ERRORS.frame_deviations, (1.0, 2.0, NAN), names="volume")
 
 
 @pytest.mark.parametrize(

@@ -3,13 +3,14 @@ fit (`FitReason`; docs/conventions.md, "Verdict of a fit"), and where an error m
 sentences about them are here."""
 
 from collections.abc import Iterator
-from typing import Final
-
-import numpy.typing as npt
+from typing import TYPE_CHECKING, Final
 
 from stepdiag._core import Adjustment, Calibration, ErrorMap, FitReason, KnownCombination, Undetermined
 from stepdiag.parameters import kind_of, units_of
 from stepdiag.units import MICRO, report_value
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
 # By Undetermined.reasons(); empty where "undetermined" says it all.
 REASONS: Final = {
@@ -129,7 +130,7 @@ def combination_text(known: KnownCombination, *, value: bool = True) -> str:
     return f"{what}{shown} {known.standard_uncertainty * MICRO:.4g} {unit}"
 
 
-def frame_deviation_texts(errors: ErrorMap, volume: npt.ArrayLike) -> Iterator[str]:
+def frame_deviation_texts(errors: ErrorMap, volume: "npt.ArrayLike") -> Iterator[str]:
     """Where an error map breaks the frame choice."""
     for name, position, value in errors.frame_deviations(volume):
         shown, unit = report_value(units_of(name), value)
