@@ -1,4 +1,4 @@
-// Random numbers of many samples at once, for loops over vectors of lanes: see stepdiag/core/random_blocks.hpp.
+// Random numbers of many samples at once in SIMD lanes: see stepdiag/core/random_blocks.hpp.
 #if defined(STEPDIAG_RANDOM_BLOCKS_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef STEPDIAG_RANDOM_BLOCKS_INL
 #undef STEPDIAG_RANDOM_BLOCKS_INL
