@@ -42,7 +42,7 @@ void ByteWriter::variable(std::uint64_t value) {
     bytes_.push_back(char(value));
 }
 
-// A zero is followed by how many more of them come.
+// A zero is followed by the number of further zeros.
 void ByteWriter::counts(const std::vector<std::uint32_t>& counts) {
     for (std::size_t i = 0; i < counts.size(); ++i) {
         variable(counts[i]);
