@@ -65,7 +65,7 @@ std::string check_fit(const ParameterTable& table, const CompensatorOptions& opt
     if (fit == Fit::rejected && !options.accept_rejected)
         throw InvalidArgument(name +
                               ": fit=rejected: the readings of this calibration contradict each other or the "
-                              "scenario; measure again, or take it all the same with accept_rejected");
+                              "scenario; measure again, or accept it with accept_rejected");
     return fit ? stepdiag::name(*fit) : "";
 }
 

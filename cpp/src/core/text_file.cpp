@@ -120,7 +120,7 @@ std::string read_text_file(const std::string& path) {
     std::vector<char> chunk(1 << 16);
     while (stream.read(chunk.data(), std::streamsize(chunk.size())) || stream.gcount() > 0) {
         text.append(chunk.data(), std::size_t(stream.gcount()));
-        if (text.size() > largest_file) throw InvalidArgument(path + ": larger than 1 GiB, which no file of ours is");
+        if (text.size() > largest_file) throw InvalidArgument(path + ": larger than 1 GiB");
     }
     if (!stream.eof()) throw InvalidArgument(path + ": cannot be read: " + std::strerror(errno));
     if (text.empty()) throw InvalidArgument(path + ": the file is empty");

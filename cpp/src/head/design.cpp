@@ -84,7 +84,7 @@ void check_size(const HeadDesign& design) {
     const double all = double(faces) * double(design.beams.size());
     std::ostringstream text;
     text << "head: has " << faces << " faces; expected at most " << most_faces << ". They need about "
-         << std::ceil(1.7e-6 * all) << " GB and " << std::ceil(18e-6 * all) << " s whenever the head is put together";
+         << std::ceil(1.7e-6 * all) << " GB and " << std::ceil(18e-6 * all) << " s whenever the head is assembled";
     throw InvalidArgument(text.str());
 }
 

@@ -113,7 +113,7 @@ NominalHead nominal_head(const HeadDesign& design, double distance, const Enviro
         const Eigen::Matrix2d near_slopes = spot_slopes(reader, b, distance);
         const Eigen::Matrix2d gained = (spot_slopes(reader, b, farther) - near_slopes) / (2.0 * (farther - distance));
         if (!(std::abs(gained.determinant()) > 1e-6))
-            throw InvalidArgument("beam " + design.beams[b].name + ": its spot does not follow the mirror's tilts");
+            throw InvalidArgument("beam " + design.beams[b].name + ": its spot does not depend on the mirror's tilts");
         nominal.spot_axes = gained.inverse();
         const double psd_distance = 0.25 * (nominal.spot_axes * near_slopes).trace() - distance;
         nominal.calibration.psd_distance = psd_distance;

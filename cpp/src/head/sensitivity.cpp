@@ -186,7 +186,7 @@ std::vector<Sensitivity> head_sensitivities(const Head& head, const MirrorPose& 
                              ? reduce_spot(signals[0], signals.tail<2>(), *nominal.calibration.psd_distance,
                                            nominal.calibration.spot_beam)
                              : reduce_beams(signals, nominal.calibration.beam_offsets);
-    if (!reduced) throw InvalidArgument("mirror: no tilt follows from its readings");
+    if (!reduced) throw InvalidArgument("mirror: its readings do not determine a tilt");
 
     // Change of each signal. `air`: for each beam, because the air's index depends on the wavelength.
     const auto derive = [&](Change change, const std::vector<double>& air) {

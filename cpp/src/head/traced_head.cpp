@@ -264,8 +264,8 @@ ArrivalTable TracedHead::replay(int beam, const std::vector<MirrorPose>& mirrors
             std::ostringstream text;
             text << "replay: beam " << design_.beams[beam].name << " at pose " << i << " (mirror at "
                  << mirrors[i].point.transpose()
-                 << " mm in the sensor frame) differs from its trace: another face came "
-                 << "into its way; with a verified share of 1 every pose is traced instead";
+                 << " mm in the sensor frame) differs from its trace: another face is in "
+                 << "the path of the beam; a verified share of 1 traces every pose instead";
             throw ReplayMismatch(text.str());
         }
     }

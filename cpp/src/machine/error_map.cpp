@@ -34,7 +34,7 @@ ErrorMap::ErrorMap(ParameterTable table) : table_(std::move(table)) {
         if (table_.functions[i]) check_function(*table_.functions[i], name);
         if (!negative) continue;
         if (!table_.functions[i])
-            throw InvalidArgument(name + ": has a table of the - direction, and none of the + direction");
+            throw InvalidArgument(name + ": has a table of the - direction but none of the + direction");
         check_function(*negative, name + " in - direction");
     }
     for (const Squareness s : all_squarenesses)

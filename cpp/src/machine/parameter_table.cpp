@@ -228,7 +228,7 @@ std::string format_parameter_table(const ParameterTable& table) {
         const auto& function = table.functions[i];
         const auto& negative = table.negative_functions[i];
         if (negative && !function)
-            throw InvalidArgument(id.name() + ": has a table of the - direction, and none of the + direction");
+            throw InvalidArgument(id.name() + ": has a table of the - direction but none of the + direction");
         if (function) rows(id, *function, negative ? "+" : "");
         if (negative) rows(id, *negative, "-");
     }

@@ -117,7 +117,7 @@ Eigen::MatrixXd correlation_factor(const Eigen::MatrixXd& correlation, const std
     Eigen::MatrixXd factor = Eigen::MatrixXd(ldlt.matrixL()) * roots.asDiagonal();
     factor = ldlt.transpositionsP().transpose() * factor;
     if (!((factor * factor.transpose() - correlation).array().abs() < rounding).all())
-        throw InvalidArgument(name + ": expected a positive semidefinite matrix: no numbers are correlated like that");
+        throw InvalidArgument(name + ": expected a positive semidefinite matrix, as every correlation matrix is");
     return factor;
 }
 

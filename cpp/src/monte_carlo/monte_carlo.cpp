@@ -156,7 +156,7 @@ Eigen::VectorXd first_result(const SampleModel& model) {
         }
     }
     throw InvalidArgument("none of the first " + std::to_string(pilot_samples) +
-                          " samples has a result: no statistics can be made of them");
+                          " samples has a result, so there are no statistics");
 }
 
 // Provisional bins for the pilot run: minimal bins about `centre`. The values of the joint outputs are kept.

@@ -82,8 +82,8 @@ std::vector<Face> make_body(const Corners& corners, const std::vector<std::vecto
         const double share = double(faces.size()) / most_faces_of_a_body;
         throw InvalidArgument("body: expected at most " + std::to_string(most_faces_of_a_body) + " faces, got " +
                               std::to_string(faces.size()) +
-                              ": each is held against every corner, which would take about " +
-                              std::to_string(std::lround(0.6 * share * share)) + " s; make several bodies of them");
+                              "; the check of each face against every corner would take about " +
+                              std::to_string(std::lround(0.6 * share * share)) + " s; divide it into several bodies");
     }
     if (!(std::isfinite(glass.index) && glass.index >= 1.0))
         throw InvalidArgument("body: expected an index of at least 1");

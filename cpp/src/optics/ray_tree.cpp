@@ -114,7 +114,7 @@ Path RayTree::path_to(int segment) const {
                               std::to_string(segment));
     const Segment& last = segments[segment];
     if (last.end == SegmentEnd::goes_on)
-        throw InvalidArgument("segment: " + std::to_string(segment) + " goes on: its path ends with another one");
+        throw InvalidArgument("segment: " + std::to_string(segment) + " goes on; its path ends with another segment");
     std::vector<int> way;
     for (int i = segment; i >= 0; i = segments[i].parent) way.push_back(i);
     std::reverse(way.begin(), way.end());

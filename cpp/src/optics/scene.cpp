@@ -28,8 +28,8 @@ RTCDevice device() {
     static const RTCDevice device = [] {
         const RTCDevice made = rtcNewDevice("threads=1,verbose=0");
         if (!made)
-            throw std::runtime_error("Embree gave no device (error " + std::to_string(rtcGetDeviceError(nullptr)) +
-                                     ")");
+            throw std::runtime_error("Embree did not create a device (error " +
+                                     std::to_string(rtcGetDeviceError(nullptr)) + ")");
         return made;
     }();
     return device;
@@ -207,7 +207,7 @@ Scene::Scene(std::vector<Face> faces) {
         const double need = 150.0 * double(triangles) / 1e6;  // measured with 1e5, 1e6 and 4e6 faces of four corners
         throw InvalidArgument("scene: " + std::to_string(count) + " faces need about " +
                               std::to_string(std::lround(need) + 1) +
-                              " MB of memory beside their own, more than there is");
+                              " MB of memory in addition to their own, more than is available");
     }
     gap_ = tree_->gap;
 }
