@@ -1,4 +1,4 @@
-// Runs that differ in noise and set-ups, and their evaluation in lanes.
+// Runs with different noise and set-ups, and their evaluation as a batch.
 #pragma once
 
 #include <limits>
@@ -26,7 +26,7 @@ inline std::vector<Line> parse(std::initializer_list<const char*> names) {
     return lines;
 }
 
-// Runs that differ in noise and set-ups; the pattern has neither.
+// Makes runs with different noise and set-ups; the pattern has no noise and no misalignment.
 struct Workshop {
     std::vector<Line> lines = parse({"ppp", "npp", "pnp", "nnp"});
     std::vector<Line> scale_lines = parse({"p00", "0p0", "00p"});
@@ -115,7 +115,7 @@ inline Eigen::VectorXd readings(const Measurement& run) {
     return all;
 }
 
-// Readings and values: a row each, a column each sample.
+// Readings or values: rows are readings or values, columns are samples.
 using Lanes = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 inline Lanes evaluate(const BatchEvaluator& evaluator, const Lanes& readings) {
