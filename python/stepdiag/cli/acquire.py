@@ -133,12 +133,12 @@ def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
     described = read_scenario(scenario)
     raw: OutputFile = given["raw"] or OutputFile(raw_path(output.path), (RAW,))
     # An output that was not made from the raw file, and a raw file that nobody goes on with, are refused by acquire.
-    path = output.claim(scenario, raw.path, error_map=described.error_map, overwrite=True)
-    raw.claim(scenario, error_map=described.error_map, overwrite=True)
+    path = output.claim(scenario, raw.path, error_map=described.truth.error_map, overwrite=True)
+    raw.claim(scenario, error_map=described.truth.error_map, overwrite=True)
     options, resume = _options(given), _resume(given)
     trigger = _trigger(given["trigger"])
     result = acquire(
-        described,
+        described.known,
         given["source"],
         path,
         trigger=trigger,

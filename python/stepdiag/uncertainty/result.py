@@ -11,7 +11,7 @@ import numpy.typing as npt
 from stepdiag._core import InvalidArgument
 from stepdiag.config.key_errors import suggest
 from stepdiag.parameters import KINDS, kind_of
-from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.known import Known
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -23,7 +23,7 @@ class UncertaintyResult:
     """Of all outputs of a scenario's virtual calibrations, in their order: the entries of the calibration, then what
     is derived from it. Native units (mm, rad)."""
 
-    scenario: Scenario
+    known: Known
     method: str
     seed: int
     outputs: Sequence[Any]  # with name, position (NaN where it has none) and unit
