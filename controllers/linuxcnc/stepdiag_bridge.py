@@ -13,8 +13,8 @@ When `request` rises, the component sends "READ <visit> <point>" to the acquisit
 `request` falls. A "FAIL", a broken connection or a timeout sets `failed` until `request` falls, and prints the reason.
 
 In simulation, --twin HOST:PORT first moves a virtual machine (`stepdiag twin`) to the position of the joints (pins
-joint-x, -y, -z), as soon as they are at rest. They are at rest if they have not changed for --rest servo cycles. The pin
-`clock` gives the time in s; without it, a cycle is --period of real time.
+joint-x, -y, -z), as soon as they are at rest. They are at rest if they have not changed for --rest servo cycles. The
+pin `clock` gives the time in s; without it, a cycle is --period of real time.
 """
 
 import argparse

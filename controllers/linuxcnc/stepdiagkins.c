@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Kinematics module for LinuxCNC: trivial Cartesian kinematics of a three-axis machine with volumetric compensation by a
-// table of stepdiag (compensator.h, BSD-3-Clause). Lengths in mm.
+// Kinematics module for LinuxCNC: trivial Cartesian kinematics of a three-axis machine with volumetric compensation by
+// a table of stepdiag (compensator.h, BSD-3-Clause). Lengths in mm.
 //   inverse   joints = command(world)      axis positions that bring the tool to world
 //   forward   world  = forward(joints)     position of the tool if the axes are at joints
 // Both use a share s in 0..1 of the correction and a tool, which are the same in both directions at any time:
@@ -8,8 +8,8 @@
 // s and tool change only by ramps, in one small step per servo cycle. See docs/linuxcnc.md.
 //
 // LinuxCNC calls both directions from its servo thread only. It calls the inverse also for targets that it only checks.
-// As soon as all joints are homed, it calls the forward once per cycle with the joints' feedback (in joint mode a second
-// time, with their commands). For this reason the forward advances the ramp and sets the pins.
+// As soon as all joints are homed, it calls the forward once per cycle with the joints' feedback (in joint mode a
+// second time, with their commands). For this reason the forward advances the ramp and sets the pins.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

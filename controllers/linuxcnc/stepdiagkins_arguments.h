@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Load-time arguments of stepdiagkins.c, the only file that includes this one: reads and checks them, and loads the table.
-// For a mistake, a message goes to LinuxCNC's error output and the module does not load.
+// Load-time arguments of stepdiagkins.c, the only file that includes this one: reads and checks them, and loads the
+// table. For a mistake, a message goes to LinuxCNC's error output and the module does not load.
 #include <ctype.h>
 #include <errno.h>
 
