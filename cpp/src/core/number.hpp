@@ -1,7 +1,9 @@
 // Interface of the number types N of generic numeric code (simd-inl.hpp, optics/number.hpp). N has + - * / > <= and the
 // functions below, declared before that code is included or in N's own namespace:
-//   mul_add(a, b, c) = a b + c      sub_mul(a, b, c) = c - a b      root(a)      magnitude(a) = |a|      negative(a) =
-//   -a with_sign(a, s) = a >= 0 with the sign of s      both(p, q) of two comparisons      broadcast(Type<N>(), double)
+//   mul_add(a, b, c) = a b + c           sub_mul(a, b, c) = c - a b
+//   magnitude(a) = |a|                   negative(a) = -a               root(a)
+//   with_sign(a, s) = a >= 0 with the sign of s
+//   both(p, q) of two comparisons        broadcast(Type<N>(), double)
 #pragma once
 
 #include <hwy/base.h>

@@ -1,6 +1,7 @@
 // Fisher information of one pixel about its mean m, for a Poisson number plus Gaussian noise of variance v:
-//   I(m) = integral of p'^2/p,  p = sum of Poisson(k; m) N(z; k, v),  p' = sum of Poisson(k; m) [N(z; k+1, v) - N(z; k,
-//   v)]
+//   I(m) = integral of p'^2/p over z
+//   p = sum of Poisson(k; m) N(z; k, v)
+//   p' = sum of Poisson(k; m) [N(z; k+1, v) - N(z; k, v)]
 // It is between 1/(m + v), the information from the variance only, and 1/m. If single electrons can almost be counted,
 // a dark pixel has more information than its variance suggests.
 #pragma once
