@@ -4,7 +4,7 @@
 
 #include "stepdiag/core/error.hpp"
 
-// Skip instruction sets that differ from another one only in instructions that are not used here.
+// Not those instruction sets that differ from another one only in what is not used here.
 #include <hwy/detect_targets.h>
 #undef HWY_DISABLED_TARGETS
 #ifdef HWY_AVX3_ZEN4  // since Highway 1.1

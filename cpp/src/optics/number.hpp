@@ -1,4 +1,4 @@
-// Functions that make Dual a number type for encounter-inl.hpp.
+// Dual numbers as a number type of encounter-inl.hpp.
 #pragma once
 
 #include "core/number.hpp"

@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 
-// The number type must precede the code that uses it:
+// Numbers before the physics that is calculated with them:
 #include "optics/number.hpp"
 //
 #include "optics/encounter-inl.hpp"
