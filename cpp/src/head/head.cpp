@@ -82,7 +82,7 @@ std::optional<Reading> trace_reading(const Head& head, const HeadSetup& setup, c
     if (path.end != PathEnd::absorbed || path.hits.size() != 2 || path.hits[0].face != mirror_face ||
         path.hits[1].face != reference_face)
         return std::nullopt;
-    // The normal bisects outgoing and returned beam: n ~ z - r. Hence beta = n_x/n_z and alpha = -n_y/n_z.
+    // The normal bisects the two directions: n ~ z - r, so that beta = n_x/n_z and alpha = -n_y/n_z.
     const Eigen::Vector3d back = setup.machine_R_sensor.transpose() * path.direction;
     return Reading{path.optical_length / (2.0 * ambient.index), back.y() / (1.0 - back.z()),
                    -back.x() / (1.0 - back.z())};

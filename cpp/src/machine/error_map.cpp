@@ -78,7 +78,7 @@ std::vector<std::string> ErrorMap::warnings(const Eigen::Vector3d& volume) const
             Eigen::Map<const Eigen::VectorXd>(table_.functions[i]->value.data(), table_.functions[i]->value.size())
                 .cwiseAbs()
                 .maxCoeff();
-        const double tolerance = 1e-9 * peak;  // accepts tables rounded to nine digits
+        const double tolerance = 1e-9 * peak;  // a table rounded to nine digits still counts as zero there
         const auto report = [&](double position, const char* where) {
             if (std::abs(function(id, position)) <= tolerance) return;
             std::ostringstream text;

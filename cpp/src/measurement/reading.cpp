@@ -24,8 +24,7 @@ Eigen::VectorXd beam_distances(const Reading& reading, const std::vector<Eigen::
 
 namespace {
 
-// Gain g(x) of the spot, spot = g x with x = (-beta, alpha), and its gradient. Its derivative with respect to the
-// distance is 2.
+// The spot's gain g(x), spot = g x with x = (-beta, alpha), and its gradient; its derivative by distance is 2.
 struct SpotGain {
     double value;
     Eigen::Vector2d gradient;

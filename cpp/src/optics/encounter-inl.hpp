@@ -1,5 +1,5 @@
-// Interaction of light with one face of a recorded path. The same code serves SIMD vectors (replay.cpp) and dual
-// numbers (replay_derivative.cpp). Highway compiles it once for every instruction set; this explains the include guard.
+// What a face does to light on a known way: one text for vectors of lanes (replay.cpp) and for numbers that carry their
+// derivative (replay_derivative.cpp). Highway compiles it anew for every instruction set, hence the guard.
 #if defined(STEPDIAG_ENCOUNTER_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef STEPDIAG_ENCOUNTER_INL
 #undef STEPDIAG_ENCOUNTER_INL

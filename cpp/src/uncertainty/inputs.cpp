@@ -14,12 +14,12 @@ enum class Of { line, part, head, air, machine };
 
 struct InputKind {
     const char* name;  // of the quantity
-    const char* text;  // name in reports
+    const char* text;  // what reports call it
     Of of;
-    const char* components;  // one letter for each; "" without components
+    const char* components;  // a letter each; "" for one without
 };
 
-// In the order of InputQuantity. Beams have numbers instead of letters.
+// Order of InputQuantity. Beams are counted, not lettered.
 constexpr std::array<InputKind, 22> input_kinds = {{
     {"reflector", "reflector", Of::line, "ab"},
     {"laser", "laser", Of::line, "ab"},
@@ -52,7 +52,7 @@ struct NoiseKind {
     const char* components;
 };
 
-// In the order of NoiseQuantity.
+// Order of NoiseQuantity.
 constexpr std::array<NoiseKind, 6> noise_kinds = {{
     {"channel", "noise", ""},
     {"common", "common noise", ""},
@@ -66,7 +66,7 @@ static_assert(noise_kinds.size() == std::size_t(NoiseQuantity::orientation) + 1)
 const InputKind& kind_of(InputQuantity quantity) { return input_kinds[std::size_t(quantity)]; }
 const NoiseKind& kind_of(NoiseQuantity quantity) { return noise_kinds[std::size_t(quantity)]; }
 
-// The number of components is unlimited for beams: one per beam for constants, two per beam for offsets.
+// Beams have any number of components: 0, 1, ... for their constants, two a beam for their offsets.
 bool counts_beams(InputQuantity quantity) {
     return quantity == InputQuantity::beam_constant || quantity == InputQuantity::beam_offset;
 }

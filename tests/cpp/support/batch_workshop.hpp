@@ -1,4 +1,4 @@
-// Runs with different noise and set-ups, and their evaluation as a batch.
+// Runs that differ in noise and set-ups, and their evaluation in lanes.
 #pragma once
 
 #include <limits>
@@ -26,7 +26,7 @@ inline std::vector<Line> parse(std::initializer_list<const char*> names) {
     return lines;
 }
 
-// Makes runs with different noise and set-ups; the pattern has no noise and no misalignment.
+// Runs that differ in noise and set-ups; the pattern has neither.
 struct Workshop {
     std::vector<Line> lines = parse({"ppp", "npp", "pnp", "nnp"});
     std::vector<Line> scale_lines = parse({"p00", "0p0", "00p"});
@@ -115,7 +115,7 @@ inline Eigen::VectorXd readings(const Measurement& run) {
     return all;
 }
 
-// Readings or values: rows are readings or values, columns are samples.
+// Readings and values: a row each, a column each sample.
 using Lanes = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 inline Lanes evaluate(const BatchEvaluator& evaluator, const Lanes& readings) {

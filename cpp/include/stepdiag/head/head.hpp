@@ -1,7 +1,7 @@
-// Laser heads and their readings. The readings of layout psd or multi_beam follow from closed definitions
-// (measurement/reading.hpp), or from ray tracing of a design with bodies, beams and detectors. The ideal head is traced
-// to its mirror and back. The head is fixed in the machine frame, the mirror on the tool. The head's reference plane
-// contains the beam's origin o and is normal to the beam. The origin o is `standoff` before the line's first commanded
+// Laser heads: what stands before the mirror and what it reads. A head of the layout psd or multi_beam reads by the
+// closed definition of its readings, or is made of bodies, beams and detectors (a design) and ray-traced; the ideal
+// head is traced to its mirror and back. The head is fixed in the machine frame, the mirror on the tool. Its reference
+// plane holds the beam's origin o and is normal to the beam; o lies `standoff` before the line's first commanded
 // functional point.
 #pragma once
 
@@ -27,8 +27,8 @@ struct Head {
     double psd_distance = 0.0;                  // layout psd, mm
     std::vector<Eigen::Vector2d> beam_offsets;  // layout multi_beam, mm
     double wavelength = 1530.0;                 // vacuum, nm
-    double aperture = 50.0;                     // edge of the square in the reference plane that receives the beam, mm
-    std::optional<Eigen::Vector2d> mirror;  // width and height, mm; empty: as required by the plan plus mirror_margin
+    double aperture = 50.0;                 // edge of the square in the reference plane that takes the beam back, mm
+    std::optional<Eigen::Vector2d> mirror;  // width and height, mm; none: as large as the plan needs, and mirror_margin
 
     static constexpr double mirror_margin = 25.0;  // on every side, mm
 
@@ -87,15 +87,15 @@ struct HeadSetup {
 HeadSetup set_up(const Head& head, const Eigen::Matrix3d& machine_R_line, const Eigen::Vector3d& first_point,
                  const Eigen::Vector2d& mirror, const Misalignment& misalignment);
 
-// Reading for a mirror with its centre at the functional point and the tool rotated by `machine_R_tool`.
-// trace_reading uses ray tracing and returns nothing if the beam misses the mirror or does not return to the head;
-// define_reading uses the closed definition.
+// The mirror's reading with its centre at the functional point and the tool turned by `machine_R_tool`:
+// by ray tracing (none where the beam misses the mirror or does not come back to the head), or by the closed
+// definition.
 std::optional<Reading> trace_reading(const Head& head, const HeadSetup& setup, const Eigen::Vector3d& functional_point,
                                      const Eigen::Matrix3d& machine_R_tool, const Medium& ambient);
 std::optional<Reading> define_reading(const HeadSetup& setup, const Eigen::Vector3d& functional_point,
                                       const Eigen::Matrix3d& machine_R_tool);
 
-// Centre and axes of the mirror in the sensor frame.
+// The mirror in the sensor frame: centre and axes.
 MirrorPose mirror_in_sensor_frame(const HeadSetup& setup, const Eigen::Vector3d& functional_point,
                                   const Eigen::Matrix3d& machine_R_tool);
 

@@ -12,18 +12,18 @@
 namespace stepdiag {
 
 struct TracedConditions {
-    Environment environment;             // the true air
-    std::optional<Environment> assumed;  // the air used to reduce the readings; empty: the true air
+    Environment environment;             // what the light runs in
+    std::optional<Environment> assumed;  // what readings are reduced with; none: the same
     ReplayOptions replay;
     std::uint64_t noise_seed = 0;  // of the sensors' own noise
 };
 
-// One value for each signal (mm), in the order of signal_names. A lost reading is empty.
+// One value a signal, in the order of signal_names; lost ones are empty.
 using SignalRow = std::vector<std::optional<double>>;
 
 class TracedReader {
 public:
-    // `head` must have a design. `mirror`: width and height, mm.
+    // `head.design` must be there.
     TracedReader(const Head& head, const Eigen::Vector2d& mirror, const TracedConditions& conditions);
 
     // One row for each pose, without the constants and the noise of a line. `first_row`: number of the first row, on

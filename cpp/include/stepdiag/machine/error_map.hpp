@@ -30,9 +30,9 @@ public:
     double squareness(Squareness squareness) const;                                                   // rad
     const ParameterTable& table() const { return table_; }
 
-    // Violations of the frame choice, one sentence each: a function that is not 0 at home, or a straightness that is
-    // not 0 at the end of travel, approached in + direction. `volume`: ends of travel, mm. The map is used as given in
-    // either case. Throws InvalidArgument for a volume that is not finite.
+    // Where the map breaks the frame choice (a function not 0 at home, a straightness not 0 at the end of travel
+    // `volume`, approached in + direction): one sentence each. Such a map is used as given. Throws InvalidArgument for
+    // a volume that is not finite.
     std::vector<std::string> warnings(const Eigen::Vector3d& volume) const;
 
 private:

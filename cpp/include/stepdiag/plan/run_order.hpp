@@ -16,8 +16,7 @@ enum class Direction { forward, backward };
 // line does not move is at home, approached in + direction.
 Approaches approaches(const Line& line, Direction direction);
 
-// One pass along a line, and the numbers of the first row of the pass and of its set-up. Rows are numbered from 0 over
-// the whole measurement.
+// One pass along a line, and the rows where it and its set-up begin.
 struct PlannedPass {
     Line line;
     int run;
@@ -28,7 +27,7 @@ struct PlannedPass {
 // The passes of all lines in the order of the plan, then those of the scale lines. Each line has the runs 0, 1, ...,
 // repeats - 1. With `backward` the forward runs are 0, 2, ..., and each is followed by its backward run 1, 3, ...
 std::vector<PlannedPass> planned_passes(const Plan& plan, int repeats, bool backward);
-// The points of a pass in the order of reading, which is reversed for a backward pass.
+// In the order in which they are read: descending on a backward pass.
 std::vector<PlanPoint> points_of(const Plan& plan, const PlannedPass& pass);
 
 }  // namespace stepdiag

@@ -12,8 +12,7 @@
 namespace stepdiag {
 
 enum class InputQuantity {
-    // Set-up of one line (`line`). Components are a, b or x, y; for beam_constant, component 0, 1, ... means d1, d2,
-    // ...
+    // of the set-up of one line (`line`), components a, b or x, y; beam_constant: component counts d1 ... dn from 0
     reflector,          // rad
     laser,              // rad
     psd_zero,           // mm
@@ -23,9 +22,9 @@ enum class InputQuantity {
     roll,               // rad
     gain,               // 1
     drift,              // mm/s, of the line's distances since its first reading
-    scale_length,       // mm, added to the distances of the line's last point (the standard of a scale line)
-    scale_factor,       // 1, relative: factor 1 + this on the travel from the line's first reading
-    // Head. `part`: name of a component of its design; applies to all lines with this head.
+    scale_length,       // mm: what the distances of the line's last point read too much (a scale line's standard)
+    scale_factor,       // 1: distances read 1 + this times their travel from the line's first reading
+    // of the head (`part`: a component of its design, by name; of all lines that have it)
     part_shift,     // mm, component x, y, z
     part_rotation,  // rad, component about x, y, z
     psd_distance,   // mm, layout psd without design: true minus nominal distance
