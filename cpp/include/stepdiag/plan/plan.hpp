@@ -14,6 +14,7 @@ namespace stepdiag {
 
 // One point of a line. Nodes of an axis are numbered from home: node k is at k * travel / steps.
 struct PlanPoint {
+    int number;                 // on its line, from 0
     Eigen::Vector3d commanded;  // mm, machine frame
     std::array<int, 3> node;    // per axis
     std::optional<Axis> moved;  // the axis that moved from the previous point; empty for the first point
