@@ -1,7 +1,7 @@
-// Laser heads: what stands before the mirror and what it reads. A head reads by the closed definition of its layout's
-// readings (measurement/reading.hpp), or is made of bodies, beams and detectors (a design) and ray-traced. The head is
-// fixed in the machine frame, the mirror on the tool. Its reference plane holds the beam's origin o and is normal to
-// the beam; o lies `standoff` before the line's first commanded functional point.
+// Laser heads and their readings. The readings follow from the closed definitions of the head's layout
+// (measurement/reading.hpp), or from ray tracing of a design with bodies, beams and detectors. The head is fixed in the
+// machine frame, the mirror on the tool. The head's reference plane contains the beam's origin o and is normal to the
+// beam. The origin o is `standoff` before the line's first commanded functional point.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,8 +25,8 @@ struct Head {
     double psd_distance = 0.0;                  // layout psd, mm
     std::vector<Eigen::Vector2d> beam_offsets;  // layout multi_beam, mm
     double wavelength = 1530.0;                 // vacuum, nm
-    double aperture = 50.0;                     // mm: edge of the square around a beam's start that takes it back
-    std::optional<Eigen::Vector2d> mirror;  // width and height, mm; none: as large as the plan needs, and mirror_margin
+    double aperture = 50.0;                     // edge of the square around a beam's start that receives it, mm
+    std::optional<Eigen::Vector2d> mirror;  // width and height, mm; empty: as required by the plan plus mirror_margin
 
     static constexpr double mirror_margin = 25.0;  // on every side, mm
 
@@ -85,7 +85,8 @@ struct HeadSetup {
 HeadSetup set_up(const Head& head, const Eigen::Matrix3d& machine_R_line, const Eigen::Vector3d& first_point,
                  const Eigen::Vector2d& mirror, const Misalignment& misalignment);
 
-// The mirror in the sensor frame, its centre at the functional point, the tool turned by `machine_R_tool`.
+// Pose of the mirror in the sensor frame, for a mirror with its centre at the functional point (machine frame, mm) and
+// the tool rotated by `machine_R_tool`.
 MirrorPose mirror_in_sensor_frame(const HeadSetup& setup, const Eigen::Vector3d& functional_point,
                                   const Eigen::Matrix3d& machine_R_tool);
 
@@ -94,16 +95,17 @@ std::vector<std::string> signal_names(const Head& head);
 bool is_distance(const std::string& signal);
 Eigen::VectorXd signals(const Head& head, const Reading& reading);
 
-// One value a signal, in the order of signal_names; lost ones are empty.
+// One value for each signal (mm or rad), in the order of signal_names. A lost reading is empty.
 using SignalRow = std::vector<std::optional<double>>;
 
-// What a head without a design reads of a mirror of this size. All layouts lose beams, and with them their signals, by
-// the same rules. A beam is read where
-//   - the mirror faces the head, tilted by less than 45 degrees (read_mirror),
-//   - the mirror lies ahead of o, and of the beam's start,
-//   - the beam meets the mirror's plane within its outline,
-//   - it comes back to the reference plane within the square of `aperture` around its start.
-// Beams of multi_beam are lost one by one; the one beam of ideal and psd starts at o.
+// Signals of a head without a design. `mirror`: pose in the sensor frame; `size`: width and height, mm. The rules for
+// lost beams are the same for all layouts. A beam has a reading if
+//   - the mirror faces the head and is tilted by less than 45 degrees (read_mirror),
+//   - the mirror is in front of o and of the beam's start,
+//   - the beam meets the mirror's plane inside its outline,
+//   - it returns to the reference plane inside the square of `aperture` around its start.
+// Each beam of layout multi_beam can be lost separately. The beam of the layouts ideal and psd starts at o; if it is
+// lost, all signals are lost.
 SignalRow define_signals(const Head& head, const MirrorPose& mirror, const Eigen::Vector2d& size);
 
 }  // namespace stepdiag

@@ -12,15 +12,15 @@
 namespace stepdiag {
 
 struct ReadingConditions {
-    Environment environment;             // what the light runs in
-    std::optional<Environment> assumed;  // what readings are reduced with; none: the same
+    Environment environment;             // the true air
+    std::optional<Environment> assumed;  // the air used to reduce the readings; empty: the true air
     ReplayOptions replay;
     std::uint64_t noise_seed = 0;  // of the sensors' own noise
 };
 
 class TracedReader {
 public:
-    // `head.design` must be there.
+    // `head` must have a design. `mirror`: width and height, mm.
     TracedReader(const Head& head, const Eigen::Vector2d& mirror, const ReadingConditions& conditions);
 
     // One row for each pose, without the constants and the noise of a line. `first_row`: number of the first row, on
