@@ -17,7 +17,7 @@
 
 namespace stepdiag {
 
-// A value that is not 0 where the frame choice has 0.
+// A value that violates the choice of frame, which requires 0 at this position.
 struct FrameDeviation {
     FunctionId function;
     double position;  // mm
@@ -37,9 +37,9 @@ public:
     double squareness(Squareness squareness) const;                                                   // rad
     const ParameterTable& table() const { return table_; }
 
-    // Where the map breaks the frame choice: functions that are not 0 at home, straightnesses that are not 0 at the end
-    // of travel `volume`, approached in + direction. Such a map is used as given. Throws InvalidArgument for a volume
-    // that is not finite.
+    // Violations of the choice of frame: functions that are not 0 at home, and straightnesses that are not 0 at the end
+    // of travel, approached in + direction. `volume`: ends of travel, mm. The map is used as given in either case.
+    // Throws InvalidArgument for a volume that is not finite.
     std::vector<FrameDeviation> frame_deviations(const Eigen::Vector3d& volume) const;
 
 private:
