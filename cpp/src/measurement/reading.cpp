@@ -70,7 +70,7 @@ std::optional<ReducedReading> reduce_spot(double distance, const Eigen::Vector2d
     if (!(x.squaredNorm() < 1.0)) return std::nullopt;
 
     ReducedReading reduced{{distance, x.y(), -x.x()}, Eigen::Matrix3d::Zero()};
-    Eigen::Matrix<double, 2, 3> by_channel;  // of x, by (distance, spot)
+    Eigen::Matrix<double, 2, 3> by_channel;  // derivative of x with respect to (distance, spot)
     by_channel << -2.0 * inverse * x, inverse;
     reduced.jacobian(0, 0) = 1.0;
     reduced.jacobian.row(1) = by_channel.row(1);

@@ -26,7 +26,7 @@ DualFrame moving(const FaceFrame& frame, const RigidRate& rate) {
     DualFrame moved;
     for (int row = 0; row < 3; ++row) {
         const Eigen::Vector3d axis = rotation.row(row).transpose();
-        const Eigen::Vector3d axis_rate = rate.rotation.cross(axis);  // -R [w]x, row by row
+        const Eigen::Vector3d axis_rate = rate.rotation.cross(axis);  // row of -R [w]x
         for (int k = 0; k < 3; ++k) moved.rotation[3 * row + k] = {axis[k], axis_rate[k]};
         moved.translation[row] = {frame.translation[row], translation_rate[row]};
     }

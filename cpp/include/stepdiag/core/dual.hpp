@@ -1,5 +1,6 @@
-// A number with its derivative by one parameter: (a + a' e)(b + b' e) = ab + (a'b + ab') e with e^2 = 0. Calculating
-// with such numbers gives exact derivatives (forward mode). Comparisons are those of the values.
+// Dual number: a value and its derivative with respect to one parameter, with
+// (a + a' e)(b + b' e) = ab + (a'b + ab') e and e^2 = 0. Calculations with dual numbers give exact derivatives
+// (forward-mode automatic differentiation). Comparisons use the values only.
 #pragma once
 
 #include <cmath>
