@@ -71,6 +71,10 @@ DoubleArray to_numpy(const std::vector<std::optional<double>>& values);  // NaN 
 DoubleArray to_numpy(const Eigen::MatrixXd& matrix);
 DoubleArray to_numpy_vector(const Eigen::VectorXd& vector);
 
+// The function of the package that makes a sentence of a finding: all sentences are worded in Python.
+py::object& wording();
+Calibration worded(Calibration calibration);  // with its findings in words; needs the interpreter lock
+
 template <class Records>
 py::typing::Tuple<typename Records::value_type, py::ellipsis> to_tuple(const Records& records) {
     py::tuple tuple(records.size());

@@ -129,10 +129,5 @@ def spread(values: FloatArray, most: int) -> FloatArray:
     return np.asarray(values[np.unique(rows)])
 
 
-def lengths(values: Sequence[float] | FloatArray) -> str:
-    """Three numbers, each read back to the same bits."""
-    return " ".join(repr(float(value)) for value in values)
-
-
 def words(values: Sequence[float] | FloatArray) -> str:
     return " ".join(f"{float(value):g}" for value in values)

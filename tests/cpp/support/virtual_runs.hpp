@@ -6,6 +6,7 @@
 
 #include "stepdiag/uncertainty/virtual_calibration.hpp"
 #include "support/head_designs.hpp"
+#include "support/usual.hpp"
 
 namespace stepdiag::test {
 
@@ -32,13 +33,11 @@ inline Head head_of(Kind kind) {
 }
 
 inline VirtualRun run_of(Kind kind, int steps = 3) {
-    const Eigen::Vector3d volume(800.0, 600.0, 500.0);
     RandomErrorMap errors;
     errors.seed = 4;
     const Heads heads(head_of(kind));
-    return {Machine(Chain::parse("[w X' b Y Z t]"), make_random_error_map(volume, errors), {5.0, -3.0, 70.0}),
-            Plan(volume, {Line::parse("ppp"), Line::parse("npp"), Line::parse("pnp"), Line::parse("nnp")}, steps,
-                 all_axes, {Line::parse("p00"), Line::parse("0p0"), Line::parse("00p")}),
+    return {Machine(chain, make_random_error_map(volume, errors), {5.0, -3.0, 70.0}),
+            plan(steps),
             heads,
             heads.calibration(),
             {},
@@ -51,7 +50,7 @@ inline UncertainInput normal(InputQuantity quantity, double spread, const std::s
     return {quantity, {DistributionKind::normal, 0.0, spread}, line, part, component};
 }
 
-// All quantities of a set-up that a head has, on one line or another.
+// All quantities of a set-up for this kind of head, on different lines.
 inline std::vector<UncertainInput> setup_inputs(Kind kind) {
     std::vector<UncertainInput> inputs;
     const auto pair = [&](InputQuantity quantity, double spread, const char* line) {
@@ -74,7 +73,7 @@ inline std::vector<UncertainInput> setup_inputs(Kind kind) {
     return inputs;
 }
 
-// Every quantity that this kind of head has, in an air that may be uncertain.
+// All uncertain quantities for this kind of head, including those of the air.
 inline UncertainInputs everything(Kind kind) {
     UncertainInputs all{setup_inputs(kind)};
     const auto add_all = [&](InputQuantity quantity, double spread, int components, const std::string& part = "") {
