@@ -19,7 +19,7 @@ Resume = Literal["point", "line", "set-up"]
 
 
 class Acquisition:
-    """What is done, and what is still to be read. `done`: the readings by (visit, point), as they were taken."""
+    """State of an acquisition. `done`: readings by (visit, point), in order of acquisition."""
 
     def __init__(
         self,
@@ -37,12 +37,12 @@ class Acquisition:
         self._visits = list(visits_of(scenario))
         self._axes = [axis - 1 for axis in header.axes]
         self._is_twin = False
-        self._set_up = 0  # for which the instrument was found ready
-        self._visit = 0  # of the last reading
+        self._set_up = 0  # the last set-up for which the instrument was ready
+        self._visit = 0  # visit of the last reading
         self.done: dict[tuple[int, int], RawReading] = {}
 
     def go_on(self, content: RawContent, resume: Resume) -> None:
-        """Takes what a raw file holds for done, but for its last line or set-up if those are to be read again."""
+        """Continue a raw file, except its last line or set-up if that is read again."""
         if content.torn is not None:
             self._operator.tell(content.torn)
         self.done = content.readings()
@@ -55,7 +55,7 @@ class Acquisition:
         self.done = {key: reading for key, reading in self.done.items() if key[0] < first}
 
     def run(self, source: str, write: Callable[[], None]) -> None:
-        """Reads what is not done; calls `write` after every visit."""
+        """Read the remaining points. Calls `write` after every visit."""
         remaining = list(self._remaining())
         if not remaining:
             self._operator.tell("every point of the plan is read already")
@@ -115,7 +115,7 @@ class Acquisition:
         self._tell_lost(visit, index, stored)
         key = (stored.visit, stored.point)
         if once_more and stored.is_lost and not self.done[key].is_lost:
-            self._file.append(values)  # the reading that there is was better
+            self._file.append(values)  # the earlier reading is better
         else:
             self._file.append([*values, stored])
             self.done.pop(key, None)
@@ -134,7 +134,9 @@ class Acquisition:
         return self._instrument.read(self._axes)
 
     def _make_ready(self, visit: Visit) -> None:
-        """The instrument measures, and reports no beam missing: whoever moves the head interrupts them all."""
+        """Make sure that the instrument measures and reports no missing beam.
+
+        Moving the head interrupts all beams, so this is called at every set-up."""
         mode = self._instrument.mode()
         if mode in STARTING:
             self._instrument.wait_for(RUNNING, self._options.start_timeout)
@@ -174,7 +176,7 @@ class Acquisition:
 
 
 def _records(visit: Visit, index: int, reading: Reading, channels: list[str]) -> Iterator[Record]:
-    """The values of a reading, and at last the reading itself."""
+    """Yield the records of the values, then the record of the reading."""
     x, y, z = (float(p) for p in visit.positions[index])
     number, line, run, direction = visit.number, visit.line, visit.run, visit.direction
     point, position = int(visit.points[index]), (x, y, z)
