@@ -109,7 +109,7 @@ def _header(orientation: bool) -> list[str]:
 
 
 def _rows(axes: list[FloatArray], origin: FloatArray, values: list[FloatArray]) -> Iterator[str]:
-    """Lines of the file: positions with all digits, values with nine significant digits."""
+    """Lines of the file: positions with all digits, values with nine decimal places."""
     words = [[repr(float(p)) for p in axis + o] for axis, o in zip(axes, origin, strict=True)]
     number = ",".join(["%.9f"] * sum(value.shape[1] for value in values)) + "\n"
     rows = np.concatenate(values, axis=1)

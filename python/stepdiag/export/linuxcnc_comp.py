@@ -6,7 +6,7 @@ interpolated linearly; beyond the table the first or last trim holds. Such a tab
 function of one axis, while the error of a point depends on all three axes. The corrected function
 is the positioning error along the line on which the other two axes are at `at`,
 
-   E(p) = e_a(p on the line) - e_a(home on the line),
+    E(p) = e_a(p on the line) - e_a(home on the line),
 
 which is EXX plus theta x L of that line (Abbe). The trims are those of the inverse, c + E(c) =
 nominal, and therefore exact at every row. `actual` differs from nominal + E by E times its slope,

@@ -1,4 +1,4 @@
-"""What `stepdiag head check` tells of a head: constants, light at the detectors, limits, mirror."""
+"""The report of `stepdiag head check`: constants, light at the detectors, limits, mirror."""
 
 from collections.abc import Iterator, Sequence
 
@@ -17,11 +17,11 @@ from stepdiag.head.trace import (
 )
 
 MICRO = 1e6
-SQUARE = 1e-9  # rad: what rounding leaves
+SQUARE = 1e-9  # rad; allows for rounding
 
 
 def check_report(head: _core.Head, distances: Sequence[float]) -> Iterator[str]:
-    """The lines of the report, for an aligned mirror at each of the distances, mm."""
+    """Lines of the report, for an aligned mirror at each of the distances (mm)."""
     design = head.design
     assert design is not None
     yield f"{design.name}: layout {design.layout}, reads {', '.join(head.signals)}"
@@ -77,7 +77,7 @@ def _arrival(found: list[Arrival]) -> str:
 
 
 def _tidy(value: float) -> float:
-    """Without the sign of a zero that has come from rounding."""
+    """The value without the sign of a zero that comes from rounding."""
     return 0.0 if abs(value) < 5e-7 else value
 
 
@@ -102,7 +102,7 @@ def _span(limits: Limits, scale: float) -> str:
 
 
 def _mirror(head: _core.Head, distances: Sequence[float]) -> Iterator[str]:
-    """The smallest mirror with its middle on z that the axes of all beams meet."""
+    """The smallest mirror, centred on z, that the axes of all beams meet."""
     half = np.zeros(2)
     for distance in distances:
         for segment in _core.trace_beams(head, distance=distance):

@@ -138,7 +138,7 @@ def _is_text(path: Path, text: str) -> bool:
 
 
 def _is_same(one: Path, other: Path) -> bool:
-    """Compares names as well: a result with the name of a missing error map would be read as one."""
+    """Compares names too: a result with the name of a missing error map would be read as one."""
     if os.path.realpath(one) == os.path.realpath(other):
         return True
     return one.exists() and other.exists() and one.samefile(other)
