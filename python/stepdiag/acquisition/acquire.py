@@ -136,5 +136,5 @@ def _opened(
     with file:
         for key, what in (("digest", "plan, head or channels"), ("axes", "axes"), ("sign", "sign")):
             if getattr(content.header, key) != getattr(header, key):
-                raise InvalidArgument(f"{path}: was begun with another {what}: a run is resumed as it was begun")
+                raise InvalidArgument(f"{path}: was begun with another {what}; resume it with the same")
         yield file, content

@@ -166,7 +166,7 @@ class Ids3010:
             if time.monotonic() > deadline:
                 error = _whole(self._request(self._full("system.getSystemError"), (), self._attempts)[0])
                 told = f"; it reports {self.error_text(error)}" if error else ""
-                raise InstrumentError(f"{self.name}: expected it to come to {mode!r}, it stays in {now!r}{told}")
+                raise InstrumentError(f"{self.name}: expected the mode {mode!r}, but it stays in {now!r}{told}")
             time.sleep(0.05)
 
     def _word(self, method: str, params: Sequence[int] = ()) -> str:

@@ -80,7 +80,7 @@ class RawFile:
         try:
             handle = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CLOEXEC)
         except OSError as error:
-            raise InvalidArgument(f"{path}: cannot go on with it: {reason(error)}") from None
+            raise InvalidArgument(f"{path}: cannot be continued: {reason(error)}") from None
         file = cls(path, handle)
         file._lock()
         try:
@@ -131,7 +131,7 @@ def check_new(path: Path) -> None:
     check_output(path)
     if path.exists() or path.is_symlink():
         raise InvalidArgument(
-            f"{path}: exists already: `resume` goes on with it, another `output` (or `raw`) begins a new one"
+            f"{path}: exists already: `resume` continues it, another `output` (or `raw`) begins a new one"
         )
 
 

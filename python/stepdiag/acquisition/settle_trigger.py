@@ -65,7 +65,7 @@ class SettleTrigger:
         if abs(step) < SMALLEST:
             if index > 0:
                 operator = of_start(self._context).operator
-                operator.confirm(f"the distance does not change to it: read {point_text(visit, index)}")
+                operator.confirm(f"the distance does not change in this step: read {point_text(visit, index)}")
             else:
                 self._rest = last
             return True
@@ -80,7 +80,7 @@ class SettleTrigger:
             window.append(context.read().pm)
             moved = _change(window[-1], last, context.sign)
             if moved is None:
-                self._complain("no beam: where the mirror rests cannot be told")
+                self._complain("no beam: cannot tell where the mirror rests")
                 window.clear()
             elif at_rest(window, context.settling):
                 self._rest = window[-1]
@@ -95,7 +95,7 @@ class SettleTrigger:
                     )
             was_away = was_away or (moved is not None and abs(moved) > AWAY)
             time.sleep(max(context.settling.interval, 0.001))
-        raise Stopped(f"{point_text(visit, index)}: the mirror did not come there in {context.wait_timeout:g} s")
+        raise Stopped(f"{point_text(visit, index)}: the mirror did not arrive within {context.wait_timeout:g} s")
 
     def _complain(self, text: str) -> None:
         """Tell the operator, at most every five seconds: the caller polls many times per second."""

@@ -58,9 +58,9 @@ class TcpTrigger:
                 self._asking, self._wanted = client, wanted
                 return wanted == expected
             wrong = _expectation(expected, line)
-            context.operator.tell(f"the controller asked in vain: {wrong}")
+            context.operator.tell(f"refused a request of the controller: {wrong}")
             self._answer(client, f"FAIL {wrong}")
-        raise Stopped(f"{point_text(visit, index)}: nobody asked for it in {context.wait_timeout:g} s")
+        raise Stopped(f"{point_text(visit, index)}: no request within {context.wait_timeout:g} s")
 
     def doubt(self, reading: Reading) -> str | None:
         return None  # a controller waits for its answer

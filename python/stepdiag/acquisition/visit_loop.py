@@ -58,14 +58,14 @@ class Acquisition:
         """Read the remaining points. Calls `write` after every visit."""
         remaining = list(self._remaining())
         if not remaining:
-            self._operator.tell("every point of the plan is read already")
+            self._operator.tell("all points of the plan have been read")
             return
         known = self._instrument.describe()
         self._is_twin = TWIN in known.get("type", "")
         visit, index = remaining[0]
         self._file.append([self._session(source, known, visit, index)])
         if self.done:
-            self._operator.tell(f"going on with {point_text(visit, index)}: bring the machine there")
+            self._operator.tell(f"continuing with {point_text(visit, index)}: move the machine there")
         options = self._options
         last = next(reversed(self.done), None)
         self._trigger.start(
@@ -127,7 +127,7 @@ class Acquisition:
             self._operator.tell(f"{point_text(visit, index)}: {channel} is lost: {why}")
         if any("no beam" in why for why in reading.lost.values()):
             self._operator.tell(
-                "after an interrupted beam this set-up may carry another constant: stop, and `restart_set_up`"
+                "an interrupted beam may change the constant of this set-up: stop, and use `restart_set_up`"
             )
 
     def _read(self) -> Sample:
@@ -148,11 +148,11 @@ class Acquisition:
         state = f"{self._instrument.name}: {', '.join(sorted(texts))}"
         if any(self._visits[number - 1].set_up == visit.set_up for number, _ in self.done):
             raise InstrumentError(
-                f"{state}; a measurement started anew would give this set-up another constant: use `restart_set_up`"
+                f"{state}; restarting the measurement would change the constant of this set-up: use `restart_set_up`"
             )
         if self._options.start == "never":
             raise InstrumentError(f"{state}; expected a running measurement without warnings")
-        self._operator.tell(f"{state}; its measurement is started anew")
+        self._operator.tell(f"{state}; restarting its measurement")
         self._instrument.start(self._options.start_timeout)
 
     def _session(self, source: str, instrument: dict[str, str], visit: Visit, index: int) -> Session:

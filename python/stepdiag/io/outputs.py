@@ -52,11 +52,9 @@ RAW: Final = FileKind("raw readings", (".jsonl",))
 CHECKPOINT: Final = FileKind(
     "checkpoint",
     (".checkpoint",),
-    "is the checkpoint of an earlier run: `resume` goes on with it; or remove it, or name another one",
+    "is the checkpoint of an earlier run: `resume` continues it; or remove it, or name another file",
 )
-CELLS: Final = FileKind(
-    "study cells", (), "cells of an interrupted study; `resume` goes on with them, or delete the file"
-)
+CELLS: Final = FileKind("study cells", (), "cells of an interrupted study; `resume` continues it, or delete the file")
 # Files of the demonstrations.
 ERROR_MAP: Final = FileKind("error map")
 REPORT: Final = FileKind("report of the demonstration")
@@ -102,7 +100,7 @@ def claim(path: Path, kind: FileKind, *, overwrite: bool = False) -> None:
         return
     found = kind_of_file(path)
     if found != kind.name:
-        is_what = f"is {_a(found)}" if found else "is nothing that stepdiag knows"
+        is_what = f"is {_a(found)}" if found else "is not a file that stepdiag recognises"
         raise InvalidArgument(
             f"{path}: {is_what}, and is not replaced by {_a(kind.name)}: move it away, or name another file"
         )
@@ -119,8 +117,7 @@ def claim_folder(folder: Path, files: Mapping[str, FileKind | str], marks: Itera
     there = [name for name in files if os.path.lexists(folder / name)]
     if there and not set(marks) & set(there):
         raise InvalidArgument(
-            f"{folder / there[0]}: is there already, and {folder} is no folder that this command has written: "
-            "name another one"
+            f"{folder / there[0]}: exists already, and {folder} was not written by this command: name another folder"
         )
     for name in there:
         expected = files[name]

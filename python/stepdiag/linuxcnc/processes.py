@@ -28,7 +28,7 @@ _held: list[int] = []  # the lock of this process, which must not wait for itsel
 def linuxcnc_lock(timeout: float = 1800.0) -> Iterator[None]:
     """Lock to hold while LinuxCNC runs or its modules are installed: a computer has one of each."""
     if _held:
-        raise LinuxcncError("this process runs LinuxCNC already; one session at a time can")
+        raise LinuxcncError("this process runs LinuxCNC already; only one session can run at a time")
     path = Path(tempfile.gettempdir()) / "stepdiag-linuxcnc.lock"
     with contextlib.suppress(FileExistsError):
         os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
@@ -62,7 +62,9 @@ def refuse_a_running_one(patience: float = 15.0) -> None:
         if not running and not old:
             break
         if time.monotonic() > end:
-            raise LinuxcncError(f"another LinuxCNC runs on this computer ({', '.join(running)}); one at a time can")
+            raise LinuxcncError(
+                f"another LinuxCNC runs on this computer ({', '.join(running)}); only one can run at a time"
+            )
         if time.monotonic() > end - patience / 2:
             end_processes(old)
         time.sleep(0.1)

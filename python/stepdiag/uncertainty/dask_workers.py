@@ -166,7 +166,7 @@ class Workers:
             said = "; ".join(f"{address} has {machine}" for address, machine in refused.items())
             raise WorkersLost(f"{self.address}: no worker has {self.machine}, as this program does: {said}")
         for address in refused.keys() - self._refused:
-            self._warn(f"worker {address} takes no part: it has {refused[address]}, this program {self.machine}")
+            self._warn(f"worker {address} is not used: it has {refused[address]}, this program {self.machine}")
         self._refused |= refused.keys()
 
 

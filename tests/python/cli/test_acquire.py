@@ -59,10 +59,10 @@ def test_operator_who_leaves_can_come_back(
         monkeypatch.setattr(sys, "stdin", io.StringIO("\n" * 5))
         assert "standard input ended" in refused(capsys, *command)
         assert len(read_measurement(folder / "run.csv")) == 5
-        assert "exists already: --resume goes on with it" in refused(capsys, *command)
+        assert "exists already: --resume continues it" in refused(capsys, *command)
         monkeypatch.setattr(sys, "stdin", io.StringIO("\n" * 30))
         assert main([*command, "--resume"]) == 0
-        assert "going on with visit 1 (line ppp, run 0, forward), point 5 at X80 Y60 Z25" in capsys.readouterr().out
+        assert "continuing with visit 1 (line ppp, run 0, forward), point 5 at X80 Y60 Z25" in capsys.readouterr().out
     assert len(read_measurement(folder / "run.csv")) == 28
 
 

@@ -189,9 +189,7 @@ def test_checkpoint_of_an_interrupted_run_is_not_overwritten_by_another(
     kept = Path("scenario.checkpoint").read_bytes()
     capsys.readouterr()
     assert run("-n", SAMPLES, "--seed", "1") == 2
-    assert (
-        "scenario.checkpoint: is the checkpoint of an earlier run: --resume goes on with it" in capsys.readouterr().err
-    )
+    assert "scenario.checkpoint: is the checkpoint of an earlier run: --resume continues it" in capsys.readouterr().err
     assert run() == 0, "a propagation draws nothing"
     assert Path("scenario.checkpoint").read_bytes() == kept
     assert run("-n", SAMPLES, "--resume") == 0
@@ -233,7 +231,7 @@ def test_result_that_cannot_be_written_leaves_the_checkpoint(
         assert run("-n", SAMPLES, "-o", f"u.{ending}") == status
     told = capsys.readouterr().err
     assert said in told
-    assert f"u.{ending}.checkpoint keeps what is done; the same command with --resume goes on" in told
+    assert f"u.{ending}.checkpoint has the finished samples: repeat the command with --resume" in told
     assert run("-n", SAMPLES, "-o", f"u.{ending}", "--resume") == 0
     assert Path(f"u.{ending}").read_bytes() == Path(f"whole.{ending}").read_bytes()
     assert {path.name for path in folder.iterdir()} == {"scenario.toml", f"whole.{ending}", f"u.{ending}"}
