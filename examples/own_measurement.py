@@ -15,7 +15,7 @@ def main(scenario_file: str, run_file: str) -> None:
         print("not determined:", sentence)
 
     table = calibration.to_xarray()
-    middle = table.sel(x=scenario.plan.volume[0] / 2, method="nearest")
+    middle = table.sel(x=scenario.known.plan.volume[0] / 2, method="nearest")
     value, uncertainty = float(middle["EXX"]) * 1e3, float(middle["EXX_u"]) * 1e3
     print(f"EXX at x = {float(middle['x']):g} mm: {value:.2f} µm, standard uncertainty {uncertainty:.2f} µm")
 

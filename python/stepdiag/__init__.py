@@ -125,6 +125,8 @@ if TYPE_CHECKING:
         read_scenario,
         simulate_scenario,
     )
+    from stepdiag.scenario.known import Known
+    from stepdiag.scenario.truth import Truth
     from stepdiag.uncertainty.dask_workers import workers_of
     from stepdiag.uncertainty.model_source import ModelSource
     from stepdiag.uncertainty.monte_carlo import run_monte_carlo
@@ -168,6 +170,7 @@ __all__ = [
     "Interferometer",
     "InvalidArgument",
     "KeyTrigger",
+    "Known",
     "LateralEffect",
     "LinuxcncError",
     "LinuxcncSession",
@@ -198,6 +201,7 @@ __all__ = [
     "SpotSensor",
     "StatisticsOptions",
     "TcpTrigger",
+    "Truth",
     "Twin",
     "UncertainInput",
     "UncertainInputs",
@@ -315,6 +319,8 @@ _LATER = {
         "read_scenario",
         "simulate_scenario",
     ),
+    "scenario.known": ("Known",),
+    "scenario.truth": ("Truth",),
     "uncertainty.dask_workers": ("workers_of",),
     "uncertainty.model_source": ("ModelSource",),
     "uncertainty.monte_carlo": ("run_monte_carlo",),

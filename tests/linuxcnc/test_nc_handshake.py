@@ -27,7 +27,7 @@ settle_s = 0.0
 
 def test_a_program_without_an_answer_stops_and_cycle_start_asks_again(tmp_path: Path) -> None:
     path = tmp_path / "run.ngc"
-    path.write_text(measuring_program(parse_scenario(SCENARIO), Options(timeout=0.1, align=False)).text)
+    path.write_text(measuring_program(parse_scenario(SCENARIO).known, Options(timeout=0.1, align=False)).text)
     stops: list[str] = []
 
     def at_stop(session: LinuxcncSession, line: int, messages: list[str]) -> None:

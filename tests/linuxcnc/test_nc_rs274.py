@@ -14,7 +14,8 @@ import pytest
 from stepdiag.program.gcode import Trigger
 from stepdiag.program.measuring_program import measuring_program
 from stepdiag.program.options import Options
-from stepdiag.scenario.description import Scenario, parse_scenario
+from stepdiag.scenario.description import parse_scenario
+from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import visits_of
 
 pytestmark = pytest.mark.skipif(shutil.which("rs274") is None, reason="rs274 is part of linuxcnc-uspace")
@@ -60,8 +61,8 @@ def interpret(program: str, folder: Path) -> list[tuple[str, str]]:
     return commands
 
 
-def scenario_of(lines: str, scale_lines: str, steps: int, plan: str) -> Scenario:
-    return parse_scenario(SCENARIO.format(lines=lines, scale_lines=scale_lines, steps=steps, plan=plan))
+def scenario_of(lines: str, scale_lines: str, steps: int, plan: str) -> Known:
+    return parse_scenario(SCENARIO.format(lines=lines, scale_lines=scale_lines, steps=steps, plan=plan)).known
 
 
 def readings_of(

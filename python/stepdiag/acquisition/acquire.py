@@ -18,6 +18,7 @@ from stepdiag.acquisition.visit_loop import Acquisition, Resume
 from stepdiag.io.data_files import write_measurement
 from stepdiag.io.whole_files import check_output
 from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.known import Known
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ def raw_path(output: Path) -> Path:
 
 
 def acquire(
-    scenario: Scenario,
+    scenario: Scenario | Known,
     source: str,
     output: Path,
     *,
@@ -58,7 +59,7 @@ def acquire(
     are kept and the acquisition can be resumed. The trigger is closed in any case.
 
     Args:
-        scenario: plan and head; its head must have one channel for each axis read
+        scenario: its `known` half is used; the head must have one channel for each axis read
             (docs/acquisition.md).
         source: address of the instrument, "ids3010://HOST[:PORT]".
         output: measurement to write, CSV or netCDF (.nc).
@@ -73,9 +74,9 @@ def acquire(
             lost.
         InstrumentError: the instrument cannot be reached or fails.
     """
-    options = options or AcquireOptions()
+    known, options = scenario.known, options or AcquireOptions()
     try:
-        channels = channels_of(scenario)
+        channels = channels_of(known)
         axes = options.axes or tuple(range(1, len(channels) + 1))
         check_axes(axes, channels)
         host, port = parse_source(source)
@@ -85,10 +86,10 @@ def acquire(
             raise InvalidArgument(f"{path}: expected different names for the raw file and the output")
         if output.exists() and not path.exists():
             raise InvalidArgument(f"{output}: exists, and was not made from {path}: move it away, or name another -o")
-        plan = described_plan(scenario)
+        plan = described_plan(known)
         header = Header(
             created=datetime.now(UTC),
-            scenario=scenario.path.name,
+            scenario=known.path.name,
             digest=digest_of(channels, plan),
             channels=channels,
             axes=list(axes),
@@ -97,7 +98,7 @@ def acquire(
         )
         instrument = Ids3010(host, port, timeout=options.timeout, attempts=options.attempts)
         with instrument, _opened(path, header, resume, instrument) as (file, content):
-            work = Acquisition(scenario, header, file, instrument, trigger, operator or Silent(), options)
+            work = Acquisition(known, header, file, instrument, trigger, operator or Silent(), options)
             if content is not None:
                 work.go_on(content, resume or "point")
 

@@ -9,24 +9,23 @@ import numpy as np
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.ids3010 import AXES
 from stepdiag.acquisition.raw_records import Visited
-from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import Visit, visits_of
 
 
-def channels_of(scenario: Scenario) -> list[str]:
+def channels_of(known: Known) -> list[str]:
     """Channels filled by the instrument's axes. Raises InvalidArgument for an unsuitable head."""
-    head = scenario.head
+    head = known.head
     if head.layout == "multi_beam":
         if len(head.signals) != AXES:
             raise InvalidArgument(
-                f"{scenario.path}: head: expected {AXES} beams, one for each axis of the IDS3010, "
-                f"got {len(head.signals)}"
+                f"{known.path}: head: expected {AXES} beams, one for each axis of the IDS3010, got {len(head.signals)}"
             )
         return list(head.signals)
     if head.layout == "ideal":
         return ["distance"]  # the conventional evaluation needs no other channel
     raise InvalidArgument(
-        f'{scenario.path}: head: the layout "{head.layout}" cannot be read: the IDS3010 gives distances and no spot; '
+        f'{known.path}: head: the layout "{head.layout}" cannot be read: the IDS3010 gives distances and no spot; '
         f'expected "multi_beam" with {AXES} beams, or "ideal" of which one axis reads the distance'
     )
 
@@ -41,14 +40,14 @@ def check_axes(axes: Sequence[int], channels: Sequence[str]) -> None:
         )
 
 
-def nominal_distances(scenario: Scenario, visit: Visit) -> list[float]:
+def nominal_distances(known: Known, visit: Visit) -> list[float]:
     """Readings in mm of an ideal head along a visit, on a machine without errors."""
-    start = scenario.plan.points(visit.line, visit.run)[0]
-    along = scenario.plan.frame(visit.line)[:, 2]
-    return [float(d) for d in scenario.heads[visit.line].standoff + (visit.positions - start) @ along]
+    start = known.plan.points(visit.line, visit.run)[0]
+    along = known.plan.frame(visit.line)[:, 2]
+    return [float(d) for d in known.heads[visit.line].standoff + (visit.positions - start) @ along]
 
 
-def described_plan(scenario: Scenario) -> list[Visited]:
+def described_plan(known: Known) -> list[Visited]:
     """The visits as records of a raw file."""
     return [
         Visited(
@@ -60,9 +59,9 @@ def described_plan(scenario: Scenario) -> list[Visited]:
             scale_line=visit.is_scale_line,
             points=[int(point) for point in visit.points],
             position_mm=[(float(x), float(y), float(z)) for x, y, z in visit.positions],
-            nominal_mm=nominal_distances(scenario, visit),
+            nominal_mm=nominal_distances(known, visit),
         )
-        for visit in visits_of(scenario)
+        for visit in visits_of(known)
     ]
 
 
@@ -72,11 +71,11 @@ def digest_of(channels: Sequence[str], plan: Sequence[Visited]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def placement(scenario: Scenario, visit: Visit) -> str:
+def placement(known: Known, visit: Visit) -> str:
     """Text with the positions of head and mirror for a visit's line, in the machine frame."""
-    first = scenario.plan.points(visit.line, visit.run)[0] + np.array(scenario.tool)
-    along = scenario.plan.frame(visit.line)[:, 2]
-    origin = first - scenario.heads[visit.line].standoff * along
+    first = known.plan.points(visit.line, visit.run)[0] + np.array(known.tool)
+    along = known.plan.frame(visit.line)[:, 2]
+    origin = first - known.heads[visit.line].standoff * along
     kind = "scale line" if visit.is_scale_line else "line"
     return (
         f"set-up {visit.set_up}, {kind} {visit.line}: beam from ({_numbers(origin, 2)}) mm along "

@@ -42,7 +42,7 @@ class Twin:
             raise InvalidArgument(f"play: expected seconds above 0, got {play!r}")
         self.instrument = TwinInstrument(described, behaviour)
         self.instrument.moves_itself = play is not None
-        self._visits = list(visits_of(described))
+        self._visits = list(visits_of(described.known))
         self._play = play
         self._ended = threading.Event()
         try:

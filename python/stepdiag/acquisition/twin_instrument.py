@@ -53,11 +53,12 @@ class TwinInstrument:
     is that of the same row of a simulated run; a visit begun again draws anew."""
 
     def __init__(self, scenario: Scenario, behaviour: TwinBehaviour | None = None) -> None:
-        self._channels = channels_of(scenario)
+        known = scenario.known
+        self._channels = channels_of(known)
         self._scenario = scenario
         self._behaviour = behaviour or TwinBehaviour()
-        self._visits = list(visits_of(scenario))
-        self._digest = digest_of(self._channels, described_plan(scenario))
+        self._visits = list(visits_of(known))
+        self._digest = digest_of(self._channels, described_plan(known))
         counts = [len(visit.points) for visit in self._visits]
         self._first_rows = [sum(counts[:number]) for number in range(len(counts))]
         self._rows = sum(counts)
@@ -65,7 +66,7 @@ class TwinInstrument:
         self._heads = of_run(scenario.actual_heads())
         self._readouts: dict[int, _core.VirtualReadout] = {}
         self._lock = threading.RLock()
-        self._random = np.random.default_rng(scenario.noise.seed)
+        self._random = np.random.default_rng(scenario.truth.noise.seed)
         self._begun = [0] * len(self._visits)
         self._visit: int | None = None
         self._set_up = 1
@@ -220,7 +221,7 @@ class TwinInstrument:
     def _distances(self) -> list[float | None]:
         if self._point() in self._behaviour.lost:
             return [None] * AXES
-        seconds = self._scenario.keys.plan.seconds_per_reading or 0.0
+        seconds = self._scenario.known.keys.plan.seconds_per_reading or 0.0
         elapsed = max(0, self._row - self._setup_row) * seconds
         signals = self._readout().read(self._position, self._approach, row=self._row, elapsed=elapsed)
         count = len(self._channels)
@@ -238,7 +239,7 @@ class TwinInstrument:
             line = next(visit.line for visit in self._visits if visit.set_up == self._set_up)
             self._readouts[self._set_up] = _core.VirtualReadout(
                 self._machine,
-                scenario.plan,
+                scenario.known.plan,
                 self._heads,
                 line,
                 simulation_options(scenario),

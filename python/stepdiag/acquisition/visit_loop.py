@@ -12,7 +12,7 @@ from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, 
 from stepdiag.acquisition.reading_plan import placement
 from stepdiag.acquisition.settling import Reading, take_reading
 from stepdiag.acquisition.triggers import Context, Operator, Trigger, point_text
-from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import Visit, visits_of
 
 Resume = Literal["point", "line", "set-up"]
@@ -23,7 +23,7 @@ class Acquisition:
 
     def __init__(
         self,
-        scenario: Scenario,
+        known: Known,
         header: Header,
         file: RawFile,
         instrument: Ids3010,
@@ -31,10 +31,10 @@ class Acquisition:
         operator: Operator,
         options: "AcquireOptions",
     ) -> None:
-        self._scenario, self._header, self._options = scenario, header, options
+        self._known, self._header, self._options = known, header, options
         self._file, self._instrument = file, instrument
         self._trigger, self._operator = trigger, operator
-        self._visits = list(visits_of(scenario))
+        self._visits = list(visits_of(known))
         self._axes = [axis - 1 for axis in header.axes]
         self._is_twin = False
         self._set_up = 0  # the last set-up for which the instrument was ready
@@ -92,7 +92,7 @@ class Acquisition:
     def _instruction(self, visit: Visit, last: int) -> str:
         if last and self._visits[last - 1].set_up == visit.set_up:
             return f"set-up {visit.set_up} stays as it is: run {visit.run}, {visit.direction}"
-        return placement(self._scenario, visit)
+        return placement(self._known, visit)
 
     def _last_taken(self) -> tuple[Visit, int]:
         number, point = next(reversed(self.done))

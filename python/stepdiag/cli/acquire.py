@@ -136,12 +136,12 @@ def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
     described = read_scenario(scenario)
     raw: OutputFile = given["raw"] or OutputFile(raw_path(output.path), (RAW,))
     # acquire() refuses outputs made from other raw files, and raw files that are not resumed.
-    path = output.claim(scenario, raw.path, error_map=described.error_map, overwrite=True)
-    raw.claim(scenario, error_map=described.error_map, overwrite=True)
+    path = output.claim(scenario, raw.path, error_map=described.truth.error_map, overwrite=True)
+    raw.claim(scenario, error_map=described.truth.error_map, overwrite=True)
     options, resume = _options(given), _resume(given)
     trigger = _trigger(given["trigger"])
     result = acquire(
-        described,
+        described.known,
         given["source"],
         path,
         trigger=trigger,

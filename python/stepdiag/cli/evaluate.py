@@ -57,17 +57,18 @@ def evaluate(
     check_input(run)
     if covariance and not is_netcdf(output.path):
         raise InvalidArgument(f"--covariance: expected an output named .nc (CSV has no covariance), got {output.path}")
-    plan = read_scenario(scenario)
-    path = output.claim(scenario, run, error_map=plan.error_map)
+    described = read_scenario(scenario)
+    path = output.claim(scenario, run, error_map=described.truth.error_map)
+    known = described.known
     measurement = read_measurement(run)
     with located(str(run)):
         result = (
-            adjust_scenario(plan, measurement, full_covariance=covariance)
+            adjust_scenario(known, measurement, full_covariance=covariance)
             if method == "adjustment"
-            else evaluate_scenario(plan, measurement, method=method, full_covariance=covariance)
+            else evaluate_scenario(known, measurement, method=method, full_covariance=covariance)
         )
     write_calibration(result, path, measurement=measurement)
-    for line in evaluation_report(result, measurement, plan):
+    for line in evaluation_report(result, measurement, known):
         click.echo(line)
     tell_fit(context, path, (result if isinstance(result, Calibration) else result.calibration).fit)
 
@@ -108,12 +109,13 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
     from stepdiag.report.observation import observation_report, prospect_csv, prospect_rows
     from stepdiag.scenario.description import read_scenario
 
-    plan = read_scenario(scenario)
-    path = None if output is None else output.claim(scenario, error_map=plan.error_map)
-    run, found = observe(plan)
-    for line in observation_report(found, run, plan):
+    described = read_scenario(scenario)
+    path = None if output is None else output.claim(scenario, error_map=described.truth.error_map)
+    known = described.known
+    run, found = observe(known)
+    for line in observation_report(found, run, known):
         click.echo(line)
-    table = prospects(plan, [*(steps or USUAL_STEPS), plan.plan.steps])
+    table = prospects(known, [*(steps or USUAL_STEPS), known.plan.steps])
     click.echo("largest standard uncertainties by the number of steps, and the mirror that they take:")
     for line in prospect_rows(table):
         click.echo(line)

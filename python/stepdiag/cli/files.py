@@ -80,21 +80,22 @@ def init(output: OutputFile, scenario: Path | None, head_name: str | None) -> No
     from stepdiag.config.scenario_template import template
     from stepdiag.head.description import find_shipped_head
     from stepdiag.io.whole_files import make_folder, read_text, write_whole
-    from stepdiag.scenario.description import parse_scenario, read_scenario, runs_of
+    from stepdiag.scenario.description import parse_scenario, read_scenario
+    from stepdiag.scenario.known import runs_of
     from stepdiag.scenario.planned_readings import empty_sheet
 
     if scenario is not None and head_name is not None:
         raise InvalidArgument("--head: goes with a new scenario, not with --sheet-for")
     texts = {}
     if scenario is not None:
-        plan = read_scenario(scenario)
+        known = read_scenario(scenario).known
     else:
         texts["scenario.toml"] = template("head.toml" if head_name else None)
         shipped = find_shipped_head(head_name) if head_name else None
         if shipped is not None:
             texts["head.toml"] = read_text(shipped)
         # Checked as in its new folder, which does not contain the head's copy yet.
-        plan = parse_scenario(template(head_name))
+        known = parse_scenario(template(head_name)).known
     folder = output.path
     written = [folder / name for name in (*texts, "measurement.csv")]
     for path in written:
@@ -103,7 +104,8 @@ def init(output: OutputFile, scenario: Path | None, head_name: str | None) -> No
     make_folder(folder)
     for name, text in texts.items():
         write_whole(folder / name, text)
-    empty_sheet(plan.plan, plan.signals, repeats=runs_of(plan.keys.plan), backward=plan.keys.plan.backward).write(
+    keys = known.keys.plan
+    empty_sheet(known.plan, known.signals, repeats=runs_of(keys), backward=keys.backward).write(
         folder / "measurement.csv"
     )
     for path in written:

@@ -85,9 +85,9 @@ def nc(scenario: Path, output: OutputFile, **given: Any) -> None:
     from stepdiag.scenario.description import read_scenario
 
     described = read_scenario(scenario)
-    path = output.claim(scenario, error_map=described.error_map)
+    path = output.claim(scenario, error_map=described.truth.error_map)
     program = measuring_program(
-        described, Options(**{name: value for name, value in given.items() if value is not None})
+        described.known, Options(**{name: value for name, value in given.items() if value is not None})
     )
     write_whole(path, program.text)
     for text in program.unapproached:

@@ -75,9 +75,9 @@ def plan(
     from stepdiag.scenario.description import read_scenario
 
     described = read_scenario(scenario)
-    path = None if output is None else output.claim(scenario, error_map=described.error_map)
-    available = described.keys.plan_by_time.minutes if minutes is None else minutes
-    near = own_spacing(described) if spacing is None else spacing
+    path = None if output is None else output.claim(scenario, error_map=described.truth.error_map)
+    available = described.known.keys.plan_by_time.minutes if minutes is None else minutes
+    near = own_spacing(described.known) if spacing is None else spacing
     with click.progressbar(length=1, label="plans", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
 
         def show(done: int, of: int) -> None:

@@ -24,7 +24,7 @@ def simulate(scenario: Path, output: OutputFile, overwrite: bool) -> None:
     from stepdiag.scenario.map_warnings import scenario_warnings
 
     described = read_scenario(scenario)
-    path = output.claim(scenario, error_map=described.error_map, overwrite=overwrite)
+    path = output.claim(scenario, error_map=described.truth.error_map, overwrite=overwrite)
     for warning in scenario_warnings(described):
         tell("warning", warning)
     write_measurement(simulate_scenario(described), path)

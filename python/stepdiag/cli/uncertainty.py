@@ -197,14 +197,14 @@ def uncertainty(
     if (covariance or keep) and (output is None or not is_netcdf(output.path)):
         raise InvalidArgument(f"{'--covariance' if covariance else '--keep'}: expected -o with a name that ends in .nc")
     described = read_scenario(scenario)
-    path = None if output is None else output.claim(scenario, error_map=described.error_map)
+    path = None if output is None else output.claim(scenario, error_map=described.truth.error_map)
     if list_inputs:
-        for line in input_rows(described.uncertain):
+        for line in input_rows(described.known.uncertain):
             click.echo(line)
         return
     if wanted.draws:
         others = [scenario] if path is None else [scenario, path]
-        kept.claim(*others, error_map=described.error_map, overwrite=resume)
+        kept.claim(*others, error_map=described.truth.error_map, overwrite=resume)
     for warning in scenario_warnings(described):
         tell("warning", warning)
     with _kept(wanted, KeyboardInterrupt), chosen_workers(scheduler, workers) as chosen:

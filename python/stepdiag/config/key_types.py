@@ -1,6 +1,6 @@
 """What the keys of our TOML files (scenarios, heads) are made of: sections, and the kinds of values that keys take."""
 
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -52,3 +52,15 @@ def key(expected: str, meaning: str, default: Any = ..., example: Any = None) ->
 def tables(placeholder: str) -> Any:
     """Tables with names of the user's own, by default none; documentation writes [section.PLACEHOLDER]."""
     return Field({}, json_schema_extra={"placeholder": placeholder})
+
+
+Narrow = TypeVar("Narrow", bound=Section)
+
+
+def narrowed(section: Section, model: type[Narrow]) -> Narrow:
+    """The keys that `model` has, of a section that has others beside them; so of the sections in it."""
+    kept: dict[str, Any] = {}
+    for name in section.model_fields_set & model.model_fields.keys():
+        value, narrow = getattr(section, name), model.model_fields[name].annotation
+        kept[name] = narrowed(value, narrow) if isinstance(narrow, type) and issubclass(narrow, Section) else value
+    return model.model_construct(**kept)

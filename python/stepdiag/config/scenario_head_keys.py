@@ -34,8 +34,8 @@ class PoseErrorKeys(Section):
     )
 
 
-class HeadKeys(Section):
-    """What `[head]` and `[head.NAME]` have in common."""
+class NominalHeadKeys(Section):
+    """How a head is made by design."""
 
     layout: Literal["ideal", "psd", "multi_beam"] | None = key(
         '"ideal", "psd" or "multi_beam"',
@@ -85,15 +85,16 @@ class HeadKeys(Section):
         None,
         "coupled_mode",
     )
+
+
+class HeadKeys(NominalHeadKeys):
+    """What `[head]` and `[head.NAME]` have in common."""
+
     pose_errors: dict[str, PoseErrorKeys] = tables("COMPONENT")
 
 
-class HeadSection(HeadKeys):
-    """The measuring head and its mirror: a `layout`, or a `description` of its optics.
-
-    `[head.NAME]` describes further heads; each replaces the keys that it names, and has the others from `[head]`.
-    `[line.LINE]` says which of them measures a line; a line without is measured with that of `[head]`. All heads of a
-    run have the same layout and number of beams."""
+class KnownHeadKeys(Section):
+    """What is known of all heads, beside how each is made by design."""
 
     verified_share: Share = key(
         SHARE, "Described heads: share of the poses whose replay is compared with the full trace.", 1e-3
@@ -104,6 +105,15 @@ class HeadSection(HeadKeys):
         "run that has them. Not for beams d1, d2, ...",
         True,
     )
+
+
+class HeadSection(KnownHeadKeys, HeadKeys):
+    """The measuring head and its mirror: a `layout`, or a `description` of its optics.
+
+    `[head.NAME]` describes further heads; each replaces the keys that it names, and has the others from `[head]`.
+    `[line.LINE]` says which of them measures a line; a line without is measured with that of `[head]`. All heads of a
+    run have the same layout and number of beams."""
+
     by_head: dict[str, HeadKeys] = tables("NAME")
 
 

@@ -32,7 +32,7 @@ from stepdiag.config.key_types import (
     tables,
 )
 from stepdiag.config.plan_by_time_keys import PlanByTimeSection
-from stepdiag.config.scenario_head_keys import EnvironmentSection, HeadSection, LineKeys
+from stepdiag.config.scenario_head_keys import EnvironmentSection, HeadSection, KnownHeadKeys, LineKeys
 from stepdiag.config.uncertainty_keys import UncertaintySection
 
 # Limits that the core checks as well; here they keep numbers inside the integer types behind the bindings.
@@ -75,8 +75,8 @@ class RandomSection(Section):
     screw_amplitude_um: Amplitude = key(AMPLITUDE, "Amplitude of that periodic error.", 0.0)
 
 
-class MachineSection(Section):
-    """The machine; perfect without `errors` and `random`. An evaluation uses only `chain` and `tool_mm`."""
+class KnownMachineKeys(Section):
+    """What is known of the machine."""
 
     chain: str = key(
         'a kinematic chain such as "[w X\' b Y Z t]"',
@@ -84,13 +84,24 @@ class MachineSection(Section):
         example="[w X' b Y Z t]",
     )
     tool_mm: Triple = key(THREE_LENGTHS, "Offset from the tool's origin to the centre of the mirror.", (0.0, 0.0, 0.0))
+
+
+class MachineErrorsKeys(Section):
+    """The errors that a machine is simulated with."""
+
     errors: Annotated[str, Field(min_length=1)] | None = key(
         "the path of an error map (CSV)",
         "Error map to simulate with, relative to this file.",
         None,
         "truth.csv",
     )
-    random: RandomSection | None = Field(None, description="See `[machine.random]`; not together with `errors`.")
+    random: RandomSection | None = Field(
+        default=None, description="See `[machine.random]`; not together with `errors`."
+    )
+
+
+class MachineSection(MachineErrorsKeys, KnownMachineKeys):
+    """The machine; perfect without `errors` and `random`. An evaluation uses only `chain` and `tool_mm`."""
 
 
 class PlanSection(Section):
@@ -170,13 +181,18 @@ class MisalignmentSection(MisalignmentKeys):
     by_line: dict[str, MisalignmentKeys] = tables("LINE")
 
 
-class NoiseSection(Section):
-    """Standard deviations of the noise that `simulate` adds, independent and Gaussian."""
+class NoiseKeys(Section):
+    """How large the noise of the readings is: what it is simulated with, and the weights by default."""
 
     distance_um: Amplitude = key(DEVIATION, "Noise of distances (also d1, d2, ...).", 0.0)
     common_um: Amplitude = key(DEVIATION, "Noise that all distances of a point have in common.", 0.0)
     tilt_urad: Amplitude = key(DEVIATION, "Noise of the tilts.", 0.0)
     spot_um: Amplitude = key(DEVIATION, "Noise of the spot position.", 0.0)
+
+
+class NoiseSection(NoiseKeys):
+    """Standard deviations of the noise that `simulate` adds, independent and Gaussian."""
+
     seed: Seed = key(SEED, "Seed of the noise.", 0)
 
 
@@ -191,22 +207,37 @@ class PlausibleSection(Section):
     rotation_urad: Positive = key(POSITIVE, "Limit of an angular error or a squareness.", 5000.0, 5000.0)
 
 
-class ScenarioKeys(Section):
-    """The whole file, section by section."""
+class KnownKeys(Section):
+    """What is known when a run is evaluated: these keys, and how the heads are made by design."""
 
     volume: VolumeSection
-    machine: MachineSection
+    machine: KnownMachineKeys
     plan: PlanSection
-    head: HeadSection
+    head: KnownHeadKeys
     line: dict[str, LineKeys] = tables("LINE")
-    misalignment: MisalignmentSection = MisalignmentSection()
-    environment: EnvironmentSection = EnvironmentSection()
-    noise: NoiseSection = NoiseSection()
+    noise: NoiseKeys = NoiseKeys()
     uncertainty: UncertaintySection = UncertaintySection()
     adjustment: AdjustmentSection = AdjustmentSection()
     smoothness: SmoothnessSection = SmoothnessSection()
     plausible: PlausibleSection = PlausibleSection()
     plan_by_time: PlanByTimeSection = PlanByTimeSection()
+
+
+class TruthKeys(Section):
+    """What a run is simulated with beside what is known; by default nothing is wrong with machine, head and air."""
+
+    machine: MachineErrorsKeys = MachineErrorsKeys()
+    noise: NoiseSection = NoiseSection()
+    misalignment: MisalignmentSection = MisalignmentSection()
+    environment: EnvironmentSection = EnvironmentSection()
+
+
+class ScenarioKeys(TruthKeys, KnownKeys):
+    """The whole file, section by section: what is known, and the truth."""
+
+    machine: MachineSection
+    head: HeadSection
+    noise: NoiseSection = NoiseSection()
 
 
 # Sections that may hold tables of the user's own names, and where these are kept.

@@ -58,7 +58,7 @@ def draw_shares(axes: Axes, values: FloatArray, *, color: str, linestyle: str, l
 
 def draw_screw(axes: Axes, outcome: LoopOutcome) -> None:
     """Draw the remaining error in X along the first part of X."""
-    fine, nodes = np.linspace(0.0, SHOWN, 1001), outcome.scenario.plan.nodes("X")
+    fine, nodes = np.linspace(0.0, SHOWN, 1001), outcome.scenario.known.plan.nodes("X")
     nodes = nodes[nodes <= SHOWN]
     targets = np.zeros((len(fine), 3))
     targets[:, 0] = fine

@@ -47,7 +47,7 @@ class Calculated:
     def do(self, job: Job, say: Say) -> FloatArray:
         instrument = TwinInstrument(job.scenario)
         rows = []
-        visits = list(visits_of(job.scenario))
+        visits = list(visits_of(job.scenario.known))
         for visit in visits:
             for index, joints in enumerate(self._joints(job, visit.positions)):
                 instrument.move_to(joints)
@@ -60,7 +60,7 @@ class Calculated:
             [visit.line for visit in visits for _ in visit.points],
             [int(point) for visit in visits for point in visit.points],
             np.concatenate([visit.positions for visit in visits]),
-            {name: readings[:, i] for i, name in enumerate(job.scenario.signals)},
+            {name: readings[:, i] for i, name in enumerate(job.scenario.known.signals)},
             run=[visit.run for visit in visits for _ in visit.points],
             direction=[visit.direction for visit in visits for _ in visit.points],
         ).write(job.run)

@@ -135,7 +135,7 @@ class _Recorder(threading.Thread):
         source = f"ids3010://{self._twin.address[0]}:{self._twin.address[1]}"
         options = AcquireOptions(settling=SETTLING, wait_timeout=6 * PATIENCE)
         try:
-            acquire(job.scenario, source, job.run, trigger=self._trigger, options=options)
+            acquire(job.scenario.known, source, job.run, trigger=self._trigger, options=options)
             self._points()
         except Exception as error:  # for the thread that waits for it
             self.error = error
@@ -163,7 +163,7 @@ class _Recorder(threading.Thread):
 
 
 def _points_visit(job: Job) -> Visit:
-    last = list(visits_of(job.scenario))[-1]
+    last = list(visits_of(job.scenario.known))[-1]
     return Visit(
         number=last.number + 1,
         set_up=last.set_up + 1,

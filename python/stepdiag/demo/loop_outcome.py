@@ -63,11 +63,11 @@ def run_case(
     scenario = read_scenario(write_scenario(case, here, steps))
     compensated = read_scenario(write_scenario(case, later, steps, seed=2))  # other noise
     program, table = here / "program.ngc", here / "calibration.csv"
-    made = measuring_program(scenario, Options(timeout=PATIENCE))
+    made = measuring_program(scenario.known, Options(timeout=PATIENCE))
     write_whole(program, made.text)
     sets = {
-        "nodes": grid_nodes(scenario.plan, counts[0], POINT_SEED),
-        "random": random_points(scenario.plan, counts[1], POINT_SEED),
+        "nodes": grid_nodes(scenario.known.plan, counts[0], POINT_SEED),
+        "random": random_points(scenario.known.plan, counts[1], POINT_SEED),
     }
     points = np.concatenate(list(sets.values()))
 
@@ -79,7 +79,7 @@ def run_case(
     standing = went if standing is None else standing
     run = _core.read_measurement(here / "run.csv")
     say("evaluate")
-    calibration = adjust_scenario(scenario, run, full_covariance=True).calibration
+    calibration = adjust_scenario(scenario.known, run, full_covariance=True).calibration
     calibration.write(table)
     say("measure the compensated machine")
     after = controller.do(Job(compensated, program, later / "run.csv", points, table), say)
@@ -97,8 +97,8 @@ def run_case(
         calibration,
         table,
         found,
-        translations(scenario, run),
-        translations(compensated, _core.read_measurement(later / "run.csv")),
+        translations(scenario.known, run),
+        translations(compensated.known, _core.read_measurement(later / "run.csv")),
         {name: agreement(s.after, covariances(calibration, s.targets)) for name, s in found.items()}
         if case.noise
         else {},
@@ -112,10 +112,10 @@ def repetitions(outcome: LoopOutcome, seeds: int) -> dict[str, Agreement]:
     Returns remaining errors and their stated uncertainty by kind of points."""
     errors: dict[str, list[FloatArray]] = {}
     variances: dict[str, list[FloatArray]] = {}
-    steps = outcome.scenario.plan.steps
+    steps = outcome.scenario.known.plan.steps
     for seed in range(1000, 1000 + seeds):
         scenario = parse_scenario(scenario_text(NOISE, steps, seed), outcome.scenario.path)
-        calibration = adjust_scenario(scenario, simulate_scenario(scenario), full_covariance=True).calibration
+        calibration = adjust_scenario(scenario.known, simulate_scenario(scenario), full_covariance=True).calibration
         compensator = _core.Compensator(calibration, CHAIN)
         for name, points in outcome.points.items():
             targets = points.targets[:: max(1, len(points.targets) // POINTS_OF_A_SEED)]
@@ -126,7 +126,7 @@ def repetitions(outcome: LoopOutcome, seeds: int) -> dict[str, Agreement]:
 
 def whole_grid(outcome: LoopOutcome) -> tuple[float, float]:
     """Largest errors at all nodes of the grid before and after compensation, calculated, mm."""
-    nodes = [outcome.scenario.plan.nodes(axis) for axis in "XYZ"]
+    nodes = [outcome.scenario.known.plan.nodes(axis) for axis in "XYZ"]
     compensator = _core.Compensator(outcome.table, CHAIN)
     before = after = 0.0
     for x in nodes[0]:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from stepdiag._core import Calibration, Head, Measurement, adjust
 from stepdiag.parameters import kind_of
-from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.known import Known
 
 ITERATIONS = 5  # of t = alpha^2 + beta^2, each of which gains a factor of t, about 1e-7
 
@@ -27,9 +27,9 @@ class Translations:
     squareness: float  # rad
 
 
-def translations(scenario: Scenario, run: Measurement) -> Translations:
+def translations(known: Known, run: Measurement) -> Translations:
     """Evaluate the translations of a run with three or more beams."""
-    place = along_beam(scenario, run)
+    place = along_beam(known, run)
     sound = np.isfinite(place)
     reduced = Measurement(
         [line for line, good in zip(run.line, sound, strict=True) if good],
@@ -37,8 +37,8 @@ def translations(scenario: Scenario, run: Measurement) -> Translations:
         run.position[sound],
         {"distance": place[sound]},
     )
-    head = Head("ideal", standoff=scenario.head.standoff)
-    found = adjust(reduced, scenario.plan, head, scenario.chain, scenario.tool, rotations=False).calibration
+    head = Head("ideal", standoff=known.head.standoff)
+    found = adjust(reduced, known.plan, head, known.chain, known.tool, rotations=False).calibration
     lengths = [
         float(np.max(np.abs(values)))
         for name, (_, values, _) in found.functions.items()
@@ -47,14 +47,14 @@ def translations(scenario: Scenario, run: Measurement) -> Translations:
     return Translations(found, max(lengths), max(abs(angle) for angle, _ in found.squareness.values()))
 
 
-def along_beam(scenario: Scenario, run: Measurement) -> npt.NDArray[np.float64]:
+def along_beam(known: Known, run: Measurement) -> npt.NDArray[np.float64]:
     """Position of the functional point along the beam, (n,), mm, from distances and their tilts.
 
     Beam i reads (L - beta u_i + alpha v_i)/(1 - t), t = alpha^2 + beta^2, and L = z + beta x -
     alpha y of the functional point (x, y, z) in the sensor frame (docs/method.md), of which x and y
     are the commanded ones."""
-    offsets = scenario.head.beam_offsets
-    distances = np.stack([run.channels[name] for name in scenario.signals], axis=1)
+    offsets = known.head.beam_offsets
+    distances = np.stack([run.channels[name] for name in known.signals], axis=1)
     design = np.column_stack([np.ones(len(offsets)), -offsets[:, 0], offsets[:, 1]])
     scaled = np.linalg.lstsq(design, distances.T, rcond=None)[0]
     t = np.zeros(len(distances))
@@ -65,5 +65,5 @@ def along_beam(scenario: Scenario, run: Measurement) -> npt.NDArray[np.float64]:
     lines = np.array(run.line)
     for line in set(run.line):
         rows = lines == line
-        lateral[rows] = (run.position[rows] - scenario.plan.points(line)[0]) @ scenario.plan.frame(line)[:, :2]
+        lateral[rows] = (run.position[rows] - known.plan.points(line)[0]) @ known.plan.frame(line)[:, :2]
     return np.asarray(length - beta * lateral[:, 0] + alpha * lateral[:, 1])

@@ -19,7 +19,7 @@ WORDS = {"nodes": "nodes of the plan", "random": "random points"}
 
 
 def report_lines(outcomes: list[LoopOutcome], repeated: dict[str, Agreement] | None, controller: str) -> Iterator[str]:
-    steps = outcomes[0].scenario.plan.steps
+    steps = outcomes[0].scenario.known.plan.steps
     nodes, count = (len(outcomes[0].points[kind].targets) for kind in ("nodes", "random"))
     yield f"The closed loop, moved by {controller}: {steps} steps an axis, the truth {finer(steps)} times finer"
     yield from error_table(outcomes)
@@ -54,7 +54,7 @@ def node_note(outcomes: list[LoopOutcome]) -> Iterator[str]:
     yield "them, by the error itself, where the finer truth has another slope than the calibration."
     for outcome in outcomes:
         if not outcome.case.noise:
-            count = (outcome.scenario.plan.steps + 1) ** 3
+            count = (outcome.scenario.known.plan.steps + 1) ** 3
             before, after = whole_grid(outcome)
             yield (
                 f"{outcome.case.name}: largest error at any of the {count:,} nodes, calculated: "
@@ -68,8 +68,9 @@ def screw_note(outcome: LoopOutcome) -> Iterator[str]:
     yield f"A screw error of {SCREW_PITCH:g} mm pitch and {SCREW_AMPLITUDE * UM:g} µm on all axes stays between nodes:"
     yield f"{'':<6}{'step':>10}{'seen as':>22}{'left at nodes':>16}{'left between':>16}"
     for axis, name in enumerate("XYZ"):
-        step = outcome.scenario.plan.volume[axis] / outcome.scenario.plan.steps
-        nodes, fine = outcome.scenario.plan.nodes(name), np.linspace(0.0, outcome.scenario.plan.volume[axis], 20001)
+        plan = outcome.scenario.known.plan
+        step = plan.volume[axis] / plan.steps
+        nodes, fine = plan.nodes(name), np.linspace(0.0, plan.volume[axis], 20001)
         at, between = (float(np.max(np.abs(left_along(outcome, axis, p)[:, axis]))) for p in (nodes, fine))
         yield f"E{name}{name:<4}{step:7.3g} mm{alias_of(step):>22}{at * UM:>13.2g} µm{between * UM:>13.2g} µm"
     slope, beside = 2.0 * math.pi * SCREW_AMPLITUDE / SCREW_PITCH, Sizes.of(outcome.points["nodes"].before).largest

@@ -113,7 +113,7 @@ def run_case(case: Case, folder: Path) -> Result:
     measurement = _core.read_measurement(here / "run.csv")
     calibrations = {}
     for method in METHODS:
-        calibrations[method] = evaluate_scenario(scenario, measurement, method=method)
+        calibrations[method] = evaluate_scenario(scenario.known, measurement, method=method)
         calibrations[method].write(here / f"{method}.csv")
     return Result(case, scenario, scenario.machine().errors, measurement, calibrations)
 

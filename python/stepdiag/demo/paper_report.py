@@ -66,7 +66,7 @@ def traced_differences(traced: Result, defined: Result) -> dict[str, tuple[float
     the spot moves by 2 u beta (beta, -alpha). The window's glass shortens L for the angle, so the
     distance loses that times tan^2 phi."""
     mine, theirs = traced.measurement.channels, defined.measurement.channels
-    zero = defined.scenario.keys.misalignment.psd_zero_mm
+    zero = defined.scenario.truth.keys.misalignment.psd_zero_mm
     arm = 2.0 * (theirs["distance"] + PSD_DISTANCE)
     alpha, beta = (theirs["spot_y"] - zero[1]) / arm, -(theirs["spot_x"] - zero[0]) / arm
     expected = {

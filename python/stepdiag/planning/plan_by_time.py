@@ -10,11 +10,14 @@ from typing import Final, Literal
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
+from stepdiag.config.scenario_keys import MachineErrorsKeys, RandomSection, TruthKeys
 from stepdiag.config.toml_text import located
 from stepdiag.parameters import KINDS, Kind, kind_of
 from stepdiag.planning.measuring_time import measuring_time, times_of
-from stepdiag.planning.observation import extents, with_usual_errors
-from stepdiag.scenario.description import Scenario, adjust_scenario, runs_of, simulate_scenario
+from stepdiag.planning.observation import extents, not_measured
+from stepdiag.scenario.description import Scenario, adjust_scenario, simulate_scenario
+from stepdiag.scenario.known import Known, runs_of
+from stepdiag.scenario.truth import Truth, truth_of
 from stepdiag.units import MINUTE
 
 Family = Literal["length", "angle", "squareness"]
@@ -90,8 +93,9 @@ class Outcome:
 
 def candidates(scenario: Scenario) -> list[Candidate]:
     """All plans to choose from. Raises InvalidArgument where the scenario names lines that there are not."""
-    keys, plan = scenario.keys.plan_by_time, scenario.plan
-    own = Candidate(tuple(plan.lines), tuple(plan.scale_lines), plan.steps, scenario.keys.plan.repeats)
+    known = scenario.known
+    keys, plan = known.keys.plan_by_time, known.plan
+    own = Candidate(tuple(plan.lines), tuple(plan.scale_lines), plan.steps, known.keys.plan.repeats)
     sets = {(own.lines, own.scale_lines): None}
     for index, lines in enumerate(_USUAL_SETS if keys.line_sets is None else keys.line_sets):
         measured = tuple(line for line in lines if _moved(line) != 1)
@@ -125,15 +129,15 @@ def outcome(scenario: Scenario, candidate: Candidate) -> Outcome:
 
     The machine of that run has errors: some uncertainties depend on them, for a beam that is 1 mm beside its place
     reads more or less as the mirror tilts."""
-    plan_keys = scenario.keys.plan
+    known, plan_keys = scenario.known, scenario.known.keys.plan
     plan = _core.Plan(
-        scenario.plan.volume,
+        known.plan.volume,
         list(candidate.lines),
         candidate.steps,
-        order=scenario.plan.orders,
+        order=known.plan.orders,
         scale_lines=list(candidate.scale_lines),
     )
-    times = times_of(scenario.keys.plan_by_time, f"{scenario.path}: plan_by_time")
+    times = times_of(known.keys.plan_by_time, f"{known.path}: plan_by_time")
     runs = candidate.repeats * runs_of(plan_keys) // plan_keys.repeats
     seconds, between = measuring_time(plan, times, repeats=runs, backward=plan_keys.backward)
     spacing = float(max(plan.volume)) / candidate.steps
@@ -149,23 +153,29 @@ def outcome(scenario: Scenario, candidate: Candidate) -> Outcome:
             "repeats": candidate.repeats,
             "seconds_per_reading": between or None,
         }
-        more = _says_more(scenario)
-        usual = with_usual_errors(scenario, changes, noise=more)
-        calibration, largest = _propagated(usual) if more else _adjusted(usual)
+        planned = not_measured(known, changes)
+        usual = Scenario(planned, _usual_truth(scenario.truth, planned))
+        calibration, largest = _propagated(usual) if _says_more(known) else _adjusted(usual)
         determined = frozenset(extents(calibration, plan)[0])
     except InvalidArgument as error:
         trouble = str(error)
     return Outcome(candidate, seconds, spacing, (float(width), float(height)), largest, determined, trouble)
 
 
-def _says_more(scenario: Scenario) -> bool:
+def _usual_truth(truth: Truth, planned: Known) -> Truth:
+    """Of a machine with the errors of [machine.random], else of that section's defaults, with the [misalignment]."""
+    machine = MachineErrorsKeys(random=truth.keys.machine.random or RandomSection(seed=0))
+    return truth_of(TruthKeys(machine=machine, misalignment=truth.keys.misalignment), {}, planned)
+
+
+def _says_more(known: Known) -> bool:
     """Whether its [uncertainty] names more than the noise of the readings."""
-    return bool(scenario.uncertain.inputs) or any(noise.quantity != "channel" for noise in scenario.uncertain.noise)
+    return bool(known.uncertain.inputs) or any(noise.quantity != "channel" for noise in known.uncertain.noise)
 
 
 def _adjusted(usual: Scenario) -> tuple[_core.Calibration, dict[Kind, float]]:
     """By the readings' own uncertainties."""
-    calibration = adjust_scenario(usual, simulate_scenario(usual)).calibration
+    calibration = adjust_scenario(usual.known, simulate_scenario(usual)).calibration
     return calibration, {kind: value for kind, (value, _) in largest_uncertainties(calibration).items()}
 
 
@@ -231,6 +241,6 @@ def _seconds(one: Outcome) -> float:
     return one.seconds
 
 
-def own_spacing(scenario: Scenario) -> float:
+def own_spacing(known: Known) -> float:
     """How far nodes of the scenario's own plan are apart, mm: the largest of three axes."""
-    return float(max(scenario.plan.volume)) / scenario.plan.steps
+    return float(max(known.plan.volume)) / known.plan.steps

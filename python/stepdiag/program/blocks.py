@@ -10,18 +10,18 @@ from stepdiag.planning.measuring_time import Times
 from stepdiag.program.gcode import HANDSHAKE, PULSE, Trigger, Writer
 from stepdiag.program.options import Options, writer_of
 from stepdiag.program.path import AXES, Action, Align, Begin, Feed, Rapid, Read, SetUp, Space, Vector
-from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import Visit
 from stepdiag.units import MINUTE
 
 
-def header(scenario: Scenario, options: Options, space: Space, times: Times, visits: list[Visit]) -> Iterator[str]:
-    plan, keys = scenario.plan, scenario.keys
+def header(known: Known, options: Options, space: Space, times: Times, visits: list[Visit]) -> Iterator[str]:
+    plan, keys = known.plan, known.keys
     scale = f", scale lines {' '.join(plan.scale_lines)}" if plan.scale_lines else ""
     runs = 1 + max(visit.run for visit in visits)
     step = plan.volume / plan.steps
-    yield f"Measuring program of {scenario.path.name}, by stepdiag {__version__}"
-    yield f"volume {_triple(plan.volume)} mm, chain {keys.machine.chain}, tool {_triple(scenario.tool)} mm"
+    yield f"Measuring program of {known.path.name}, by stepdiag {__version__}"
+    yield f"volume {_triple(plan.volume)} mm, chain {keys.machine.chain}, tool {_triple(known.tool)} mm"
     yield (
         f"lines {' '.join(plan.lines)}{scale}; {plan.steps} steps an axis of {_triple(step)} mm, "
         f"order {' '.join(dict.fromkeys(plan.orders))}"
@@ -60,7 +60,7 @@ def modes(writer: Writer, trigger: Trigger, options: Options, feed: float) -> li
 class Body:
     """Lines for actions."""
 
-    scenario: Scenario
+    known: Known
     options: Options
     writer: Writer
     trigger: Trigger
@@ -105,10 +105,10 @@ class Body:
         """What to mount, and where.
 
         The beam starts before the first point, and the mirror faces it."""
-        plan, writer = self.scenario.plan, self.writer
-        head = self.scenario.heads[visit.line]
+        plan, writer = self.known.plan, self.writer
+        head = self.known.heads[visit.line]
         towards = plan.frame(visit.line)[:, 2]
-        first: Vector = visit.positions[0] + np.asarray(self.scenario.tool) + self.space.origin
+        first: Vector = visit.positions[0] + np.asarray(self.known.tool) + self.space.origin
         width, height = np.ptp(plan.lateral_excursion(visit.line), axis=0)
         count = len([*plan.lines, *plan.scale_lines])
         what = "scale line" if visit.is_scale_line else "line"
@@ -126,10 +126,9 @@ class Body:
         ]
 
     def _head(self, line: str) -> str:
-        keys = self.scenario.keys
-        named = keys.line.get(line)
-        head = keys.head if named is None else keys.head.by_head[named.head]
-        return (f"{named.head}, " if named else "") + str(head.description or head.layout or keys.head.layout)
+        described = self.known.described_heads[line]
+        _, dot, name = described.place.partition(".")
+        return (f"{name}, " if dot else "") + str(described.keys.description or described.keys.layout)
 
 
 def _triple(values: Vector | tuple[float, float, float]) -> str:

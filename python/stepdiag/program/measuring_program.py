@@ -13,7 +13,7 @@ from stepdiag.program.blocks import Body, header, modes
 from stepdiag.program.gcode import Writer, numbered
 from stepdiag.program.options import Options, space_of, trigger_of, writer_of
 from stepdiag.program.path import AXES, Action, Begin, Feed, Rapid, Read, SetUp, Space, actions_of
-from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import Visit, visits_of
 from stepdiag.units import MINUTE
 
@@ -41,14 +41,14 @@ class Program:
         return lines
 
 
-def measuring_program(scenario: Scenario, options: Options) -> Program:
+def measuring_program(known: Known, options: Options) -> Program:
     """The program for a scenario's plan, with feed and times of [plan_by_time].
 
     Raises InvalidArgument if an option does not suit, or a move would leave the limits."""
-    times = times_of(scenario.keys.plan_by_time, f"{scenario.path}: plan_by_time")
+    times = times_of(known.keys.plan_by_time, f"{known.path}: plan_by_time")
     writer, trigger = writer_of(options), trigger_of(options)
-    space = space_of(scenario, options)
-    visits = list(visits_of(scenario))
+    space = space_of(known, options)
+    visits = list(visits_of(known))
     actions = list(actions_of(visits, space, align=options.align))
     seconds, set_up_seconds = _duration(actions, space, times)
     program = Program(
@@ -59,9 +59,9 @@ def measuring_program(scenario: Scenario, options: Options) -> Program:
         rounding=_rounding(actions, writer),
         unapproached=_unapproached(actions, space),
     )
-    body = Body(scenario, options, writer, trigger, times, space)
+    body = Body(known, options, writer, trigger, times, space)
     lines = ["%"] if options.dialect == "iso" else []
-    for text in [*header(scenario, options, space, times, visits), *program.summary, *program.unapproached]:
+    for text in [*header(known, options, space, times, visits), *program.summary, *program.unapproached]:
         lines += writer.comment(text)
     lines += modes(writer, trigger, options, times.feed)
     for action in actions:

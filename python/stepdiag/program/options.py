@@ -8,7 +8,7 @@ import numpy as np
 from stepdiag._core import InvalidArgument
 from stepdiag.program.gcode import Dialect, DwellWord, Trigger, Writer
 from stepdiag.program.path import Space
-from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.known import Known
 
 COORDINATES: Final = ("G53", "G54", "G55", "G56", "G57", "G58", "G59")
 
@@ -60,11 +60,11 @@ def trigger_of(options: Options) -> Trigger:
     return trigger
 
 
-def space_of(scenario: Scenario, options: Options) -> Space:
+def space_of(known: Known, options: Options) -> Space:
     for name in ("origin", "safe", "limits"):
         if not np.all(np.isfinite(getattr(options, name) or 0.0)):
             raise InvalidArgument(f"{name}: expected finite lengths, got {getattr(options, name)}")
-    origin, volume = np.asarray(options.origin), scenario.plan.volume
+    origin, volume = np.asarray(options.origin), known.plan.volume
     # The far end of Z: on most machines up, away from the table.
     safe = origin + volume * (0.5, 0.5, 1.0) if options.safe is None else np.asarray(options.safe)
     lowest, highest = np.full(3, -np.inf), np.full(3, np.inf)

@@ -11,50 +11,50 @@ from stepdiag.calibration.verdict_text import verdict_rows
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.setup_table import setup_rows
 from stepdiag.scenario.adjustment import scale_line_angle
-from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
 from stepdiag.units import MICRO
 
 
-def evaluation_report(result: Calibration | Adjustment, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
+def evaluation_report(result: Calibration | Adjustment, measurement: Measurement, known: Known) -> Iterator[str]:
     """The verdict of the fit, lost readings, largest standard uncertainties and what is not determined; of an
     adjustment also which readings were left out, and how head and mirror were set up."""
     if isinstance(result, Calibration):
-        return _published(result, measurement, scenario)
-    return _adjusted(result, measurement, scenario)
+        return _published(result, measurement, known)
+    return _adjusted(result, measurement, known)
 
 
-def _published(calibration: Calibration, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
+def _published(calibration: Calibration, measurement: Measurement, known: Known) -> Iterator[str]:
     yield f"fit: unchecked: the method {calibration.method} does not test it; -m adjustment does"
-    yield from _what_was_done(calibration, measurement, scenario)
+    yield from _what_was_done(calibration, measurement, known)
     yield from uncertainty_rows(calibration)
     yield from undetermined_rows(calibration)
     yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
-    if scenario.keys.adjustment.model_fields_set:
+    if known.keys.adjustment.model_fields_set:
         yield f"note: [adjustment] is not used by the method {calibration.method}"
 
 
-def _adjusted(adjustment: Adjustment, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
+def _adjusted(adjustment: Adjustment, measurement: Measurement, known: Known) -> Iterator[str]:
     calibration = adjustment.calibration
     yield from verdict_rows(adjustment)
-    yield from _what_was_done(calibration, measurement, scenario)
+    yield from _what_was_done(calibration, measurement, known)
     yield from _left_out(adjustment.outliers)
     yield from uncertainty_rows(calibration)
     yield from reversal_rows(calibration)
-    rows = list(setup_rows(adjustment.setup, [*scenario.plan.lines, *scenario.plan.scale_lines]))
+    rows = list(setup_rows(adjustment.setup, [*known.plan.lines, *known.plan.scale_lines]))
     if rows:
         yield "set-up found, 12.3(45) being 12.3 with a standard uncertainty of 4.5:"
         yield from rows
     yield from undetermined_rows(calibration, adjustment.combinations)
     yield from smoothness_rows(adjustment.smoothness)
-    yield from cosine_rows(scenario)
+    yield from cosine_rows(known)
     yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
 
 
-def _what_was_done(calibration: Calibration, measurement: Measurement, scenario: Scenario) -> Iterator[str]:
+def _what_was_done(calibration: Calibration, measurement: Measurement, known: Known) -> Iterator[str]:
     yield f"method: {calibration.method}, chain {calibration.chain.name}"
     yield f"readings: {len(measurement)} points on {len(set(measurement.line))} lines"
-    incomplete, missing = lost_readings(measurement, scenario.plan, scenario.signals)
+    incomplete, missing = lost_readings(measurement, known.plan, known.signals)
     if incomplete or missing:
         yield f"lost: {incomplete} rows without a complete reading, {missing} points of the plan without a row"
 
@@ -101,16 +101,16 @@ def smoothness_rows(deviations: Mapping[str, float]) -> Iterator[str]:
         yield f"smoothed, standard deviation of second differences: {', '.join(said)}"
 
 
-def cosine_rows(scenario: Scenario) -> Iterator[str]:
+def cosine_rows(known: Known) -> Iterator[str]:
     """What angles that no reading tells may do to lengths, in words."""
-    if scenario.signals == ("distance",):
+    if known.signals == ("distance",):
         yield (
             "lines without tilts: a laser at an angle to its line reads wrong by the square of it; laser_urad in "
             "[adjustment] says how well it stands (2000 at most), and that is in the uncertainties"
         )
     lines: dict[float, list[str]] = {}
-    for line in scenario.plan.scale_lines:
-        angle = scale_line_angle(scenario.keys.adjustment, line)
+    for line in known.plan.scale_lines:
+        angle = scale_line_angle(known.keys.adjustment, line)
         if angle > 0.0:
             lines.setdefault(angle, []).append(line)
     for angle, names in lines.items():

@@ -84,9 +84,9 @@ def _scenario(path: Path) -> Finding:
     from stepdiag.scenario.map_warnings import scenario_warnings
 
     scenario = read_scenario(path)
-    plan = scenario.plan
+    known, plan = scenario.known, scenario.known.plan
     lines = f"{len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines"
-    summary = f"{scenario.chain.name}, {lines}"
+    summary = f"{known.chain.name}, {lines}"
     scenario.machine()  # refuses an error map that is not sound
     scenario.actual_heads()  # and pose errors that push components into each other
     return Finding("scenario", summary, tuple(scenario_warnings(scenario)))

@@ -9,20 +9,20 @@ from stepdiag.parameters import KINDS, REPORT_UNIT, in_report_units
 from stepdiag.planning.observation import Prospect, extents, growth
 from stepdiag.report.evaluation import cosine_rows, uncertainty_rows, undetermined_rows
 from stepdiag.report.setup_table import setup_rows
-from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
 
 PARAMETERS: Final = 21
 
 
-def observation_report(found: Adjustment, run: _core.Measurement, scenario: Scenario) -> Iterator[str]:
+def observation_report(found: Adjustment, run: _core.Measurement, known: Known) -> Iterator[str]:
     """What the scenario's own plan determines, with what would help for the rest."""
-    plan, calibration = scenario.plan, found.calibration
+    plan, calibration = known.plan, found.calibration
     yield (
         f"plan: {len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines; {len(run)} points, "
-        f"{', '.join(scenario.signals)}; {found.degrees_of_freedom} readings more than unknowns"
+        f"{', '.join(known.signals)}; {found.degrees_of_freedom} readings more than unknowns"
     )
-    incomplete, _ = lost_readings(run, plan, scenario.signals)
+    incomplete, _ = lost_readings(run, plan, known.signals)
     if incomplete:
         yield f"lost: {incomplete} rows without a complete reading, by the beam's way alone"
     yield "for a perfect machine, head and mirror set up without error:"
@@ -33,14 +33,14 @@ def observation_report(found: Adjustment, run: _core.Measurement, scenario: Scen
     if parts:
         yield f"determined at some of the positions: {', '.join(parts)}"
     # All values are 0 here, to rounding.
-    known = [f"{what.partition(' = ')[0]}, ±{what.partition(' +- ')[2]}" for what in found.combinations]
-    yield from undetermined_rows(calibration, known)
+    combinations = [f"{what.partition(' = ')[0]}, ±{what.partition(' +- ')[2]}" for what in found.combinations]
+    yield from undetermined_rows(calibration, combinations)
     yield from uncertainty_rows(calibration)
     rows = list(setup_rows(found.setup, [*plan.lines, *plan.scale_lines], values=False))
     if rows:
         yield "set-up, standard uncertainties:"
         yield from rows
-    yield from cosine_rows(scenario)
+    yield from cosine_rows(known)
 
 
 def prospect_rows(found: Sequence[Prospect]) -> Iterator[str]:

@@ -9,7 +9,8 @@ import numpy as np
 from stepdiag._core import Adjustment, InvalidArgument, Measurement
 from stepdiag.calibration.verdict_text import verdict_rows
 from stepdiag.io.data_files import read_measurement
-from stepdiag.scenario.description import Scenario, adjust_scenario, read_scenario
+from stepdiag.scenario.description import adjust_scenario, read_scenario
+from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
 
 SAME_POINT: Final = 1e-3  # mm, as in the evaluations: positions in files may have been rounded
@@ -19,26 +20,26 @@ def adjust_run(scenario_file: Path, run_file: Path) -> tuple[list[str], str | No
     """What is to say of the two, and the verdict of the adjustment: None of a sheet without readings.
 
     Raises InvalidArgument naming both files where they do not belong together."""
-    scenario, run = read_scenario(scenario_file), read_measurement(run_file)
+    known, run = read_scenario(scenario_file).known, read_measurement(run_file)
     try:
-        if any(np.isfinite(run.channels[name]).any() for name in scenario.signals if name in run.channels):
-            adjustment = adjust_scenario(scenario, run)
-            return list(_said(scenario, run, adjustment)), adjustment.verdict.fit
-        _check_points(scenario, run)
+        if any(np.isfinite(run.channels[name]).any() for name in known.signals if name in run.channels):
+            adjustment = adjust_scenario(known, run)
+            return list(_said(known, run, adjustment)), adjustment.verdict.fit
+        _check_points(known, run)
     except InvalidArgument as error:
         raise InvalidArgument(f"{run_file}: does not belong to {scenario_file}: {error}") from None
     return ["the points are those of the plan; there are no readings of this head yet"], None
 
 
-def _said(scenario: Scenario, run: Measurement, adjustment: Adjustment) -> Iterator[str]:
-    incomplete, missing = lost_readings(run, scenario.plan, scenario.signals)
+def _said(known: Known, run: Measurement, adjustment: Adjustment) -> Iterator[str]:
+    incomplete, missing = lost_readings(run, known.plan, known.signals)
     yield f"{len(run)} rows, {incomplete} without a complete reading; {missing} points of the plan without a row"
     yield from verdict_rows(adjustment)
 
 
-def _check_points(scenario: Scenario, run: Measurement) -> None:
+def _check_points(known: Known, run: Measurement) -> None:
     """Raises InvalidArgument for a point that the plan does not have."""
-    plan = scenario.plan
+    plan = known.plan
     for line, number, point, position in zip(run.line, run.run, run.point, run.position, strict=True):
         points = plan.points(line, int(number)) if line in (*plan.lines, *plan.scale_lines) else ()
         if point >= len(points) or np.max(np.abs(points[point] - position)) > SAME_POINT:

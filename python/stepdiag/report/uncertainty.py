@@ -37,14 +37,14 @@ def _distribution(distribution: _core.Distribution, name: str, unit: float) -> s
 
 def opening_rows(result: UncertaintyResult) -> Iterator[str]:
     """What is calibrated, and how many things are uncertain about it."""
-    scenario, plan = result.scenario, result.scenario.plan
+    known, plan = result.known, result.known.plan
     derived = len(result.outputs) - result.entries
     yield (
         f"virtual calibrations: method {result.method}, {len(plan.lines)} lines of {plan.steps} steps, "
-        f"{len(plan.scale_lines)} scale lines, readings {', '.join(scenario.signals)}"
+        f"{len(plan.scale_lines)} scale lines, readings {', '.join(known.signals)}"
     )
     yield (
-        f"uncertain: {len(scenario.uncertain.inputs)} inputs, {len(scenario.uncertain.noise)} kinds of noise; "
+        f"uncertain: {len(known.uncertain.inputs)} inputs, {len(known.uncertain.noise)} kinds of noise; "
         f"outputs: {result.entries} values of the 21 parameters" + (f", {derived} derived" if derived else "")
     )
 

@@ -8,7 +8,7 @@ from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.config.adjustment_keys import AdjustmentKeys, AdjustmentSection, SmoothnessSection
 from stepdiag.config.key_errors import show
-from stepdiag.config.scenario_keys import PlausibleSection, ScenarioKeys
+from stepdiag.config.scenario_keys import KnownKeys, PlausibleSection
 from stepdiag.config.toml_text import located
 from stepdiag.units import MICROMETRE, MICRORADIAN
 
@@ -35,7 +35,7 @@ SCALE_LINE_ANGLE: Final = 500.0 * MICRORADIAN
 LAYOUT_OF: Final = {"psd_zero_mm": ("psd", "no spot"), "beam_constants_um": ("multi_beam", "no beams d1, d2, ...")}
 
 
-def setup_priors(keys: ScenarioKeys, layout: str, path: Path) -> tuple[_core.SetupPriors, dict[str, _core.SetupPriors]]:
+def setup_priors(keys: KnownKeys, layout: str, path: Path) -> tuple[_core.SetupPriors, dict[str, _core.SetupPriors]]:
     """Of all lines, and of the lines that have a table of their own."""
     shared = _priors(keys.adjustment, layout, f"{path}: adjustment")
     by_line = {}

@@ -2,46 +2,48 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.config.key_errors import expectation, show, suggest
-from stepdiag.config.scenario_head_keys import DESCRIPTION_KEYS, LAYOUT_KEYS, HeadKeys, PoseErrorKeys
-from stepdiag.config.scenario_keys import ScenarioKeys
+from stepdiag.config.key_types import narrowed
+from stepdiag.config.scenario_head_keys import (
+    DESCRIPTION_KEYS,
+    LAYOUT_KEYS,
+    HeadKeys,
+    HeadSection,
+    NominalHeadKeys,
+    PoseErrorKeys,
+)
+from stepdiag.config.scenario_keys import KnownKeys
 from stepdiag.config.toml_text import located
 from stepdiag.head.description import components, find_head, read_head_design
 from stepdiag.units import MICRORADIAN
 
-Shift = tuple[float, float, float]
+Triple = tuple[float, float, float]
+# Of the components of one head that are out of their places: shift (mm) and rotation vector (rad).
+PoseErrors = Mapping[str, tuple[Triple, Triple]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class DescribedHead:
-    """One head as its keys say, those of [head] included. `place` is where they stand: head, head.left."""
+    """One head by design, as its keys say, those of [head] included. `place` is where they stand: head, head.left."""
 
     place: str
-    keys: HeadKeys
-    design: _core.HeadDesign | None
+    keys: NominalHeadKeys
+    design: _core.HeadDesign | None = field(compare=False)  # what the description in `keys` says
 
-    def nominal(self) -> _core.Head:
-        """The head as designed: what an evaluation knows of it."""
-        return self._make({})
-
-    def actual(self) -> _core.Head:
-        """With its components out of their places: what a run is simulated with."""
-        return self._make({name: _pose_error(error) for name, error in self.keys.pose_errors.items()})
-
-    def _make(self, pose_errors: dict[str, tuple[Shift, Shift]]) -> _core.Head:
+    def make(self, pose_errors: PoseErrors) -> _core.Head:
         keys = self.keys
         if self.design is not None:
             return _core.Head.from_design(
                 self.design,
                 standoff=keys.standoff_mm,
                 mirror=keys.mirror_mm,
-                pose_errors=pose_errors,
+                pose_errors=dict(pose_errors),
                 reading_model=keys.reading_model,
             )
         return _core.Head(
@@ -55,61 +57,56 @@ class DescribedHead:
         )
 
 
-def heads_by_line(keys: ScenarioKeys, plan: _core.Plan, path: Path) -> dict[str, DescribedHead]:
+def heads_by_line(
+    keys: KnownKeys, plan: _core.Plan, described: Mapping[str, DescribedHead], path: Path
+) -> dict[str, DescribedHead]:
     """The head of every line of the plan, scale lines included. Raises InvalidArgument."""
-    default, named = _describe(keys, plan, path)
     lines = [*plan.lines, *plan.scale_lines]
     for line in keys.line:
         if line not in lines:
             raise InvalidArgument(f"{path}: line.{line}: not a line of the plan; {suggest(line, lines)}")
+    named = [place.removeprefix("head.") for place in described if place != "head"]
     heads = {}
     for line in lines:
-        if line in keys.line:
-            name = keys.line[line].head
-            if name not in named:
-                known = f"expected one of {', '.join(named)}" if named else "there is no [head.NAME]"
-                raise InvalidArgument(f"{path}: line.{line}.head: no head of this scenario; {known}, got {show(name)}")
-            heads[line] = named[name]
-        elif default is not None:
-            heads[line] = default
-        else:
+        name = keys.line[line].head if line in keys.line else None
+        place = "head" if name is None else f"head.{name}"
+        if place in described:
+            heads[line] = described[place]
+        elif name is None:
             raise InvalidArgument(
                 f"{path}: line.{line}.head: missing; expected one of {', '.join(named)}, "
                 "or a layout or description in [head] for lines without"
             )
+        else:
+            known = f"expected one of {', '.join(named)}" if named else "there is no [head.NAME]"
+            raise InvalidArgument(f"{path}: line.{line}.head: no head of this scenario; {known}, got {show(name)}")
     return heads
 
 
-def nominal_heads(heads: Mapping[str, DescribedHead], path: Path) -> dict[str, _core.Head]:
-    """What each line's head is by design, one object for each head. Raises InvalidArgument where layouts are mixed."""
+def make_heads(
+    described: Mapping[str, DescribedHead], pose_errors: Mapping[str, PoseErrors], path: Path
+) -> dict[str, _core.Head]:
+    """By line, one object for each head: as designed, or with components out of their places (by the head's own)."""
     made: dict[str, _core.Head] = {}
-    for head in heads.values():
+    for head in described.values():
         if head.place not in made:
             with located(f"{path}: {head.place}"):
-                made[head.place] = head.nominal()
-    first = next(iter(heads))
-    expected = made[heads[first].place]
-    for line, head in heads.items():
-        got = made[head.place]
+                made[head.place] = head.make(pose_errors.get(head.place, {}))
+    return {line: made[head.place] for line, head in described.items()}
+
+
+def check_alike(described: Mapping[str, DescribedHead], heads: Mapping[str, _core.Head], path: Path) -> None:
+    """Raises InvalidArgument where layouts are mixed."""
+    first, expected = next(iter(heads.items()))
+    for line, got in heads.items():
         if (got.layout, got.signals) != (expected.layout, expected.signals):
             raise InvalidArgument(
-                f"{path}: {head.place}: expected heads of one layout and number of beams: that of {first} reads "
-                f"{_readings(expected)}, got one that reads {_readings(got)} for {line}"
+                f"{path}: {described[line].place}: expected heads of one layout and number of beams: that of {first} "
+                f"reads {_readings(expected)}, got one that reads {_readings(got)} for {line}"
             )
-    return {line: made[head.place] for line, head in heads.items()}
 
 
-def actual_heads(heads: Mapping[str, DescribedHead], path: Path) -> dict[str, _core.Head]:
-    """The heads as they are, components out of their places."""
-    made: dict[str, _core.Head] = {}
-    for head in heads.values():
-        if head.place not in made:
-            with located(f"{path}: {head.place}"):
-                made[head.place] = head.actual()
-    return {line: made[head.place] for line, head in heads.items()}
-
-
-def signals_of(keys: ScenarioKeys, head: _core.Head, path: Path) -> list[str]:
+def signals_of(keys: KnownKeys, head: _core.Head, path: Path) -> list[str]:
     """The channels of a run. Raises InvalidArgument where there is nothing but tilts to leave out of them."""
     if keys.head.tilts:
         return head.signals
@@ -128,18 +125,20 @@ def _readings(head: _core.Head) -> str:
     return f"{', '.join(head.signals)} ({head.layout})"
 
 
-def _describe(
-    keys: ScenarioKeys, plan: _core.Plan, path: Path
-) -> tuple[DescribedHead | None, dict[str, DescribedHead]]:
-    shared = {name: getattr(keys.head, name) for name in keys.head.model_fields_set & HeadKeys.model_fields.keys()}
-    default = None
-    if not keys.head.by_head or {"layout", "description"} & shared.keys():
-        default = _one(shared, "head", plan, path)
-    named = {name: _one(_inherited(shared, own), f"head.{name}", plan, path) for name, own in keys.head.by_head.items()}
-    described = [head for head in (default, *named.values()) if head is not None and head.design is not None]
-    if "verified_share" in keys.head.model_fields_set and not described:
+def describe_heads(keys: HeadSection, path: Path) -> tuple[dict[str, DescribedHead], dict[str, PoseErrors]]:
+    """By their places, of all heads of a scenario: how they are by design, and what is out of its place in them."""
+    shared = {name: getattr(keys, name) for name in keys.model_fields_set & HeadKeys.model_fields.keys()}
+    by_place = {}
+    if not keys.by_head or {"layout", "description"} & shared.keys():
+        by_place["head"] = shared
+    by_place |= {f"head.{name}": _inherited(shared, own) for name, own in keys.by_head.items()}
+    own_keys = {place: HeadKeys.model_validate(values) for place, values in by_place.items()}
+    described = {place: _described(own, place, path) for place, own in own_keys.items()}
+    if "verified_share" in keys.model_fields_set and not any(head.design is not None for head in described.values()):
         raise InvalidArgument(f"{path}: head.verified_share: goes with a description; a layout replays nothing")
-    return default, named
+    return described, {
+        place: {name: _pose_error(error) for name, error in own.pose_errors.items()} for place, own in own_keys.items()
+    }
 
 
 def _inherited(shared: Mapping[str, Any], own: HeadKeys) -> dict[str, Any]:
@@ -156,8 +155,8 @@ def _inherited(shared: Mapping[str, Any], own: HeadKeys) -> dict[str, Any]:
     return values
 
 
-def _one(values: Mapping[str, Any], place: str, plan: _core.Plan, path: Path) -> DescribedHead:
-    keys = HeadKeys.model_validate(dict(values))
+def _described(keys: HeadKeys, place: str, path: Path) -> DescribedHead:
+    nominal = narrowed(keys, NominalHeadKeys)
     where = f"{path}: {place}"
     if keys.layout is None and keys.description is None:
         expected = expectation(HeadKeys.model_fields["layout"])
@@ -169,9 +168,8 @@ def _one(values: Mapping[str, Any], place: str, plan: _core.Plan, path: Path) ->
             other = "a description" if keys.description is None else "a layout; a description has its own"
             raise InvalidArgument(f"{where}.{name}: goes with {other}")
     _check_layout(keys, where)
-    _check_mirror(keys, plan, where, path)
     if keys.description is None:
-        return DescribedHead(place, keys, None)
+        return DescribedHead(place, nominal, None)
     with located(f"{where}.description"):
         design = read_head_design(find_head(keys.description, path.parent))
     known = components(design)
@@ -181,7 +179,7 @@ def _one(values: Mapping[str, Any], place: str, plan: _core.Plan, path: Path) ->
                 f"{where}.pose_errors.{name}: no component of the head {show(design.name)}; "
                 f"expected one of {', '.join(known)}"
             )
-    return DescribedHead(place, keys, design)
+    return DescribedHead(place, nominal, design)
 
 
 def _check_layout(keys: HeadKeys, where: str) -> None:
@@ -191,16 +189,19 @@ def _check_layout(keys: HeadKeys, where: str) -> None:
         raise InvalidArgument(f'{where}.beam_offsets_mm: missing; the layout "multi_beam" needs it')
 
 
-def _check_mirror(keys: HeadKeys, plan: _core.Plan, where: str, path: Path) -> None:
+def check_mirrors(described: Mapping[str, DescribedHead], plan: _core.Plan, path: Path) -> None:
+    """Raises InvalidArgument where a mirror is smaller than the plan's steps take it to be."""
     with located(f"{path}: plan"):  # it may find the steps too small
         smallest = plan.smallest_mirror()
-    if keys.mirror_mm is not None and (keys.mirror_mm[0] < smallest[0] or keys.mirror_mm[1] < smallest[1]):
-        least = [math.ceil(10.0 * edge) / 10.0 for edge in smallest]  # so that what is named will do
-        raise InvalidArgument(
-            f"{where}.mirror_mm: too small for this plan: expected at least {least}, got {show(keys.mirror_mm)}"
-        )
+    for place, head in described.items():
+        mirror = head.keys.mirror_mm
+        if mirror is not None and (mirror[0] < smallest[0] or mirror[1] < smallest[1]):
+            least = [math.ceil(10.0 * edge) / 10.0 for edge in smallest]  # so that what is named will do
+            raise InvalidArgument(
+                f"{path}: {place}.mirror_mm: too small for this plan: expected at least {least}, got {show(mirror)}"
+            )
 
 
-def _pose_error(keys: PoseErrorKeys) -> tuple[Shift, Shift]:
+def _pose_error(keys: PoseErrorKeys) -> tuple[Triple, Triple]:
     a, b, c = keys.rotation_urad
     return keys.shift_mm, (a * MICRORADIAN, b * MICRORADIAN, c * MICRORADIAN)

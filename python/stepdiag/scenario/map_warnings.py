@@ -5,27 +5,28 @@ from collections.abc import Iterator, Sequence
 
 from stepdiag._core import Chain, ErrorMap, InvalidArgument
 from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.known import Known
 
 
 def scenario_warnings(scenario: Scenario) -> Iterator[str]:
     """One sentence for each oddity of the error map that a scenario names, with the map's path in front."""
-    file = scenario.error_map
+    file = scenario.truth.error_map
     if file is None:
         return
-    for warning in map_warnings(scenario.machine().errors, scenario):
+    for warning in map_warnings(scenario.machine().errors, scenario.known):
         yield f"{file}: {warning}"
 
 
-def map_warnings(errors: ErrorMap, scenario: Scenario) -> Iterator[str]:
+def map_warnings(errors: ErrorMap, known: Known) -> Iterator[str]:
     """The map against the frame's zeros, and its leading lines against the machine that it is used for."""
-    yield from errors.warnings(scenario.plan.volume)
+    yield from errors.warnings(known.plan.volume)
     header = errors.header
     chain = header.get("chain")
-    if chain is not None and not _is_chain(chain, scenario.chain):
-        yield f"is for the chain {chain}, the scenario has {scenario.chain.name}; used as given"
+    if chain is not None and not _is_chain(chain, known.chain):
+        yield f"is for the chain {chain}, the scenario has {known.chain.name}; used as given"
     for key, what, wanted in (
-        ("volume_mm", "volume", scenario.plan.volume.tolist()),
-        ("tool_mm", "tool offset", scenario.tool),
+        ("volume_mm", "volume", known.plan.volume.tolist()),
+        ("tool_mm", "tool offset", known.tool),
     ):
         if key in header and not _are_numbers(header[key], wanted):
             mine = " ".join(f"{number:g}" for number in wanted)

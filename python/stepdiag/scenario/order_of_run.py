@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag._core import Plan
-from stepdiag.scenario.description import Scenario, runs_of
+from stepdiag.scenario.known import Known, runs_of
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,10 @@ class Visit:
     approach: npt.NDArray[np.int_]  # (3,) +1 or -1: how the axes come to every point, the first included
 
 
-def visits_of(scenario: Scenario) -> Iterator[Visit]:
+def visits_of(known: Known) -> Iterator[Visit]:
     """The visits of a scenario's plan, in the order of the rows that `simulate` makes: lines, then scale lines; of each
     its runs, and with `backward` after each forward run its backward one."""
-    keys, plan = scenario.keys.plan, scenario.plan
+    keys, plan = known.keys.plan, known.plan
     runs = runs_of(keys) * (2 if keys.backward else 1)
     number = 0
     for set_up, line in enumerate([*plan.lines, *plan.scale_lines], start=1):

@@ -5,26 +5,23 @@ from pathlib import Path
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.config.key_errors import BY_LINE, show, suggest
+from stepdiag.config.key_errors import BY_LINE, show
 from stepdiag.config.scenario_head_keys import AirKeys, EnvironmentSection
-from stepdiag.config.scenario_keys import SECTIONS_BY_LINE, MisalignmentKeys, NoiseSection, ScenarioKeys
+from stepdiag.config.scenario_keys import KnownKeys, MisalignmentKeys, MisalignmentSection, NoiseSection, PlanSection
 from stepdiag.config.toml_text import located
 from stepdiag.units import HECTOPASCAL, HOUR, MICROMETRE, MICRORADIAN, PERCENT
 
 
-def misalignments(keys: ScenarioKeys, heads: Mapping[str, _core.Head], path: Path) -> dict[str, _core.Misalignment]:
+def misalignments(
+    section: MisalignmentSection, plan: PlanSection, heads: Mapping[str, _core.Head], path: Path
+) -> dict[str, _core.Misalignment]:
     """By line. A line that is missing is aligned."""
-    lines = [*keys.plan.lines, *keys.plan.scale_lines]
-    for section in SECTIONS_BY_LINE:
-        for line in getattr(keys, section).by_line:
-            if line not in lines:
-                raise InvalidArgument(f"{path}: {section}.{line}: not a line of the plan; {suggest(line, lines)}")
     result = {}
-    for line in lines:
-        own = keys.misalignment.by_line.get(line)
-        if line in keys.plan.scale_lines and own is None:
+    for line in [*plan.lines, *plan.scale_lines]:
+        own = section.by_line.get(line)
+        if line in plan.scale_lines and own is None:
             continue
-        shared = MisalignmentKeys() if line in keys.plan.scale_lines else keys.misalignment
+        shared = MisalignmentKeys() if line in plan.scale_lines else section
         values = shared.model_dump(exclude={BY_LINE}) | (own.model_dump(exclude_unset=True) if own else {})
         place = f"misalignment.{line}" if own and own.beam_constants_um is not None else "misalignment"
         result[line] = _core.Misalignment(
@@ -38,7 +35,7 @@ def misalignments(keys: ScenarioKeys, heads: Mapping[str, _core.Head], path: Pat
             gain=values["gain"],
             drift=values["drift_um_per_h"] * MICROMETRE / HOUR,
         )
-        if values["drift_um_per_h"] != 0.0 and keys.plan.seconds_per_reading is None:
+        if values["drift_um_per_h"] != 0.0 and plan.seconds_per_reading is None:
             place = f"misalignment.{line}" if own and "drift_um_per_h" in own.model_fields_set else "misalignment"
             raise InvalidArgument(
                 f"{path}: {place}.drift_um_per_h: expected plan.seconds_per_reading as well, got none"
@@ -104,7 +101,7 @@ def environment(keys: AirKeys, place: str) -> Air:
         return _core.Environment.from_air(equation=keys.equation or "ciddor", **given)
 
 
-def weights(keys: ScenarioKeys) -> _core.ReadingUncertainty:
+def weights(keys: KnownKeys) -> _core.ReadingUncertainty:
     """[uncertainty], else the positive deviations of [noise], else the core's defaults; key by key."""
     given = {}
     for name, key, unit in (

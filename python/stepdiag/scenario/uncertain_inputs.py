@@ -11,7 +11,7 @@ from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.config.distribution_keys import StatedDistribution
 from stepdiag.config.key_errors import show, suggest
-from stepdiag.config.scenario_keys import ScenarioKeys
+from stepdiag.config.scenario_keys import KnownKeys
 from stepdiag.config.toml_text import located
 from stepdiag.config.uncertainty_keys import SetupUncertaintyKeys, UncertaintySection
 from stepdiag.head.description import components
@@ -84,33 +84,24 @@ _UNIT_NAMES: Final = {
 
 
 def uncertain_inputs(
-    keys: ScenarioKeys, described: Mapping[str, DescribedHead], heads: Mapping[str, _core.Head], path: Path
+    keys: KnownKeys, described: Mapping[str, DescribedHead], heads: Mapping[str, _core.Head], path: Path
 ) -> _core.UncertainInputs:
     """What the section says, checked against head and plan. Raises InvalidArgument naming the key."""
     section, place = keys.uncertainty, f"{path}: uncertainty"
     head = next(iter(heads.values()))
-    _check_names(keys, place)
     _check_fit(section, keys, described, head, place)
     for line, own in section.by_line.items():
-        _check_fit(own, keys, {line: described[line]}, head, f"{place}.{line}")
+        if line in described:
+            _check_fit(own, keys, {line: described[line]}, head, f"{place}.{line}")
     inputs = [*_of_lines(keys, head), *_of_components(section, described, place), *_of_all(section, head)]
     noise, correlations = list(_noise(keys, head, place)), list(_correlations(section, inputs, place))
     with located(place):
         return _core.UncertainInputs(inputs, noise, correlations)
 
 
-def _check_names(keys: ScenarioKeys, place: str) -> None:
-    """Tables of names that are no lines may be misspelt keys, too."""
-    lines = [*keys.plan.lines, *keys.plan.scale_lines]
-    for line in keys.uncertainty.by_line:
-        if line not in lines:
-            known = [*lines, "head", "channel", "correlated"]
-            raise InvalidArgument(f"{place}.{line}: not a line of the plan; {suggest(line, known)}")
-
-
 def _check_fit(
     section: SetupUncertaintyKeys,
-    keys: ScenarioKeys,
+    keys: KnownKeys,
     described: Mapping[str, DescribedHead],
     head: _core.Head,
     place: str,
@@ -140,14 +131,9 @@ def _check_fit(
             raise InvalidArgument(f"{place}.{name}.expectation: a random walk has none; a drift is linear in time")
         if name in OF_SCALE_LINES and isinstance(section, UncertaintySection) and not keys.plan.scale_lines:
             raise InvalidArgument(f"{place}.{name}: goes with plan.scale_lines, got none")
-        if name in STATE_OF_AIR and "refractive_index" in keys.environment.model_fields_set:
-            raise InvalidArgument(
-                f"{place}.{name}: goes with a state of the air; [environment] has a refractive_index, for which there "
-                "is refractive_index_ppm"
-            )
 
 
-def _of_lines(keys: ScenarioKeys, head: _core.Head) -> Iterator[_core.UncertainInput]:
+def _of_lines(keys: KnownKeys, head: _core.Head) -> Iterator[_core.UncertainInput]:
     shared = keys.uncertainty
     for line in [*keys.plan.lines, *keys.plan.scale_lines]:
         own = shared.by_line.get(line, SetupUncertaintyKeys())
@@ -188,7 +174,7 @@ def _inputs(
         yield _core.UncertainInput(meaning.quantity, distribution, line=line, part=part, component=component)
 
 
-def _noise(keys: ScenarioKeys, head: _core.Head, place: str) -> Iterator[_core.ReadingNoise]:
+def _noise(keys: KnownKeys, head: _core.Head, place: str) -> Iterator[_core.ReadingNoise]:
     """Of every channel that is read, by its own key, that of its kind, [noise] or the weight, in this order."""
     section, weight = keys.uncertainty, weights(keys)
     channels = head.signals if keys.head.tilts else ["distance"]

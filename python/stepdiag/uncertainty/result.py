@@ -11,7 +11,7 @@ import numpy.typing as npt
 from stepdiag._core import InvalidArgument
 from stepdiag.config.key_errors import suggest
 from stepdiag.parameters import KINDS, kind_of
-from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.known import Known
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -25,7 +25,7 @@ class UncertaintyResult:
     The outputs are the entries of the calibration, followed by derived quantities. All arrays have
     this order. Parts of the result that were not requested are None."""
 
-    scenario: Scenario
+    known: Known
     method: str
     seed: int
     outputs: Sequence[Any]  # with name, position (mm, or NaN) and unit

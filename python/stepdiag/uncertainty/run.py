@@ -89,7 +89,7 @@ def evaluate_uncertainty(
         propagation = _core.propagate(model, covariance=request.volume)
         volume = _volume(model.calibration, propagation, entries, request) if request.volume else None
     result = UncertaintyResult(
-        scenario=scenario,
+        known=scenario.known,
         method=request.method,
         seed=request.seed,
         outputs=model.outputs,

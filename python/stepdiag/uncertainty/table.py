@@ -263,13 +263,13 @@ def _volume(result: UncertaintyResult) -> dict[str, Any]:
 
 
 def attributes_of(result: UncertaintyResult) -> dict[str, Any]:
-    scenario, found = result.scenario, result.monte_carlo
+    known, found = result.known, result.monte_carlo
     attributes: dict[str, Any] = {
         "method": result.method,
-        "scenario": scenario.path.name,
-        "chain": scenario.chain.name,
-        "volume_mm": scenario.plan.volume,
-        "tool_mm": np.array(scenario.tool),
+        "scenario": known.path.name,
+        "chain": known.chain.name,
+        "volume_mm": known.plan.volume,
+        "tool_mm": np.array(known.tool),
         "coverage": result.coverage,
     }
     if found is not None:

@@ -22,31 +22,32 @@ def virtual_calibrations(
 
     `derived`: quantities to be had of every calibration beside its parameters. Raises InvalidArgument where the
     scenario cannot be simulated, or not be evaluated by this method."""
-    if not scenario.keys.head.tilts:
+    known = scenario.known
+    if not known.keys.head.tilts:
         raise InvalidArgument(f"{scenario.path}: head.tilts: virtual calibrations have all readings of their head")
     environment, assumed = _air(scenario)
-    in_air = replace(scenario, environment=environment, assumed_environment=assumed)
+    truth = replace(scenario.truth, environment=environment, assumed_environment=assumed)
     machine, heads = scenario.machine(), scenario.actual_heads()
     with located(str(scenario.path)):
         return _core.VirtualCalibrations(
             machine,
-            scenario.plan,
+            known.plan,
             of_run(heads),
-            scenario.uncertain,
-            calibration_heads=of_run(scenario.heads),
+            known.uncertain,
+            calibration_heads=of_run(known.heads),
             method=method,
             seed=seed,
             derived=list(derived),
-            simulation=simulation_options(in_air),
-            adjustment=adjustment_options(scenario),
+            simulation=simulation_options(replace(scenario, truth=truth)),
+            adjustment=adjustment_options(known),
         )
 
 
 def _air(scenario: Scenario) -> tuple[_core.Environment | None, _core.Environment | None]:
     """The true and the assumed air; where nothing is said of it, but its state is uncertain, that of 20 °C."""
-    section = scenario.keys.uncertainty
+    section, truth = scenario.known.keys.uncertainty, scenario.truth
     is_uncertain = any(getattr(section, name) is not None for name in STATE_OF_AIR)
-    if scenario.environment is None and is_uncertain:
+    if truth.environment is None and is_uncertain:
         usual = _core.Environment.from_air()
         return usual, usual
-    return scenario.environment, scenario.assumed_environment
+    return truth.environment, truth.assumed_environment

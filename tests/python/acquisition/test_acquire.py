@@ -163,7 +163,7 @@ def test_zero_takes_a_constant_off_every_set_up_and_beam(tmp_path: Path) -> None
     for name in ("d1", "d2", "d3"):
         constants = np.round((kept.channels[name] - zeroed.channels[name]) * 1e9)
         assert [len(set(constants[part])) for part in (slice(0, 14), slice(14, 28))] == [1, 1]
-        assert zeroed.channels[name][0] == zeroed.channels[name][14] == described.head.standoff
+        assert zeroed.channels[name][0] == zeroed.channels[name][14] == described.known.head.standoff
 
 
 def test_sign_turns_the_distances(tmp_path: Path) -> None:

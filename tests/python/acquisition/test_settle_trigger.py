@@ -52,7 +52,7 @@ class Followed:
         self.operator = Listener()
         self.trigger = SettleTrigger()
         self.trigger.start(Context(self.read, SETTLING, 60.0, sign, self.operator))
-        self.visits = list(visits_of(scenario(plan=SMALL)))
+        self.visits = list(visits_of(scenario(plan=SMALL).known))
 
     def read(self) -> Sample:
         self.last = next(self.rows, ())
@@ -305,7 +305,7 @@ def test_mirror_at_rest_elsewhere_waits_for_the_point(tmp_path: Path) -> None:
 
 def test_program_that_takes_up_backlash_is_followed(tmp_path: Path) -> None:
     described = scenario(plan=LINE + "\nbackward = true")
-    space = space_of(described, Options(dialect="iso"))
+    space = space_of(described.known, Options(dialect="iso"))
     aligned = threading.Event()
 
     class Waiting(Listener):
@@ -324,7 +324,7 @@ def test_program_that_takes_up_backlash_is_followed(tmp_path: Path) -> None:
             options=fast(settling=Settling(count=3, average=2, interval=0.001)),
             operator=operator,
         )
-        for action in actions_of(list(visits_of(described)), space):
+        for action in actions_of(list(visits_of(described.known)), space):
             if isinstance(action, Feed):
                 for share in np.linspace(0.1, 1.0, 10):
                     twin.instrument.move_to(here + share * (action.position - here))

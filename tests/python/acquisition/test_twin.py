@@ -22,11 +22,11 @@ from stepdiag.scenario.order_of_run import visits_of
 def readout(described: Scenario, line: str) -> VirtualReadout:
     return VirtualReadout(
         described.machine(),
-        described.plan,
-        described.head,
+        described.known.plan,
+        described.known.head,
         line,
-        misalignment=dict(described.misalignment),
-        noise=described.noise,
+        misalignment=dict(described.truth.misalignment),
+        noise=described.truth.noise,
     )
 
 
@@ -34,7 +34,7 @@ def test_readout_at_the_plans_points_is_the_simulated_run() -> None:
     described = scenario(plan=LINES + "\nbackward = true", noise="distance_um = 0.1\nseed = 5")
     run = simulate_scenario(described)
     row = 0
-    for visit in visits_of(described):
+    for visit in visits_of(described.known):
         head = readout(described, visit.line)
         approach = "".join("-" if sign < 0 else "+" for sign in visit.approach)
         for position in visit.positions:
@@ -46,7 +46,7 @@ def test_readout_at_the_plans_points_is_the_simulated_run() -> None:
 def test_readout_moves_on_between_the_plans_points() -> None:
     described = scenario(noise="")
     head = readout(described, "ppp")
-    along = described.plan.frame("ppp")[:, 2]
+    along = described.known.plan.frame("ppp")[:, 2]
     near, far = head.read((10.0, 20.0, 30.0)), head.read((10.001, 20.0, 30.0))
     # The slope of the machine's errors is below 1e-3, of the mirror's tilt too.
     assert np.allclose(far - near, 0.001 * along[0], rtol=0.0, atol=2e-6)
@@ -261,7 +261,7 @@ def test_traced_head_reads_as_in_its_simulated_run() -> None:
 def test_twin_that_plays_stands_at_the_point_where_a_visit_is_begun() -> None:
     """Before it answers: a client that goes on in the middle of a visit reads at once."""
     described = scenario()
-    visit = list(visits_of(described))[1]
+    visit = list(visits_of(described.known))[1]
     with Twin(described, play=1000.0) as twin, Ids3010(*twin.address) as client:
         client.ask("stepdiag.twin.visit", [visit.number, 4])
         _, state = client.ask("stepdiag.twin.state")

@@ -114,18 +114,6 @@ def test_calibration_has_the_same_bytes_when_the_truth_is_deleted(case: str, met
     assert outcomes[0][0] == (2 if (case, method) == ("faces", "conventional") else 0)
 
 
-def test_library_evaluates_without_asking_for_the_truth(monkeypatch: pytest.MonkeyPatch) -> None:
-    def forbidden(*_: Any) -> None:
-        raise AssertionError("an evaluation asked for the truth")
-
-    from stepdiag.scenario.description import Scenario, parse_scenario
-
-    scenario = parse_scenario(SCENARIO)
-    measurement = sd.simulate_scenario(scenario)
-    monkeypatch.setattr(Scenario, "machine", forbidden)
-    assert sd.evaluate_scenario(scenario, measurement).method == "adjustment"
-
-
 # --- mistakes --------------------------------------------------------------------------------------------------------
 MISTAKES: list[tuple[list[str], str]] = [
     (["simulate"], "Missing argument 'SCENARIO'"),

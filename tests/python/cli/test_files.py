@@ -61,7 +61,7 @@ def test_odd_map_of_a_scenario_is_used_as_given_with_a_warning(
 def test_map_of_the_same_machine_gives_no_warning(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scenario = sd.read_scenario("scenario.toml")
     errors = scenario.machine().errors
-    errors.write("truth.csv", chain=scenario.chain, volume=scenario.plan.volume, tool=scenario.tool)
+    errors.write("truth.csv", chain=scenario.known.chain, volume=scenario.known.plan.volume, tool=scenario.known.tool)
     Path("scenario.toml").write_text(of_map("truth.csv"))
     assert run("simulate", "scenario.toml", "-o", "out.csv") == 0
     assert run("check", "scenario.toml") == 0

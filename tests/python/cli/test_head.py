@@ -223,7 +223,7 @@ def test_init_with_a_head_makes_a_copy_to_edit() -> None:
     assert run("init", "-o", "machine", "--head", "three_beams") == 0
     assert sorted(path.name for path in Path("machine").iterdir()) == ["head.toml", "measurement.csv", "scenario.toml"]
     assert Path("machine/head.toml").read_bytes() == find_head("three_beams").read_bytes()
-    assert sd.read_scenario("machine/scenario.toml").head.design.name == "three beams"
+    assert sd.read_scenario("machine/scenario.toml").known.head.design.name == "three beams"
     assert set(sd.read_measurement("machine/measurement.csv").channels) == {"d1", "d2", "d3"}
     assert run("simulate", "machine/scenario.toml", "-o", "run.csv") == 0
     assert run("evaluate", "machine/scenario.toml", "run.csv", "-o", "calibration.csv") == 0

@@ -39,14 +39,14 @@ def uncommented(text: str) -> str:
 
 
 def test_template_is_a_scenario_and_stays_one_with_every_key_uncommented() -> None:
-    assert parse_scenario(template()).plan.lines == ["ppp", "npp", "pnp", "nnp"]
+    assert parse_scenario(template()).known.plan.lines == ["ppp", "npp", "pnp", "nnp"]
     everything = parse_scenario(uncommented(template()))
-    assert everything.keys.adjustment.laser_urad == "free"
-    assert everything.head.design.name == "beam and PSD"
-    assert everything.keys.head.pose_errors.keys() == {"window"}
+    assert everything.known.keys.adjustment.laser_urad == "free"
+    assert everything.known.head.design.name == "beam and PSD"
+    assert everything.truth.pose_errors["head"].keys() == {"window"}
 
 
 def test_template_for_a_head_has_its_description_and_no_layout() -> None:
     scenario = parse_scenario(template("three_beams"))
-    assert scenario.head.signals == ["d1", "d2", "d3"]
-    assert scenario.keys.head.layout is None
+    assert scenario.known.head.signals == ["d1", "d2", "d3"]
+    assert scenario.known.described["head"].keys.layout is None

@@ -64,14 +64,14 @@ def test_the_place_along_the_beam_is_that_of_the_functional_point(tmp_path: Path
     )
     scenario = _read(clean.scenario.path.with_name("true.toml"), text)
     run = simulate_scenario(scenario)
-    place = along_beam(scenario, run)
+    place = along_beam(scenario.known, run)
     lines = np.array(run.line)
-    for line in scenario.plan.lines:
+    for line in scenario.known.plan.lines:
         rows = lines == line
-        along = scenario.plan.frame(line)[:, 2]
-        first = scenario.plan.points(line)[0]
+        along = scenario.known.plan.frame(line)[:, 2]
+        first = scenario.known.plan.points(line)[0]
         _, points = scenario.machine().pose(run.position[rows])
-        expected = (points - first - np.array(scenario.tool)) @ along + scenario.head.standoff
+        expected = (points - first - np.array(scenario.known.tool)) @ along + scenario.known.head.standoff
         # Tilts of 0.1 mrad times errors of 50 µm across the beam, which are not among the commanded ones.
         np.testing.assert_allclose(place[rows], expected, rtol=0.0, atol=2e-5)
 
@@ -119,7 +119,7 @@ def test_agreement_is_that_of_the_normal_distribution() -> None:
 
 
 def test_nodes_are_nodes_and_hold_the_corners(clean: LoopOutcome) -> None:
-    plan = clean.scenario.plan
+    plan = clean.scenario.known.plan
     nodes = grid_nodes(plan, 100, 3)
     steps = nodes / plan.volume * plan.steps
     np.testing.assert_allclose(steps, np.round(steps), rtol=0.0, atol=1e-9)
@@ -132,7 +132,7 @@ def test_without_errors_there_is_nothing_to_compensate(clean: LoopOutcome) -> No
     from stepdiag.demo.loop_points import errors_at
 
     points = clean.points["random"].targets
-    assert not np.any(errors_at(Machine(clean.scenario.chain), points, points))
+    assert not np.any(errors_at(Machine(clean.scenario.known.chain), points, points))
 
 
 def test_the_report_says_what_is_left(clean: LoopOutcome) -> None:

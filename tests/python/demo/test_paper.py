@@ -119,7 +119,7 @@ def test_displaced_psd_spoils_positions_and_angles(results: dict[str, Result]) -
 
 
 def test_constants_of_the_definition_are_those_of_the_traced_head(results: dict[str, Result]) -> None:
-    calibration = results["3"].scenario.head.calibration
+    calibration = results["3"].scenario.known.head.calibration
     assert calibration.psd_distance == pytest.approx(PSD_DISTANCE, abs=1e-6)  # as many digits are written
     assert calibration.spot_beam.tolist() == pytest.approx([LASER_OFFSET, 0.0], abs=1e-6)
 
@@ -133,10 +133,8 @@ def test_traced_readings_are_the_defined_ones_to_second_order(results: dict[str,
 
 def test_traced_run_evaluated_with_the_defined_head_gives_the_defined_calibration(results: dict[str, Result]) -> None:
     traced, defined = results["3"], results["3d"]
-    scenario, head = traced.scenario, defined.scenario.head
-    ours = sd.evaluate(
-        traced.measurement, scenario.plan, head, scenario.chain, scenario.tool, method="enhanced"
-    ).functions
+    known, head = traced.scenario.known, defined.scenario.known.head
+    ours = sd.evaluate(traced.measurement, known.plan, head, known.chain, known.tool, method="enhanced").functions
     theirs = defined.calibrations["enhanced"].functions
     for name in theirs:
         # 34 nm of spot over an arm of twice 131 mm are 130 nrad, most of it constant along a line; over a lateral

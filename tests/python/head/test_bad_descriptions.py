@@ -216,7 +216,7 @@ def test_pose_error_that_pushes_a_component_into_another_is_refused(tmp_path: Pa
 
 def test_scenarios_that_the_table_spoils_are_sound() -> None:
     for text in (DESCRIBED, SEVERAL):
-        assert parse_scenario(text).head.layout == "psd"
+        assert parse_scenario(text).known.head.layout == "psd"
 
 
 # --- whatever a file holds ---------------------------------------------------------------------------------------------

@@ -59,7 +59,7 @@ def points_of(described: Scenario) -> list[tuple[int, int, list[float]]]:
     """Visit, point and position of all readings in order."""
     return [
         (visit.number, int(point), [float(x) for x in position])
-        for visit in visits_of(described)
+        for visit in visits_of(described.known)
         for point, position in zip(visit.points, visit.positions, strict=True)
     ]
 

@@ -10,9 +10,10 @@ from small_scenario import SCENARIO
 import stepdiag as sd
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.cli import main
-from stepdiag.planning.observation import extents, growth, observe, prospects, without_errors
+from stepdiag.planning.observation import extents, growth, not_measured, observe, prospects
 from stepdiag.report.observation import prospect_csv
-from stepdiag.scenario.description import parse_scenario
+from stepdiag.scenario.description import Scenario, parse_scenario
+from stepdiag.scenario.truth import Truth
 
 VOLUME = SCENARIO.replace("x_mm = 80.0", "x_mm = 800.0").replace("y_mm = 60.0", "y_mm = 600.0")
 LARGE = VOLUME.replace("z_mm = 50.0", "z_mm = 500.0")
@@ -21,9 +22,9 @@ NO_SCALES = SCENARIO.replace('["p00", "0p0", "00p"]', "[]")
 
 def test_scenario_without_errors_has_the_weights_and_unknowns_of_its_own() -> None:
     scenario = parse_scenario(SCENARIO.replace("distance_um = 0.1", "distance_um = 0.3") + "[adjustment]\ngain = 0.5\n")
-    perfect = without_errors(scenario, 7)
-    assert perfect.plan.steps == 7
-    assert perfect.uncertainty.distance == scenario.uncertainty.distance == pytest.approx(0.3e-3)
+    perfect = Scenario(not_measured(scenario.known, {"steps": 7}), Truth())
+    assert perfect.known.plan.steps == 7
+    assert perfect.known.uncertainty.distance == scenario.known.uncertainty.distance == pytest.approx(0.3e-3)
     assert not perfect.machine().error([[80.0, 60.0, 50.0]]).any()
     run = sd.simulate_scenario(perfect)
     for angle in (run.channels["alpha"], run.channels["beta"]):
@@ -44,7 +45,7 @@ def test_uncertainties_said_before_are_those_of_an_aligned_run() -> None:
 
 
 def test_largest_uncertainty_grows_with_the_square_root_of_the_steps() -> None:
-    found = prospects(parse_scenario(LARGE.split("[misalignment]")[0]), [10, 50, 100, 200])
+    found = prospects(parse_scenario(LARGE.split("[misalignment]")[0]).known, [10, 50, 100, 200])
     # Separately found: 0.74 µm / 1.7 µrad at 10 steps, 1.67 / 3.6 at 50, 2.36 / 5.1 at 100, of all lengths.
     for prospect, length, angle in zip(found, (0.74, 1.67, 2.36), (1.7, 3.6, 5.1), strict=False):
         worst = max(prospect.largest["positioning"], prospect.largest["straightness"])
@@ -59,7 +60,7 @@ def test_mirror_that_is_too_small_for_few_steps_is_said_in_the_table() -> None:
     scenario = parse_scenario(
         LARGE.replace('"ideal"', '"ideal"\nmirror_mm = [100.0, 100.0]').replace("= 5\n", "= 20\n")
     )
-    few, enough = prospects(scenario, [5, 20])
+    few, enough = prospects(scenario.known, [5, 20])
     assert "mirror_mm: too small for this plan" in few.trouble
     assert not few.largest
     assert few.mirror[0] > 100.0
@@ -68,7 +69,7 @@ def test_mirror_that_is_too_small_for_few_steps_is_said_in_the_table() -> None:
 
 
 def test_table_is_written_with_what_is_not_determined_left_empty() -> None:
-    found = prospects(parse_scenario(SCENARIO.replace('["ppp", "npp", "pnp", "nnp"]', '["ppp"]')), [2, 5])
+    found = prospects(parse_scenario(SCENARIO.replace('["ppp", "npp", "pnp", "nnp"]', '["ppp"]')).known, [2, 5])
     rows = list(csv.DictReader(prospect_csv(found).splitlines()))
     assert [row["steps"] for row in rows] == ["2", "5"]
     assert all(row["u_squareness_urad"] == "" for row in rows)
@@ -132,7 +133,7 @@ def recovered(text: str) -> dict[str, float]:
     scenario = parse_scenario(text)
     truth = scenario.machine().errors
     calibration = sd.evaluate_scenario(scenario, sd.simulate_scenario(scenario))
-    whole, _, _ = extents(calibration, scenario.plan)
+    whole, _, _ = extents(calibration, scenario.known.plan)
     functions = {name: calibration.functions[name] for name in whole if name in calibration.functions}
     errors = {name: float(np.max(np.abs(v - truth.function(name, p)))) for name, (p, v, _) in functions.items()}
     squareness = {

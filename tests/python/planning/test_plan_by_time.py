@@ -56,19 +56,19 @@ def test_runs_after_the_first_go_back_to_the_beginning_and_backward_runs_do_not(
 
 def test_seconds_per_mm_stand_in_place_of_the_feed() -> None:
     scenario = parse_scenario(SCENARIO + "[plan_by_time]\nseconds_per_mm = 0.02\nline_change_min = 4.0\n")
-    times = times_of(scenario.keys.plan_by_time, "")
+    times = times_of(scenario.known.keys.plan_by_time, "")
     assert times.move(np.array([100.0])) == pytest.approx(2.0)
     assert times.scale_line_change == times.line_change == 240.0
     both = parse_scenario(SCENARIO + "[plan_by_time]\nseconds_per_mm = 0.02\nfeed_mm_per_min = 100.0\n")
     with pytest.raises(sd.InvalidArgument, match=r"seconds_per_mm: expected it or feed_mm_per_min, got both"):
-        times_of(both.keys.plan_by_time, "")
+        times_of(both.known.keys.plan_by_time, "")
 
 
 # --- plans -----------------------------------------------------------------------------------------------------------
 def test_plan_of_the_scenario_has_the_uncertainties_of_its_run() -> None:
     scenario = parse_scenario(SCENARIO)
     noiseless = parse_scenario(SCENARIO.replace("distance_um = 0.1", "distance_um = 0.0"))
-    plan = scenario.plan
+    plan = scenario.known.plan
     found = outcome(scenario, Candidate(tuple(plan.lines), tuple(plan.scale_lines), plan.steps, 1))
     expected = largest_uncertainties(sd.evaluate_scenario(scenario, sd.simulate_scenario(noiseless)))
     # A time for each reading has no part in it: the drift is fixed.

@@ -12,7 +12,8 @@ from stepdiag.cli import main
 from stepdiag.planning.measuring_time import measuring_time, times_of
 from stepdiag.program.measuring_program import Program, measuring_program
 from stepdiag.program.options import Options
-from stepdiag.scenario.description import Scenario, parse_scenario
+from stepdiag.scenario.description import parse_scenario
+from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import visits_of
 
 SCENARIO = """
@@ -47,11 +48,11 @@ PLANS = [
 CASES = pytest.mark.parametrize(("lines", "plan"), PLANS)
 
 
-def scenario_of(lines: str = BODY, plan: str = "", steps: int = 7) -> Scenario:
-    return parse_scenario(SCENARIO.format(lines=lines, plan=plan, steps=steps))
+def scenario_of(lines: str = BODY, plan: str = "", steps: int = 7) -> Known:
+    return parse_scenario(SCENARIO.format(lines=lines, plan=plan, steps=steps)).known
 
 
-def assert_is_the_plan(program: Program, traced: Trace, scenario: Scenario, origin: object, atol: float) -> None:
+def assert_is_the_plan(program: Program, traced: Trace, scenario: Known, origin: object, atol: float) -> None:
     visits = list(visits_of(scenario))
     expected = np.concatenate([visit.positions for visit in visits]) + np.asarray(origin)
     np.testing.assert_allclose([position for _, position in traced.readings], expected, rtol=0.0, atol=atol)
@@ -192,7 +193,7 @@ def test_the_command_writes_the_program_and_tells_its_time(tmp_path: Path, capsy
     assert (
         output.read_text()
         == measuring_program(
-            parse_scenario(path.read_text(), path), Options(limits=(0.0, 800.0, -1.0, 601.0, -1.0, 501.0))
+            parse_scenario(path.read_text(), path).known, Options(limits=(0.0, 800.0, -1.0, 601.0, -1.0, 501.0))
         ).text
     )
     assert main(["nc", str(path), "-o", str(path)]) == 2
@@ -201,7 +202,7 @@ def test_the_command_writes_the_program_and_tells_its_time(tmp_path: Path, capsy
 
 def test_a_file_name_cannot_leave_its_comment() -> None:
     name = "a)b(py,%\n" + "x" * 60 + " py,import os " + "y" * 60 + "µ.toml"
-    scenario = parse_scenario(SCENARIO.format(lines='["ppp"]', plan="", steps=2), name)
+    scenario = parse_scenario(SCENARIO.format(lines='["ppp"]', plan="", steps=2), name).known
     program = measuring_program(scenario, Options())
     assert len(trace(program.text, iso=False).readings) == program.readings
     head = program.text.split("\nG21")[0].splitlines()

@@ -85,22 +85,22 @@ def test_table_for_a_line_replaces_only_the_keys_it_names() -> None:
 # --- what an adjustment is told beside them --------------------------------------------------------------------------
 def test_switches_reach_the_core() -> None:
     names = ("one_setup_per_line", "reversal", "rotations", "outlier_probability", "smoothness", "full_covariance")
-    usual = adjustment_options(parse_scenario(SCENARIO))
+    usual = adjustment_options(parse_scenario(SCENARIO).known)
     assert [getattr(usual, name) for name in names] == [False, True, True, 0.01, None, False]
     switches = (
         '[adjustment]\nangles = "fixed"\none_setup_per_line = true\nreversal = false\noutlier_probability = 0.0\n'
     )
-    other = adjustment_options(parse_scenario(SCENARIO + switches))
+    other = adjustment_options(parse_scenario(SCENARIO + switches).known)
     assert [getattr(other, name) for name in names] == [True, False, False, 0.0, None, False]
 
 
 def test_smoothness_becomes_native_units() -> None:
-    smooth = parse_scenario(SCENARIO + "[smoothness]\ntranslation_um = 0.5\nrotation_urad = 2.0\n").smoothness
+    smooth = parse_scenario(SCENARIO + "[smoothness]\ntranslation_um = 0.5\nrotation_urad = 2.0\n").known.smoothness
     assert smooth is not None
     assert (smooth.translation, smooth.rotation) == pytest.approx((0.5e-3, 2e-6), rel=1e-15)
     assert not smooth.cross_validated
-    assert parse_scenario(SCENARIO + "[smoothness]\n").smoothness is None
-    found = parse_scenario(SCENARIO + "[smoothness]\ncross_validated = true\n").smoothness
+    assert parse_scenario(SCENARIO + "[smoothness]\n").known.smoothness is None
+    found = parse_scenario(SCENARIO + "[smoothness]\ncross_validated = true\n").known.smoothness
     assert found is not None
     assert found.cross_validated
 
@@ -158,7 +158,7 @@ def test_runs_of_several_orders_are_simulated_and_evaluated() -> None:
     run = sd.simulate_scenario(scenario)
     assert sorted(set(run.run.tolist())) == [0, 1]
     second = (run.run == 1) & (np.array(run.line) == "ppp")
-    assert run.position[second].tolist() == scenario.plan.points("ppp", 1).tolist()
+    assert run.position[second].tolist() == scenario.known.plan.points("ppp", 1).tolist()
     largest = sd.largest_deviations(sd.evaluate_scenario(scenario, run), scenario.machine().errors)
     # The floor of double precision at distances of half a metre is some 1e-12 mm; scale lines are of two orders too.
     assert abs(largest["positioning"].value) < 1e-10
@@ -166,7 +166,7 @@ def test_runs_of_several_orders_are_simulated_and_evaluated() -> None:
 
 def test_backward_run_goes_the_way_of_its_forward_run() -> None:
     scenario = parse_scenario(ORDERS.replace("[plan]", "[plan]\nbackward = true"))
-    assert scenario.plan.orders == ["XYZ", "XYZ", "YZX", "YZX"]
+    assert scenario.known.plan.orders == ["XYZ", "XYZ", "YZX", "YZX"]
     run = sd.simulate_scenario(scenario)
     assert sorted(set(run.run.tolist())) == [0, 1, 2, 3]
     of_line = np.array(run.line) == "ppp"

@@ -19,31 +19,31 @@ from stepdiag.scenario.description import parse_scenario
 # --- what a file means -----------------------------------------------------------------------------------------------
 def test_file_becomes_the_types_of_the_core() -> None:
     scenario = parse_scenario(GOOD)
-    assert scenario.chain == sd.Chain("[w X' b Y Z t]")
-    assert scenario.tool == (1.0, 2.0, 3.0)
-    assert scenario.plan.steps == 50
-    assert scenario.plan.order == "XYZ"
-    assert scenario.plan.scale_lines == ["p00", "0p0"]
-    assert scenario.plan.volume.tolist() == [800.0, 600.0, 500.0]
-    assert scenario.head.layout == "ideal"
-    assert scenario.head.standoff == 100.0
-    assert scenario.environment is None
-    assert scenario.noise.distance == pytest.approx(0.2e-3, rel=1e-15)  # one product of two rounded numbers
-    assert (scenario.noise.tilt, scenario.noise.seed) == (0.0, 1)
+    assert scenario.known.chain == sd.Chain("[w X' b Y Z t]")
+    assert scenario.known.tool == (1.0, 2.0, 3.0)
+    assert scenario.known.plan.steps == 50
+    assert scenario.known.plan.order == "XYZ"
+    assert scenario.known.plan.scale_lines == ["p00", "0p0"]
+    assert scenario.known.plan.volume.tolist() == [800.0, 600.0, 500.0]
+    assert scenario.known.head.layout == "ideal"
+    assert scenario.known.head.standoff == 100.0
+    assert scenario.truth.environment is None
+    assert scenario.truth.noise.distance == pytest.approx(0.2e-3, rel=1e-15)  # one product of two rounded numbers
+    assert (scenario.truth.noise.tilt, scenario.truth.noise.seed) == (0.0, 1)
 
 
 def test_scenario_cannot_be_changed() -> None:
     scenario = parse_scenario(GOOD)
     with pytest.raises(AttributeError):
-        scenario.tool = (0.0, 0.0, 0.0)  # type: ignore[misc]
+        scenario.known.tool = (0.0, 0.0, 0.0)  # type: ignore[misc]
     with pytest.raises(TypeError):
-        scenario.misalignment["ppp"] = sd.Misalignment()  # type: ignore[index]
+        scenario.truth.misalignment["ppp"] = sd.Misalignment()  # type: ignore[index]
     with pytest.raises(ValueError, match="frozen"):
-        scenario.keys.plan.steps = 3
+        scenario.known.keys.plan.steps = 3
 
 
 def test_section_for_a_line_replaces_only_the_keys_it_names() -> None:
-    misalignment = parse_scenario(GOOD).misalignment
+    misalignment = parse_scenario(GOOD).truth.misalignment
     assert misalignment["ppp"].reflector.tolist() == pytest.approx([100e-6, 300e-6], rel=1e-15)
     assert misalignment["ppp"].laser.tolist() == [0.0, 0.0]
     assert misalignment["npp"].reflector.tolist() == misalignment["ppp"].reflector.tolist()
@@ -52,7 +52,7 @@ def test_section_for_a_line_replaces_only_the_keys_it_names() -> None:
 
 
 def test_scale_line_is_aligned_except_for_what_its_own_section_names() -> None:
-    misalignment = parse_scenario(GOOD).misalignment
+    misalignment = parse_scenario(GOOD).truth.misalignment
     assert "0p0" not in misalignment
     assert misalignment["p00"].reflector.tolist() == [0.0, 0.0]
     assert misalignment["p00"].psd_zero.tolist() == [0.0, 0.0]
@@ -70,7 +70,7 @@ def test_scale_line_is_aligned_except_for_what_its_own_section_names() -> None:
 def test_weights_are_those_stated_else_the_noise_else_the_defaults(
     sections_text: str, expected: tuple[float, float, float]
 ) -> None:
-    weights = parse_scenario(GOOD.split("[noise]")[0] + sections_text).uncertainty
+    weights = parse_scenario(GOOD.split("[noise]")[0] + sections_text).known.uncertainty
     assert (weights.distance, weights.tilt, weights.spot) == pytest.approx(expected, rel=1e-15)
 
 
@@ -99,7 +99,7 @@ def test_missing_error_map_is_no_concern_of_an_evaluation(tmp_path: Path) -> Non
     file = tmp_path / "scenario.toml"
     file.write_text(changed("[machine.random]\nseed = 7\n", 'errors = "truth.csv"\n'))
     scenario = sd.read_scenario(file)
-    assert scenario.plan.steps == 50
+    assert scenario.known.plan.steps == 50
     with pytest.raises(sd.InvalidArgument, match=r"scenario\.toml: machine\.errors: .*truth\.csv: cannot be read"):
         scenario.machine()
 
@@ -107,7 +107,7 @@ def test_missing_error_map_is_no_concern_of_an_evaluation(tmp_path: Path) -> Non
 def test_byte_order_mark_is_passed_over(tmp_path: Path) -> None:
     file = tmp_path / "scenario.toml"
     file.write_bytes(b"\xef\xbb\xbf" + GOOD.encode())
-    assert sd.read_scenario(file).plan.steps == 50
+    assert sd.read_scenario(file).known.plan.steps == 50
 
 
 # --- what is wrong with a file ---------------------------------------------------------------------------------------

@@ -33,7 +33,7 @@ def test_visits_go_in_the_order_of_a_simulated_run(tmp_path: Path, plan: str) ->
     path.write_text(SCENARIO.format(plan=plan))
     scenario = read_scenario(path)
     run = simulate_scenario(scenario)
-    visits = list(visits_of(scenario))
+    visits = list(visits_of(scenario.known))
     assert [visit.number for visit in visits] == list(range(1, len(visits) + 1))
     assert [v.line for v in visits for _ in v.points] == run.line
     assert [v.direction for v in visits for _ in v.points] == run.direction
@@ -45,7 +45,7 @@ def test_visits_go_in_the_order_of_a_simulated_run(tmp_path: Path, plan: str) ->
 def test_axes_come_to_a_point_as_the_line_travels(tmp_path: Path) -> None:
     path = tmp_path / "scenario.toml"
     path.write_text(SCENARIO.format(plan="backward = true"))
-    approach = {(v.line, v.direction): list(v.approach) for v in visits_of(read_scenario(path))}
+    approach = {(v.line, v.direction): list(v.approach) for v in visits_of(read_scenario(path).known)}
     assert approach["nnp", "forward"] == [-1, -1, 1]
     assert approach["nnp", "backward"] == [1, 1, -1]
     assert approach["00n", "backward"] == [1, 1, 1]

@@ -40,12 +40,12 @@ def test_set_up_is_read_in_native_units_and_inherited_key_by_key() -> None:
     text = changed("steps = 50\n", "steps = 5\n" + RUNS).replace("laser_urad = [700", "gain = 0.0\nlaser_urad = [700")
     scenario = parse_scenario(text.replace("psd_zero_mm", SETUP + "psd_zero_mm"))
     for line, gain in (("ppp", 0.01), ("npp", 0.0)):
-        setup = scenario.misalignment[line]
+        setup = scenario.truth.misalignment[line]
         assert setup.lateral.tolist() == [0.5, -1.0]
         assert setup.roll == 2000 * 1e-6
         assert setup.gain == gain
         assert setup.drift == pytest.approx(1e-5, rel=1e-15)  # mm/s; a product and a quotient
-    scale_line = scenario.misalignment["p00"]  # named for its laser alone: the rest is aligned
+    scale_line = scenario.truth.misalignment["p00"]  # named for its laser alone: the rest is aligned
     assert (scale_line.roll, scale_line.gain, scale_line.drift, *scale_line.lateral) == (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -56,10 +56,10 @@ def test_runs_are_those_of_the_core_and_read_back_from_their_file(tmp_path: Path
     run = simulate_scenario(scenario)
     expected = sd.simulate(
         scenario.machine(),
-        scenario.plan,
-        scenario.head,
-        misalignment=dict(scenario.misalignment),
-        noise=scenario.noise,
+        scenario.known.plan,
+        scenario.known.head,
+        misalignment=dict(scenario.truth.misalignment),
+        noise=scenario.truth.noise,
         repeats=2,
         backward=True,
         seconds_per_reading=2.5,

@@ -24,7 +24,7 @@ TRACED = TIMED.replace('layout = "ideal"', 'description = "beam_and_psd"')
 
 
 def uncertain(keys: str, text: str = TIMED) -> _core.UncertainInputs:
-    return parse_scenario(f"{text}[uncertainty]\n{keys}\n").uncertain
+    return parse_scenario(f"{text}[uncertainty]\n{keys}\n").known.uncertain
 
 
 def inputs_of(keys: str, text: str = TIMED) -> list[tuple[str, str, str, int]]:
@@ -33,7 +33,7 @@ def inputs_of(keys: str, text: str = TIMED) -> list[tuple[str, str, str, int]]:
 
 # --- meaning ---------------------------------------------------------------------------------------------------------
 def test_without_the_section_only_readings_are_uncertain() -> None:
-    found = parse_scenario(TIMED).uncertain
+    found = parse_scenario(TIMED).known.uncertain
     assert found.inputs == []
     assert {one.channel: one.distribution.spread for one in found.noise} == pytest.approx(
         {"distance": 1e-4, "alpha": 1e-6, "beta": 1e-6}, rel=1e-15
@@ -63,7 +63,7 @@ def test_every_channel_has_a_kind(channel: str, kind: str) -> None:
 
 def test_weights_are_the_standard_uncertainties_of_their_distributions() -> None:
     text = TIMED + '[uncertainty]\ndistance_um = {distribution = "rectangular", half_width = 3.0}\ntilt_urad = 2\n'
-    weights = parse_scenario(text).uncertainty
+    weights = parse_scenario(text).known.uncertainty
     assert weights.distance == pytest.approx(3e-3 / math.sqrt(3.0), rel=1e-15)
     assert weights.tilt == pytest.approx(2e-6, rel=1e-15)
 

@@ -79,7 +79,7 @@ def made_up(**changes: Any) -> UncertaintyResult:
     )
     settings: dict[str, Any] = {"propagation": propagation, "monte_carlo": drawn, "comparison": comparison}
     return UncertaintyResult(
-        parse_scenario(SCENARIO), "enhanced", 2**64 - 1, outputs, count - 1, 0.95, 2, **(settings | changes)
+        parse_scenario(SCENARIO).known, "enhanced", 2**64 - 1, outputs, count - 1, 0.95, 2, **(settings | changes)
     )
 
 

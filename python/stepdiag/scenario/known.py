@@ -1,0 +1,103 @@
+"""What is known when a run of a scenario is evaluated, and what is asked for: no truth of a simulated run."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+
+from stepdiag import _core
+from stepdiag.config.scenario_keys import KnownKeys, PlanSection
+from stepdiag.config.toml_text import located
+from stepdiag.scenario.adjustment import plausible_limits, setup_priors, smoothness_of
+from stepdiag.scenario.heads import DescribedHead, check_alike, check_mirrors, heads_by_line, make_heads, signals_of
+from stepdiag.scenario.setup import weights
+from stepdiag.scenario.uncertain_inputs import uncertain_inputs
+
+
+@dataclass(frozen=True)
+class Known:
+    """The known half of a scenario, checked and in native units (mm, rad, nm): all that evaluations, reports, measuring
+    programs and the acquisition are given. What a run was simulated with is in no attribute of it.
+
+    `described`: the heads by design, by the place of their keys, also those that measure no line. The other fields
+    follow from the first three: chain, tool and plan; by line the head that measures it, as it is described and as it
+    is by design; the channels of a run; weights of readings, priors of the set-up, smoothness and limits of what is
+    plausible; what is uncertain."""
+
+    path: Path
+    keys: KnownKeys
+    described: Mapping[str, DescribedHead]
+    chain: _core.Chain = field(compare=False)
+    tool: tuple[float, float, float] = field(compare=False)
+    plan: _core.Plan = field(compare=False)
+    described_heads: Mapping[str, DescribedHead] = field(compare=False)
+    heads: Mapping[str, _core.Head] = field(compare=False)
+    signals: tuple[str, ...] = field(compare=False)
+    uncertainty: _core.ReadingUncertainty = field(compare=False)
+    setup: _core.SetupPriors = field(compare=False)
+    setup_by_line: Mapping[str, _core.SetupPriors] = field(compare=False)
+    smoothness: _core.Smoothness | None = field(compare=False)
+    plausible: _core.PlausibleLimits = field(compare=False)
+    uncertain: _core.UncertainInputs = field(compare=False)
+
+    @property
+    def known(self) -> "Known":
+        """Itself: what takes a scenario for its known half alone takes this as well."""
+        return self
+
+    @property
+    def head(self) -> _core.Head:
+        """The head of the first line; those of the others have the same readings."""
+        return next(iter(self.heads.values()))
+
+
+def known_of(keys: KnownKeys, described: Mapping[str, DescribedHead], path: Path) -> Known:
+    """Makes the core's types, whose own checks get file and section put in front. What is said of the set-up of lines
+    that are not measured is passed over."""
+    with located(f"{path}: machine.chain"):
+        chain = _core.Chain(keys.machine.chain)
+    with located(f"{path}: plan"):
+        plan = _core.Plan(
+            (keys.volume.x_mm, keys.volume.y_mm, keys.volume.z_mm),
+            list(keys.plan.lines),
+            keys.plan.steps,
+            order=_orders(keys.plan),
+            scale_lines=list(keys.plan.scale_lines),
+        )
+    check_mirrors(described, plan, path)
+    described_heads = heads_by_line(keys, plan, described, path)
+    heads = make_heads(described_heads, {}, path)
+    check_alike(described_heads, heads, path)
+    head = next(iter(heads.values()))
+    with located(str(path)):
+        uncertainty = weights(keys)
+    signals = signals_of(keys, head, path)
+    setup, setup_by_line = setup_priors(keys, head.layout, path)
+    return Known(
+        path=path,
+        keys=keys,
+        described=MappingProxyType(dict(described)),
+        chain=chain,
+        tool=keys.machine.tool_mm,
+        plan=plan,
+        described_heads=MappingProxyType(described_heads),
+        heads=MappingProxyType(heads),
+        signals=tuple(signals),
+        uncertainty=uncertainty,
+        setup=setup,
+        setup_by_line=MappingProxyType({line: own for line, own in setup_by_line.items() if line in heads}),
+        smoothness=smoothness_of(keys.smoothness, path),
+        plausible=plausible_limits(keys.plausible),
+        uncertain=uncertain_inputs(keys, described_heads, heads, path),
+    )
+
+
+def _orders(keys: PlanSection) -> list[str]:
+    """By run: a backward run goes the way of the forward run before it."""
+    orders = [keys.order] if isinstance(keys.order, str) else keys.order
+    return [order for order in orders for _ in range(2 if keys.backward and len(orders) > 1 else 1)]
+
+
+def runs_of(keys: PlanSection) -> int:
+    """How often each line is measured, backward runs not counted."""
+    return keys.repeats * (1 if isinstance(keys.order, str) else len(keys.order))

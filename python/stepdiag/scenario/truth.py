@@ -1,0 +1,88 @@
+"""The truth of a simulated run: what is wrong with machine, head, set-up and air. No evaluation is given it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+
+from stepdiag import _core
+from stepdiag._core import InvalidArgument
+from stepdiag.config.key_errors import show
+from stepdiag.config.scenario_keys import TruthKeys
+from stepdiag.config.toml_text import located
+from stepdiag.io.whole_files import check_input
+from stepdiag.scenario.heads import PoseErrors
+from stepdiag.scenario.known import Known
+from stepdiag.scenario.setup import environments, misalignments, noise_of
+from stepdiag.scenario.uncertain_inputs import STATE_OF_AIR
+from stepdiag.units import MICROMETRE, MICRORADIAN
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What a run is simulated with beside what is known, checked and in native units.
+
+    Truth() is that of a perfect machine and a perfect set-up, read without noise. `error_map`: the file that [machine]
+    names, read when the machine is simulated. `pose_errors`: by the place of a head's keys. `assumed_environment`: what
+    the instrument takes the air for, with which it reduces its readings; the true air, where nothing else is said."""
+
+    keys: TruthKeys = field(default_factory=TruthKeys)
+    error_map: Path | None = None
+    pose_errors: Mapping[str, PoseErrors] = field(default_factory=dict)
+    misalignment: Mapping[str, _core.Misalignment] = field(default_factory=dict)
+    noise: _core.Noise = field(default_factory=_core.Noise)
+    environment: _core.Environment | None = None
+    assumed_environment: _core.Environment | None = None
+
+
+def truth_of(keys: TruthKeys, pose_errors: Mapping[str, PoseErrors], known: Known) -> Truth:
+    """Of a run of what is known. Raises InvalidArgument naming the key."""
+    path, errors = known.path, keys.machine.errors
+    if errors is not None and keys.machine.random is not None:
+        raise InvalidArgument(f"{path}: machine: expected errors or [machine.random], got both")
+    if errors is not None and "\0" in errors:
+        raise InvalidArgument(f"{path}: machine.errors: expected the path of a file, got {show(errors)}")
+    environment, assumed = environments(keys.environment, path)
+    _check_air(keys, known)
+    return Truth(
+        keys=keys,
+        error_map=None if errors is None else path.parent / errors,
+        pose_errors=MappingProxyType(dict(pose_errors)),
+        misalignment=MappingProxyType(misalignments(keys.misalignment, known.keys.plan, known.heads, path)),
+        noise=noise_of(keys.noise),
+        environment=environment,
+        assumed_environment=assumed,
+    )
+
+
+def _check_air(keys: TruthKeys, known: Known) -> None:
+    """Whether air whose state is uncertain has one."""
+    for name in STATE_OF_AIR if "refractive_index" in keys.environment.model_fields_set else ():
+        stated = getattr(known.keys.uncertainty, name)
+        if stated is not None and not stated.is_certain:
+            raise InvalidArgument(
+                f"{known.path}: uncertainty.{name}: goes with a state of the air; [environment] has a "
+                "refractive_index, for which there is refractive_index_ppm"
+            )
+
+
+def errors_of(truth: Truth, known: Known) -> _core.ErrorMap:
+    """The machine's: reads the error map, or makes the random one."""
+    random = truth.keys.machine.random
+    if truth.error_map is not None:
+        with located(f"{known.path}: machine.errors"):
+            check_input(truth.error_map)
+            return _core.read_error_map(truth.error_map)
+    if random is None:
+        return _core.ErrorMap()
+    with located(f"{known.path}: machine.random"):
+        return _core.random_error_map(
+            known.plan.volume,
+            seed=random.seed,
+            translation=random.translation_um * MICROMETRE,
+            rotation=random.rotation_urad * MICRORADIAN,
+            squareness=random.squareness_urad * MICRORADIAN,
+            intervals=random.intervals or max(2, known.plan.steps),
+            screw_pitch=random.screw_pitch_mm,
+            screw_amplitude=random.screw_amplitude_um * MICROMETRE,
+        )
