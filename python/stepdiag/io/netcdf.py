@@ -1,4 +1,4 @@
-"""netCDF-4 files: written completely or not at all; all checks of what is read.
+"""netCDF-4 files: written completely or not at all, and checked when read.
 
 labelled_tables.py, netcdf_read.py and docs/files.md describe their contents.
 """

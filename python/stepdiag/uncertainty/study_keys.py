@@ -85,6 +85,10 @@ class Cell:
 
 @dataclass(frozen=True)
 class Study:
+    """A study as read from its file.
+
+    `shape`: steps of each axis of the grid, then the number of methods."""
+
     path: Path
     scenario: Path
     content: Mapping[str, Any]

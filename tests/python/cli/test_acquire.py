@@ -105,7 +105,7 @@ def test_run_is_made_from_the_raw_file_alone(folder: Path, capsys: pytest.Captur
         (["scenario.toml", "--source", "ids3010://h", "--settle-limit-um", "0"], "settle-limit-um"),
         (["scenario.toml", "--source", "ids3010://h", "--settle-limit-um", "nan"], "limit_um: expected"),
         (["scenario.toml", "--source", "ids3010://h", "--timeout", "inf"], "timeout: expected"),
-        (["scenario.toml", "--source", "ids3010://h", "--resume"], "run.raw.jsonl: cannot go on with it"),
+        (["scenario.toml", "--source", "ids3010://h", "--resume"], "run.raw.jsonl: cannot be continued"),
         (
             ["scenario.toml", "--source", "ids3010://h", "--resume", "--restart-line"],
             "expected one of --resume, --restart-line and --restart-set-up",

@@ -268,7 +268,7 @@ REFUSED = [
     (["-n", "1e4", "--joint", "C0Y,C0Y"], "--joint: expected one to 3 different outputs, such as C0Y,B0Z, got"),
     (["-n", "1e4", "--joint", "C0Y,B0Z,A0Z,EXX"], "--joint: expected one to 3 different outputs"),
     (["--coverage", "95"], "--coverage: expected a probability between 0 and 1, got 95"),
-    (["--point", "1,2"], "expected X,Y,Z in mm, or X,Y,Z and the offset of a tool behind them"),
+    (["--point", "1,2"], "expected X,Y,Z in mm, or X,Y,Z followed by a tool offset"),
     (["--point", "1,2,nan"], "expected X,Y,Z in mm"),
     (["-o", "u.txt"], "u.txt: expected a name that ends in .nc or .csv"),
     (["-o", "nowhere/u.nc"], "the folder nowhere does not exist"),
