@@ -160,7 +160,7 @@ def _convert(raw: Path, output: OutputFile, options: "AcquireOptions") -> None:
 
     path = output.claim(raw, overwrite=True)
     if path.exists() and raw_path(path).resolve() != raw.resolve():
-        raise InvalidArgument(f"{path}: exists, and does not stand beside {raw}: move it away, or name another -o")
+        raise InvalidArgument(f"{path}: exists, and is not beside {raw}: move it away, or name another -o")
     content = read_raw(raw)
     if content.torn is not None:
         tell("warning", content.torn)

@@ -11,7 +11,7 @@ from stepdiag.io.outputs import COMP_FILE, COMP_LINES, GRID, ISG_TABLE, KINEMATI
 # Those of stepdiag.export.write.FORMATS, which is slow to import; a test compares them.
 FORMATS = ("linuxcnc-comp", "linuxcnc-kins", "isg", "csv-grid")
 KINDS = {"linuxcnc-kins": KINEMATICS_TABLE, "isg": ISG_TABLE, "csv-grid": GRID}
-FOLDER = {"compensation.ini": COMP_LINES} | {f"joint{n}.comp": COMP_FILE for n in range(3)}  # of linuxcnc-comp
+FOLDER = {"compensation.ini": COMP_LINES} | {f"joint{n}.comp": COMP_FILE for n in range(3)}  # linuxcnc-comp
 MM = "<X Y Z>"
 
 

@@ -30,7 +30,7 @@ class ExportOptions:
     origin: Triple | None = None  # home in the controller's coordinates, mm; None: 0 0 0
     incomplete: bool = False  # export undetermined values as 0
     approach: Approach | None = None  # direction to export if there are two; None: mean
-    at: Triple | None = None  # linuxcnc-comp: point on the corrected lines, mm; None: centre
+    at: Triple | None = None  # linuxcnc-comp: point on corrected lines, mm from home; None: centre
     rows: int | None = None  # linuxcnc-comp, isg: largest number of rows in a table
     nodes: tuple[int, int, int] | None = None  # csv-grid: points along X, Y, Z
     step: float | None = None  # csv-grid: largest spacing, mm

@@ -80,7 +80,7 @@ def run_monte_carlo(
     if samples < 1:
         raise InvalidArgument(f"samples: expected 1 or more, got {samples}")
     if resume and checkpoint is None:
-        raise InvalidArgument("resume: expected a checkpoint to go on from")
+        raise InvalidArgument("resume: expected a checkpoint to continue")
     saved = read_bytes(checkpoint) if resume and checkpoint else None  # fails before the work
     if checkpoint and resume:
         check_output(checkpoint)
