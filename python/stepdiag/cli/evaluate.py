@@ -39,8 +39,8 @@ def evaluate(
     the adjustment are taken from the scenario.
 
     The first line of the report is the verdict of the fit, which is also stored in the calibration.
-    If the fit is rejected, the command ends with a warning and exit code 3. It writes the
-    calibration, but do not use it. A result that no machine can have ([plausible] in the scenario)
+    If the fit is rejected, the command ends with a warning and exit code 3; the calibration is
+    written, but must not be used. A result that no machine can have ([plausible] in the scenario)
     is an error, and nothing is written.
 
     \b
