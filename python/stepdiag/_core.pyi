@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumetricAccuracy', 'adjust', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'volumetric_accuracy', 'with_covariance']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumetricAccuracy', 'adjust', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'volumetric_accuracy', 'with_covariance']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -114,6 +114,41 @@ class Machine:
     @property
     def tool(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
+class PlannedPass:
+    """
+    One pass along a line of a plan, as Plan.passes gives it.
+    """
+    @property
+    def approach(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        How the axes X, Y, Z come to every point, the first included: +1 or -1, (3,).
+        """
+    @property
+    def direction(self) -> str:
+        """
+        "forward" or "backward".
+        """
+    @property
+    def line(self) -> str:
+        ...
+    @property
+    def line_index(self) -> int:
+        """
+        The line's place among the plan's lines, then its scale lines, from 0.
+        """
+    @property
+    def points(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        Numbers of the points in the order in which they are read, (n,): they descend on a backward pass.
+        """
+    @property
+    def positions(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The commanded positions of these points, (n, 3), mm.
+        """
+    @property
+    def run(self) -> int:
+        ...
 class Plan:
     """
     The lines measured through a volume, in single-axis steps. Lines are named by the travel signs of X, Y, Z: three of p n 0.
@@ -134,6 +169,10 @@ class Plan:
     def nodes(self, axis: str) -> numpy.typing.NDArray[numpy.float64]:
         """
         Node positions of axis "X", "Y" or "Z", (steps + 1,), mm.
+        """
+    def passes(self, repeats: typing.SupportsIndex = 1, *, backward: bool = False) -> list[PlannedPass]:
+        """
+        The passes of a run in the order in which they are measured: the plan's lines in their order, then its scale lines; of each line runs 0, 1, 2, ..., `repeats` of them; with `backward` runs 0, 2, ... and after each its backward run 1, 3, ... Raises InvalidArgument for repeats below 1.
         """
     def points(self, line: str, run: typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
         """

@@ -94,8 +94,7 @@ void bind_measurement(py::module_& m) {
         .def_property_readonly("direction",
                                [](const Measurement& run) {
                                    std::vector<std::string> names;
-                                   for (const Station& s : run.stations())
-                                       names.push_back(s.direction == Direction::forward ? "forward" : "backward");
+                                   for (const Station& s : run.stations()) names.push_back(name(s.direction));
                                    return names;
                                })
         .def_property_readonly("position",

@@ -1,7 +1,8 @@
+#include <limits>
 #include <variant>
 
 #include "bindings.hpp"
-#include "stepdiag/plan/plan.hpp"
+#include "stepdiag/plan/run_order.hpp"
 
 namespace stepdiag::bindings {
 namespace {
@@ -31,9 +32,44 @@ std::vector<StepOrder> parse_orders(const std::variant<std::string, std::vector<
     return orders;
 }
 
+DoubleArray positions_of(const std::vector<PlanPoint>& points) {
+    Eigen::MatrixXd positions(points.size(), 3);
+    for (std::size_t k = 0; k < points.size(); ++k) positions.row(k) = points[k].commanded.transpose();
+    return to_numpy(positions);
+}
+
 }  // namespace
 
 void bind_plan(py::module_& m) {
+    py::class_<PlannedPass>(m, "PlannedPass", "One pass along a line of a plan, as Plan.passes gives it.")
+        .def_property_readonly(
+            "line_index", [](const PlannedPass& pass) { return pass.line_index; },
+            "The line's place among the plan's lines, then its scale lines, from 0.")
+        .def_property_readonly("line", [](const PlannedPass& pass) { return pass.line.name(); })
+        .def_readonly("run", &PlannedPass::run)
+        .def_property_readonly(
+            "direction", [](const PlannedPass& pass) { return name(pass.direction); }, "\"forward\" or \"backward\".")
+        .def_property_readonly(
+            "points",
+            [](const PlannedPass& pass) {
+                std::vector<int> numbers;
+                for (const PlanPoint& point : pass.points) numbers.push_back(point.number);
+                return py::array_t<std::int64_t>(py::cast(numbers));
+            },
+            "Numbers of the points in the order in which they are read, (n,): they descend on a backward pass.")
+        .def_property_readonly(
+            "positions", [](const PlannedPass& pass) { return positions_of(pass.points); },
+            "The commanded positions of these points, (n, 3), mm.")
+        .def_property_readonly(
+            "approach",
+            [](const PlannedPass& pass) {
+                std::vector<int> signs;
+                for (const Approach approach : approaches(pass.line, pass.direction))
+                    signs.push_back(approach == Approach::positive ? 1 : -1);
+                return py::array_t<std::int64_t>(py::cast(signs));
+            },
+            "How the axes X, Y, Z come to every point, the first included: +1 or -1, (3,).");
+
     py::class_<Plan>(m, "Plan",
                      "The lines measured through a volume, in single-axis steps. Lines are named by the travel signs "
                      "of X, Y, Z: three of p n 0.")
@@ -66,12 +102,19 @@ void bind_plan(py::module_& m) {
         .def(
             "points",
             [](const Plan& plan, const std::string& line, const IntegerLike& run) {
-                const auto points = plan.points(Line::parse(line), to_int(run, "run"));
-                Eigen::MatrixXd positions(points.size(), 3);
-                for (std::size_t k = 0; k < points.size(); ++k) positions.row(k) = points[k].commanded.transpose();
-                return to_numpy(positions);
+                return positions_of(plan.points(Line::parse(line), to_int(run, "run")));
             },
             py::arg("line"), py::arg("run") = integer(0), "Commanded points of a line of this plan, (n, 3), mm.")
+        .def(
+            "passes",
+            [](const Plan& plan, const IntegerLike& repeats, bool backward) {
+                return planned_passes(plan, int(to_integer(repeats, "repeats", 1, std::numeric_limits<int>::max())),
+                                      backward);
+            },
+            py::arg("repeats") = integer(1), py::kw_only(), py::arg("backward") = false,
+            "The passes of a run in the order in which they are measured: the plan's lines in their order, then its "
+            "scale lines; of each line runs 0, 1, 2, ..., `repeats` of them; with `backward` runs 0, 2, ... and after "
+            "each its backward run 1, 3, ... Raises InvalidArgument for repeats below 1.")
         .def(
             "nodes", [](const Plan& plan, const std::string& axis) { return to_numpy(plan.nodes(to_axis(axis))); },
             py::arg("axis"), "Node positions of axis \"X\", \"Y\" or \"Z\", (steps + 1,), mm.")

@@ -6,7 +6,6 @@
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/core/rotation.hpp"
 #include "stepdiag/head/nominal_head.hpp"
-#include "stepdiag/optics/path.hpp"
 
 namespace stepdiag {
 namespace {
@@ -15,8 +14,17 @@ Eigen::Matrix3d turned(const Eigen::Matrix3d& frame, const Eigen::Vector2d& angl
     return frame * rotation_exp({angles.x(), angles.y(), 0.0});
 }
 
-constexpr int mirror_face = 0;
-constexpr int reference_face = 1;
+// The rules of define_signals for the beam from `start` in the reference plane, which has a reading.
+bool comes_back(const Reading& reading, const Eigen::Vector2d& start, const MirrorPose& mirror,
+                const Eigen::Vector2d& size, double aperture) {
+    const Eigen::Vector2d tilt(-reading.beta, reading.alpha);
+    const double length = reading.beam_length() + tilt.dot(start);
+    const Eigen::Vector3d from_centre = Eigen::Vector3d(start.x(), start.y(), length) - mirror.point;
+    const Eigen::Vector2d met = mirror.rotation.leftCols<2>().transpose() * from_centre;
+    const Eigen::Vector2d aside = 2.0 * length / (1.0 - reading.tan2_phi()) * tilt;
+    return length > 0.0 && (2.0 * met.cwiseAbs() - size).maxCoeff() <= 0.0 &&
+           2.0 * aside.lpNorm<Eigen::Infinity>() <= aperture;
+}
 
 }  // namespace
 
@@ -72,29 +80,6 @@ HeadSetup set_up(const Head& head, const Eigen::Matrix3d& machine_R_line, const 
             turned(machine_R_line, misalignment.reflector), mirror};
 }
 
-std::optional<Reading> trace_reading(const Head& head, const HeadSetup& setup, const Eigen::Vector3d& functional_point,
-                                     const Eigen::Matrix3d& machine_R_tool, const Medium& ambient) {
-    const Eigen::Vector2d aperture = Eigen::Vector2d::Constant(head.aperture);
-    const Scene scene(
-        {make_rectangle(functional_point, machine_R_tool * setup.tool_R_mirror, setup.mirror, Surface::reflecting),
-         make_rectangle(setup.origin, setup.machine_R_sensor, aperture, Surface::absorbing)});
-    const Path path = trace(scene, ambient, {setup.origin, setup.machine_R_sensor.col(2)});
-    if (path.end != PathEnd::absorbed || path.hits.size() != 2 || path.hits[0].face != mirror_face ||
-        path.hits[1].face != reference_face)
-        return std::nullopt;
-    // The normal bisects the two directions: n ~ z - r, so that beta = n_x/n_z and alpha = -n_y/n_z.
-    const Eigen::Vector3d back = setup.machine_R_sensor.transpose() * path.direction;
-    return Reading{path.optical_length / (2.0 * ambient.index), back.y() / (1.0 - back.z()),
-                   -back.x() / (1.0 - back.z())};
-}
-
-std::optional<Reading> define_reading(const HeadSetup& setup, const Eigen::Vector3d& functional_point,
-                                      const Eigen::Matrix3d& machine_R_tool) {
-    const Eigen::Matrix3d sensor_R_machine = setup.machine_R_sensor.transpose();
-    const Eigen::Vector3d normal = machine_R_tool * setup.tool_R_mirror.col(2);
-    return read_mirror(sensor_R_machine * (functional_point - setup.origin), sensor_R_machine * normal);
-}
-
 MirrorPose mirror_in_sensor_frame(const HeadSetup& setup, const Eigen::Vector3d& functional_point,
                                   const Eigen::Matrix3d& machine_R_tool) {
     const Eigen::Matrix3d sensor_R_machine = setup.machine_R_sensor.transpose();
@@ -113,6 +98,8 @@ std::vector<std::string> signal_names(const Head& head) {
     return names;
 }
 
+bool is_distance(const std::string& signal) { return signal.front() == 'd'; }
+
 Eigen::VectorXd signals(const Head& head, const Reading& reading) {
     switch (head.layout) {
         case HeadLayout::ideal: return Eigen::Vector3d(reading.distance, reading.alpha, reading.beta);
@@ -123,6 +110,19 @@ Eigen::VectorXd signals(const Head& head, const Reading& reading) {
         case HeadLayout::multi_beam: break;
     }
     return beam_distances(reading, head.beam_offsets);
+}
+
+SignalRow define_signals(const Head& head, const MirrorPose& mirror, const Eigen::Vector2d& size) {
+    const bool one_beam = head.layout != HeadLayout::multi_beam;
+    SignalRow row(one_beam ? 3 : head.beam_offsets.size());
+    const std::optional<Reading> reading = read_mirror(mirror.point, mirror.rotation.col(2));
+    if (!reading) return row;
+    const Eigen::VectorXd values = signals(head, *reading);
+    for (std::size_t c = 0; c < row.size(); ++c) {
+        const Eigen::Vector2d start = one_beam ? Eigen::Vector2d(0.0, 0.0) : head.beam_offsets[c];
+        if (comes_back(*reading, start, mirror, size, head.aperture)) row[c] = values[Eigen::Index(c)];
+    }
+    return row;
 }
 
 }  // namespace stepdiag

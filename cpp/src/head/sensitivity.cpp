@@ -175,7 +175,7 @@ std::vector<Sensitivity> head_sensitivities(const Head& head, const MirrorPose& 
     for (HeadBeam& beam : plain->beams)
         if (beam.interferometer) beam.interferometer = Interferometer{beam.interferometer->aperture};
     linear.design = plain;
-    TracedConditions conditions;
+    ReadingConditions conditions;
     conditions.environment = environment;
     const SignalRow row = TracedReader(linear, size, conditions).trace(mirror);
     Eigen::VectorXd signals(row.size());

@@ -10,7 +10,7 @@ constexpr double point_radius = 1e-9;  // mm
 
 }  // namespace
 
-TracedReader::TracedReader(const Head& head, const Eigen::Vector2d& mirror, const TracedConditions& conditions)
+TracedReader::TracedReader(const Head& head, const Eigen::Vector2d& mirror, const ReadingConditions& conditions)
     : traced_(*head.design, head.pose_errors, conditions.environment, mirror),
       nominal_(nominal_head(*head.design, head.standoff, conditions.assumed.value_or(conditions.environment))),
       conditions_(conditions) {}

@@ -225,7 +225,7 @@ std::string format_measurement(const Measurement& measurement) {
             if (!channel.standard_uncertainty.empty())
                 text += field(channel.standard_uncertainty[i], channel_column(channel.name)->uncertainty_shift);
         if (runs) text += "," + std::to_string(stations[i].run);
-        if (directions) text += stations[i].direction == Direction::forward ? ",forward" : ",backward";
+        if (directions) text += std::string(",") + name(stations[i].direction);
         text += "\n";
     }
     return text;

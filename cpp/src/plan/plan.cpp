@@ -69,7 +69,7 @@ const StepOrder& Plan::order(int run) const {
 std::vector<PlanPoint> Plan::points(const Line& line, int run) const {
     const bool scale = is_scale_line(line);
     if (!contains(line)) throw InvalidArgument("line \"" + line.name() + "\" is not in the plan");
-    PlanPoint point{Eigen::Vector3d::Zero(), {0, 0, 0}, std::nullopt};
+    PlanPoint point{0, Eigen::Vector3d::Zero(), {0, 0, 0}, std::nullopt};
     const auto place = [&](Axis axis, int node) {
         point.node[index(axis)] = node;
         point.commanded[index(axis)] = node_position(axis, node);
@@ -83,6 +83,7 @@ std::vector<PlanPoint> Plan::points(const Line& line, int run) const {
             if (!line.moves(axis)) continue;
             place(axis, point.node[index(axis)] + line.sign(axis) * stride);
             point.moved = axis;
+            ++point.number;
             points.push_back(point);
         }
     return points;

@@ -4,6 +4,8 @@
 
 namespace stepdiag {
 
+const char* name(Direction direction) { return direction == Direction::forward ? "forward" : "backward"; }
+
 Approaches approaches(const Line& line, Direction direction) {
     const int travel = direction == Direction::forward ? 1 : -1;
     Approaches approaches = all_positive;
@@ -17,25 +19,21 @@ std::vector<PlannedPass> planned_passes(const Plan& plan, int repeats, bool back
     lines.insert(lines.end(), plan.scale_lines().begin(), plan.scale_lines().end());
     std::vector<PlannedPass> passes;
     std::uint64_t row = 0;
-    for (const Line& line : lines) {
-        const std::size_t points = plan.points(line).size();
+    for (std::size_t index = 0; index < lines.size(); ++index)
         for (int repeat = 0; repeat < repeats; ++repeat) {
             const std::uint64_t setup_row = row;
             const int run = backward ? 2 * repeat : repeat;
-            passes.push_back({line, run, Direction::forward, row, setup_row});
-            row += points;
-            if (!backward) continue;
-            passes.push_back({line, run + 1, Direction::backward, row, setup_row});
-            row += points;
+            const auto add = [&](int number, Direction direction) {
+                std::vector<PlanPoint> points = plan.points(lines[index], number);
+                if (direction == Direction::backward) std::reverse(points.begin(), points.end());
+                row += points.size();
+                passes.push_back(
+                    {index, lines[index], number, direction, row - points.size(), setup_row, std::move(points)});
+            };
+            add(run, Direction::forward);
+            if (backward) add(run + 1, Direction::backward);
         }
-    }
     return passes;
-}
-
-std::vector<PlanPoint> points_of(const Plan& plan, const PlannedPass& pass) {
-    std::vector<PlanPoint> points = plan.points(pass.line, pass.run);
-    if (pass.direction == Direction::backward) std::reverse(points.begin(), points.end());
-    return points;
 }
 
 }  // namespace stepdiag

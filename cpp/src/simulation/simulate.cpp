@@ -1,16 +1,90 @@
 #include "stepdiag/simulation/simulate.hpp"
 
 #include <cmath>
+#include <memory>
 
-#include "simulation/pass_readings.hpp"
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/core/random.hpp"
+#include "stepdiag/simulation/pass_reader.hpp"
 
 namespace stepdiag {
+namespace {
+
+void check_misalignment(const Misalignment& misalignment, const Head& head, const std::string& line) {
+    const std::size_t given = misalignment.beam_constants.size(), beams = head.beam_offsets.size();
+    if (given > 0 && (head.layout != HeadLayout::multi_beam || given != beams))
+        throw InvalidArgument("misalignment of " + line + ": expected " + std::to_string(beams) +
+                              " beam constants, got " + std::to_string(given));
+    if (misalignment.gain != 0.0 && head.design && head.layout == HeadLayout::multi_beam)
+        throw InvalidArgument("misalignment of " + line +
+                              ": gain: expected 0, because the beams of a traced head stand where its design and its "
+                              "pose errors put them");
+}
+
+void check_options(const Plan& plan, const Heads& heads, const SimulationOptions& options) {
+    for (const auto& [line, misalignment] : options.misalignment) {
+        if (!plan.contains(Line::parse(line)))
+            throw InvalidArgument("misalignment: line \"" + line + "\" is not in the plan");
+        const auto small = [](const Eigen::Vector2d& angles) {
+            return angles.allFinite() && angles.cwiseAbs().maxCoeff() < 0.1;
+        };
+        bool finite = misalignment.psd_zero.allFinite() && misalignment.lateral.allFinite() &&
+                      std::isfinite(misalignment.distance_constant) && std::isfinite(misalignment.drift);
+        for (const double constant : misalignment.beam_constants) finite = finite && std::isfinite(constant);
+        if (!small(misalignment.reflector) || !small(misalignment.laser) || !small({misalignment.roll, 0.0}) || !finite)
+            throw InvalidArgument("misalignment of " + line + ": expected angles below 0.1 rad and finite lengths");
+        if (!(std::abs(misalignment.gain) <= 0.5))
+            throw InvalidArgument("misalignment of " + line + ": gain: expected a number from -0.5 to 0.5");
+        if (misalignment.drift != 0.0 && !options.seconds_per_reading)
+            throw InvalidArgument("misalignment of " + line + ": drift: expected seconds_per_reading as well");
+        check_misalignment(misalignment, heads.of(Line::parse(line)), line);
+    }
+    check_noise(options.noise);
+    if (options.repeats < 1 || options.repeats > SimulationOptions::largest_repeat_count)
+        throw InvalidArgument("repeats: expected 1 to " + std::to_string(SimulationOptions::largest_repeat_count) +
+                              ", got " + std::to_string(options.repeats));
+    if (const auto& seconds = options.seconds_per_reading; seconds && !(std::isfinite(*seconds) && *seconds > 0.0))
+        throw InvalidArgument("seconds_per_reading: expected a finite time above 0");
+    if (!(options.verified_share >= 0.0 && options.verified_share <= 1.0))
+        throw InvalidArgument("verified_share: expected a share from 0 to 1");
+}
+
+void check_heads(const Heads& heads, const Plan& plan) {
+    check_head(heads.head);
+    for (const auto& [line, head] : heads.by_line) {
+        if (!plan.contains(Line::parse(line)))
+            throw InvalidArgument("head of " + line + ": line \"" + line + "\" is not in the plan");
+        check_head(head);
+        if (signal_names(head) != signal_names(heads.head))
+            throw InvalidArgument("head of " + line + ": expected the same signals as the other lines' heads");
+    }
+}
+
+double deviation(const Noise& noise, const std::string& channel) {
+    if (channel == "alpha" || channel == "beta") return noise.tilt;
+    return channel == "spot_x" || channel == "spot_y" ? noise.spot : noise.distance;
+}
+
+}  // namespace
+
 void check_noise(const Noise& noise) {
     for (const auto& [key, deviation] : {std::pair("distance", noise.distance), std::pair("tilt", noise.tilt),
                                          std::pair("spot", noise.spot), std::pair("common", noise.common)})
         if (!(std::isfinite(deviation) && deviation >= 0.0))
             throw InvalidArgument(std::string("noise ") + key + ": expected a finite standard deviation, at least 0");
+}
+
+void Noise::add(SignalRow& row, const std::vector<std::string>& signals, std::uint64_t number) const {
+    constexpr std::uint64_t common_draw = 0xffff;  // no channel has this number
+    const auto draw = [&](std::uint64_t c) {
+        return normal_pair(seed, RandomStream::reading_noise, (number << 16) | c)[0];
+    };
+    const double of_all = common > 0.0 ? common * draw(common_draw) : 0.0;
+    for (std::size_t c = 0; c < row.size(); ++c) {
+        if (!row[c]) continue;
+        if (is_distance(signals[c])) *row[c] += of_all;
+        if (const double sigma = deviation(*this, signals[c]); sigma > 0.0) *row[c] += sigma * draw(c);
+    }
 }
 
 const Head& Heads::of(const Line& line) const {
@@ -24,51 +98,61 @@ HeadCalibrations Heads::calibration() const {
     return calibrations;
 }
 
+Misalignment SimulationOptions::misalignment_of(const Line& line) const {
+    const auto entry = misalignment.find(line.name());
+    return entry == misalignment.end() ? Misalignment{} : entry->second;
+}
+
+Environment SimulationOptions::environment_of(const Head& head) const {
+    return environment.value_or(assumed ? Environment{Air{}} : usual_environment(head));
+}
+
+ReadingConditions SimulationOptions::conditions_of(const Head& head) const {
+    return {environment_of(head), assumed, {verified_share, noise.seed}, noise.seed};
+}
+
+void check_run(const Plan& plan, const Heads& heads, const SimulationOptions& options) {
+    check_heads(heads, plan);
+    check_options(plan, heads, options);
+}
+
 Measurement simulate(const Machine& machine, const Plan& plan, const Heads& heads, const SimulationOptions& options,
                      ReplayCount* count) {
     check_run(plan, heads, options);
-    const std::vector<std::string> names = signal_names(heads.head);
-    std::map<const Head*, TracedReader> readers;  // the common head is put together once
-
-    std::vector<Station> stations;
-    std::vector<Channel> channels;
-    for (const std::string& name : names) channels.push_back({name, {}});
-    const double seconds = options.seconds_per_reading.value_or(0.0);
-    for (const PlannedPass& pass : planned_passes(plan, options.repeats, options.backward)) {
-        const Line& line = pass.line;
-        const Head& head = heads.of(line);
-        const Eigen::Vector2d mirror = mirror_size(head, plan);
-        const Misalignment misalignment = misalignment_of(options, line);
-        check_misalignment(misalignment, head, line);
-        const HeadSetup setup =
-            set_up(head, plan.frame(line), plan.points(line, pass.run).front().commanded + machine.tool(), mirror,
-                   misalignment);
-        std::vector<Pose> poses;
-        const std::vector<PlanPoint> points = points_of(plan, pass);
-        for (std::size_t k = 0; k < points.size(); ++k) {
-            const std::size_t point = pass.direction == Direction::forward ? k : points.size() - 1 - k;
-            stations.push_back({pass.run, line, int(point), pass.direction, points[k].commanded});
-            poses.push_back(machine.pose(points[k].commanded, approaches(line, pass.direction)));
-        }
-
-        std::vector<SignalRow> rows;
-        if (head.design) {
-            const auto reader = readers.try_emplace(&head, head, mirror, traced_conditions(head, options)).first;
-            rows = read_traced(reader->second, setup, poses, pass.first_row, count);
-        } else {
-            rows = read_defined(head, setup, poses, misalignment, options);
-        }
-        for (std::size_t k = 0; k < rows.size(); ++k) {
-            const std::uint64_t row = pass.first_row + k;
-            const double elapsed = double(row - pass.setup_row) * seconds;
-            add_setup(rows[k], names, misalignment, elapsed);
-            add_noise(rows[k], names, options.noise, row);
-            for (std::size_t c = 0; c < channels.size(); ++c) channels[c].value.push_back(rows[k][c]);
+    const std::vector<PlannedPass> passes = planned_passes(plan, options.repeats, options.backward);
+    const std::vector<std::string> signals = signal_names(heads.head);
+    std::map<const Head*, std::shared_ptr<const TracedReader>> traced;  // a common head is put together once
+    std::vector<SignalRow> rows;
+    for (const PlannedPass& pass : passes) {
+        const LinePlace place = place_on_line(machine, plan, heads, pass.line);
+        const PassReader reader(*place.head, place, options.misalignment_of(pass.line),
+                                options.conditions_of(*place.head), traced[place.head]);
+        traced[place.head] = reader.traced();
+        std::vector<double> elapsed(pass.points.size());
+        for (std::size_t k = 0; k < elapsed.size(); ++k)
+            elapsed[k] = double(pass.first_row + k - pass.setup_row) * options.seconds_per_reading.value_or(0.0);
+        for (SignalRow& row : reader.read(tool_poses(machine, pass), elapsed, pass.first_row, count)) {
+            options.noise.add(row, signals, rows.size());
+            rows.push_back(std::move(row));
         }
     }
-    if (options.seconds_per_reading) {
+    return as_measured(passes, signals, rows, options.seconds_per_reading);
+}
+
+Measurement as_measured(const std::vector<PlannedPass>& passes, const std::vector<std::string>& signals,
+                        const std::vector<SignalRow>& rows, const std::optional<double>& seconds_per_reading) {
+    std::vector<Station> stations;
+    for (const PlannedPass& pass : passes)
+        for (const PlanPoint& point : pass.points)
+            stations.push_back({pass.run, pass.line, point.number, pass.direction, point.commanded});
+    std::vector<Channel> channels;
+    for (std::size_t c = 0; c < signals.size(); ++c) {
+        Channel& channel = channels.emplace_back(Channel{signals[c], {}});
+        for (const SignalRow& row : rows) channel.value.push_back(row[c]);
+    }
+    if (seconds_per_reading) {
         Channel& time = channels.emplace_back(Channel{"time", {}});
-        for (std::size_t row = 0; row < stations.size(); ++row) time.value.push_back(double(row) * seconds);
+        for (std::size_t row = 0; row < rows.size(); ++row) time.value.push_back(double(row) * *seconds_per_reading);
     }
     return Measurement(std::move(stations), std::move(channels));
 }

@@ -63,11 +63,12 @@ std::vector<MovedComponent> moved_components(const RunModel& model, const Head& 
 
 // Of a pass's rows those whose mirror stands farthest to each side, nearest and farthest, or is turned most.
 std::vector<MirrorPose> outermost(const RunModel& model, const RunPass& pass, const Eigen::VectorXd& deviations) {
-    const Misalignment misalignment = misalignment_of(model.lines[pass.line].with(deviations));
-    const HeadSetup setup = set_up(*pass.head, pass.frame, pass.first_point, pass.mirror, misalignment);
+    const Misalignment misalignment = misalignment_of(model.lines[pass.planned.line_index].with(deviations));
+    const HeadSetup setup =
+        set_up(*pass.place.head, pass.place.frame, pass.place.first_point, pass.place.mirror, misalignment);
     std::vector<MirrorPose> all, chosen;
-    for (std::size_t k = 0; k < pass.rows; ++k) {
-        const Pose& pose = model.poses[pass.planned.first_row + k];
+    for (std::size_t k = 0; k < pass.rows(); ++k) {
+        const Pose& pose = model.poses[pass.first_row() + k];
         all.push_back(mirror_in_sensor_frame(setup, pose.position, pose.rotation));
     }
     for (int number = 0; number < 5; ++number) {
@@ -146,7 +147,7 @@ bool is_clear(const RunModel& model, const Head& head, const Eigen::Vector2d& mi
     std::vector<std::vector<std::vector<Segment>>> segments(paths.size());
     const auto add = [&](const TracedHead& own, const Eigen::VectorXd& deviations) {
         for (const RunPass& pass : model.passes)
-            if (pass.head == &head && pass.planned.first_row == pass.planned.setup_row)
+            if (pass.place.head == &head && pass.planned.first_row == pass.planned.setup_row)
                 for (std::size_t w = 0; w < paths.size(); ++w)
                     add_segments(own, paths[w], outermost(model, pass, deviations), segments[w]);
     };
@@ -178,16 +179,16 @@ Placement MovedComponent::at(const std::vector<double>& deviations) const {
 
 std::optional<HeadPaths> record_paths(const RunModel& model, const Head& head) {
     const auto pass =
-        std::find_if(model.passes.begin(), model.passes.end(), [&](const RunPass& v) { return v.head == &head; });
-    const Outline reference{{}, true, Eigen::Vector2d::Constant(head.aperture / 2.0), {}};
-    HeadPaths paths{&head, reference, mirror_outline(model, pass->mirror), 1e-3, {}, {}, {}};
+        std::find_if(model.passes.begin(), model.passes.end(), [&](const RunPass& v) { return v.place.head == &head; });
+    const Eigen::Vector2d& mirror = pass->place.mirror;
+    HeadPaths paths{&head, mirror_outline(model, mirror), 0.0, {}, {}, {}};
     if (!head.design) return paths;
     if (!reads_axes_alone(*head.design) || head.design->beams.size() > most_simd_beams) return std::nullopt;
 
     paths.nominal = nominal_head(*head.design, head.standoff, model.assumed(head));
     paths.moved = moved_components(model, head);
     const Eigen::VectorXd expectations = model.draws.expectations();
-    const TracedHead traced = traced_at(model, head, pass->mirror, expectations);
+    const TracedHead traced = traced_at(model, head, mirror, expectations);
     const std::vector<MirrorPose> mirrors = outermost(model, *pass, expectations);
     paths.gap = traced.optics(0).fixed.self_intersection_gap();
     int channel = 0;
@@ -197,7 +198,7 @@ std::optional<HeadPaths> record_paths(const RunModel& model, const Head& head) {
         path->channel = channel++;
         paths.beams.push_back(std::move(*path));
     }
-    if (!is_clear(model, head, pass->mirror, traced, paths.beams)) return std::nullopt;
+    if (!is_clear(model, head, mirror, traced, paths.beams)) return std::nullopt;
     return paths;
 }
 

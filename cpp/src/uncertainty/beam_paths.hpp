@@ -1,4 +1,5 @@
 // The paths of a head's beams as the run with every input at its expectation has them, recorded once for all samples.
+// A head without a design has none: it reads by definition.
 #pragma once
 
 #include <memory>
@@ -40,10 +41,10 @@ struct BeamPath {
 
 struct HeadPaths {
     const Head* head;
-    Outline reference;  // of a head without a design: the square that takes the beam back
-    Outline mirror;     // as small as a mirror that turns with the tool is at least
+    Outline mirror;  // as small as a mirror that turns with the tool is at least
+    // Of a design:
     double gap;
-    std::vector<BeamPath> beams;  // of a design
+    std::vector<BeamPath> beams;
     NominalHead nominal;
     std::vector<MovedComponent> moved;
 };

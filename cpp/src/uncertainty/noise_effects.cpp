@@ -5,7 +5,6 @@
 #include <cmath>
 #include <variant>
 
-#include "simulation/pass_readings.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -143,18 +142,15 @@ MatrixXd NoiseEffects::of_poses(int column) const {
 }
 
 void NoiseEffects::sum_walks(MatrixXd& by_row, bool by_setup) const {
-    const auto& stations = nominal_.stations();
-    const auto starts = [&](Index r) {  // a backward run goes on with the set-up of the forward one
-        if (r == 0) return true;
-        const Station &before = stations[std::size_t(r) - 1], &here = stations[std::size_t(r)];
-        const bool same_pass = before.run == here.run && before.line == here.line;
-        return by_setup && !same_pass && here.direction == Direction::forward;
-    };
+    std::vector<bool> starts(std::size_t(by_row.cols()));
+    starts[0] = true;
+    for (const PlannedPass& pass : planned_passes(run_.plan, run_.simulation.repeats, run_.simulation.backward))
+        if (by_setup) starts[pass.setup_row] = true;
     // The step to a row acts on it and all that follow, up to where the walk begins anew.
     for (Index r = by_row.cols() - 2; r >= 0; --r)
-        if (!starts(r + 1)) by_row.col(r) += by_row.col(r + 1);
+        if (!starts[std::size_t(r) + 1]) by_row.col(r) += by_row.col(r + 1);
     for (Index r = 0; r < by_row.cols(); ++r)
-        if (starts(r)) by_row.col(r).setZero();
+        if (starts[std::size_t(r)]) by_row.col(r).setZero();
     by_row *= std::sqrt(run_.simulation.seconds_per_reading.value_or(run_.seconds_per_reading));
 }
 

@@ -115,25 +115,17 @@ RunModel::RunModel(const VirtualRun& given, std::uint64_t seed) : run(given), dr
     const int beams = run.heads.head.layout == HeadLayout::multi_beam ? int(channels.size()) : 0;
 
     for (const PlannedPass& pass : planned_passes(run.plan, run.simulation.repeats, run.simulation.backward)) {
-        const Line& line = pass.line;
-        const Head& head = run.heads.of(line);
-        const Misalignment misalignment = stepdiag::misalignment_of(run.simulation, line);
-        check_misalignment(misalignment, head, line);
-        if (passes.empty() || passes.back().planned.line.name() != line.name())
-            lines.push_back({numbers_of(misalignment, std::size_t(beams)), {}});
-        const std::vector<PlanPoint> points = points_of(run.plan, pass);
-        const Eigen::Vector3d first = run.plan.points(line, pass.run).front().commanded;
-        const Eigen::Matrix3d frame = run.plan.frame(line);
-        passes.push_back({pass, &head, frame, first + run.machine.tool(), mirror_size(head, run.plan), points.size(),
-                          lines.size() - 1});
-        const Eigen::Vector3d last = run.plan.points(line, pass.run).back().commanded;
-        for (std::size_t k = 0; k < points.size(); ++k) {
-            const Eigen::Vector3d& commanded = points[k].commanded;
-            const std::size_t row = rows.size();
-            rows.push_back({double(row - pass.setup_row) * seconds, frame.col(2).dot(commanded - first),
-                            (commanded - last).norm() == 0.0});
-            poses.push_back(run.machine.pose(commanded, approaches(line, pass.direction)));
-        }
+        if (pass.line_index == lines.size())
+            lines.push_back({numbers_of(run.simulation.misalignment_of(pass.line), std::size_t(beams)), {}});
+        const LinePlace place = place_on_line(run.machine, run.plan, run.heads, pass.line);
+        const bool forward = pass.direction == Direction::forward;
+        const Eigen::Vector3d first = (forward ? pass.points.front() : pass.points.back()).commanded;
+        for (const PlanPoint& point : pass.points)
+            rows.push_back({double(rows.size() - pass.setup_row) * seconds,
+                            place.frame.col(2).dot(point.commanded - first),
+                            point.number + 1 == int(pass.points.size())});
+        for (const Pose& pose : tool_poses(run.machine, pass)) poses.push_back(pose);
+        passes.push_back({pass, place});
     }
     if (rows.size() > Draws::most_rows)
         throw InvalidArgument("virtual run: expected at most " + std::to_string(Draws::most_rows) + " rows");
@@ -150,13 +142,13 @@ void RunModel::add_input(const UncertainInput& input, int index) {
         const auto pass = std::find_if(passes.begin(), passes.end(),
                                        [&](const RunPass& v) { return v.planned.line.name() == input.line; });
         if (pass == passes.end()) throw InvalidArgument(what + ": line \"" + input.line + "\" is not in the plan");
-        if (input.quantity == InputQuantity::psd_zero && pass->head->layout != HeadLayout::psd)
+        if (input.quantity == InputQuantity::psd_zero && pass->place.head->layout != HeadLayout::psd)
             throw InvalidArgument(what + ": expected a head of layout psd");
-        if (input.quantity == InputQuantity::gain && pass->head->design && beams > 0)
+        if (input.quantity == InputQuantity::gain && pass->place.head->design && beams > 0)
             throw InvalidArgument(what +
                                   ": the beams of a traced head stand where its design and its pose errors put "
                                   "them");
-        lines[pass->line].uncertain.push_back({place->first + input.component, index});
+        lines[pass->planned.line_index].uncertain.push_back({place->first + input.component, index});
         return;
     }
     if (const auto place = place_in_shared(input.quantity, beams)) {
@@ -166,13 +158,13 @@ void RunModel::add_input(const UncertainInput& input, int index) {
         const bool of_air = input.quantity == InputQuantity::temperature || input.quantity == InputQuantity::pressure ||
                             input.quantity == InputQuantity::humidity;
         for (const RunPass& pass : passes) {
-            if (of_closed_head && pass.head->design)
+            if (of_closed_head && pass.place.head->design)
                 throw InvalidArgument(what +
                                       ": expected a head without a design; components of a design are moved by "
                                       "part_shift and part_rotation");
-            if (input.quantity == InputQuantity::psd_distance && pass.head->layout != HeadLayout::psd)
+            if (input.quantity == InputQuantity::psd_distance && pass.place.head->layout != HeadLayout::psd)
                 throw InvalidArgument(what + ": expected a head of layout psd");
-            if (of_air && !std::holds_alternative<Air>(true_environment(*pass.head, run.simulation).air))
+            if (of_air && !std::holds_alternative<Air>(run.simulation.environment_of(*pass.place.head).air))
                 throw InvalidArgument(what + ": expected a state of the air as environment, got a constant index");
         }
         shared.uncertain.push_back({place->first + input.component, index});
@@ -180,8 +172,8 @@ void RunModel::add_input(const UncertainInput& input, int index) {
     }
     check_component(what, input.component, 3);
     const auto has_part = [&](const RunPass& pass) {
-        if (!pass.head->design) return false;
-        const auto names = component_names(*pass.head->design);
+        if (!pass.place.head->design) return false;
+        const auto names = component_names(*pass.place.head->design);
         return std::find(names.begin(), names.end(), input.part) != names.end();
     };
     if (std::none_of(passes.begin(), passes.end(), has_part))
@@ -217,7 +209,7 @@ bool RunModel::moves_poses() const {
 bool RunModel::has_uncertain_air() const { return shared.is_uncertain(shared_field::temperature, 4); }
 
 Environment RunModel::environment(const Head& head, const std::vector<double>& numbers) const {
-    Environment environment = true_environment(head, run.simulation);
+    Environment environment = run.simulation.environment_of(head);
     environment.relative_error += numbers[shared_field::refractive_index];
     if (Air* air = std::get_if<Air>(&environment.air)) {
         air->temperature += numbers[shared_field::temperature];
@@ -228,7 +220,7 @@ Environment RunModel::environment(const Head& head, const std::vector<double>& n
 }
 
 Environment RunModel::assumed(const Head& head) const {
-    return run.simulation.assumed.value_or(true_environment(head, run.simulation));
+    return run.simulation.assumed.value_or(run.simulation.environment_of(head));
 }
 
 Head RunModel::head(const Head& nominal, const std::vector<double>& numbers, const Eigen::VectorXd& deviations) const {

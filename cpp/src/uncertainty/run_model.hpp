@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "simulation/pass_readings.hpp"
+#include "stepdiag/simulation/pass_reader.hpp"
 #include "stepdiag/uncertainty/virtual_calibration.hpp"
 #include "uncertainty/draws.hpp"
 
@@ -71,12 +71,10 @@ struct RunRow {
 
 struct RunPass {
     PlannedPass planned;
-    const Head* head;
-    Eigen::Matrix3d frame;
-    Eigen::Vector3d first_point;  // commanded, tool offset included
-    Eigen::Vector2d mirror;
-    std::size_t rows;
-    std::size_t line;  // index of its Fields
+    LinePlace place;
+
+    std::size_t first_row() const { return std::size_t(planned.first_row); }
+    std::size_t rows() const { return planned.points.size(); }
 };
 
 struct NoiseTerm {
@@ -97,7 +95,7 @@ struct RunModel {
     std::vector<RunPass> passes;
     std::vector<RunRow> rows;
     std::vector<Pose> poses;    // nominal tool, by row
-    std::vector<Fields> lines;  // by line of the plan, scale lines last
+    std::vector<Fields> lines;  // by line_index
     Fields shared;
     std::vector<MovedPart> moved_parts;
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "stepdiag/core/rotation.hpp"
 
@@ -26,15 +27,13 @@ bool has_sensor_noise(const HeadDesign& design) {
 ScalarSampler::ScalarSampler(const RunModel& model) : model_(model) {
     if (model.has_uncertain_air() || !model.moved_parts.empty()) return;
     for (const RunPass& pass : model.passes) {
-        if (!pass.head->design || has_sensor_noise(*pass.head->design)) continue;
+        const Head& head = *pass.place.head;
+        if (!head.design || has_sensor_noise(*head.design)) continue;
         for (const double share : {model.run.simulation.verified_share, trace_all}) {
-            SimulationOptions options = model.run.simulation;
-            options.environment = true_environment(*pass.head, options);
-            options.verified_share = share;
-            auto& reader = readers_[{pass.head, share}];
-            if (!reader)
-                reader =
-                    std::make_shared<TracedReader>(*pass.head, pass.mirror, traced_conditions(*pass.head, options));
+            ReadingConditions conditions = model.run.simulation.conditions_of(head);
+            conditions.replay.verified_share = share;
+            auto& traced = traced_[{&head, share}];
+            if (!traced) traced = std::make_shared<TracedReader>(head, pass.place.mirror, conditions);
         }
     }
 }
@@ -65,51 +64,40 @@ std::vector<Displacement> ScalarSampler::displacements(const Eigen::VectorXd& de
     return displaced;
 }
 
-std::vector<SignalRow> ScalarSampler::raw(const RunPass& pass, const Head& head, const HeadSetup& setup,
-                                          const Misalignment& misalignment, const std::vector<double>& shared,
-                                          const std::vector<Pose>& poses, std::optional<std::uint64_t> sample,
-                                          std::size_t first_row, double verified_share) const {
-    SimulationOptions options = model_.run.simulation;
-    options.environment = model_.environment(*pass.head, shared);
-    options.assumed = model_.assumed(*pass.head);
-    options.verified_share = verified_share;
-    options.noise.seed = sample ? model_.draws.sensor_seed(*sample) : 0;
-    if (!head.design) return read_defined(head, setup, poses, misalignment, options);
-    const auto found = readers_.find({pass.head, verified_share});
-    const auto reader = found != readers_.end()
-                            ? found->second
-                            : std::make_shared<TracedReader>(head, pass.mirror, traced_conditions(head, options));
-    return read_traced(*reader, setup, poses, first_row);
-}
-
 Eigen::MatrixXd ScalarSampler::read(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample,
                                     const RunPass& pass, const std::vector<std::size_t>& rows,
                                     const std::vector<Displacement>& displaced, double verified_share) const {
-    const std::vector<double> numbers = model_.lines[pass.line].with(deviations);
+    const std::vector<double> numbers = model_.lines[pass.planned.line_index].with(deviations);
     const std::vector<double> shared = model_.shared.with(deviations);
-    const Misalignment misalignment = misalignment_of(numbers);
-    const Head head = model_.head(*pass.head, shared, deviations);
-    const HeadSetup setup = set_up(head, pass.frame, pass.first_point, pass.mirror, misalignment);
+    const Head& nominal = *pass.place.head;
+    const std::uint64_t seed = sample ? model_.draws.sensor_seed(*sample) : 0;
+    const ReadingConditions conditions{
+        model_.environment(nominal, shared), model_.assumed(nominal), {verified_share, seed}, seed};
+    const auto traced = traced_.find({&nominal, verified_share});
+    const PassReader reader(model_.head(nominal, shared, deviations), pass.place, misalignment_of(numbers), conditions,
+                            traced == traced_.end() ? nullptr : traced->second);
     std::vector<Pose> poses;
+    std::vector<double> elapsed;
     for (const std::size_t row : rows) {
         Pose pose = model_.poses[row];
         pose.position += displaced[row].shift;
         if (!displaced[row].rotation.isZero(0.0)) pose.rotation = rotation_exp(displaced[row].rotation) * pose.rotation;
         poses.push_back(pose);
+        elapsed.push_back(model_.rows[row].elapsed);
     }
-    std::vector<SignalRow> signals =
-        raw(pass, head, setup, misalignment, shared, poses, sample, rows.front(), verified_share);
+    const std::vector<SignalRow> signals = reader.read(poses, elapsed, rows.front());
 
     const std::size_t channels = model_.channels.size();
     Eigen::MatrixXd readings = Eigen::MatrixXd::Constant(Eigen::Index(rows.size()), Eigen::Index(channels),
                                                          std::numeric_limits<double>::quiet_NaN());
     for (std::size_t k = 0; k < rows.size(); ++k) {
         const RunRow& row = model_.rows[rows[k]];
-        add_setup(signals[k], model_.channels, misalignment, row.elapsed);
         double model_error = 0.0;
-        if (shared[shared_field::reading_model] != 0.0)
-            if (const auto reading = define_reading(setup, poses[k].position, poses[k].rotation))
+        if (shared[shared_field::reading_model] != 0.0) {
+            const MirrorPose mirror = reader.mirror(poses[k]);
+            if (const auto reading = read_mirror(mirror.point, mirror.rotation.col(2)))
                 model_error = shared[shared_field::reading_model] * reading->beam_length() * reading->tan2_phi();
+        }
         for (std::size_t c = 0; c < channels; ++c) {
             if (!signals[k][c]) continue;
             double value = *signals[k][c];
@@ -133,11 +121,11 @@ Eigen::VectorXd ScalarSampler::readings(const Eigen::VectorXd& deviations, std::
     Eigen::VectorXd all(model_.rows.size() * channels);
     const std::vector<Displacement> displaced = displacements(deviations, sample, model_.rows.size());
     for (const RunPass& pass : model_.passes) {
-        std::vector<std::size_t> rows(pass.rows);
-        for (std::size_t k = 0; k < pass.rows; ++k) rows[k] = std::size_t(pass.planned.first_row) + k;
+        std::vector<std::size_t> rows(pass.rows());
+        std::iota(rows.begin(), rows.end(), pass.first_row());
         const Eigen::MatrixXd read_here =
             read(deviations, sample, pass, rows, displaced, model_.run.simulation.verified_share);
-        for (std::size_t k = 0; k < pass.rows; ++k)
+        for (std::size_t k = 0; k < rows.size(); ++k)
             for (std::size_t c = 0; c < channels; ++c)
                 all[Eigen::Index(rows[k] * channels + c)] = read_here(Eigen::Index(k), Eigen::Index(c));
     }

@@ -1,6 +1,6 @@
-// One sample of a virtual run, reading by reading: what simulate() does with the sample's own head, set-ups and air at
-// the sample's own tool poses. This is the definition: simd_sampler, which is faster, is checked against it and falls
-// back on it.
+// One sample of a virtual run, reading by reading: every pass read (simulation/pass_reader.hpp) with the sample's own
+// head, set-up and air at the sample's own tool poses. This is the definition: simd_sampler, which is faster, is
+// checked against it and falls back on it.
 #pragma once
 
 #include <map>
@@ -32,10 +32,6 @@ public:
 private:
     std::vector<Displacement> displacements(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample,
                                             std::size_t rows) const;
-    std::vector<SignalRow> raw(const RunPass& pass, const Head& head, const HeadSetup& setup,
-                               const Misalignment& misalignment, const std::vector<double>& shared,
-                               const std::vector<Pose>& poses, std::optional<std::uint64_t> sample,
-                               std::size_t first_row, double verified_share) const;
     Eigen::MatrixXd read(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample, const RunPass& pass,
                          const std::vector<std::size_t>& rows, const std::vector<Displacement>& displaced,
                          double verified_share) const;
@@ -43,7 +39,7 @@ private:
 
     const RunModel& model_;
     // Of the heads that are the same in all samples, by verified share.
-    std::map<std::pair<const Head*, double>, std::shared_ptr<const TracedReader>> readers_;
+    std::map<std::pair<const Head*, double>, std::shared_ptr<const TracedReader>> traced_;
 };
 
 }  // namespace stepdiag

@@ -158,12 +158,6 @@ STEPDIAG_INLINE void detect(const SimdBeam& beam, std::size_t lane, Light<Pair>&
     const Pair distance = mul_add(common(beam.scale), light.optical_length, at(*beam.offset, lane));
     store(distance, to + lane);
     light.followed = both(light.followed, is_finite(distance));
-    if (beam.detector == SimdDetector::ideal) {
-        const Pair half = common(1.0) / (common(1.0) - light.direction[2]);
-        store(light.direction[1] * half, to + lane_group + lane);
-        store(negative(light.direction[0] * half), to + 2 * lane_group + lane);
-        return;
-    }
     const SimdRow* const axis = beam.detector_rows;
     const Pair along = mul_add(at(axis[0], lane), light.direction[0],
                                mul_add(at(axis[1], lane), light.direction[1], at(axis[2], lane) * light.direction[2]));
@@ -234,9 +228,13 @@ void trace(const SimdPass& pass, const Outline& outline, const std::vector<SimdB
     }
 }
 
+// Follows where every beam is read by the rules of define_signals and a little to spare.
 void define(const SimdPass& pass, const SimdClosed& closed) {
+    const Pair zero = common(0.0), one = common(1.0), aside = common(0.25 * closed.aperture);
+    const Pair half_mirror[2] = {common(closed.half_mirror[0]), common(closed.half_mirror[1])};
+    const SimdRow* const axes = pass.setup->mirror_axes;
     for (std::size_t lane = 0; lane < lane_group; lane += 2 * hn::Lanes(Tag())) {
-        const Pair ratio = at(*closed.index_ratio, lane), zero = common(0.0), one = common(1.0);
+        const Pair ratio = at(*closed.index_ratio, lane);
         MaskPair followed = is_finite(ratio);  // else the air is out of its equation's range
         for (std::size_t row = 0; row < pass.rows; ++row) {
             Mirror mirror{*pass.setup, lane, {}, {}, {}, {}};
@@ -249,18 +247,42 @@ void define(const SimdPass& pass, const SimdClosed& closed) {
             const Pair by_w = one / w;
             const Pair distance = length * by_w;
             followed = both(followed, both(both(mirror.normal[2] > zero, w > zero), length > zero));
+            // The beam from (u, v) meets the mirror's plane at (u, v, alpha v - beta u) and a constant.
+            Pair along[2][2];
+            for (int axis = 0; axis < 2; ++axis) {
+                const Pair z = at(axes[3 * axis + 2], lane);
+                along[axis][0] = sub_mul(z, beta, at(axes[3 * axis], lane));
+                along[axis][1] = mul_add(z, alpha, at(axes[3 * axis + 1], lane));
+            }
+            const Pair tilt = magnitude(alpha) + magnitude(beta);  // at least the larger one
+            const auto check = [&](Pair u, Pair v, Pair beam_distance) HWY_ATTR {
+                const Pair x = u - mirror.centre[0], y = v - mirror.centre[1];
+                for (int axis = 0; axis < 2; ++axis) {
+                    const Pair met = mul_add(along[axis][0], x, along[axis][1] * y);
+                    followed = both(followed, magnitude(met) <= half_mirror[axis]);
+                }
+                followed = both(followed, both(beam_distance > zero, beam_distance * tilt <= aside));
+            };
             double* const to = pass.readings + row * pass.channels * lane_group + lane;
-            if (closed.psd_distance) {
+            if (closed.layout == HeadLayout::multi_beam) {
+                for (std::size_t i = 0; i < pass.channels; ++i) {
+                    const Pair u = at(closed.beams[2 * i], lane), v = at(closed.beams[2 * i + 1], lane);
+                    const Pair beam_distance = mul_add(sub_mul(beta, u, alpha * v), by_w, distance);
+                    check(u, v, beam_distance);
+                    store(beam_distance * ratio, to + i * lane_group);
+                }
+                continue;
+            }
+            check(zero, zero, distance);
+            store(distance * ratio, to);
+            if (closed.layout == HeadLayout::psd) {
                 const Pair reach = mul_add(at(*closed.psd_distance, lane), by_w, distance);
                 const Pair gain = reach + reach;
-                store(distance * ratio, to);
                 store(negative(gain * beta), to + lane_group);
                 store(gain * alpha, to + 2 * lane_group);
             } else {
-                for (std::size_t i = 0; i < pass.channels; ++i) {
-                    const Pair u = at(closed.beams[2 * i], lane), v = at(closed.beams[2 * i + 1], lane);
-                    store(mul_add(sub_mul(beta, u, alpha * v), by_w, distance) * ratio, to + i * lane_group);
-                }
+                store(alpha, to + lane_group);
+                store(beta, to + 2 * lane_group);
             }
         }
         keep(followed, pass.followed + lane);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "stepdiag/core/random_blocks.hpp"
+#include "stepdiag/head/head_layout.hpp"
 #include "stepdiag/optics/replay.hpp"
 
 namespace stepdiag {
@@ -48,7 +49,7 @@ struct SimdFace {
     double inverse_index = 0.0, index_ratio = 0.0, one_less_ratio2 = 0.0;
 };
 
-enum class SimdDetector { ideal, interferometer, spot };
+enum class SimdDetector { interferometer, spot };
 
 struct SimdBeam {
     std::vector<SimdFace> out, back;  // before and after the mirror; the last one is the detector's
@@ -84,11 +85,14 @@ struct SimdPass {
 inline constexpr std::size_t most_simd_beams = 8;
 void trace_pass(const SimdPass& pass, const Outline& mirror, const std::vector<SimdBeam>& beams, double gap);
 
-// By the closed definition of a layout's readings: distance and spot, or beams.
+// By the closed definition of a layout's readings, with the rules of define_signals (head/head.hpp).
 struct SimdClosed {
+    HeadLayout layout;
     const SimdRow* index_ratio;   // of the true air to the assumed
-    const SimdRow* psd_distance;  // none: beams
-    const SimdRow* beams;         // u and v of each, gain included
+    const SimdRow* psd_distance;  // layout psd
+    const SimdRow* beams;         // layout multi_beam: u and v of each, gain included
+    Eigen::Vector2d half_mirror;  // a mirror of this size at most, as it does not turn with the tool
+    double aperture;
 };
 void define_pass(const SimdPass& pass, const SimdClosed& closed);
 

@@ -18,22 +18,23 @@ std::unique_ptr<const SimdSampler> SimdSampler::make(const RunModel& model) {
     std::unique_ptr<SimdSampler> run(new SimdSampler(model));
     for (const RunPass& pass : model.passes) {
         auto head = std::find_if(run->heads_.begin(), run->heads_.end(),
-                                 [&](const HeadPaths& paths) { return paths.head == pass.head; });
+                                 [&](const HeadPaths& paths) { return paths.head == pass.place.head; });
         if (head == run->heads_.end()) {
-            std::optional<HeadPaths> paths = record_paths(model, *pass.head);
+            std::optional<HeadPaths> paths = record_paths(model, *pass.place.head);
             if (!paths) return nullptr;
             run->heads_.push_back(std::move(*paths));
             head = std::prev(run->heads_.end());
         }
-        if (pass.line < run->lines_.size()) continue;
+        if (pass.planned.line_index < run->lines_.size()) continue;
+        const LinePlace& place = pass.place;
         Line line{};
-        const Eigen::Vector3d origin = pass.first_point - pass.head->standoff * pass.frame.col(2);
-        RowMajor::Map(line.frame.frame) = pass.frame;
+        const Eigen::Vector3d origin = place.first_point - place.head->standoff * place.frame.col(2);
+        RowMajor::Map(line.frame.frame) = place.frame;
         Eigen::Vector3d::Map(line.frame.origin) = origin;
         line.head = std::size_t(head - run->heads_.begin());
-        const Fields& fields = model.lines[pass.line];
+        const Fields& fields = model.lines[pass.planned.line_index];
         line.setup_varies = fields.is_uncertain(field::reflector, field::gain);
-        const bool gain_corrects = pass.head->layout != HeadLayout::multi_beam && fields.acts(field::gain);
+        const bool gain_corrects = place.head->layout != HeadLayout::multi_beam && fields.acts(field::gain);
         line.corrects = gain_corrects || fields.acts(field::psd_zero, int(fields.nominal.size()) - field::psd_zero) ||
                         model.shared.acts(shared_field::reading_model) || model.shared.acts(shared_field::wavelength);
         run->lines_.push_back(line);
@@ -117,7 +118,7 @@ void SimdSampler::displace(std::optional<std::uint64_t> first_sample, Scratch& s
 }
 
 void SimdSampler::correct(const RunPass& pass, const SimdPass& lanes, const Scratch& scratch) const {
-    const std::vector<SimdRow>& fields = scratch.fields[pass.line];
+    const std::vector<SimdRow>& fields = scratch.fields[pass.planned.line_index];
     std::vector<SimdRow> constant(lanes.channels);
     SimdRow gain, wavelength;
     for (std::size_t lane = 0; lane < lane_group; ++lane) {
@@ -133,7 +134,7 @@ void SimdSampler::correct(const RunPass& pass, const SimdPass& lanes, const Scra
                 to = fields[field::psd_zero + (model_.channels[c] == "spot_y")].value[lane];
         }
     }
-    const std::size_t first = std::size_t(pass.planned.first_row);
+    const std::size_t first = pass.first_row();
     correct_pass(lanes, {&elapsed_[first], &travel_[first], &is_last_[first], constant.data(), &gain,
                          &fields[field::drift], &scratch.shared[shared_field::reading_model], &wavelength,
                          &fields[field::scale_factor], &fields[field::scale_length], is_distance_.data()});
@@ -158,18 +159,19 @@ void SimdSampler::trace(const double* deviations, std::optional<std::uint64_t> f
 
     const std::size_t channels = model_.channels.size();
     for (const RunPass& pass : model_.passes) {
-        const std::size_t first = std::size_t(pass.planned.first_row);
-        const Line& line = lines_[pass.line];
+        const std::size_t first = pass.first_row(), l = pass.planned.line_index;
+        const Line& line = lines_[l];
         const HeadPaths& paths = heads_[line.head];
         const Scratch::HeadRows& head = scratch.heads[line.head];
         SimdPass lanes{&poses_[first], nullptr,
-                       pass.rows,      &scratch.setups[pass.line],
+                       pass.rows(),    &scratch.setups[l],
                        channels,       readings + first * channels * lane_group,
                        nullptr,        followed};
         if (!scratch.displaced.empty()) lanes.displaced = &scratch.displaced[6 * first];
         if (reads_excess_) lanes.excess = &scratch.excess[first];
         if (head.beams.empty())
-            define_pass(lanes, {head.index_ratio, head.psd_distance, scratch.closed_beams[pass.line].data()});
+            define_pass(lanes, {paths.head->layout, head.index_ratio, head.psd_distance, scratch.closed_beams[l].data(),
+                                paths.mirror.half_size, paths.head->aperture});
         else trace_pass(lanes, paths.mirror, head.beams, paths.gap);
         if (line.corrects) correct(pass, lanes, scratch);
     }
@@ -239,14 +241,14 @@ constexpr double no_index = std::numeric_limits<double>::quiet_NaN();
 
 void SimdSampler::prepare_head(const HeadPaths& paths, Scratch::HeadRows& to) const {
     const Head& head = *paths.head;
-    if (!head.design && head.layout != HeadLayout::ideal) {
+    if (!head.design) {
         to.rows.resize(2 + 2 * head.beam_offsets.size());
         to.index_ratio = &to.rows[0];
         if (head.layout == HeadLayout::psd) to.psd_distance = &to.rows[1];
-        else to.beam_offsets = &to.rows[2];
+        if (head.layout == HeadLayout::multi_beam) to.beam_offsets = &to.rows[2];
         return;
     }
-    std::size_t count = head.design ? 0 : rows_of_a_beam + rows_of_a_face;
+    std::size_t count = 0;
     for (const BeamPath& path : paths.beams) count += rows_of_a_beam + rows_of_a_face * path.route.encounters.size();
     to.rows.resize(count);
     SimdRow* next = to.rows.data();
@@ -268,20 +270,6 @@ void SimdSampler::prepare_head(const HeadPaths& paths, Scratch::HeadRows& to) co
         to.beams.push_back(std::move(beam));
         return to.beams.back();
     };
-    if (!head.design) {
-        static const double no_plane[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
-        SimdBeam& beam = new_beam(SimdDetector::ideal, 0);
-        SimdFace face{Event::absorbed, false, &paths.reference, {}, 1.0, 1.0};
-        std::copy_n(no_plane, 12, face.plane);
-        SimdRow* const rows = take(rows_of_a_face);
-        fill(no_plane, 12, rows);
-        face.plane_rows = rows, face.before_row = face.after_row = beam.air;
-        beam.back.push_back(face);
-        const double source[6] = {0, 0, 0, 0, 0, 1};
-        fill(source, 6, const_cast<SimdRow*>(beam.source));
-        const_cast<SimdRow*>(beam.offset)->fill(0.0);
-        return;
-    }
     const bool by_lane = model_.has_uncertain_air() || !paths.moved.empty();
     for (const BeamPath& path : paths.beams) {
         const HeadBeam& light = head.design->beams[std::size_t(path.beam)];
@@ -343,7 +331,7 @@ void SimdSampler::fill_air(const HeadPaths& paths, const Scratch& scratch, Scrat
             to.index_ratio->value[lane] =
                 index(head.wavelength) / refractive_index(model_.assumed(head), head.wavelength);
         for (std::size_t b = 0; b < to.beams.size(); ++b) {
-            const double air = index(head.design ? paths.beams[b].wavelength : head.wavelength);
+            const double air = index(paths.beams[b].wavelength);
             const_cast<SimdRow*>(to.beams[b].air)->value[lane] = air;
             if (to.beams[b].detector != SimdDetector::interferometer) continue;
             const auto& interferometer = *head.design->beams[std::size_t(paths.beams[b].beam)].interferometer;

@@ -19,27 +19,15 @@ namespace stepdiag {
 namespace {
 
 Measurement measurement_of(const RunModel& model, const Eigen::VectorXd& readings) {
-    std::vector<Station> stations;
-    std::vector<Channel> channels;
-    for (const std::string& name : model.channels) channels.push_back({name, {}});
-    for (const RunPass& pass : model.passes) {
-        const std::vector<PlanPoint> points = points_of(model.run.plan, pass.planned);
-        for (std::size_t k = 0; k < pass.rows; ++k) {
-            const std::size_t point = pass.planned.direction == Direction::forward ? k : pass.rows - 1 - k;
-            stations.push_back(
-                {pass.planned.run, pass.planned.line, int(point), pass.planned.direction, points[k].commanded});
+    std::vector<PlannedPass> passes;
+    for (const RunPass& pass : model.passes) passes.push_back(pass.planned);
+    std::vector<SignalRow> rows(model.rows.size());
+    for (std::size_t r = 0; r < rows.size(); ++r)
+        for (std::size_t c = 0; c < model.channels.size(); ++c) {
+            const double value = readings[Eigen::Index(r * model.channels.size() + c)];
+            rows[r].push_back(std::isnan(value) ? std::nullopt : std::optional(value));
         }
-    }
-    for (std::size_t r = 0; r < stations.size(); ++r)
-        for (std::size_t c = 0; c < channels.size(); ++c) {
-            const double value = readings[Eigen::Index(r * channels.size() + c)];
-            channels[c].value.push_back(std::isnan(value) ? std::nullopt : std::optional(value));
-        }
-    if (model.run.simulation.seconds_per_reading) {
-        Channel& time = channels.emplace_back(Channel{"time", {}});
-        for (std::size_t r = 0; r < stations.size(); ++r) time.value.push_back(double(r) * model.seconds);
-    }
-    return Measurement(std::move(stations), std::move(channels));
+    return as_measured(passes, model.channels, rows, model.run.simulation.seconds_per_reading);
 }
 
 std::string unit_of(const std::string& parameter) {
@@ -168,8 +156,7 @@ private:
         const std::size_t channels = model.channels.size();
         for (std::size_t v = 0; v < model.passes.size(); ++v) {
             const RunPass& pass = model.passes[v];
-            const std::size_t row =
-                std::size_t(pass.planned.first_row) + std::size_t(uniform(std::uint32_t(v + 1)) * double(pass.rows));
+            const std::size_t row = pass.first_row() + std::size_t(uniform(std::uint32_t(v + 1)) * double(pass.rows()));
             const Eigen::MatrixXd traced = state_.scalar.trace(deviations(lane), sample, pass, {row});
             for (std::size_t c = 0; c < channels; ++c) {
                 const double found = readings_[row * channels + c].value[lane];

@@ -53,8 +53,8 @@ class NominalHeadKeys(Section):
     standoff_mm: PositiveLength = key(POSITIVE_LENGTH, "Distance from head to mirror at a line's first point.", 100.0)
     mirror_mm: tuple[PositiveLength, PositiveLength] | None = key(
         "two positive lengths in mm",
-        "Width and height of the mirror; by default as large as the plan needs. A beam that misses it is a lost "
-        "reading of `ideal` and of described heads; the layouts `psd` and `multi_beam` lose none.",
+        "Width and height of the mirror; by default as large as the plan and the beams need. A beam that misses it is "
+        "a lost reading.",
         None,
         [120.0, 120.0],
     )
@@ -75,8 +75,8 @@ class NominalHeadKeys(Section):
     )
     aperture_mm: PositiveLength = key(
         POSITIVE_LENGTH,
-        "Edge of the square that takes the beam back. A beam outside it is a lost reading of `ideal`; "
-        "the other layouts lose none.",
+        "Edge of the square that takes each beam back, around the place where it leaves the head. A beam that comes "
+        "back outside it is a lost reading.",
         50.0,
     )
     reading_model: ReadingModel | None = key(

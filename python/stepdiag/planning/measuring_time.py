@@ -1,5 +1,6 @@
 """How long a plan takes to measure: moves of a trapezoidal speed, settling, readings, and a set-up for each line."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,9 +52,9 @@ def measuring_time(plan: Plan, times: Times, *, repeats: int = 1, backward: bool
     forward run after another goes back to the line's first point."""
     total, place = 0.0, np.zeros(3)
     on_lines, gaps = 0.0, 0
-    for line in [*plan.lines, *plan.scale_lines]:
+    for line, passes in itertools.groupby(plan.passes(repeats, backward=backward), key=lambda planned: planned.line):
         total += times.scale_line_change if line in plan.scale_lines else times.line_change
-        way = _way(plan, line, repeats, backward)
+        way = np.concatenate([planned.positions for planned in passes])
         total += float(times.move(np.linalg.norm(way[:1] - place, axis=1)).sum())
         moving = float(times.move(np.linalg.norm(np.diff(way, axis=0), axis=1)).sum())
         reading = times.settle + times.measure
@@ -62,12 +63,3 @@ def measuring_time(plan: Plan, times: Times, *, repeats: int = 1, backward: bool
         gaps += len(way) - 1
         place = way[-1]
     return total, on_lines / gaps
-
-
-def _way(plan: Plan, line: str, repeats: int, backward: bool) -> FloatArray:
-    """The points of all runs of a line, one after the other."""
-    runs = []
-    for number in range(repeats * (2 if backward else 1)):
-        points = plan.points(line, number)
-        runs.append(points[::-1] if backward and number % 2 else points)
-    return np.concatenate(runs)

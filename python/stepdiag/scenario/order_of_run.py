@@ -1,4 +1,4 @@
-"""The order in which a run is measured: what the measuring program moves through, and what readings are taken in."""
+"""The visits of a scenario's run: what the measuring program moves through, and what readings are taken in."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from stepdiag._core import Plan
 from stepdiag.scenario.known import Known, runs_of
 
 
@@ -27,30 +26,17 @@ class Visit:
 
 
 def visits_of(known: Known) -> Iterator[Visit]:
-    """The visits of a scenario's plan, in the order of the rows that `simulate` makes: lines, then scale lines; of each
-    its runs, and with `backward` after each forward run its backward one."""
+    """The passes of a scenario's plan (`Plan.passes`), numbered."""
     keys, plan = known.keys.plan, known.plan
-    runs = runs_of(keys) * (2 if keys.backward else 1)
-    number = 0
-    for set_up, line in enumerate([*plan.lines, *plan.scale_lines], start=1):
-        for run in range(runs):
-            number += 1
-            yield _visit(plan, number, set_up, run, line, backward=keys.backward and run % 2 == 1)
-
-
-def _visit(plan: Plan, number: int, set_up: int, run: int, line: str, *, backward: bool) -> Visit:
-    positions = plan.points(line, run)
-    points = np.arange(len(positions))
-    travel = np.array([-1 if sign == "n" else 1 for sign in line])
-    moved = np.array([sign != "0" for sign in line])
-    return Visit(
-        number=number,
-        set_up=set_up,
-        run=run,
-        line=line,
-        direction="backward" if backward else "forward",
-        is_scale_line=line in plan.scale_lines,
-        points=points[::-1] if backward else points,
-        positions=positions[::-1] if backward else positions,
-        approach=np.where(moved, -travel if backward else travel, 1),
-    )
+    for number, planned in enumerate(plan.passes(runs_of(keys), backward=keys.backward), start=1):
+        yield Visit(
+            number=number,
+            set_up=planned.line_index + 1,
+            run=planned.run,
+            line=planned.line,
+            direction="backward" if planned.direction == "backward" else "forward",
+            is_scale_line=planned.line in plan.scale_lines,
+            points=planned.points,
+            positions=planned.positions,
+            approach=planned.approach,
+        )

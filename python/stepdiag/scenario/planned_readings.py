@@ -9,24 +9,15 @@ from stepdiag._core import Measurement, Plan
 
 def empty_sheet(plan: Plan, signals: Sequence[str], *, repeats: int = 1, backward: bool = False) -> Measurement:
     """The plan's rows in measuring order, with all readings lost."""
-    line: list[str] = []
-    point: list[int] = []
-    run: list[int] = []
-    direction: list[str] = []
-    positions = []
-    ways = ("forward", "backward") if backward else ("forward",)
-    for name in [*plan.lines, *plan.scale_lines]:
-        for number, way in enumerate(ways * repeats):
-            points = plan.points(name, number)
-            numbers = range(len(points))[:: 1 if way == "forward" else -1]
-            positions.append(points[list(numbers)])
-            line += [name] * len(points)
-            point += numbers
-            run += [number] * len(points)
-            direction += [way] * len(points)
-    lost = np.full(len(line), np.nan)
+    passes = plan.passes(repeats, backward=backward)
+    rows = [planned for planned in passes for _ in planned.points]
     return Measurement(
-        line, point, np.concatenate(positions), dict.fromkeys(signals, lost), run=run, direction=direction
+        [planned.line for planned in rows],
+        [int(point) for planned in passes for point in planned.points],
+        np.concatenate([planned.positions for planned in passes]),
+        dict.fromkeys(signals, np.full(len(rows), np.nan)),
+        run=[planned.run for planned in rows],
+        direction=[planned.direction for planned in rows],
     )
 
 

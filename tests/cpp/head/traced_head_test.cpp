@@ -196,7 +196,7 @@ TEST(TracedReading, CameraFindsTheSpotOfTheChiefRay) {
     camera.electrons = 4e6;  // a quarter of the power comes to the sensor
     camera.shot_noise = true;
     with_camera.sensors[0].device = camera;
-    TracedConditions conditions;
+    ReadingConditions conditions;
     conditions.environment = air;
     const TracedReader psd(make_head(with_psd, 100.0), mirror_size, conditions);
     const TracedReader picture(make_head(with_camera, 100.0), mirror_size, conditions);

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <random>
 
 #include "support/refuses.hpp"
+#include "support/traced_mirror.hpp"
 
 namespace {
 
@@ -96,6 +98,44 @@ TEST(Simulate, RefractiveIndexIsTakenOffAgain) {
     for (std::size_t i = 0; i < vacuum.size(); ++i)
         EXPECT_NEAR(*vacuum.find("distance")->value[i], *in_air.find("distance")->value[i],
                     1e-12);  // a product, a quotient
+}
+
+TEST(Simulate, RunsOfRandomMachinesAreTraced) {
+    std::mt19937_64 engine(8);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    const auto pair = [&](double size) { return Vector2d(size * unit(engine), size * unit(engine)); };
+    for (const char* chain : {"[w X' b Y Z t]", "[w b Z X Y t]", "[w Z' Y' X' b t]"})
+        for (const HeadLayout layout : {HeadLayout::ideal, HeadLayout::psd, HeadLayout::multi_beam}) {
+            stepdiag::RandomErrorMap errors;
+            errors.seed = engine();
+            const Machine random(Chain::parse(chain), stepdiag::make_random_error_map(volume, errors),
+                                 {5.0, -3.0, 70.0});
+            Head head;
+            head.layout = layout;
+            head.psd_distance = 50.0;
+            head.mirror = Vector2d(220.0, 220.0);
+            if (layout == HeadLayout::multi_beam) head.beam_offsets = {{0, 1}, {20, 0}, {0, 20}, {-15, -15}};
+            SimulationOptions options;
+            for (const char* line : {"ppp", "nnp", "p00"})
+                options.misalignment[line] = {pair(1e-3), pair(1e-3), Vector2d::Zero(),   0.0,
+                                              {},         pair(2.0),  0.05 * unit(engine)};
+            options.backward = true;
+            const auto run = simulate(random, plan(), head, options);
+            const auto names = signal_names(head);
+            for (std::size_t i = 0; i < run.size(); ++i) {
+                const auto& station = run.stations()[i];
+                const Vector3d first = plan().points(station.line).front().commanded + random.tool();
+                const auto setup = set_up(head, plan().frame(station.line), first, *head.mirror,
+                                          options.misalignment[station.line.name()]);
+                const auto pose = random.pose(station.commanded, approaches(station.line, station.direction));
+                const auto traced = stepdiag::test::trace_signals(head, setup, pose.position, pose.rotation);
+                for (std::size_t c = 0; c < names.size(); ++c) {
+                    const bool tilt = names[c] == "alpha" || names[c] == "beta";
+                    // Roundings of unit vectors, and of coordinates of 1200 mm; spots have both, over 2.5 m of path.
+                    EXPECT_NEAR(run.find(names[c])->value[i].value(), traced[c].value(), tilt ? 1e-14 : 1e-11);
+                }
+            }
+        }
 }
 
 TEST(Simulate, ReadingsBesideASmallMirrorAreLost) {

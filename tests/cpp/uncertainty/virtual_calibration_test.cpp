@@ -199,6 +199,37 @@ TEST(VirtualCalibration, SampleWithALostReadingHasNoResultAndIsTracedWhole) {
     EXPECT_EQ(model.count().traced, std::uint64_t(lost));
 }
 
+TEST(VirtualCalibration, SampleThatLosesABeamOfAClosedHeadHasNoResult) {
+    for (const Kind kind : {Kind::ideal, Kind::psd, Kind::multi_beam})
+        for (const bool by_aperture : {false, true}) {
+            VirtualRun run = run_of(kind);
+            Head head = head_of(kind);
+            // At 1.2 m, 5 mrad take the beam 6 mm aside on the mirror, and 12 mm on the reference plane.
+            if (by_aperture) head.aperture = 12.0;
+            else
+                head.mirror =
+                    run.plan.smallest_mirror() + Eigen::Vector2d::Constant(kind == Kind::multi_beam ? 46.0 : 6.0);
+            run.heads = head;
+            run.inputs.inputs = {normal(InputQuantity::laser, 2.5e-3, "npp"),
+                                 normal(InputQuantity::laser, 2.5e-3, "npp", "", 1)};
+            const VirtualCalibrations model(run, {}, seed);
+            ASSERT_TRUE(model.is_in_lanes());
+            const Eigen::MatrixXd outputs = outputs_of(model, 64);
+            int lost = 0;
+            for (std::uint64_t sample = 0; sample < 64; ++sample) {
+                const Eigen::VectorXd readings = model.readings(sample);
+                const bool is_lost = !readings.allFinite();
+                lost += is_lost;
+                EXPECT_EQ(outputs.col(Eigen::Index(sample)).hasNaN(), is_lost) << sample;
+                if (!is_lost)
+                    expect_same(outputs.col(Eigen::Index(sample)), evaluated(model, readings), rounding, "outputs");
+            }
+            EXPECT_GT(lost, 0) << int(kind) << by_aperture;
+            EXPECT_LT(lost, 64) << int(kind) << by_aperture;
+            EXPECT_GE(model.count().traced, std::uint64_t(lost));
+        }
+}
+
 TEST(VirtualCalibration, FaceThatOnlyAFarSampleMeetsIsAnError) {
     // Screens beside the first beam's way back, 3.5 to 10 mm off; usual samples move it by tenths of a millimetre.
     HeadDesign design = three_beams();

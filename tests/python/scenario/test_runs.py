@@ -108,6 +108,6 @@ def test_set_up_that_makes_no_sense_is_refused_by_the_core() -> None:
 def test_gain_of_a_traced_multi_beam_head_is_refused_in_words() -> None:
     text = changed('layout = "ideal"', 'description = "three_beams"').replace("psd_zero_mm", "gain = 0.01\npsd_zero_mm")
     with pytest.raises(
-        sd.InvalidArgument, match=r"s\.toml: .*ppp: gain: expected 0, because the beams of a traced head"
+        sd.InvalidArgument, match=r"s\.toml: misalignment of nnp: gain: expected 0, because the beams of a traced head"
     ):
         simulate_scenario(parse_scenario(text, "s.toml"))

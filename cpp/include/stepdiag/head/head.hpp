@@ -1,8 +1,7 @@
-// Laser heads: what stands before the mirror and what it reads. A head of the layout psd or multi_beam reads by the
-// closed definition of its readings, or is made of bodies, beams and detectors (a design) and ray-traced; the ideal
-// head is traced to its mirror and back. The head is fixed in the machine frame, the mirror on the tool. Its reference
-// plane holds the beam's origin o and is normal to the beam; o lies `standoff` before the line's first commanded
-// functional point.
+// Laser heads: what stands before the mirror and what it reads. A head reads by the closed definition of its layout's
+// readings (measurement/reading.hpp), or is made of bodies, beams and detectors (a design) and ray-traced. The head is
+// fixed in the machine frame, the mirror on the tool. Its reference plane holds the beam's origin o and is normal to
+// the beam; o lies `standoff` before the line's first commanded functional point.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,7 +16,6 @@
 #include "stepdiag/head/traced_head.hpp"
 #include "stepdiag/measurement/head_calibration.hpp"
 #include "stepdiag/measurement/reading.hpp"
-#include "stepdiag/optics/medium.hpp"
 
 namespace stepdiag {
 
@@ -27,7 +25,7 @@ struct Head {
     double psd_distance = 0.0;                  // layout psd, mm
     std::vector<Eigen::Vector2d> beam_offsets;  // layout multi_beam, mm
     double wavelength = 1530.0;                 // vacuum, nm
-    double aperture = 50.0;                 // edge of the square in the reference plane that takes the beam back, mm
+    double aperture = 50.0;                     // mm: edge of the square around a beam's start that takes it back
     std::optional<Eigen::Vector2d> mirror;  // width and height, mm; none: as large as the plan needs, and mirror_margin
 
     static constexpr double mirror_margin = 25.0;  // on every side, mm
@@ -87,20 +85,25 @@ struct HeadSetup {
 HeadSetup set_up(const Head& head, const Eigen::Matrix3d& machine_R_line, const Eigen::Vector3d& first_point,
                  const Eigen::Vector2d& mirror, const Misalignment& misalignment);
 
-// The mirror's reading with its centre at the functional point and the tool turned by `machine_R_tool`:
-// by ray tracing (none where the beam misses the mirror or does not come back to the head), or by the closed
-// definition.
-std::optional<Reading> trace_reading(const Head& head, const HeadSetup& setup, const Eigen::Vector3d& functional_point,
-                                     const Eigen::Matrix3d& machine_R_tool, const Medium& ambient);
-std::optional<Reading> define_reading(const HeadSetup& setup, const Eigen::Vector3d& functional_point,
-                                      const Eigen::Matrix3d& machine_R_tool);
-
-// The mirror in the sensor frame: centre and axes.
+// The mirror in the sensor frame, its centre at the functional point, the tool turned by `machine_R_tool`.
 MirrorPose mirror_in_sensor_frame(const HeadSetup& setup, const Eigen::Vector3d& functional_point,
                                   const Eigen::Matrix3d& machine_R_tool);
 
 // Names of the signals a head gives (channels of a Measurement), and their values for a reading.
 std::vector<std::string> signal_names(const Head& head);
+bool is_distance(const std::string& signal);
 Eigen::VectorXd signals(const Head& head, const Reading& reading);
+
+// One value a signal, in the order of signal_names; lost ones are empty.
+using SignalRow = std::vector<std::optional<double>>;
+
+// What a head without a design reads of a mirror of this size. All layouts lose beams, and with them their signals, by
+// the same rules. A beam is read where
+//   - the mirror faces the head, tilted by less than 45 degrees (read_mirror),
+//   - the mirror lies ahead of o, and of the beam's start,
+//   - the beam meets the mirror's plane within its outline,
+//   - it comes back to the reference plane within the square of `aperture` around its start.
+// Beams of multi_beam are lost one by one; the one beam of ideal and psd starts at o.
+SignalRow define_signals(const Head& head, const MirrorPose& mirror, const Eigen::Vector2d& size);
 
 }  // namespace stepdiag

@@ -11,20 +11,17 @@
 
 namespace stepdiag {
 
-struct TracedConditions {
+struct ReadingConditions {
     Environment environment;             // what the light runs in
     std::optional<Environment> assumed;  // what readings are reduced with; none: the same
     ReplayOptions replay;
     std::uint64_t noise_seed = 0;  // of the sensors' own noise
 };
 
-// One value a signal, in the order of signal_names; lost ones are empty.
-using SignalRow = std::vector<std::optional<double>>;
-
 class TracedReader {
 public:
     // `head.design` must be there.
-    TracedReader(const Head& head, const Eigen::Vector2d& mirror, const TracedConditions& conditions);
+    TracedReader(const Head& head, const Eigen::Vector2d& mirror, const ReadingConditions& conditions);
 
     // One row a pose, without the constants and the noise of a line. `first_row` counts the sensors' noise on.
     std::vector<SignalRow> read(const std::vector<MirrorPose>& mirrors, std::uint64_t first_row = 0,
@@ -39,7 +36,7 @@ private:
 
     TracedHead traced_;
     NominalHead nominal_;
-    TracedConditions conditions_;
+    ReadingConditions conditions_;
 };
 
 }  // namespace stepdiag

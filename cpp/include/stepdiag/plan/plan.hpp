@@ -13,6 +13,7 @@ namespace stepdiag {
 
 // One point of a line. Axis nodes are counted from home: node k of an axis stands at k * travel / steps.
 struct PlanPoint {
+    int number;                 // on its line, from 0
     Eigen::Vector3d commanded;  // mm, machine frame
     std::array<int, 3> node;    // per axis
     std::optional<Axis> moved;  // the axis that moved to get here; none for a line's first point

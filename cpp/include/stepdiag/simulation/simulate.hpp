@@ -1,4 +1,5 @@
-// The virtual machine and its virtual head: machine + plan + head + misalignments + noise -> Measurement.
+// The virtual machine and its virtual head: machine + plan + head + misalignments + noise -> Measurement. Every pass is
+// read by pass_reader.
 // The machine's total error motion moves the mirror before the scene is made; the step-diagonal equations are not used.
 #pragma once
 
@@ -6,12 +7,13 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "stepdiag/core/air.hpp"
 #include "stepdiag/head/traced_reading.hpp"
 #include "stepdiag/machine/machine.hpp"
 #include "stepdiag/measurement/measurement.hpp"
-#include "stepdiag/plan/plan.hpp"
+#include "stepdiag/plan/run_order.hpp"
 
 namespace stepdiag {
 
@@ -23,6 +25,9 @@ struct Noise {
     double spot = 0.0;      // mm
     std::uint64_t seed = 0;
     double common = 0.0;  // mm: one draw a row, added to all of its distances
+
+    // To the signals of a row, by its number in the run.
+    void add(SignalRow& row, const std::vector<std::string>& signals, std::uint64_t number) const;
 };
 
 // Throws InvalidArgument for a deviation that is negative or not finite.
@@ -39,6 +44,11 @@ struct SimulationOptions {
     std::optional<double> seconds_per_reading = {};  // makes the channel time, which counts from the first reading
 
     static constexpr int largest_repeat_count = 1'000;
+
+    Misalignment misalignment_of(const Line& line) const;
+    // Whoever says what air is assumed means air; else usual_environment.
+    Environment environment_of(const Head& head) const;
+    ReadingConditions conditions_of(const Head& head) const;
 };
 
 // The heads of a run's lines. All of them give the same signals.
@@ -52,14 +62,19 @@ struct Heads {
     HeadCalibrations calibration() const;
 };
 
-// Rows in the order in which they are read: the plan's lines in their order, then its scale lines; of each line runs 0,
-// 1, 2, ...; with `backward` runs 0, 2, ... and after each its backward run 1, 3, ..., points descending. The drift of
-// distances counts from the first reading of each forward run. Lost readings are empty fields. Throws InvalidArgument
-// for a head that makes no sense, a mirror smaller than the plan's smallest, misalignments of 0.1 rad or more or of
-// lines that are not in the plan, a drift without seconds_per_reading, a gain of a traced multi_beam head, heads of
-// lines that are not in the plan, heads that do not give the same signals, negative noise, an index below 1. Throws
-// ReplayMismatch where a traced head's replay and its trace differ.
+// Rows in the order in which they are read (plan/run_order.hpp). The drift of distances counts from the first reading
+// of each forward run. Lost readings are empty fields. Throws InvalidArgument for a head that makes no sense, a mirror
+// smaller than the plan's smallest, misalignments of 0.1 rad or more or of lines that are not in the plan, a drift
+// without seconds_per_reading, a gain of a traced multi_beam head, heads of lines that are not in the plan, heads that
+// do not give the same signals, negative noise, an index below 1. Throws ReplayMismatch where a traced head's replay
+// and its trace differ.
 Measurement simulate(const Machine& machine, const Plan& plan, const Heads& heads,
                      const SimulationOptions& options = {}, ReplayCount* count = nullptr);
+// Throws InvalidArgument as simulate() does.
+void check_run(const Plan& plan, const Heads& heads, const SimulationOptions& options);
+
+// The rows of these passes, in their order, as a measurement. `seconds_per_reading` makes the channel time.
+Measurement as_measured(const std::vector<PlannedPass>& passes, const std::vector<std::string>& signals,
+                        const std::vector<SignalRow>& rows, const std::optional<double>& seconds_per_reading);
 
 }  // namespace stepdiag

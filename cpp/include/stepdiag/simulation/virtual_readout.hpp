@@ -3,9 +3,8 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 
-#include "stepdiag/simulation/simulate.hpp"
+#include "stepdiag/simulation/pass_reader.hpp"
 
 namespace stepdiag {
 
@@ -21,15 +20,10 @@ public:
     SignalRow read(const Eigen::Vector3d& position, const Approaches& approach = all_positive, std::uint64_t row = 0,
                    double elapsed = 0.0) const;
 
-    const Head& head() const { return head_; }
-
 private:
     Machine machine_;
-    Head head_;
-    SimulationOptions options_;
-    Misalignment misalignment_;
-    HeadSetup setup_;
-    std::optional<TracedReader> reader_;  // of a head with a design
+    Noise noise_;
+    PassReader reader_;
 };
 
 }  // namespace stepdiag
