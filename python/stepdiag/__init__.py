@@ -40,6 +40,7 @@ from stepdiag._core import (
     HeadDesign,
     Interferometer,
     InvalidArgument,
+    KnownCombination,
     LateralEffect,
     Machine,
     Measurement,
@@ -65,6 +66,7 @@ from stepdiag._core import (
     StatisticsOptions,
     UncertainInput,
     UncertainInputs,
+    Undetermined,
     Validation,
     Verdict,
     VirtualCalibrations,
@@ -95,7 +97,9 @@ from stepdiag._core import (
     trace_beams,
     volumetric_accuracy,
     with_covariance,
+    word_findings_with,
 )
+from stepdiag.calibration.finding_text import undetermined_text
 from stepdiag.io.to_xarray import attach
 
 if TYPE_CHECKING:
@@ -171,6 +175,7 @@ __all__ = [
     "InvalidArgument",
     "KeyTrigger",
     "Known",
+    "KnownCombination",
     "LateralEffect",
     "LinuxcncError",
     "LinuxcncSession",
@@ -207,6 +212,7 @@ __all__ = [
     "UncertainInputs",
     "UncertaintyRequest",
     "UncertaintyResult",
+    "Undetermined",
     "Validation",
     "Verdict",
     "VirtualCalibrations",
@@ -340,6 +346,7 @@ _LATER = {
 _MODULE_OF = {name: module for module, names in _LATER.items() for name in names}
 
 attach()
+word_findings_with(undetermined_text)  # the extension's findings are worded here
 
 
 def __getattr__(name: str) -> Any:

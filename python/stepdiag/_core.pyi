@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumetricAccuracy', 'adjust', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'volumetric_accuracy', 'with_covariance']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'Undetermined', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumetricAccuracy', 'adjust', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'volumetric_accuracy', 'with_covariance', 'word_findings_with']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -59,13 +59,13 @@ class ErrorMap:
         """
         functions: name -> (position, value), one-dimensional and of one length, positions ascending. negative_functions: the same of the - direction, where it has others. Raises InvalidArgument.
         """
+    def frame_deviations(self, volume: numpy.typing.ArrayLike) -> list[tuple[str, float, float]]:
+        """
+        Where the map breaks the frame choice (0 at home, straightness 0 at both ends of travel, approached in + direction): (function, position in mm, value in mm or rad) each.
+        """
     def function(self, name: str, position: numpy.typing.ArrayLike, approach: str = '+') -> numpy.typing.NDArray[numpy.float64]:
         """
         Values (mm or rad) of one error function at positions (mm), shape (n,), approached in the direction "+" or "-".
-        """
-    def warnings(self, volume: numpy.typing.ArrayLike) -> list[str]:
-        """
-        Where the map breaks the frame choice (0 at home, straightness 0 at both ends of travel, approached in + direction); one sentence each.
         """
     def write(self, path: str | os.PathLike[str], *, chain: Chain | str | None = None, volume: numpy.typing.ArrayLike | None = None, tool: numpy.typing.ArrayLike | None = None) -> None:
         """
@@ -811,6 +811,71 @@ class PlausibleLimits:
     @property
     def translation(self) -> float:
         ...
+class Undetermined:
+    """
+    What the readings leave open, as data; `Calibration.undetermined` has it in words.
+    """
+    @staticmethod
+    def all_remedies() -> list[str]:
+        ...
+    @staticmethod
+    def reasons() -> list[str]:
+        ...
+    @property
+    def component(self) -> int:
+        """
+        Of a set-up: as in SetupEstimate.
+        """
+    @property
+    def line(self) -> str:
+        """
+        The line to add; else empty.
+        """
+    @property
+    def lines_planned(self) -> int:
+        """
+        Of such a step: its lines in the plan.
+        """
+    @property
+    def lines_read(self) -> int:
+        """
+        Of such a step: the lines that it was read on.
+        """
+    @property
+    def parameters(self) -> list[str]:
+        """
+        "EXX", ..., "C0Y"; of a set-up its quantity, as in SetupEstimate.
+        """
+    @property
+    def part(self) -> str:
+        """
+        What is open: "whole"; "slope"; "positions": at some of them; "reversal"; "reversal_at_home": of the reversal errors only the change along the axis is known; "setup".
+        """
+    @property
+    def positions(self) -> list[float]:
+        """
+        mm: where it is open; of a step that was read on too few lines its two ends.
+        """
+    @property
+    def reason(self) -> str:
+        """
+        One of `reasons()`.
+        """
+    @property
+    def remedies(self) -> list[str]:
+        """
+        What would help, the best first; any one of them does. Of `all_remedies()`.
+        """
+    @property
+    def setups(self) -> list[tuple[int, str]]:
+        """
+        Of a set-up: (first run, line) of each that is open.
+        """
+    @property
+    def step(self) -> int:
+        """
+        Of such a step: its number, from 1; else 0.
+        """
 class Calibration:
     """
     The 21 parameters as far as the readings determine them, with standard uncertainties; native units (mm, rad).
@@ -854,6 +919,11 @@ class Calibration:
         When it was evaluated: ISO 8601, UTC; empty where it is not known.
         """
     @property
+    def findings(self) -> list[Undetermined]:
+        """
+        What the readings do not determine, why, and what would help; files keep it in words only.
+        """
+    @property
     def fit(self) -> str | None:
         """
         Verdict of the fit: "accepted", "doubtful", "rejected" (not to be used) or "unchecked" (nothing controls the readings); None where it is not known.
@@ -892,7 +962,7 @@ class Calibration:
     @property
     def undetermined(self) -> list[str]:
         """
-        What the readings do not determine, why, and what would help; one sentence each.
+        The findings in words; one sentence each.
         """
     @property
     def undetermined_reversal_constants(self) -> list[str]:
@@ -1085,6 +1155,38 @@ class Verdict:
     @property
     def reasons(self) -> list[FitReason]:
         ...
+class KnownCombination:
+    """
+    A sum of unknowns that are not determined one by one: of slopes of positioning errors and straightnesses, or of two unknowns of one set-up.
+    """
+    @property
+    def component(self) -> int:
+        """
+        Of a set-up: as in SetupEstimate.
+        """
+    @property
+    def line(self) -> str:
+        """
+        Of a set-up; empty for slopes.
+        """
+    @property
+    def run(self) -> int:
+        """
+        Of a set-up: the first run that has it.
+        """
+    @property
+    def standard_uncertainty(self) -> float:
+        ...
+    @property
+    def terms(self) -> list[tuple[float, str]]:
+        """
+        (weight, parameter) each; of a set-up its quantities, as in SetupEstimate.
+        """
+    @property
+    def value(self) -> float:
+        """
+        rad; of slopes mm/mm.
+        """
 class Adjustment:
     """
     What an adjustment found: calibration, set-ups, and how the readings fit.
@@ -1098,7 +1200,7 @@ class Adjustment:
         Of a larger square sum, if model and uncertainties are right.
         """
     @property
-    def combinations(self) -> list[str]:
+    def combinations(self) -> list[KnownCombination]:
         """
         What is known of unknowns that are not determined one by one.
         """
@@ -2151,6 +2253,10 @@ def volumetric_accuracy(calibration: Calibration, *, tool: numpy.typing.ArrayLik
 def with_covariance(calibration: Calibration, covariance: numpy.typing.ArrayLike) -> Calibration:
     """
     The calibration with another covariance of its values, such as Propagation.covariance of its entries, and the standard uncertainties that go with it. Raises InvalidArgument for what is no covariance of these values.
+    """
+def word_findings_with(words: collections.abc.Callable[[Undetermined], str]) -> None:
+    """
+    Sets the function that makes a sentence of an Undetermined; the package does so.
     """
 __version__: str = '0.1.0'
 largest_repeat_count: int = 1000

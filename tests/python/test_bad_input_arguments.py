@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from refusal import refused
-from truth import CHAIN, DIAGONALS, VOLUME, Setup
+from truth import Setup
+from usual import CHAIN, DIAGONALS, VOLUME
 
 import stepdiag as sd
 
@@ -130,8 +131,8 @@ def test_error_map_is_not_asked_for_what_makes_no_sense() -> None:
     refused(ERRORS.function, "EXX", "far", names="position")
     refused(ERRORS.function, "EXX", [0.0, NAN], names="position")
     refused(ERRORS.function, "EXX", [INF], names="position")
-    refused(ERRORS.warnings, (1.0, 2.0), names="volume")
-    refused(ERRORS.warnings, (1.0, 2.0, NAN), names="volume")
+    refused(ERRORS.frame_deviations, (1.0, 2.0), names="volume")
+    refused(ERRORS.frame_deviations, (1.0, 2.0, NAN), names="volume")
 
 
 @pytest.mark.parametrize(

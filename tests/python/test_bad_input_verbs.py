@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from refusal import refused
-from truth import CHAIN, DIAGONALS, VOLUME, Setup, changed
+from truth import Setup, changed
+from usual import CHAIN, DIAGONALS, VOLUME
 
 import stepdiag as sd
 

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 from refusal import refused
+from usual import CHAIN, SMALL_VOLUME, small_plan
 
 import stepdiag as sd
 
-PLAN = sd.Plan((80, 60, 50), ["ppp", "npp", "pnp", "nnp"], 4, scale_lines=["p00", "0p0", "00p"])
-HEAD, CHAIN = sd.Head(), "[w X' b Y Z t]"
-MACHINE = sd.Machine(CHAIN, sd.random_error_map((80, 60, 50), seed=2))
+PLAN, HEAD = small_plan(steps=4), sd.Head()
+MACHINE = sd.Machine(CHAIN, sd.random_error_map(SMALL_VOLUME, seed=2))
 SIMULATION: dict[str, Any] = {
     "misalignment": {"ppp": sd.Misalignment(reflector=(1e-4, 2e-4))},
     "noise": sd.Noise(distance=1e-4, tilt=1e-6, seed=4),

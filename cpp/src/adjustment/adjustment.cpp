@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <unsupported/Eigen/SpecialFunctions>
 
 #include "adjustment/adjustment_result.hpp"
@@ -10,7 +9,6 @@
 #include "adjustment/smoothness.hpp"
 #include "adjustment/verdict.hpp"
 #include "stepdiag/core/error.hpp"
-#include "stepdiag/core/units.hpp"
 
 namespace stepdiag {
 namespace {
@@ -33,18 +31,15 @@ std::array<double, function_count> smoothness_at_start(const AdjustmentOptions& 
     return given_deviations(*options.smoothness);
 }
 
-std::vector<std::string> describe(const Observability& observability, const Eigen::VectorXd& x,
-                                  const BorderedBand& inverse) {
-    std::vector<std::string> sentences;
-    for (const KnownCombination& combination : observability.combinations()) {
-        std::ostringstream text;
-        text.precision(4);
-        text << combination.text << " = " << combination.form.value(x) / microradian << " +- "
-             << std::sqrt(std::max(0.0, combination.form.variance(inverse))) / microradian
-             << (combination.is_angle ? " urad" : " um/m");
-        sentences.push_back(text.str());
+std::vector<KnownCombination> known_combinations(const Observability& observability, const Eigen::VectorXd& x,
+                                                 const BorderedBand& inverse) {
+    std::vector<KnownCombination> known;
+    for (const auto& [form, combination] : observability.combinations()) {
+        known.push_back(combination);
+        known.back().value = form.value(x);
+        known.back().standard_uncertainty = std::sqrt(std::max(0.0, form.variance(inverse)));
     }
-    return sentences;
+    return known;
 }
 
 }  // namespace
@@ -77,8 +72,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     solver.assume_usual(observability.determined());
 
     Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
-    Adjustment result{
-        {"", chain, {}, {}, {}, {}, {}, {}, {}}, {}, {}, 0.0, 0, 1.0, 0, {}, smoothness_at_start(options)};
+    Adjustment result{{"", chain, {}, {}, {}, {}}, {}, {}, 0.0, 0, 1.0, 0, {}, smoothness_at_start(options)};
     OutlierSearch outliers(problem, solver, options);
     try {
         result.iterations = outliers.solve_without_gross(observability.determined(), x);
@@ -97,18 +91,15 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     const BorderedBand& inverse = outliers.inverse();
     result.calibration = make_calibration(problem, tables, forms, x, inverse);
     const std::vector<bool> known = known_unknowns(problem, observability.determined(), inverse);
-    result.calibration.undetermined = observability.sentences(known);
-    if (!is_anything_determined(result.calibration))
-        throw InvalidArgument(
-            "adjustment: nothing can be determined. " +
-            (result.calibration.undetermined.empty() ? std::string() : result.calibration.undetermined.front()));
+    result.calibration.findings = observability.findings(known);
+    if (!is_anything_determined(result.calibration)) throw NothingDetermined("adjustment", result.calibration.findings);
     refuse_implausible(result.calibration, measurement, plan, options.plausible);
     if (options.full_covariance) result.calibration.covariance = full_covariance(problem, forms, solver.factor());
     result.setup = setup_estimates(problem, known, x, inverse);
     result.residuals = outliers.residuals();
     std::stable_sort(result.residuals.begin(), result.residuals.end(),
                      [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
-    result.combinations = describe(observability, x, inverse);
+    result.combinations = known_combinations(observability, x, inverse);
     result.weighted_square_sum = solver.equations().square_sum(x);
     result.degrees_of_freedom = degrees_of_freedom(solver);
     if (result.degrees_of_freedom > 0)

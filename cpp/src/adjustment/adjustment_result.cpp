@@ -63,7 +63,7 @@ CalibratedForms choose_forms(const AdjustmentTables& tables) {
 
 Calibration make_calibration(const AdjustmentProblem& problem, const AdjustmentTables& tables,
                              const CalibratedForms& forms, const Eigen::VectorXd& x, const BorderedBand& inverse) {
-    Calibration calibration{"adjustment", problem.chain(), problem.plan().volume(), problem.tool(), {}, {}, {}, {}, {}};
+    Calibration calibration{"adjustment", problem.chain(), problem.plan().volume(), problem.tool(), {}, {}};
     for (int i = 0; i < function_count; ++i) {
         if (forms.functions[i]) {
             CalibratedFunction function{forms.functions[i]->position, {}, {}, forms.slope_determined[i]};

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <sstream>
 
 #include "adjustment/setup_priors.hpp"
 
@@ -28,37 +27,10 @@ bool touches(const Eigen::VectorXd& vector, const LinearForm& form, const Eigen:
     return std::abs(form.value(vector)) > touching * largest * possible;
 }
 
-std::string join(const std::vector<std::string>& parts) {
-    std::string text;
-    for (const auto& part : parts) text += (text.empty() ? "" : ", ") + part;
-    return text;
-}
-
-std::string slope_name(FunctionId id) {
-    return id.is_positioning() ? std::string("scale of ") + letter(id.axis) : "slope of " + id.name();
-}
-
-std::string setup_name(int column) {
+// The quantity that a column of a set-up's vector stands for, and its component.
+std::pair<std::string, int> setup_unknown(int column) {
     const auto of = setup_column_name(column);
-    if (!of) return "cosine error";
-    const std::string axis = of->component == 0 ? " about local x" : " about local y";
-    const std::string along = of->component == 0 ? " along local x" : " along local y";
-    switch (of->quantity) {
-        case SetupQuantity::reflector: return "reflector tilt" + axis;
-        case SetupQuantity::laser: return "laser tilt" + axis;
-        case SetupQuantity::distance_constant: return "distance constant";
-        case SetupQuantity::beam_constants: return "constant of beam d" + std::to_string(of->component + 1);
-        case SetupQuantity::psd_zero: return "zero offset of the position sensing device" + along;
-        case SetupQuantity::lateral: return "lateral beam offset" + along;
-        case SetupQuantity::roll: return "head roll";
-        case SetupQuantity::gain: return "tilt gain";
-        case SetupQuantity::drift: return "drift";
-    }
-    return "";
-}
-
-std::string place(const LineSetup& setup) {
-    return setup.line.name() + (setup.run > 0 ? " (run " + std::to_string(setup.run) + ")" : "");
+    return of ? std::pair(name(of->quantity), of->component) : std::pair(std::string("cosine_error"), 0);
 }
 
 }  // namespace
@@ -70,18 +42,21 @@ Observability::Observability(const GaussNewton& solver, AdjustmentTables& tables
         if (tables.slope(FunctionId::at(i))) sloped.push_back(FunctionId::at(i));
     std::vector<LinearForm*> forms = tables.all();
     // A tilt reads reflector minus laser: where each of them is open, that may be known.
-    std::vector<KnownCombination> differences;
+    std::vector<OpenCombination> differences;
     for (const LineSetup& setup : problem_.setups())
         for (int i = 0; i < 2; ++i) {
             const int reflector = setup.unknown[setup::reflector + i], laser = setup.unknown[setup::laser + i];
             if (reflector == no_unknown || laser == no_unknown) continue;
-            KnownCombination difference{
-                {}, setup_name(setup::reflector + i) + " - laser tilt on " + place(setup), true};
+            OpenCombination difference;
+            difference.combination.terms = {{1.0, name(SetupQuantity::reflector)}, {-1.0, name(SetupQuantity::laser)}};
+            difference.combination.component = i;
+            difference.combination.run = setup.run;
+            difference.combination.line = setup.line.name();
             difference.form.add(reflector, 1.0);
             difference.form.add(laser, -1.0);
             differences.push_back(difference);
         }
-    for (KnownCombination& difference : differences) forms.push_back(&difference.form);
+    for (OpenCombination& difference : differences) forms.push_back(&difference.form);
 
     const Eigen::VectorXd units = column_units(solver);
     const std::vector<int>& held = solver.dependent();
@@ -96,7 +71,7 @@ Observability::Observability(const GaussNewton& solver, AdjustmentTables& tables
         for (std::size_t i = 0; i < sloped.size(); ++i)
             slopes(i, h) = tables.slope(sloped[i])->value(vector) / problem_.plan().volume()[index(sloped[i].axis)];
     }
-    for (const KnownCombination& difference : differences)
+    for (const OpenCombination& difference : differences)
         if (difference.form.determined && !determined_[difference.form.unknown[0]]) combinations_.push_back(difference);
     combine_slopes(slopes, sloped);
 }
@@ -119,38 +94,37 @@ void Observability::combine_slopes(const Eigen::MatrixXd& slopes, const std::vec
         Eigen::Index largest;
         weights.cwiseAbs().maxCoeff(&largest);
         weights /= weights[largest] > 0.0 ? weights.cwiseAbs().sum() : -weights.cwiseAbs().sum();
-        KnownCombination combination{{}, "", false};
-        std::ostringstream text;
-        text.precision(3);
+        OpenCombination combination;
         for (std::size_t i = 0; i < open.size(); ++i) {
             const double weight = weights[Eigen::Index(i)];
             if (std::abs(weight) < 1e-3 || combination.form.size == 6) continue;
             const FunctionId id = functions[open[i]];
             const LinearForm& slope = *tables_.slope(id);
             combination.form.add(slope.unknown[0], weight / problem_.plan().volume()[index(id.axis)]);
-            text << (weight < 0.0 ? (i ? " - " : "-") : (text.tellp() > 0 ? " + " : "")) << std::abs(weight) << ' '
-                 << slope_name(id);
+            combination.combination.terms.push_back({weight, id.name()});
         }
-        combination.text = text.str();
         combinations_.push_back(combination);
     }
 }
 
-std::vector<std::string> Observability::sentences(const std::vector<bool>& known) const {
-    std::vector<std::string> sentences;
-    add_function_sentences(sentences);
-    add_setup_sentences(known, sentences);
-    return sentences;
+std::vector<Undetermined> Observability::findings(const std::vector<bool>& known) const {
+    std::vector<Undetermined> findings;
+    add_functions(findings);
+    add_reversal(findings);
+    add_setups(known, findings);
+    return findings;
 }
 
-void Observability::add_function_sentences(std::vector<std::string>& sentences) const {
-    std::vector<std::string> open, not_moved;
+void Observability::add_functions(std::vector<Undetermined>& findings) const {
+    Undetermined open{
+        OpenPart::whole, {}, OpenReason::not_separated, {Remedy::tilts, Remedy::other_directions, Remedy::other_order}};
+    Undetermined not_moved{OpenPart::whole, {}, OpenReason::not_moved, {Remedy::lines_to_the_end}};
     for (int i = 0; i < function_count; ++i) {
         const FunctionId id = FunctionId::at(i);
         const FunctionForms &values = tables_.values(id), &shapes = tables_.shapes(id);
         if (id.is_rotation() && !problem_.has_rotations()) continue;
         if (values.position.size() < 2 && shapes.position.size() < 2) {
-            not_moved.push_back(id.name());
+            not_moved.parameters.push_back(id.name());
             continue;
         }
         const auto count = [](const FunctionForms& forms, bool determined) {
@@ -162,80 +136,77 @@ void Observability::add_function_sentences(std::vector<std::string>& sentences) 
         const bool slope_open = slope && !slope->determined && !id.is_straightness();
         const bool shape_only = slope_open && count(shapes, true) > count(values, true);
         const FunctionForms& known = shape_only ? shapes : values;
-        if (slope_open && (shape_only || (id.is_positioning() && count(values, true) == 0))) {
-            const std::string line = std::array<const char*, 3>{"p00", "0p0", "00p"}[index(id.axis)];
-            const auto& lines = problem_.setups();
-            const bool measured = std::any_of(lines.begin(), lines.end(), [&](const LineSetup& setup) {
-                return setup.line.moves(id.axis) && setup.line.moved_axes() == 1;
-            });
-            sentences.push_back(
-                slope_name(id) +
-                (id.is_positioning() && measured ? ": its line does not tell it from rotations that move the tool; "
-                                                   "add body diagonals, or give priors to the line's set-up"
-                 : id.is_positioning()           ? ": add the line " + line
-                                                 : ": read tilts on lines of other directions, or give a prior to "
-                                                   "the set-up"));
-        }
+        if (slope_open && (shape_only || (id.is_positioning() && count(values, true) == 0)))
+            findings.push_back(open_slope(id));
         if (count(known, true) == 0) {
-            open.push_back(id.name());
-            continue;
-        }
-        if (const auto lost = count(known, false); lost > 0) {
-            std::ostringstream text;
-            text << id.name() << " at " << lost << " of its positions (";
-            int listed = 0;
+            open.parameters.push_back(id.name());
+        } else if (count(known, false) > 0) {
+            findings.push_back(
+                {OpenPart::positions, {id.name()}, OpenReason::not_seen, {Remedy::lost_points, Remedy::lines_there}});
             for (std::size_t k = 0; k < known.value.size(); ++k)
-                if (known.value[k].size > 0 && !known.value[k].determined && ++listed <= 4)
-                    text << (listed > 1 ? ", " : "") << known.position[k];
-            text << (lost > 4 ? ", ... mm)" : " mm)")
-                 << ": the readings do not tell it there; measure points that were lost, or more lines that visit them";
-            sentences.push_back(text.str());
+                if (known.value[k].size > 0 && !known.value[k].determined)
+                    findings.back().positions.push_back(known.position[k]);
         }
     }
-    if (!not_moved.empty())
-        sentences.push_back(join(not_moved) + ": no reading on a line that moves the axis to its end; add such lines");
-    if (!open.empty())
-        sentences.push_back(
-            join(open) +
-            ": the readings do not tell them apart; read tilts too, or add lines of other directions or "
-            "another order of steps");
+    for (const Undetermined& finding : {not_moved, open})
+        if (!finding.parameters.empty()) findings.push_back(finding);
     for (const Squareness s : all_squarenesses)
         if (!tables_.squareness(s) || !tables_.squareness(s)->determined)
-            sentences.push_back(name(s) + ": add body diagonals, or the two face diagonals of its plane");
-    std::vector<std::string> reversals, constants;
-    for (int i = 0; i < function_count; ++i) {
-        const FunctionForms &reversal = tables_.reversal(FunctionId::at(i)),
-                            &change = tables_.reversal_change(FunctionId::at(i));
-        const auto open_at = [](const FunctionForms& forms) {
-            return std::any_of(forms.value.begin(), forms.value.end(),
-                               [](const auto& form) { return !form.determined; });
-        };
-        if (open_at(change)) reversals.push_back(FunctionId::at(i).name());
-        else if (open_at(reversal)) constants.push_back(FunctionId::at(i).name());
-    }
-    if (!reversals.empty())
-        sentences.push_back("reversal of " + join(reversals) + ": measure more lines forward and backward");
-    if (!constants.empty())
-        sentences.push_back("reversal of " + join(constants) +
-                            " at home: only its change along the axis is known; measure single-axis lines forward and "
-                            "backward");
+            findings.push_back(
+                {OpenPart::whole, {name(s)}, OpenReason::not_seen, {Remedy::body_diagonals, Remedy::face_diagonals}});
 }
 
-void Observability::add_setup_sentences(const std::vector<bool>& known, std::vector<std::string>& sentences) const {
-    std::map<int, std::vector<std::string>> lines;  // by column
-    for (const LineSetup& setup : problem_.setups())
-        for (const int column : setup.active)
-            if (!known[setup.unknown[column]]) lines[column].push_back(place(setup));
-    bool scale_open = false;
-    for (const Axis axis : all_axes) {
-        const auto& slope = tables_.slope({axis, Component(index(axis))});
-        scale_open = scale_open || (slope && !slope->determined);
+Undetermined Observability::open_slope(FunctionId id) const {
+    Undetermined slope{OpenPart::slope, {id.name()}};
+    const bool measured = std::any_of(problem_.setups().begin(), problem_.setups().end(), [&](const LineSetup& setup) {
+        return setup.line.moves(id.axis) && setup.line.moved_axes() == 1;
+    });
+    if (!id.is_positioning()) {
+        slope.remedies = {Remedy::tilts_of_other_directions, Remedy::line_priors};
+    } else if (measured) {
+        slope.reason = OpenReason::tool_rotations;
+        slope.remedies = {Remedy::body_diagonals, Remedy::line_priors};
+    } else {
+        slope.remedies = {Remedy::axis_line};
+        slope.line = line_along(id.axis);
     }
-    for (const auto& [column, places] : lines)
-        sentences.push_back(setup_name(column) + " on " + join(places) + ": give a prior" +
-                            (scale_open && column >= setup::laser && column < setup::distance_constant
-                                 ? ", or make the scales known"
-                                 : ", or take it as fixed"));
+    return slope;
+}
+
+void Observability::add_reversal(std::vector<Undetermined>& findings) const {
+    Undetermined reversal{OpenPart::reversal, {}, OpenReason::not_seen, {Remedy::both_ways}};
+    Undetermined at_home{OpenPart::reversal_at_home, {}, OpenReason::not_seen, {Remedy::single_axes_both_ways}};
+    const auto is_open = [](const FunctionForms& forms) {
+        return std::any_of(forms.value.begin(), forms.value.end(), [](const auto& form) { return !form.determined; });
+    };
+    for (int i = 0; i < function_count; ++i) {
+        const FunctionId id = FunctionId::at(i);
+        if (is_open(tables_.reversal_change(id))) reversal.parameters.push_back(id.name());
+        else if (is_open(tables_.reversal(id))) at_home.parameters.push_back(id.name());
+    }
+    for (const Undetermined& finding : {reversal, at_home})
+        if (!finding.parameters.empty()) findings.push_back(finding);
+}
+
+void Observability::add_setups(const std::vector<bool>& known, std::vector<Undetermined>& findings) const {
+    const bool scale_open = std::any_of(all_axes.begin(), all_axes.end(), [&](Axis axis) {
+        const auto& slope = tables_.slope({axis, Component(index(axis))});
+        return slope && !slope->determined;
+    });
+    std::map<int, Undetermined> by_column;
+    for (const LineSetup& setup : problem_.setups())
+        for (const int column : setup.active) {
+            if (known[setup.unknown[column]]) continue;
+            Undetermined& finding = by_column[column];
+            const bool hangs_on_scales = column >= setup::laser && column < setup::distance_constant && scale_open;
+            const auto [quantity, component] = setup_unknown(column);
+            finding.part = OpenPart::setup;
+            finding.parameters = {quantity};
+            finding.remedies = {Remedy::prior, hangs_on_scales ? Remedy::scales : Remedy::fixed};
+            finding.component = component;
+            finding.setups.emplace_back(setup.run, setup.line.name());
+        }
+    for (const auto& entry : by_column) findings.push_back(entry.second);
 }
 
 }  // namespace stepdiag

@@ -200,6 +200,23 @@ void bind_result(py::module_& m) {
             "\"accepted\", \"doubtful\", \"rejected\" or \"unchecked\".")
         .def_readonly("reasons", &Verdict::reasons);
 
+    py::class_<KnownCombination>(m, "KnownCombination",
+                                 "A sum of unknowns that are not determined one by one: of slopes of positioning "
+                                 "errors and straightnesses, or of two unknowns of one set-up.")
+        .def_property_readonly(
+            "terms",
+            [](const KnownCombination& c) {
+                std::vector<std::pair<double, std::string>> terms;
+                for (const auto& term : c.terms) terms.emplace_back(term.weight, term.parameter);
+                return terms;
+            },
+            "(weight, parameter) each; of a set-up its quantities, as in SetupEstimate.")
+        .def_readonly("component", &KnownCombination::component, "Of a set-up: as in SetupEstimate.")
+        .def_readonly("run", &KnownCombination::run, "Of a set-up: the first run that has it.")
+        .def_readonly("line", &KnownCombination::line, "Of a set-up; empty for slopes.")
+        .def_readonly("value", &KnownCombination::value, "rad; of slopes mm/mm.")
+        .def_readonly("standard_uncertainty", &KnownCombination::standard_uncertainty);
+
     using Result = AdjustmentOfRun;
     py::class_<Result>(m, "Adjustment", "What an adjustment found: calibration, set-ups, and how the readings fit.")
         .def_property_readonly("calibration", [](const Result& r) { return r.adjustment.calibration; })
@@ -274,8 +291,13 @@ AdjustmentOfRun adjust_run(const Measurement& measurement, const Plan& plan, con
     const Eigen::Vector3d offset = to_vector3(tool, "tool");
     const Chain kinematics = to_chain(chain);
     const HeadCalibrations heads = to_heads(head, plan).calibration();
-    py::gil_scoped_release release;
-    return {adjust(measurement, plan, kinematics, offset, heads, options), measurement.stations()};
+    const auto result = [&] {
+        const py::gil_scoped_release release;
+        return adjust(measurement, plan, kinematics, offset, heads, options);
+    };
+    AdjustmentOfRun of_run{result(), measurement.stations()};
+    of_run.adjustment.calibration = worded(std::move(of_run.adjustment.calibration));
+    return of_run;
 }
 
 }  // namespace

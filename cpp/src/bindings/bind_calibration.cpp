@@ -62,8 +62,8 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
                              const Arrays& reversal_negative_uncertainty, const Names& undetermined_reversal_constants,
                              const std::string& date, const std::optional<std::string>& fit,
                              const std::optional<double>& variance_factor) {
-    Calibration calibration{
-        method, to_chain(chain), to_vector3(volume, "volume"), to_vector3(tool, "tool"), {}, {}, undetermined, {}};
+    Calibration calibration{method, to_chain(chain), to_vector3(volume, "volume"), to_vector3(tool, "tool"), {}, {},
+                            {},     undetermined};
     for (const auto& [name, table] : functions)
         calibration.functions[function_index(name, "functions")] = to_function(table, name);
     for (const auto& [text, entry] : squareness) {

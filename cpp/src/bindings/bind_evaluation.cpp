@@ -4,7 +4,26 @@
 #include "stepdiag/evaluation/enhanced.hpp"
 
 namespace stepdiag::bindings {
+
+py::object& wording() {
+    static py::object& words = *new py::object(py::none());  // outlives the interpreter
+    return words;
+}
+
+Calibration worded(Calibration calibration) {
+    for (const Undetermined& finding : calibration.findings)
+        calibration.undetermined.push_back(wording()(finding).cast<std::string>());
+    return calibration;
+}
+
 namespace {
+
+template <class Enum, int count>
+std::vector<std::string> names_of() {
+    std::vector<std::string> names;
+    for (int i = 0; i < count; ++i) names.push_back(name(Enum(i)));
+    return names;
+}
 
 Calibration evaluate(const Measurement& measurement, const Plan& plan, const HeadLike& head, const ChainLike& chain,
                      const ArrayLike& tool, const std::string& method, const ReadingUncertainty& uncertainty,
@@ -18,14 +37,52 @@ Calibration evaluate(const Measurement& measurement, const Plan& plan, const Hea
     const Eigen::Vector3d offset = to_vector3(tool, "tool");
     const Chain kinematics = to_chain(chain);
     const HeadCalibrations heads = to_heads(head, plan).calibration();
-    py::gil_scoped_release release;
-    if (evaluator)
-        return evaluator(measurement, plan, kinematics, offset, heads, {uncertainty, full_covariance, plausible});
-    AdjustmentOptions options;
-    options.uncertainty = uncertainty;
-    options.full_covariance = full_covariance;
-    options.plausible = plausible;
-    return adjust(measurement, plan, kinematics, offset, heads, options).calibration;
+    const auto calibration = [&] {
+        const py::gil_scoped_release release;
+        if (evaluator)
+            return evaluator(measurement, plan, kinematics, offset, heads, {uncertainty, full_covariance, plausible});
+        AdjustmentOptions options;
+        options.uncertainty = uncertainty;
+        options.full_covariance = full_covariance;
+        options.plausible = plausible;
+        return adjust(measurement, plan, kinematics, offset, heads, options).calibration;
+    };
+    return worded(calibration());
+}
+
+void bind_undetermined(py::module_& m) {
+    py::class_<Undetermined>(m, "Undetermined",
+                             "What the readings leave open, as data; `Calibration.undetermined` has it in words.")
+        .def_property_readonly(
+            "part", [](const Undetermined& u) { return name(u.part); },
+            "What is open: \"whole\"; \"slope\"; \"positions\": at some of them; \"reversal\"; "
+            "\"reversal_at_home\": of the reversal errors only the change along the axis is known; \"setup\".")
+        .def_readonly("parameters", &Undetermined::parameters,
+                      "\"EXX\", ..., \"C0Y\"; of a set-up its quantity, as in SetupEstimate.")
+        .def_property_readonly(
+            "reason", [](const Undetermined& u) { return name(u.reason); }, "One of `reasons()`.")
+        .def_property_readonly(
+            "remedies",
+            [](const Undetermined& u) {
+                std::vector<std::string> names;
+                for (const Remedy remedy : u.remedies) names.push_back(name(remedy));
+                return names;
+            },
+            "What would help, the best first; any one of them does. Of `all_remedies()`.")
+        .def_readonly("positions", &Undetermined::positions,
+                      "mm: where it is open; of a step that was read on too few lines its two ends.")
+        .def_readonly("step", &Undetermined::step, "Of such a step: its number, from 1; else 0.")
+        .def_readonly("lines_read", &Undetermined::lines_read, "Of such a step: the lines that it was read on.")
+        .def_readonly("lines_planned", &Undetermined::lines_planned, "Of such a step: its lines in the plan.")
+        .def_readonly("line", &Undetermined::line, "The line to add; else empty.")
+        .def_readonly("component", &Undetermined::component, "Of a set-up: as in SetupEstimate.")
+        .def_readonly("setups", &Undetermined::setups, "Of a set-up: (first run, line) of each that is open.")
+        .def_static("reasons", &names_of<OpenReason, open_reason_count>)
+        .def_static("all_remedies", &names_of<Remedy, remedy_count>);
+    m.def(
+        "word_findings_with",
+        [](const py::typing::Callable<std::string(const Undetermined&)>& words) { wording() = words; },
+        py::arg("words"), "Sets the function that makes a sentence of an Undetermined; the package does so.");
 }
 
 std::vector<std::pair<std::string, std::optional<double>>> covariance_labels(const Calibration& calibration) {
@@ -75,6 +132,7 @@ void bind_evaluation(py::module_& m) {
         .def_readonly("translation", &PlausibleLimits::translation)
         .def_readonly("rotation", &PlausibleLimits::rotation);
 
+    bind_undetermined(m);
     py::class_<Calibration>(
         m, "Calibration",
         "The 21 parameters as far as the readings determine them, with standard uncertainties; native units (mm, rad).")
@@ -146,8 +204,9 @@ void bind_evaluation(py::module_& m) {
                 return names;
             },
             "Functions of whose reversal error only the change from home is known; its values are 0 at home.")
-        .def_readonly("undetermined", &Calibration::undetermined,
-                      "What the readings do not determine, why, and what would help; one sentence each.")
+        .def_readonly("findings", &Calibration::findings,
+                      "What the readings do not determine, why, and what would help; files keep it in words only.")
+        .def_readonly("undetermined", &Calibration::undetermined, "The findings in words; one sentence each.")
         .def_property_readonly(
             "covariance",
             [](const Calibration& c) {

@@ -129,11 +129,16 @@ void bind_machine(py::module_& m) {
             "Values (mm or rad) of one error function at positions (mm), shape (n,), approached in the direction \"+\" "
             "or \"-\".")
         .def(
-            "warnings",
-            [](const ErrorMap& map, const ArrayLike& volume) { return map.warnings(to_vector3(volume, "volume")); },
+            "frame_deviations",
+            [](const ErrorMap& map, const ArrayLike& volume) {
+                std::vector<std::tuple<std::string, double, double>> deviations;
+                for (const auto& [function, position, value] : map.frame_deviations(to_vector3(volume, "volume")))
+                    deviations.emplace_back(function.name(), position, value);
+                return deviations;
+            },
             py::arg("volume"),
             "Where the map breaks the frame choice (0 at home, straightness 0 at both ends of travel, approached in "
-            "+ direction); one sentence each.")
+            "+ direction): (function, position in mm, value in mm or rad) each.")
         .def(
             "write",
             [](const ErrorMap& map, const PathLike& path, const std::optional<ChainLike>& chain,

@@ -70,6 +70,10 @@ DoubleArray to_numpy(const std::vector<std::optional<double>>& values);  // NaN 
 DoubleArray to_numpy(const Eigen::MatrixXd& matrix);
 DoubleArray to_numpy_vector(const Eigen::VectorXd& vector);
 
+// The function of the package that makes a sentence of a finding: all sentences are worded in Python.
+py::object& wording();
+Calibration worded(Calibration calibration);  // with its findings in words; needs the interpreter lock
+
 inline IntegerLike integer(int number) { return py::reinterpret_steal<IntegerLike>(py::int_(number).release()); }
 inline ArrayLike zeros(int size) {
     return py::reinterpret_borrow<ArrayLike>(py::make_tuple(0.0, 0.0, 0.0)[py::slice(0, size, 1)]);

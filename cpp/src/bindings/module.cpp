@@ -143,6 +143,10 @@ void bind_exception(py::module_& m) {
     py::register_exception_translator([](std::exception_ptr thrown) {
         try {
             if (thrown) std::rethrow_exception(thrown);
+        } catch (const NothingDetermined& refusal) {
+            std::string text = refusal.evaluation() + ": nothing can be determined";
+            if (!refusal.findings().empty()) text += ". " + wording()(refusal.findings().front()).cast<std::string>();
+            PyErr_SetString(type.ptr(), text.c_str());
         } catch (const InvalidArgument& error) {
             const std::string_view text = error.what();
             const auto message = py::reinterpret_steal<py::object>(

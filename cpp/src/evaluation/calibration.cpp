@@ -117,8 +117,10 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
     if (calibration.variance_factor) table.header["variance_factor"] = format_decimal(*calibration.variance_factor, 0);
     if (!slopes.empty()) table.header["undetermined_slopes"] = join(slopes, " ");
     if (!constants.empty()) table.header["undetermined_reversal_constants"] = join(constants, " ");
-    if (!calibration.undetermined.empty())
-        table.header["undetermined"] = join(calibration.undetermined, sentence_break);
+    std::vector<std::string> undetermined = calibration.undetermined;
+    if (undetermined.empty())
+        for (const Undetermined& finding : calibration.findings) undetermined.push_back(text(finding));
+    if (!undetermined.empty()) table.header["undetermined"] = join(undetermined, sentence_break);
     return table;
 }
 
@@ -137,9 +139,8 @@ Calibration read_calibration(const std::string& path) {
                             lengths_of(table, "volume_mm", path),
                             lengths_of(table, "tool_mm", path),
                             {},
-                            {},
-                            split(optional_value("undetermined"), sentence_break),
                             {}};
+    calibration.undetermined = split(optional_value("undetermined"), sentence_break);
     calibration.date = optional_value("date");
     calibration.fit = fit_of(table.header, path);
     if (const std::string factor = optional_value("variance_factor"); !factor.empty()) {

@@ -22,20 +22,24 @@ Calibration evaluate_conventional(const Measurement& measurement, const Plan& pl
                               std::to_string(diagonals));
 
     const ConventionalMap map(passes, plan, usable);
-    Calibration calibration{"conventional", chain, plan.volume(), tool, {}, {}, {}, {}};
+    Calibration calibration{"conventional", chain, plan.volume(), tool, {}, {}};
     evaluate_linear(map, passes, plan, options.full_covariance, calibration);
     calibration.fit = Fit::unchecked;
     for (const Axis axis : all_axes)
-        if (const AxisSystem& system = map.lengths(axis); !system.gap.empty())
-            calibration.undetermined.push_back(
-                std::string("translations of ") + letter(axis) + ": " + system.gap +
-                (system.gap_was_planned ? "; three body diagonals of different direction are needed at every step"
-                                        : "; measure the lost points again"));
-    if (!is_anything_determined(calibration))
-        throw InvalidArgument("conventional evaluation: nothing can be determined. " +
-                              calibration.undetermined.front());
+        if (auto gap = map.lengths(axis).gap) {
+            gap->reason = OpenReason::few_diagonals;
+            if (gap->lines_read == gap->lines_planned) gap->remedies = {Remedy::three_diagonals};
+            calibration.findings.push_back(*gap);
+        }
+    for (const Squareness s : all_squarenesses)
+        if (!map.is_determined(s))
+            calibration.findings.push_back(
+                {OpenPart::whole, {name(s)}, OpenReason::not_seen, calibration.findings.front().remedies});
+    if (!is_anything_determined(calibration)) throw NothingDetermined("conventional evaluation", calibration.findings);
     refuse_implausible(calibration, measurement, plan, options.plausible);
-    calibration.undetermined.push_back("rotations: the conventional evaluation uses distances only");
+    calibration.findings.push_back({OpenPart::whole, {}, OpenReason::distances_alone});
+    for (int i = 0; i < function_count; ++i)
+        if (FunctionId::at(i).is_rotation()) calibration.findings.back().parameters.push_back(FunctionId::at(i).name());
     return calibration;
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <sstream>
 
 namespace stepdiag {
 namespace {
@@ -36,8 +35,12 @@ struct Kind {
     int first_column;   // of machine_R_line: local x and y for the tilts, z for the lengths
     int rows_per_step;  // equations that a step makes
     int first_channel;  // of a reading
+    Component first_component;
+    OpenReason lack;
+    Remedy more_lines;
 };
-constexpr Kind angles{0, 2, 1}, lengths{2, 1, 0};
+constexpr Kind angles{0, 2, 1, Component::A, OpenReason::few_tilts, Remedy::two_directions},
+    lengths{2, 1, 0, Component::X, OpenReason::few_lengths, Remedy::three_directions};
 
 Equations equations_of(const std::vector<Step>& steps, const std::vector<Pass>& passes, const Kind& kind) {
     Equations equations(kind.rows_per_step * steps.size(), 3);
@@ -237,21 +240,22 @@ private:
             for (int c = 0; c < 3; ++c) {
                 if (system.intervals[i].determined[c]) continue;
                 system.determined[c] = false;
-                if (!system.gap.empty()) continue;
-                system.gap = describe_gap(axis, int(i));
-                system.gap_was_planned = system.intervals[i].steps.size() == steps_[index(axis)][i].size();
+                if (!system.gap) system.gap = gap_at(axis, int(i));
             }
+        for (int c = 0; c < 3; ++c)
+            if (!system.determined[c])
+                system.gap->parameters.push_back(
+                    FunctionId{axis, Component(static_cast<int>(kind_.first_component) + c)}.name());
     }
 
-    std::string describe_gap(Axis axis, int interval) const {
-        const auto read = systems_[index(axis)].intervals[interval].steps.size();
-        const auto planned = steps_[index(axis)][interval].size();
-        std::ostringstream text;
-        text << "step " << interval + 1 << " of " << letter(axis) << " (" << plan_.node_position(axis, interval)
-             << " to " << plan_.node_position(axis, interval + 1) << " mm) was read on " << read
-             << (read == 1 ? " line" : " lines");
-        if (read < planned) text << " of " << planned;
-        return text.str();
+    Undetermined gap_at(Axis axis, int interval) const {
+        Undetermined gap{OpenPart::whole, {}, kind_.lack};
+        gap.positions = {plan_.node_position(axis, interval), plan_.node_position(axis, interval + 1)};
+        gap.step = interval + 1;
+        gap.lines_read = int(systems_[index(axis)].intervals[interval].steps.size());
+        gap.lines_planned = int(steps_[index(axis)][interval].size());
+        gap.remedies = {gap.lines_read < gap.lines_planned ? Remedy::lost_points : kind_.more_lines};
+        return gap;
     }
 
     const std::vector<Pass>& passes_;

@@ -3,11 +3,12 @@
 
 #include <array>
 #include <memory>
-#include <string>
+#include <optional>
 #include <vector>
 
 #include "evaluation/passes.hpp"
 #include "stepdiag/evaluation/least_squares.hpp"
+#include "stepdiag/evaluation/undetermined.hpp"
 
 namespace stepdiag {
 
@@ -33,8 +34,7 @@ struct StepSystem {
 struct AxisSystem {
     std::vector<StepSystem> intervals;
     std::array<bool, 3> determined{};  // component: in every interval
-    std::string gap;                   // where not: the first interval that lacks readings, in words
-    bool gap_was_planned = false;      // and whether it lacks them even if no reading had been lost
+    std::optional<Undetermined> gap;   // where not: the first interval that lacks readings
 };
 using AxisSystems = std::array<AxisSystem, 3>;
 

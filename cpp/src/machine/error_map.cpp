@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
 #include "stepdiag/core/error.hpp"
-#include "stepdiag/core/units.hpp"
 
 namespace stepdiag {
 namespace {
@@ -68,9 +66,9 @@ Eigen::Vector3d ErrorMap::theta(Axis axis, double position, Approach approach) c
     return theta;
 }
 
-std::vector<std::string> ErrorMap::warnings(const Eigen::Vector3d& volume) const {
+std::vector<FrameDeviation> ErrorMap::frame_deviations(const Eigen::Vector3d& volume) const {
     if (!volume.allFinite()) throw InvalidArgument("volume: expected three finite edges in mm");
-    std::vector<std::string> sentences;
+    std::vector<FrameDeviation> deviations;
     for (int i = 0; i < function_count; ++i) {
         if (!table_.functions[i]) continue;
         const FunctionId id = FunctionId::at(i);
@@ -79,17 +77,14 @@ std::vector<std::string> ErrorMap::warnings(const Eigen::Vector3d& volume) const
                 .cwiseAbs()
                 .maxCoeff();
         const double tolerance = 1e-9 * peak;  // a table rounded to nine digits still counts as zero there
-        const auto report = [&](double position, const char* where) {
-            if (std::abs(function(id, position)) <= tolerance) return;
-            std::ostringstream text;
-            text << id.name() << " is " << function(id, position) / (id.is_rotation() ? microradian : micrometre)
-                 << (id.is_rotation() ? " urad " : " um ") << where << ", where the frame choice has 0; used as given";
-            sentences.push_back(text.str());
+        const auto note = [&](double position) {
+            const double value = function(id, position);
+            if (std::abs(value) > tolerance) deviations.push_back({id, position, value});
         };
-        report(0.0, "at home");
-        if (id.is_straightness()) report(volume[index(id.axis)], "at the end of travel");
+        note(0.0);
+        if (id.is_straightness()) note(volume[index(id.axis)]);
     }
-    return sentences;
+    return deviations;
 }
 
 ErrorMap read_error_map(const std::string& path) { return ErrorMap(read_parameter_table(path)); }

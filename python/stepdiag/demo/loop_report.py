@@ -1,7 +1,5 @@
 """Report of the closed loop: a table of errors before and after, and explanations."""
 
-import csv
-import io
 import math
 from collections.abc import Iterator
 
@@ -12,6 +10,7 @@ from stepdiag.demo.loop_cases import CHAIN, DISTANCE_NOISE, RADIUS, SCREW_AMPLIT
 from stepdiag.demo.loop_outcome import LoopOutcome, whole_grid
 from stepdiag.demo.loop_points import Agreement, FloatArray, Sizes, errors_at
 from stepdiag.demo.paper_report import alias_of
+from stepdiag.io.csv_text import csv_text
 from stepdiag.units import MICRO
 
 UM = 1e3  # of a mm
@@ -117,13 +116,10 @@ def recheck_table(outcomes: list[LoopOutcome]) -> Iterator[str]:
 
 def point_table(outcomes: list[LoopOutcome]) -> str:
     """All points as CSV, errors in µm."""
-    text = io.StringIO()
-    rows = csv.writer(text, lineterminator="\n")
     parts = [f"{when}_{axis}_um" for when in ("before", "after") for axis in "xyz"]
-    rows.writerow(["case", "points", "x_mm", "y_mm", "z_mm", *parts])
+    rows = []
     for outcome in outcomes:
         for kind, points in outcome.points.items():
             for target, before, after in zip(points.targets, points.before, points.after, strict=True):
-                numbers = [float(value) for value in (*target, *(before * UM), *(after * UM))]
-                rows.writerow([outcome.case.name, kind, *map(repr, numbers)])
-    return text.getvalue()
+                rows.append([outcome.case.name, kind, *map(float, (*target, *(before * UM), *(after * UM)))])
+    return csv_text(["case", "points", "x_mm", "y_mm", "z_mm", *parts], rows)

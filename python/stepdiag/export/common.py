@@ -131,10 +131,5 @@ def spread(values: FloatArray, most: int) -> FloatArray:
     return np.asarray(values[np.unique(rows)])
 
 
-def lengths(values: Sequence[float] | FloatArray) -> str:
-    """Three numbers with all digits (exact round trip)."""
-    return " ".join(repr(float(value)) for value in values)
-
-
 def words(values: Sequence[float] | FloatArray) -> str:
     return " ".join(f"{float(value):g}" for value in values)

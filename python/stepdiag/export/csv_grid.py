@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
-from stepdiag.calibration.verdict_text import fit_row
+from stepdiag.calibration.finding_text import fit_row
 from stepdiag.export.common import (
     Export,
     ExportOptions,
@@ -21,13 +21,13 @@ from stepdiag.export.common import (
     common_nodes,
     compensated_map,
     inside,
-    lengths,
     origin_of,
     require,
     spread,
     tool_of,
     words,
 )
+from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 
 GRID_FORMAT: Final = "stepdiag error grid 1"
@@ -66,8 +66,7 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
         "not_compensated": "; ".join(missing),
         "calibrated": calibration.date,
     }
-    text = "".join(f"# {key}={value}\n" for key, value in leading.items() if value)
-    text += ",".join(_header(bool(options.orientation))) + "\n" + "".join(_rows(axes, origin, values))
+    text = csv_text(_header(bool(options.orientation)), [], leading) + "".join(_rows(axes, origin, values))
     return Export({output: text}, [fit_row(calibration), *_report(leading, axes, error, loss, place, missing)])
 
 

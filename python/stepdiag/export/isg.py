@@ -21,7 +21,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, Chain, ErrorMap, InvalidArgument, Machine
-from stepdiag.calibration.verdict_text import fit_row
+from stepdiag.calibration.finding_text import fit_row
 from stepdiag.export.common import (
     Export,
     ExportOptions,

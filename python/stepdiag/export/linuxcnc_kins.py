@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from stepdiag._core import Calibration, Compensator
-from stepdiag.calibration.verdict_text import fit_row
+from stepdiag.calibration.finding_text import fit_row
 from stepdiag.export.common import Export, ExportOptions, FloatArray, origin_of, require, tool_of, words
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, read_error_map
-from stepdiag.calibration.verdict_text import MEANING
+from stepdiag.calibration.finding_text import MEANING
 from stepdiag.export.common import Export, ExportOptions, tool_of
 from stepdiag.export.csv_grid import csv_grid
 from stepdiag.export.isg import isg

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from stepdiag._core import Adjustment, Measurement, Outlier, SetupEstimate
-from stepdiag.calibration.verdict_text import reason_text
+from stepdiag.calibration.finding_text import combination_text, reason_text
 from stepdiag.io.labelled_tables import calibration_table, channel_units
 
 _SETUP_UNITS: Final = {
@@ -40,7 +40,7 @@ def adjustment_table(adjustment: Adjustment, measurement: Measurement | None = N
     if adjustment.outliers:
         variables |= _outliers(adjustment.outliers)
     return table.assign(variables).assign_attrs(
-        combinations="\n".join(adjustment.combinations),
+        combinations="\n".join(map(combination_text, adjustment.combinations)),
         fit_reasons="\n".join(map(reason_text, adjustment.verdict.reasons)),
     )
 

@@ -58,6 +58,15 @@ def measurement_table(measurement: Measurement) -> xr.Dataset:
     return xr.Dataset(variables, coordinates, {"title": "step-diagonal measurement"})
 
 
+def position_axis(coordinates: dict[str, Any], name: str, position: Any) -> str:
+    """The dimension of a function's positions, put into the coordinates: that of its machine axis, or its own."""
+    axis = name[2].lower()
+    if axis in coordinates and not np.array_equal(coordinates[axis][1], position):
+        axis = f"{axis}_{name}"
+    coordinates[axis] = (axis, position, {"units": "mm", "long_name": f"position of {name[2]}"})
+    return axis
+
+
 def calibration_table(calibration: Calibration) -> xr.Dataset:
     """The determined parameters by name, each with its standard uncertainty as NAME_u.
 
@@ -71,15 +80,8 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
     coordinates: dict[str, Any] = {}
     variables: dict[str, Any] = {}
 
-    def dimension(name: str, position: Any) -> str:
-        axis = name[2].lower()
-        if axis in coordinates and not np.array_equal(coordinates[axis][1], position):
-            axis = f"{axis}_{name}"
-        coordinates[axis] = (axis, position, {"units": "mm", "long_name": f"position of {name[2]}"})
-        return axis
-
     for name, (position, value, uncertainty) in sorted(calibration.functions.items(), key=lambda item: _order(item[0])):
-        axis = dimension(name, position)
+        axis = position_axis(coordinates, name, position)
         attributes = {
             "units": units_of(name),
             "long_name": f"{_COMPONENT[name[1]]} of axis {name[2]}",
@@ -88,7 +90,7 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
         variables[name] = (axis, value, attributes)
         variables[f"{name}_u"] = (axis, uncertainty, _uncertainty_of(attributes))
     for name, (position, value, uncertainty) in sorted(calibration.reversal.items(), key=lambda item: _order(item[0])):
-        axis = dimension(f"{name}_reversal", position)
+        axis = position_axis(coordinates, f"{name}_reversal", position)
         attributes = {
             "units": units_of(name),
             "long_name": f"reversal error of the {_COMPONENT[name[1]]} of axis {name[2]}",

@@ -6,8 +6,9 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration
+from stepdiag.calibration.finding_text import fit_row
 from stepdiag.calibration.functional_point import functional_point_straightness
-from stepdiag.calibration.verdict_text import fit_row
+from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.comparison import decimal
 from stepdiag.report.evaluation import reversal_rows, undetermined_rows
@@ -75,21 +76,17 @@ def functional_point_csv(calibration: Calibration) -> str:
     leading = {
         "format": FUNCTIONAL_POINT_FORMAT,
         "chain": calibration.chain.name,
-        "volume_mm": _lengths(calibration.volume),
-        "tool_mm": _lengths(calibration.tool),
+        "volume_mm": lengths(calibration.volume),
+        "tool_mm": lengths(calibration.tool),
         "method": calibration.method,
         "date": calibration.date,
         "straightness_reference": calibration.straightness_reference,
         "covariance": "counted" if counted else "not known: straightness and rotations are taken as independent",
     }
-    lines = [f"# {key}={value}" for key, value in leading.items() if value]
-    lines.append("parameter,position_mm,table,functional_point,unit,standard_uncertainty")
+    columns = "parameter,position_mm,table,functional_point,unit,standard_uncertainty"
+    rows = []
     for name, (position, value, uncertainty) in functional_point_straightness(calibration).items():
         for row in zip(position, calibration.functions[name][1], value, uncertainty, strict=True):
             p, table, there, u = (float(number) for number in row)
-            lines.append(f"{name},{decimal(p)},{decimal(table, 3)},{decimal(there, 3)},um,{decimal(u, 3)}")
-    return "\n".join(lines) + "\n"
-
-
-def _lengths(values: np.ndarray) -> str:
-    return " ".join(f"{value!r}" for value in values.tolist())
+            rows.append([name, decimal(p), decimal(table, 3), decimal(there, 3), "um", decimal(u, 3)])
+    return csv_text(columns.split(","), rows, leading)

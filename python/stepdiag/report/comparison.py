@@ -9,6 +9,7 @@ import numpy as np
 
 from stepdiag._core import Calibration
 from stepdiag.calibration.comparison import Comparison, Difference
+from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.io.data_files import date_of_today, is_netcdf
 from stepdiag.io.whole_files import write_whole
 from stepdiag.parameters import REPORT_UNIT, in_report_units, kind_of, units_of
@@ -99,13 +100,13 @@ def comparison_csv(comparison: Comparison) -> str:
     leading = {
         "format": COMPARISON_FORMAT,
         "chain": a.chain.name,
-        "volume_mm": " ".join(map(str, a.volume.tolist())),
+        "volume_mm": lengths(a.volume),
         **{f"{key}_{which}": getattr(c, key) for which, c in (("a", a), ("b", b)) for key in ("method", "date")},
         "limit": str(comparison.limit),
         "values": str(comparison.count),
     }
-    lines = [f"# {key}={value}" for key, value in leading.items() if value]
-    lines.append("parameter,position_mm,difference,unit,standard_uncertainty,normalised_difference,shape_only")
+    columns = "parameter,position_mm,difference,unit,standard_uncertainty,normalised_difference,shape_only"
+    rows = []
     for difference in comparison.differences:
         shift, unit = (3, "um") if units_of(difference.parameter) == "mm" else (6, "urad")
         for position, value, u, normalised in zip(
@@ -116,8 +117,8 @@ def comparison_csv(comparison: Comparison) -> str:
             strict=True,
         ):
             fields = [difference.parameter, decimal(position), decimal(value, shift), unit, decimal(u, shift)]
-            lines.append(",".join([*fields, decimal(normalised), str(difference.shape_only).lower()]))
-    return "\n".join(lines) + "\n"
+            rows.append([*fields, decimal(normalised), str(difference.shape_only).lower()])
+    return csv_text(columns.split(","), rows, leading)
 
 
 def decimal(value: float, shift: int = 0) -> str:
@@ -131,17 +132,15 @@ def comparison_table(comparison: Comparison) -> "xr.Dataset":
     """The differences as NAME_difference, with NAME_difference_u and NAME_normalised, over positions x, y, z (mm)."""
     import xarray as xr  # takes half a second, which the other reports need not wait for
 
+    from stepdiag.io.labelled_tables import position_axis
+
     coordinates: dict[str, Any] = {}
     variables: dict[str, Any] = {}
     for difference in comparison.differences:
         name = difference.parameter
         dimensions: tuple[str, ...] = ()
         if not np.isnan(difference.position[0]):
-            axis = name[2].lower()
-            if axis in coordinates and not np.array_equal(coordinates[axis][1], difference.position):
-                axis = f"{axis}_{name}"
-            coordinates[axis] = (axis, difference.position, {"units": "mm", "long_name": f"position of {name[2]}"})
-            dimensions = (axis,)
+            dimensions = (position_axis(coordinates, name, difference.position),)
         attributes = {
             "units": units_of(name),
             "long_name": f"{name}, B - A",

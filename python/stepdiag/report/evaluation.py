@@ -1,13 +1,13 @@
 """What the commands tell about their results, as lines of text."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from stepdiag._core import Adjustment, Calibration, Measurement, Outlier, straightness_reference
+from stepdiag.calibration.finding_text import combination_text, verdict_rows
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
-from stepdiag.calibration.verdict_text import verdict_rows
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.setup_table import setup_rows
 from stepdiag.scenario.adjustment import scale_line_angle
@@ -45,7 +45,7 @@ def _adjusted(adjustment: Adjustment, measurement: Measurement, known: Known) ->
     if rows:
         yield "set-up found, 12.3(45) being 12.3 with a standard uncertainty of 4.5:"
         yield from rows
-    yield from undetermined_rows(calibration, adjustment.combinations)
+    yield from undetermined_rows(calibration, map(combination_text, adjustment.combinations))
     yield from smoothness_rows(adjustment.smoothness)
     yield from cosine_rows(known)
     yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
@@ -77,18 +77,14 @@ def _place(outlier: Outlier) -> str:
     return f"run {outlier.run}, line {outlier.line}, point {outlier.point}, {outlier.channel}"
 
 
-def undetermined_rows(calibration: Calibration, combinations: Sequence[str] = ()) -> Iterator[str]:
+def undetermined_rows(calibration: Calibration, combinations: Iterable[str] = ()) -> Iterator[str]:
     """What is not determined, and what is known of it all the same."""
     for sentence in calibration.undetermined:
         yield f"undetermined: {sentence}"
     for combination in combinations:
-        yield f"known: {_in_report_signs(combination)}"
+        yield f"known: {combination}"
     if calibration.undetermined_slopes:
         yield "note: a function of undetermined slope is given by its shape, with both ends at 0"
-
-
-def _in_report_signs(text: str) -> str:
-    return text.replace("+-", "±").replace("urad", "µrad").replace("um/m", "µm/m")
 
 
 def smoothness_rows(deviations: Mapping[str, float]) -> Iterator[str]:

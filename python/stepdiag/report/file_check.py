@@ -9,6 +9,7 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
+from stepdiag.calibration.finding_text import frame_deviation_texts
 from stepdiag.io.data_files import is_netcdf, read_calibration, read_measurement
 from stepdiag.io.file_kind import NETCDF_BEGINS, head_of, kind_of_text
 from stepdiag.io.whole_files import check_input, read_beginning
@@ -145,4 +146,4 @@ def _warnings(errors: _core.ErrorMap) -> Iterator[str]:
             for axis in "XYZ"
         }
         volume = [float(ends[axis]) for axis in "XYZ"]
-    yield from errors.warnings(volume)
+    yield from frame_deviation_texts(errors, volume)

@@ -5,6 +5,8 @@ from typing import Final
 
 from stepdiag import _core
 from stepdiag._core import Adjustment
+from stepdiag.calibration.finding_text import combination_text
+from stepdiag.io.csv_text import csv_text
 from stepdiag.parameters import KINDS, REPORT_UNIT, in_report_units
 from stepdiag.planning.observation import Prospect, extents, growth
 from stepdiag.report.evaluation import cosine_rows, uncertainty_rows, undetermined_rows
@@ -33,7 +35,7 @@ def observation_report(found: Adjustment, run: _core.Measurement, known: Known) 
     if parts:
         yield f"determined at some of the positions: {', '.join(parts)}"
     # All values are 0 here, to rounding.
-    combinations = [f"{what.partition(' = ')[0]}, ±{what.partition(' +- ')[2]}" for what in found.combinations]
+    combinations = (combination_text(combination, value=False) for combination in found.combinations)
     yield from undetermined_rows(calibration, combinations)
     yield from uncertainty_rows(calibration)
     rows = list(setup_rows(found.setup, [*plan.lines, *plan.scale_lines], values=False))
@@ -62,8 +64,9 @@ def prospect_rows(found: Sequence[Prospect]) -> Iterator[str]:
 
 def prospect_csv(found: Sequence[Prospect]) -> str:
     """The table as a file; what is not determined is an empty field."""
-    rows = ["steps,mirror_width_mm,mirror_height_mm,u_positioning_um,u_straightness_um,u_angle_urad,u_squareness_urad"]
+    columns = "steps,mirror_width_mm,mirror_height_mm,u_positioning_um,u_straightness_um,u_angle_urad,u_squareness_urad"
+    rows = []
     for p in found:
-        cells = [repr(in_report_units(kind, p.largest[kind])) if kind in p.largest else "" for kind in KINDS]
-        rows.append(",".join([str(p.steps), *map(repr, p.mirror), *cells]))
-    return "\n".join(rows) + "\n"
+        cells = [in_report_units(kind, p.largest[kind]) if kind in p.largest else None for kind in KINDS]
+        rows.append([p.steps, *p.mirror, *cells])
+    return csv_text(columns.split(","), rows)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from stepdiag.io.csv_text import csv_text
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units
 from stepdiag.planning.plan_by_time import Choice, Family, Outcome, choose, complete, front
 
@@ -87,14 +88,14 @@ def left_out_rows(found: Sequence[Outcome]) -> Iterator[str]:
 def plan_csv(found: Sequence[Outcome]) -> str:
     """All plans as a file, also those that others beat; what is not determined is an empty field."""
     kept = {id(o) for o in front(found)}
-    rows = [
+    columns = (
         "minutes,lines,scale_lines,steps,spacing_mm,repeats,mirror_width_mm,mirror_height_mm,parameters_determined,"
         "u_positioning_um,u_straightness_um,u_angle_urad,u_squareness_urad,on_front"
-    ]
+    )
+    rows = []
     for o in sorted(found, key=lambda o: o.seconds):
         c = o.candidate
-        cells = [repr(in_report_units(kind, o.largest[kind])) if kind in o.largest else "" for kind in KINDS]
-        fields = [repr(o.minutes), " ".join(c.lines), " ".join(c.scale_lines), str(c.steps), repr(o.spacing)]
-        fields += [str(c.repeats), *map(repr, o.mirror), str(len(o.determined)), *cells, str(int(id(o) in kept))]
-        rows.append(",".join(fields))
-    return "\n".join(rows) + "\n"
+        cells = [in_report_units(kind, o.largest[kind]) if kind in o.largest else None for kind in KINDS]
+        plan = [o.minutes, " ".join(c.lines), " ".join(c.scale_lines), c.steps, o.spacing, c.repeats, *o.mirror]
+        rows.append([*plan, len(o.determined), *cells, int(id(o) in kept)])
+    return csv_text(columns.split(","), rows)

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Adjustment, InvalidArgument, Measurement
-from stepdiag.calibration.verdict_text import verdict_rows
+from stepdiag.calibration.finding_text import verdict_rows
 from stepdiag.io.data_files import read_measurement
 from stepdiag.scenario.description import adjust_scenario, read_scenario
 from stepdiag.scenario.known import Known

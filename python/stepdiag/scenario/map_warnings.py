@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from stepdiag._core import Chain, ErrorMap, InvalidArgument
+from stepdiag.calibration.finding_text import frame_deviation_texts
 from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.known import Known
 
@@ -19,7 +20,7 @@ def scenario_warnings(scenario: Scenario) -> Iterator[str]:
 
 def map_warnings(errors: ErrorMap, known: Known) -> Iterator[str]:
     """The map against the frame's zeros, and its leading lines against the machine that it is used for."""
-    yield from errors.warnings(known.plan.volume)
+    yield from frame_deviation_texts(errors, known.plan.volume)
     header = errors.header
     chain = header.get("chain")
     if chain is not None and not _is_chain(chain, known.chain):

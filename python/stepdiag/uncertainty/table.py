@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 import xarray as xr
 
+from stepdiag.io.labelled_tables import position_axis
 from stepdiag.uncertainty.result import FloatArray, UncertaintyResult, label, volume_units
 
 UNCERTAINTY_FORMAT: Final = "stepdiag uncertainty 1"
@@ -45,7 +46,7 @@ def uncertainty_table(result: UncertaintyResult) -> xr.Dataset:
         first = result.outputs[rows[0]]
         dimensions: tuple[str, ...] = ()
         if not math.isnan(first.position):
-            dimensions = (_dimension(coordinates, name, result.positions[rows]),)
+            dimensions = (position_axis(coordinates, name, result.positions[rows]),)
         for ending, meaning, unit, values in columns:
             value = values[rows] if dimensions else values[rows[0]]
             attributes = {"units": unit or first.unit, "long_name": f"{meaning} of {name}"}
@@ -54,14 +55,6 @@ def uncertainty_table(result: UncertaintyResult) -> xr.Dataset:
     for part in (_validation, _budget, _monte_carlo, _joint, _volume):
         variables |= part(result)
     return xr.Dataset(variables, coordinates, attributes_of(result))
-
-
-def _dimension(coordinates: dict[str, Any], name: str, position: FloatArray) -> str:
-    axis = name[2].lower()
-    if axis in coordinates and not np.array_equal(coordinates[axis][1], position):
-        axis = f"{axis}_{name}"
-    coordinates[axis] = (axis, position, {"units": "mm", "long_name": f"position of {name[2]}"})
-    return axis
 
 
 def _functions(result: UncertaintyResult) -> dict[str, list[int]]:

@@ -1,12 +1,12 @@
 """Writes the result of an uncertainty evaluation: netCDF, or CSV in the units of reports."""
 
-import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from stepdiag._core import InvalidArgument
+from stepdiag.io.csv_text import csv_text
 from stepdiag.io.data_files import date_of_today, is_netcdf
 from stepdiag.io.netcdf import write_dataset
 from stepdiag.io.whole_files import write_whole
@@ -31,23 +31,19 @@ def uncertainty_csv(result: UncertaintyResult) -> str:
     """The result as CSV: a row per output in µm and µrad, attributes as `# key=value` lines."""
     columns = columns_of(result)
     facts = {"format": UNCERTAINTY_FORMAT, "date": date_of_today()} | attributes_of(result)
-    lines = [f"# {name}={_fact(value)}" for name, value in facts.items()]
     named = [(ending or "_mean").removeprefix("_").replace("_u", "_standard_uncertainty") for ending, *_ in columns]
     named = ["standard_uncertainty" if name == "u" else name for name in named]
-    lines.append(",".join(["output", "position_mm", "unit", *named]))
+    rows = []
     for k, output in enumerate(result.outputs):
         unit = {"µm": "um", "µrad": "urad"}.get(report_value(output.unit, 0.0)[1], output.unit)
-        cells = [_quoted(output.name), "" if math.isnan(output.position) else repr(float(output.position)), unit]
+        cells = [output.name, float(output.position), unit]
         for ending, _, _, values in columns:
-            value = float(values[k]) if ending == "_freedom" else report_value(output.unit, float(values[k]))[0]
-            cells.append("" if math.isnan(value) else repr(value))
-        lines.append(",".join(cells))
-    return "\n".join(lines) + "\n"
+            value = float(values[k])
+            cells.append(value if ending == "_freedom" else report_value(output.unit, value)[0])
+        rows.append(cells)
+    leading = {name: _fact(value) for name, value in facts.items()}
+    return csv_text(["output", "position_mm", "unit", *named], rows, leading)
 
 
 def _fact(value: Any) -> str:
     return " ".join(f"{x:.17g}" for x in value) if isinstance(value, np.ndarray) else str(value)
-
-
-def _quoted(name: str) -> str:
-    return '"' + name.replace('"', '""') + '"' if "," in name or '"' in name else name

@@ -81,7 +81,7 @@ TEST(BatchAdjustment, WhatReadingsLeaveOpenDoesNotPullAtTheRest) {
     expect_same(without_scales);
 
     Workshop faces;
-    faces.lines = parse({"pp0", "np0", "p0p", "n0p", "0pp", "0np"});
+    faces.lines = stepdiag::test::lines({"pp0", "np0", "p0p", "n0p", "0pp", "0np"});
     faces.options.setup[static_cast<int>(stepdiag::SetupQuantity::laser)] = stepdiag::free_unknown;
     expect_same(faces);
 }

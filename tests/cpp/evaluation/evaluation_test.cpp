@@ -8,6 +8,7 @@
 #include "stepdiag/evaluation/enhanced.hpp"
 #include "stepdiag/simulation/simulate.hpp"
 #include "support/refuses.hpp"
+#include "support/usual.hpp"
 
 namespace {
 
@@ -19,19 +20,16 @@ using stepdiag::HeadCalibration;
 using stepdiag::Line;
 using stepdiag::Measurement;
 using stepdiag::Plan;
+using stepdiag::test::chain;
+using stepdiag::test::diagonals;
+using stepdiag::test::lines;
+using stepdiag::test::scale_lines;
+using stepdiag::test::volume;
 
-std::vector<Line> lines(std::initializer_list<const char*> names) {
-    std::vector<Line> lines;
-    for (const char* name : names) lines.push_back(Line::parse(name));
-    return lines;
-}
-
-const Vector3d volume(800.0, 600.0, 500.0);
-const Chain chain = Chain::parse("[w X' b Y Z t]");
 const Vector3d no_tool = Vector3d::Zero();
 
-Plan plan(std::vector<Line> diagonals, int steps) {
-    return Plan(volume, std::move(diagonals), steps, stepdiag::all_axes, lines({"p00", "0p0", "00p"}));
+Plan plan(std::vector<Line> lines, int steps) {
+    return Plan(volume, std::move(lines), steps, stepdiag::all_axes, scale_lines);
 }
 
 std::string file(const std::string& name) { return std::string(STEPDIAG_TEST_DATA) + "/runs/" + name; }
@@ -66,7 +64,7 @@ Measurement without(const Measurement& run, const char* line, int point) {
 TEST(Evaluation, EnhancedRecoversTheCleanRun) {
     const auto run = stepdiag::read_measurement(file("clean/measurement.csv"));
     const auto truth = stepdiag::read_error_map(file("clean/truth.csv"));
-    const auto four = plan(lines({"ppp", "npp", "pnp", "nnp"}), 20);
+    const auto four = plan(diagonals, 20);
     const auto error = worst(evaluate_enhanced(run, four, chain, no_tool, {}), truth);
     EXPECT_LE(error.position, 15e-6);  // second order: some products of 60 urad with 60 urad over 1 m
     EXPECT_LE(error.angle, 5e-9);
@@ -81,24 +79,24 @@ TEST(Evaluation, EnhancedReducesThreeBeams) {
         evaluate_enhanced(run, plan(lines({"ppp", "npp", "pnp"}), 12), Chain::parse("[w b Z X Y t]"), no_tool, head);
     EXPECT_LE(worst(calibration, truth).position, 2.5e-3);  // laser angles of 1.2 mrad
     EXPECT_LE(worst(calibration, truth).angle, 50e-9);
-    EXPECT_TRUE(calibration.undetermined.empty());
+    EXPECT_TRUE(calibration.findings.empty());
 }
 
 TEST(Evaluation, LostReadingIsBridgedByFourLinesAndSaidByThree) {
     const auto truth = stepdiag::make_random_error_map(volume, {});
-    for (const auto& diagonals : {lines({"ppp", "npp", "pnp", "nnp"}), lines({"ppp", "npp", "pnp"})}) {
-        const auto p = plan(diagonals, 8);
+    for (const auto& measured : {diagonals, lines({"ppp", "npp", "pnp"})}) {
+        const auto p = plan(measured, 8);
         const auto run = without(simulate({chain, truth, no_tool}, p, {}), "ppp", 7);
         const auto calibration = evaluate_enhanced(run, p, chain, no_tool, {});
         EXPECT_LE(worst(calibration, truth).position, 20e-6);
         EXPECT_LE(worst(calibration, truth).angle, 10e-9);
-        EXPECT_EQ(calibration.undetermined.empty(), diagonals.size() == 4);
-        EXPECT_EQ(calibration.functions[0].has_value(), diagonals.size() == 4);
+        EXPECT_EQ(calibration.findings.empty(), measured.size() == 4);
+        EXPECT_EQ(calibration.functions[0].has_value(), measured.size() == 4);
     }
 }
 
 TEST(Evaluation, CovarianceHasTheStandardUncertaintiesOnItsDiagonal) {
-    const auto p = plan(lines({"ppp", "npp", "pnp", "nnp"}), 5);
+    const auto p = plan(diagonals, 5);
     const auto run = simulate({chain, stepdiag::make_random_error_map(volume, {}), no_tool}, p, {});
     stepdiag::EvaluationOptions options;
     options.full_covariance = true;
@@ -120,11 +118,9 @@ TEST(Evaluation, CovarianceHasTheStandardUncertaintiesOnItsDiagonal) {
 TEST(Evaluation, ReadingsOfAnotherPlanAreRefused) {
     const auto run = stepdiag::read_measurement(file("clean/measurement.csv"));
     for (const auto evaluate : {&stepdiag::evaluate_enhanced, &stepdiag::evaluate_conventional}) {
-        expect_refused([&] { evaluate(run, plan(lines({"ppp", "npp", "pnp", "nnp"}), 19), chain, no_tool, {}, {}); },
-                       "row");
+        expect_refused([&] { evaluate(run, plan(diagonals, 19), chain, no_tool, {}, {}); }, "row");
         expect_refused([&] { evaluate(run, plan(lines({"ppp", "npp"}), 20), chain, no_tool, {}, {}); }, "row");
-        expect_refused(
-            [&] { evaluate(run, plan(lines({"ppp", "npp", "pnp", "nnp"}), 20), chain, {0, 0, NAN}, {}, {}); }, "tool");
+        expect_refused([&] { evaluate(run, plan(diagonals, 20), chain, {0, 0, NAN}, {}, {}); }, "tool");
     }
     const auto raw = stepdiag::read_measurement(file("three_beams/measurement.csv"));
     expect_refused([&] { evaluate_enhanced(raw, plan(lines({"ppp", "npp", "pnp"}), 12), chain, no_tool, {}); }, "beam");

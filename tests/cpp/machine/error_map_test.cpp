@@ -70,7 +70,7 @@ TEST(ErrorMap, FunctionApproachedInTheOtherDirectionMayBeAnother) {
     EXPECT_EQ(map.theta(Axis::X, 10.0), Vector3d(0.0, 0.0, 3e-5));
     EXPECT_EQ(map.theta(Axis::X, 10.0, Approach::negative), Vector3d(0.0, 0.0, -1e-5));
     EXPECT_EQ(map.function({Axis::Y, Component::A}, 5.0, Approach::negative), 0.0);
-    EXPECT_TRUE(map.warnings(volume).empty());
+    EXPECT_TRUE(map.frame_deviations(volume).empty());
 }
 
 TEST(ErrorMap, SquarenessesHaveNoDirection) {
@@ -101,7 +101,7 @@ TEST(ErrorMap, RandomMapObeysTheFrameChoiceAndItsAmplitudes) {
     options.squareness = 40e-6;
     options.intervals = 33;
     const ErrorMap map = stepdiag::make_random_error_map(volume, options);
-    EXPECT_TRUE(map.warnings(volume).empty());
+    EXPECT_TRUE(map.frame_deviations(volume).empty());
     for (int i = 0; i < stepdiag::function_count; ++i) {
         const FunctionId id = FunctionId::at(i);
         const double travel = volume[index(id.axis)];
@@ -147,15 +147,18 @@ TEST(ErrorMap, ScrewPitchRidesOnThePositioningErrors) {
     EXPECT_EQ(screw.function(eyx, 12.0), smooth.function(eyx, 12.0));
 }
 
-TEST(ErrorMap, MapOutsideTheFrameChoiceIsUsedWithAWarning) {
+TEST(ErrorMap, MapOutsideTheFrameChoiceIsUsedAsGivenAndSaid) {
     const FunctionId eyx{Axis::X, Component::Y};
     const ErrorMap map = with(eyx, nodes({0.0, 800.0}, {1e-3, 2e-3}));
-    const auto warnings = map.warnings(volume);
-    ASSERT_EQ(warnings.size(), 2u);
-    EXPECT_NE(warnings[0].find("EYX"), std::string::npos);
+    const auto deviations = map.frame_deviations(volume);
+    ASSERT_EQ(deviations.size(), 2u);
+    EXPECT_EQ(deviations[1].function.name(), "EYX");
+    EXPECT_EQ(deviations[1].position, volume[0]);
+    EXPECT_EQ(deviations[1].value, 2e-3);
     EXPECT_EQ(map.function(eyx, 0.0), 1e-3);
-    expect_refused([&] { map.warnings({1.0, 2.0, not_a_number}); }, "volume");
-    EXPECT_EQ(with(exx, nodes({0.0, 800.0}, {0.0, 2e-3})).warnings(volume).size(), 0u);  // positioning keeps its slope
+    expect_refused([&] { map.frame_deviations({1.0, 2.0, not_a_number}); }, "volume");
+    EXPECT_EQ(with(exx, nodes({0.0, 800.0}, {0.0, 2e-3})).frame_deviations(volume).size(),
+              0u);  // positioning keeps its slope
 }
 
 TEST(ErrorMap, TableThatMakesNoSenseIsRefusedByName) {

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "support/refuses.hpp"
+#include "support/usual.hpp"
 
 namespace {
 
@@ -14,14 +15,9 @@ using Eigen::Vector3d;
 using stepdiag::Axis;
 using stepdiag::Line;
 using stepdiag::Plan;
-
-const Vector3d volume(800.0, 600.0, 500.0);
-
-std::vector<Line> lines(std::initializer_list<const char*> names) {
-    std::vector<Line> lines;
-    for (const char* name : names) lines.push_back(Line::parse(name));
-    return lines;
-}
+using stepdiag::test::diagonals;
+using stepdiag::test::lines;
+using stepdiag::test::volume;
 
 std::vector<Vector3d> commanded(const Plan& plan, const char* line) {
     std::vector<Vector3d> positions;
@@ -144,21 +140,20 @@ TEST(Plan, WhatMakesNoPlanIsRefused) {
     const auto make = [](Vector3d edges, std::vector<Line> l, int steps, std::vector<Line> scale = {}) {
         Plan(edges, std::move(l), steps, stepdiag::all_axes, std::move(scale));
     };
-    const auto four = lines({"ppp", "npp", "pnp", "nnp"});
-    expect_refused([&] { make({0.0, 600.0, 500.0}, four, 5); }, "volume");
-    expect_refused([&] { make({800.0, -600.0, 500.0}, four, 5); }, "volume");
-    expect_refused([&] { make({800.0, 600.0, nan}, four, 5); }, "volume");
-    expect_refused([&] { make({INFINITY, 600.0, 500.0}, four, 5); }, "volume");
-    expect_refused([&] { make({800.0, 600.0, 1e-200}, four, 5); }, "volume");  // its square is no longer a number
-    expect_refused([&] { make(volume, four, 0); }, "steps");
-    expect_refused([&] { make(volume, four, -3); }, "steps");
-    expect_refused([&] { make(volume, four, 1'000'000'000); }, "steps");
+    expect_refused([&] { make({0.0, 600.0, 500.0}, diagonals, 5); }, "volume");
+    expect_refused([&] { make({800.0, -600.0, 500.0}, diagonals, 5); }, "volume");
+    expect_refused([&] { make({800.0, 600.0, nan}, diagonals, 5); }, "volume");
+    expect_refused([&] { make({INFINITY, 600.0, 500.0}, diagonals, 5); }, "volume");
+    expect_refused([&] { make({800.0, 600.0, 1e-200}, diagonals, 5); }, "volume");  // its square is no longer a number
+    expect_refused([&] { make(volume, diagonals, 0); }, "steps");
+    expect_refused([&] { make(volume, diagonals, -3); }, "steps");
+    expect_refused([&] { make(volume, diagonals, 1'000'000'000); }, "steps");
     expect_refused([&] { make(volume, {}, 5); }, "lines");
     expect_refused([&] { make(volume, lines({"ppp", "ppp"}), 5); }, "lines: \"ppp\"");
     expect_refused([&] { make(volume, lines({"ppp", "p00"}), 5, lines({"p00"})); }, "\"p00\"");
-    expect_refused([&] { make(volume, four, 5, lines({"pp0"})); }, "scale_lines");
-    expect_refused([&] { Plan(volume, four, 5, std::vector<stepdiag::StepOrder>{}); }, "order");
-    expect_refused([&] { Plan(volume, four, 5).points(Line::parse("ppn")); }, "\"ppn\"");
+    expect_refused([&] { make(volume, diagonals, 5, lines({"pp0"})); }, "scale_lines");
+    expect_refused([&] { Plan(volume, diagonals, 5, std::vector<stepdiag::StepOrder>{}); }, "order");
+    expect_refused([&] { Plan(volume, diagonals, 5).points(Line::parse("ppn")); }, "\"ppn\"");
     for (const char* order : {"", "XY", "XYY", "xyz", "XYZX", "ABC"})
         expect_refused([&] { stepdiag::parse_order(order); }, "order \"" + std::string(order) + "\"");
 }

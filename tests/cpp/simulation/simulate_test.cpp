@@ -9,6 +9,7 @@
 
 #include "support/refuses.hpp"
 #include "support/traced_mirror.hpp"
+#include "support/usual.hpp"
 
 namespace {
 
@@ -22,13 +23,13 @@ using stepdiag::Machine;
 using stepdiag::Misalignment;
 using stepdiag::Plan;
 using stepdiag::SimulationOptions;
-
-const Vector3d volume(800.0, 600.0, 500.0);
+using stepdiag::test::chain;
+using stepdiag::test::volume;
 
 Machine machine() {
     stepdiag::RandomErrorMap options;
     options.seed = 4;
-    return Machine(Chain::parse("[w X' b Y Z t]"), stepdiag::make_random_error_map(volume, options), {5.0, -3.0, 70.0});
+    return Machine(chain, stepdiag::make_random_error_map(volume, options), {5.0, -3.0, 70.0});
 }
 
 Plan plan(int steps = 10) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "support/refuses.hpp"
+#include "support/usual.hpp"
 
 namespace {
 
@@ -16,13 +17,13 @@ using stepdiag::Machine;
 using stepdiag::Plan;
 using stepdiag::SimulationOptions;
 using stepdiag::VirtualReadout;
-
-const Vector3d volume(800.0, 600.0, 500.0);
+using stepdiag::test::chain;
+using stepdiag::test::volume;
 
 Machine machine() {
     stepdiag::RandomErrorMap options;
     options.seed = 4;
-    return Machine(Chain::parse("[w X' b Y Z t]"), stepdiag::make_random_error_map(volume, options), {5.0, -3.0, 70.0});
+    return Machine(chain, stepdiag::make_random_error_map(volume, options), {5.0, -3.0, 70.0});
 }
 
 Plan plan() {

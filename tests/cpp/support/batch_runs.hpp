@@ -9,20 +9,17 @@
 #include "stepdiag/evaluation/conventional.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
 #include "stepdiag/simulation/simulate.hpp"
+#include "support/usual.hpp"
 
 namespace stepdiag {
 namespace {
 
 using Eigen::Vector3d;
+using test::diagonals;
+using test::lines;
+using test::scale_lines;
+using test::volume;
 using Method = EvaluationMethod;
-
-const Vector3d volume(800.0, 600.0, 500.0);
-
-std::vector<Line> lines(std::initializer_list<const char*> names) {
-    std::vector<Line> lines;
-    for (const char* name : names) lines.push_back(Line::parse(name));
-    return lines;
-}
 
 struct TestRun {
     std::string name;
@@ -72,10 +69,8 @@ Head beam_head(std::vector<Eigen::Vector2d> offsets) {
     return head;
 }
 
-const std::vector<Line> diagonals = lines({"ppp", "npp", "pnp", "nnp"}), scales = lines({"p00", "0p0", "00p"});
-
 std::vector<TestRun> runs() {
-    const Plan usual(volume, diagonals, 6, all_axes, scales);
+    const Plan usual(volume, diagonals, 6, all_axes, scale_lines);
     const Head spots = spot_head({0.0, 0.0}), beams = beam_head({{0.0, 0.0}, {20.0, 0.0}, {0.0, 20.0}});
     return {
         {"ideal", usual, {}},
@@ -89,15 +84,16 @@ std::vector<TestRun> runs() {
                             head.psd_distance = 320.0;
                             return head;
                         }()}})},
-        {"three_diagonals", Plan(volume, lines({"ppp", "npp", "pnp"}), 5, all_axes, scales), {}},
-        {"reversed_lines", Plan(volume, lines({"ppn", "pnp", "nnn", "npp"}), 4, all_axes, scales), spots},
+        {"three_diagonals", Plan(volume, lines({"ppp", "npp", "pnp"}), 5, all_axes, scale_lines), {}},
+        {"reversed_lines", Plan(volume, lines({"ppn", "pnp", "nnn", "npp"}), 4, all_axes, scale_lines), spots},
         {"without_scale_lines", Plan(volume, diagonals, 4), {}},
         {"faces",
          Plan(volume, lines({"ppp", "npp", "pnp", "nnp", "pp0", "np0", "p0p", "n0p", "0pp", "0np"}), 4, all_axes,
-              scales),
+              scale_lines),
          beams},
-        {"one_step", Plan(volume, diagonals, 1, all_axes, scales), {}},
-        {"orders", Plan(volume, diagonals, 4, std::vector{parse_order("XYZ"), parse_order("ZYX")}, scales), spots, 3},
+        {"one_step", Plan(volume, diagonals, 1, all_axes, scale_lines), {}},
+        {"orders", Plan(volume, diagonals, 4, std::vector{parse_order("XYZ"), parse_order("ZYX")}, scale_lines), spots,
+         3},
         {"backward", usual, {}, 2, true},
         {"another_chain_and_tool", usual, spots, 1, false, "[w b Z X Y t]", {20.0, -30.0, 150.0}},
     };

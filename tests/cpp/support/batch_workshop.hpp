@@ -9,6 +9,7 @@
 #include "stepdiag/batch/batch_evaluator.hpp"
 #include "stepdiag/core/random_blocks.hpp"
 #include "stepdiag/simulation/simulate.hpp"
+#include "support/usual.hpp"
 
 namespace batch_tests {
 
@@ -20,16 +21,9 @@ using stepdiag::lane_group;
 using stepdiag::Line;
 using stepdiag::Measurement;
 
-inline std::vector<Line> parse(std::initializer_list<const char*> names) {
-    std::vector<Line> lines;
-    for (const char* name : names) lines.push_back(Line::parse(name));
-    return lines;
-}
-
 // Runs that differ in noise and set-ups; the pattern has neither.
 struct Workshop {
-    std::vector<Line> lines = parse({"ppp", "npp", "pnp", "nnp"});
-    std::vector<Line> scale_lines = parse({"p00", "0p0", "00p"});
+    std::vector<Line> lines = stepdiag::test::diagonals, scale_lines = stepdiag::test::scale_lines;
     stepdiag::Head head = {};
     std::string chain = "[w X' b Y Z t]";
     double angle = 1e-3;  // standard deviation of set-ups
@@ -37,7 +31,7 @@ struct Workshop {
     bool backward = false;
     double seconds = 0.0;
     AdjustmentOptions options = {};
-    Eigen::Vector3d volume{800.0, 600.0, 500.0}, tool{20.0, -10.0, 50.0};
+    Eigen::Vector3d volume = stepdiag::test::volume, tool{20.0, -10.0, 50.0};
 
     stepdiag::Plan plan() const { return {volume, lines, 6, stepdiag::all_axes, scale_lines}; }
     stepdiag::Machine machine() const {

@@ -6,6 +6,7 @@
 
 #include "stepdiag/uncertainty/virtual_calibration.hpp"
 #include "support/head_designs.hpp"
+#include "support/usual.hpp"
 
 namespace stepdiag::test {
 
@@ -32,13 +33,11 @@ inline Head head_of(Kind kind) {
 }
 
 inline VirtualRun run_of(Kind kind, int steps = 3) {
-    const Eigen::Vector3d volume(800.0, 600.0, 500.0);
     RandomErrorMap errors;
     errors.seed = 4;
     const Heads heads(head_of(kind));
-    return {Machine(Chain::parse("[w X' b Y Z t]"), make_random_error_map(volume, errors), {5.0, -3.0, 70.0}),
-            Plan(volume, {Line::parse("ppp"), Line::parse("npp"), Line::parse("pnp"), Line::parse("nnp")}, steps,
-                 all_axes, {Line::parse("p00"), Line::parse("0p0"), Line::parse("00p")}),
+    return {Machine(chain, make_random_error_map(volume, errors), {5.0, -3.0, 70.0}),
+            plan(steps),
             heads,
             heads.calibration(),
             {},

@@ -11,18 +11,8 @@ from adjusted import adjust, assert_as_dense, assert_rank, claims, statement
 from dense_adjustment import DenseAdjustment, Knowledge, Prior, deviation
 from dense_model import SQUARENESS, Setup, Table, rounding
 from noisy_repetitions import ratios
-from virtual_runs import (
-    DIAGONALS,
-    FACES,
-    SCALE_LINES,
-    lost,
-    measured,
-    noisy,
-    random_scenario,
-    random_table,
-    truth_of,
-    within,
-)
+from usual import DIAGONALS, FACES, SCALE_LINES
+from virtual_runs import lost, measured, noisy, random_scenario, random_table, truth_of, within
 
 import stepdiag as sd
 

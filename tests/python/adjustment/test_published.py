@@ -14,7 +14,8 @@ import pytest
 import reference
 from adjusted import adjust, assert_rank, distance_from
 from dense_adjustment import DenseAdjustment, Knowledge
-from virtual_runs import DIAGONALS, FACES, SCALE_LINES, lost, measured, random_scenario, random_table, within
+from usual import DIAGONALS, FACES, SCALE_LINES
+from virtual_runs import lost, measured, random_scenario, random_table, within
 
 import stepdiag as sd
 

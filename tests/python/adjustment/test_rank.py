@@ -12,18 +12,8 @@ from dense_adjustment import DenseAdjustment, Knowledge
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from truth import deviations
-from virtual_runs import (
-    CHAINS,
-    DIAGONALS,
-    FACES,
-    ORDERS,
-    SCALE_LINES,
-    lost,
-    measured,
-    random_scenario,
-    random_table,
-    within,
-)
+from usual import ALL_CHAINS, DIAGONALS, FACES, ORDERS, SCALE_LINES
+from virtual_runs import lost, measured, random_scenario, random_table, within
 
 import stepdiag as sd
 
@@ -167,6 +157,7 @@ def test_lost_points_lines_and_nodes(lines: list[str], gone: tuple[tuple[str, in
         assert_rank(adjustment, dense)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(data=st.data())
 def test_any_plan_with_any_losses_claims_what_the_rank_allows(data: st.DataObject) -> None:
@@ -185,7 +176,7 @@ def test_any_plan_with_any_losses_claims_what_the_rank_allows(data: st.DataObjec
         scale_lines=[line for line in scales if line not in lines],
         steps=data.draw(st.integers(1, 3)),
         layout=data.draw(st.sampled_from(["ideal", "psd", "multi_beam"])),
-        chain=data.draw(st.sampled_from(CHAINS)),
+        chain=data.draw(st.sampled_from(ALL_CHAINS)),
         order=data.draw(st.sampled_from(ORDERS)),
         misalignment={},
         backward=data.draw(st.booleans()),

@@ -19,7 +19,8 @@ from adjusted import (
 )
 from dense_adjustment import DenseAdjustment, Knowledge
 from dense_model import Setup
-from virtual_runs import DIAGONALS, measured, noisy, random_scenario, random_table, truth_of, within
+from usual import DIAGONALS
+from virtual_runs import measured, noisy, random_scenario, random_table, truth_of, within
 
 import stepdiag as sd
 

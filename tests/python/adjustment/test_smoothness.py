@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import reference
-from adjusted import FUNCTIONS, adjust, assert_as_dense
+from adjusted import adjust, assert_as_dense
 from dense_adjustment import DenseAdjustment, Knowledge
-from virtual_runs import DIAGONALS, measured, noisy, random_scenario, random_table
+from usual import DIAGONALS
+from virtual_runs import measured, noisy, random_scenario, random_table
 
 import stepdiag as sd
+from stepdiag.parameters import FUNCTIONS
 
 
 @pytest.mark.parametrize(("translation", "rotation"), [(1e-3, 3e-6), (5e-3, 0.0), (0.0, 1e-6)])
@@ -68,6 +70,7 @@ def test_cross_validation_finds_smooth_axes_and_keeps_the_screw() -> None:
         assert np.mean(smooth.calibration.functions[name][2]) < np.mean(rough.calibration.functions[name][2]), name
 
 
+@pytest.mark.slow
 def test_cross_validation_claims_no_more_than_it_knows() -> None:
     """Errors in units of the stated uncertainties stay of the size of one."""
     ratios = []

@@ -11,16 +11,8 @@ from adjusted import adjust, distance_from, error_map, is_complete
 from dense_adjustment import Knowledge
 from places import RUNS
 from reference_files import read_error_table, read_scenario
-from virtual_runs import (
-    DIAGONALS,
-    FACES,
-    SCALE_LINES,
-    head_of,
-    measured,
-    plan_of,
-    random_scenario,
-    random_table,
-)
+from usual import DIAGONALS, FACES, SCALE_LINES
+from virtual_runs import head_of, measured, plan_of, random_scenario, random_table
 
 import stepdiag as sd
 

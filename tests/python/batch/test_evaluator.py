@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 import reference
-from adjusted import FUNCTIONS, adjust, claims, statement
+from adjusted import adjust, claims, statement
 from dense_adjustment import DenseAdjustment
 from virtual_runs import head_of, measured, noisy, plan_of, random_scenario, random_table, within
 
 import stepdiag as sd
+from stepdiag.parameters import FUNCTIONS
 
 SQUARENESS = ("C0Y", "B0Z", "A0Z")
 CONVERGED = 1e-4  # of a standard uncertainty: what is left after the last step is estimated to be below half of it

@@ -5,10 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from calibrations import CHAIN, FUNCTIONS, LINES, TOOL, VOLUME, calibrate, parts_of
+from calibrations import TOOL, VOLUME, calibrate, parts_of
 from refusal import refused
+from usual import CHAIN, DIAGONALS
 
 import stepdiag as sd
+from stepdiag.parameters import FUNCTIONS
 
 NODES = np.linspace(0.0, 80.0, 6)
 
@@ -170,7 +172,7 @@ def test_shapes_are_compared_where_a_slope_is_open() -> None:
 
 def test_uncertainty_of_a_shape_counts_the_covariance() -> None:
     known = calibrate(1, full_covariance=True)
-    open_plan = sd.Plan(VOLUME, LINES, 5)
+    open_plan = sd.Plan(VOLUME, DIAGONALS, 5)
     shape = calibrate(2, plan=open_plan, full_covariance=True)
     assert "EXX" in shape.undetermined_slopes
     difference = difference_of(sd.compare_calibrations(known, shape), "EXX")

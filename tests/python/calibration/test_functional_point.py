@@ -5,12 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from calibrations import CHAIN, FUNCTIONS, calibrate
+from calibrations import calibrate
+from usual import CHAIN, VOLUME
 
 import stepdiag as sd
 from stepdiag.cli import main
+from stepdiag.parameters import FUNCTIONS
 
-VOLUME = (800.0, 600.0, 500.0)
 CHAINS = ["[w X' b Y Z t]", "[w Z' Y' b X t]", "[w Y' X' Z' b t]", "[w b X Y Z t]"]
 TOOLS = [(0.0, 0.0, 0.0), (20.0, -40.0, 150.0)]
 

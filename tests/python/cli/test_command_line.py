@@ -80,7 +80,7 @@ def test_report_says_what_is_undetermined(here: Path, capsys: pytest.CaptureFixt
     Path("no_scales.toml").write_text(SCENARIO.replace('["p00", "0p0", "00p"]', "[]"))
     assert run("simulate", "no_scales.toml", "-o", "no_scales.csv") == 0
     assert run("evaluate", "no_scales.toml", "no_scales.csv", "-o", "calibration.csv") == 0
-    assert "undetermined: scale of X: add the line p00" in capsys.readouterr().out
+    assert "undetermined: scale of X (EXX): add the line p00" in capsys.readouterr().out
 
 
 # --- an evaluator sees no truth --------------------------------------------------------------------------------------

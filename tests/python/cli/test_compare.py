@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from calibrations import FUNCTIONS, calibrate, parts_of
+from calibrations import calibrate, parts_of
 
 import stepdiag as sd
 from stepdiag.cli import main
+from stepdiag.parameters import FUNCTIONS
 
 
 @pytest.fixture

@@ -27,14 +27,14 @@ def test_check_tells_every_kind(here: Path, capsys: pytest.CaptureFixture[str]) 
 def test_check_warns_of_a_map_that_breaks_the_zeros(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("truth.csv").write_text("parameter,position_mm,value,unit,standard_uncertainty\nEYX,0,1.5,um,\nEYX,80,0,um,\n")
     assert run("check", "truth.csv") == 0
-    assert "truth.csv: warning: EYX is 1.5 um at home" in capsys.readouterr().out
+    assert "truth.csv: warning: EYX is 1.5 µm at home" in capsys.readouterr().out
 
 
 COLUMNS = "parameter,position_mm,value,unit,standard_uncertainty\n"
 
 # What an error map says, and what is told of it by simulate and check.
 ODD_MAPS = {
-    "zeros": (f"{COLUMNS}EYX,0,1.5,um,\nEYX,80,0,um,\n", "EYX is 1.5 um at home"),
+    "zeros": (f"{COLUMNS}EYX,0,1.5,um,\nEYX,80,0,um,\n", "EYX is 1.5 µm at home"),
     "chain": (f"# chain=[w b X Y Z t]\n{COLUMNS}", "is for the chain [w b X Y Z t], the scenario has [w X' b Y Z t]"),
     "no chain": (f"# chain=serial\n{COLUMNS}", "is for the chain serial"),
     "volume": (f"# volume_mm=80 60 40\n{COLUMNS}", "is for the volume 80 60 40 mm, the scenario has 80 60 50 mm"),

@@ -15,13 +15,12 @@ import pytest
 from error_tables import COLUMNS, leading_lines
 from places import DATA
 from refusal import refused
+from usual import CHAIN, VOLUME
 
 import stepdiag as sd
 
 FOLDER = DATA / "bad_tables"
-CHAIN = "[w X' b Y Z t]"
 REASONS = dict(line.split(": ", 1) for line in (FOLDER / "refusals.txt").read_text("utf-8").splitlines())
-VOLUME = (800.0, 600.0, 500.0)
 ROWS = "EXX,0.0,0.0,um,0.1\nEXX,800.0,40.0,um,0.1\nEAY,0.0,0.0,urad,\nEAY,600.0,30.0,urad,\nC0Y,,-12.0,urad,0.5\n"
 GOOD = "\n".join([*leading_lines(CHAIN, VOLUME, (0.0, 0.0, 80.0)), COLUMNS, ROWS])
 

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from refusal import refused
+from usual import CHAIN, VOLUME
 
 import stepdiag as sd
 
-VOLUME, TOOL, CHAIN = (800.0, 600.0, 500.0), (5.0, -3.0, 80.0), "[w X' b Y Z t]"
+TOOL = (5.0, -3.0, 80.0)
 ERRORS = sd.random_error_map(VOLUME, seed=1)
 # The machine adds up positions of 1,000 mm, each rounded to 1e-13 mm; the compensator adds up errors.
 MACHINE_ROUNDING = 2e-12

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 from compensator_oracle import Oracle
-from error_tables import COLUMNS, NAMES, VOLUME, RandomTable, all_chains, leading_lines
+from error_tables import COLUMNS, NAMES, RandomTable, leading_lines
 from places import RUNS
 from refusal import refused
+from usual import ALL_CHAINS, VOLUME
 
 import stepdiag as sd
 from stepdiag.cli import main
@@ -25,7 +26,7 @@ def written(path: Path, text: str, **newline: Any) -> Path:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_forward_of_a_command_is_the_target_within_the_stated_bound(tmp_path: Path, seed: int) -> None:
-    chain = all_chains()[4 * seed]
+    chain = ALL_CHAINS[4 * seed]
     path = written(tmp_path / "table.csv", RandomTable(seed=500 + seed, chain=chain).text())
     for options in ({}, {"outside": "linear", "margin": 30.0}, {"origin": (-300.0, 20.0, 1e4)}):
         compensator = sd.Compensator(path, chain, **options)  # type: ignore[arg-type]

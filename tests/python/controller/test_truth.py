@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from compensator_oracle import CAPPED, OUTSIDE, REFUSED, Oracle
-from error_tables import COLUMNS, TOOL, VOLUME, RandomTable, all_chains, leading_lines
+from error_tables import COLUMNS, TOOL, RandomTable, leading_lines
+from usual import ALL_CHAINS, VOLUME
 
 import stepdiag as sd
 
@@ -60,9 +61,9 @@ def corners(volume: tuple[float, ...] = VOLUME) -> np.ndarray:
     return np.array(np.meshgrid(*[(0.0, edge) for edge in volume])).reshape(3, -1).T
 
 
-@pytest.mark.parametrize("chain", all_chains())
+@pytest.mark.parametrize("chain", ALL_CHAINS)
 def test_errors_of_every_chain_are_those_of_the_conventions(tmp_path: Path, chain: str) -> None:
-    both = Both(tmp_path, RandomTable(seed=all_chains().index(chain), chain=chain).text())
+    both = Both(tmp_path, RandomTable(seed=ALL_CHAINS.index(chain), chain=chain).text())
     both.compare(inside(1, 6), status=0)
     both.compare(corners()[[0, 3, 7]], status=0)
     both.compare(inside(2, 3), tool=(0.0, 0.0, 0.0))
@@ -174,9 +175,8 @@ def test_approach_chooses_among_two_directions(tmp_path: Path, approach: str) ->
 def test_worst_of_many_random_tables(tmp_path: Path, record_property: Any) -> None:
     """Everything at once, and what the largest deviation was."""
     worst = 0.0
-    chains = all_chains()
     for seed in range(12):
-        table = RandomTable(seed=400 + seed, chain=chains[(5 * seed) % 24], directed=seed % 2 == 1)
+        table = RandomTable(seed=400 + seed, chain=ALL_CHAINS[(5 * seed) % 24], directed=seed % 2 == 1)
         both = Both(tmp_path, table.text())
         positions = inside(seed, 4)
         expected = [both.oracle.error(p).position for p in positions]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth import DIAGONALS, FACES, SCALE_LINES, Setup, changed, without
+from truth import Setup, changed, without
+from usual import DIAGONALS, FACES, SCALE_LINES
 
 import stepdiag as sd
 
@@ -42,6 +43,7 @@ def repeated(setup: Setup, run: sd.Measurement, method: str) -> np.ndarray:
     return np.array(results)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("layout", "method", "lines", "lost"),
     [

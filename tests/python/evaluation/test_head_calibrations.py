@@ -7,16 +7,8 @@ import math
 import numpy as np
 import pytest
 from small_heads import SpotHead, three_beams, window
-from truth import (
-    DIAGONALS,
-    MICROMETRE,
-    MICRORADIAN,
-    NANOMETRE,
-    NANORADIAN,
-    SCALE_LINES,
-    Setup,
-    worst,
-)
+from truth import MICROMETRE, MICRORADIAN, NANOMETRE, NANORADIAN, Setup, worst
+from usual import DIAGONALS, SCALE_LINES
 
 import stepdiag as sd
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import reference
-from truth import DIAGONALS, Setup
+from truth import Setup
+from usual import DIAGONALS
 
 import stepdiag as sd
 

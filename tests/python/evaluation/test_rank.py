@@ -6,19 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from truth import (
-    DIAGONALS,
-    FACES,
-    MICROMETRE,
-    NANOMETRE,
-    NANORADIAN,
-    SCALE_LINES,
-    Setup,
-    changed,
-    row_of,
-    without,
-    worst,
-)
+from truth import MICROMETRE, NANOMETRE, NANORADIAN, Setup, changed, row_of, without, worst
+from usual import DIAGONALS, FACES, SCALE_LINES
 
 import stepdiag as sd
 

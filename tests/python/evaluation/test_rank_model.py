@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from rank_model import RankModel
-from truth import DIAGONALS, FACES, SCALE_LINES, SQUARENESS_AXIS, Setup, without
+from truth import SQUARENESS_AXIS, Setup, without
+from usual import DIAGONALS, FACES, SCALE_LINES
 
 import stepdiag as sd
-
-FUNCTIONS = {f"E{c}{a}" for c in "XYZABC" for a in "XYZ"}
+from stepdiag.parameters import FUNCTIONS
 
 
 @pytest.mark.parametrize(

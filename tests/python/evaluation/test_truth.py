@@ -2,23 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import permutations
-
 import numpy as np
 import pytest
 import reference_files
 from places import RUNS
-from truth import (
-    DIAGONALS,
-    MICROMETRE,
-    MICRORADIAN,
-    NANOMETRE,
-    NANORADIAN,
-    Setup,
-    changed,
-    deviations,
-    worst,
-)
+from truth import MICROMETRE, MICRORADIAN, NANOMETRE, NANORADIAN, Setup, changed, deviations, worst
+from usual import ALL_CHAINS, DIAGONALS, ORDERS
 
 import stepdiag as sd
 
@@ -140,14 +129,7 @@ def test_conventional_is_right_where_nothing_turns(seed: int, lines: list[str]) 
     assert worst(calibration, truth).position <= 15 * NANOMETRE
 
 
-CHAINS = [
-    f"[w {' '.join(axis + chr(39) for axis in order[:bed])} b {' '.join(order[bed:])} t]"
-    for order in permutations("XYZ")
-    for bed in range(4)
-]
-
-
-@pytest.mark.parametrize("chain", CHAINS)
+@pytest.mark.parametrize("chain", ALL_CHAINS)
 def test_enhanced_recovers_machines_of_every_chain(chain: str) -> None:
     setup = Setup(steps=12, chain=chain, order="ZXY", tool=(30.0, -20.0, 80.0))
     truth = setup.errors(7)
@@ -157,10 +139,8 @@ def test_enhanced_recovers_machines_of_every_chain(chain: str) -> None:
     assert error.angle <= 2 * CLEAN[1]
 
 
-@pytest.mark.parametrize("order", ["".join(p) for p in permutations("XYZ")])
-@pytest.mark.parametrize(
-    "lines", [["ppp", "npp", "pnp", "nnp"], ["nnn", "pnn", "npn", "ppn"], ["ppn", "npp", "nnn", "pnp"]]
-)
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("lines", [DIAGONALS, ["nnn", "pnn", "npn", "ppn"], ["ppn", "npp", "nnn", "pnp"]])
 def test_enhanced_recovers_any_order_and_reversed_lines(order: str, lines: list[str]) -> None:
     setup = Setup(steps=11, order=order, lines=lines, volume=(300.0, 700.0, 450.0))
     truth = setup.errors(5)

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from calibrations import CHAIN, calibrate, parts_of, same_calibration, simulate
+from calibrations import calibrate, parts_of, same_calibration, simulate
 from exported import CHAINS, calibration_of, export, random_calibration
 from refusal import refused
+from usual import CHAIN, DIAGONALS, SMALL_VOLUME, small_plan
 
 import stepdiag as sd
 from stepdiag.cli import export as cli_export
@@ -77,7 +78,7 @@ def test_an_option_of_another_format_is_refused(tmp_path: Path, to: str, option:
 
 @pytest.mark.parametrize("to", FORMATS)
 def test_a_scale_that_is_not_determined_is_no_scale_of_0(tmp_path: Path, to: str) -> None:
-    plan = sd.Plan((80.0, 60.0, 50.0), ["ppp", "npp", "pnp", "nnp"], 5)  # no scale lines
+    plan = sd.Plan(SMALL_VOLUME, DIAGONALS, 5)  # no scale lines
     calibration = calibrate(1, plan=plan)
     assert "EXX" in calibration.undetermined_slopes
     refused(export, calibration, to, tmp_path / "out", names="EXX (slope)")
@@ -106,7 +107,7 @@ def test_what_an_error_map_lacks_is_0(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     errors = sd.ErrorMap({"EXX": ([0.0, 80.0], [0.0, 0.01])})
-    errors.write("map.csv", chain=CHAINS[0], volume=(80.0, 60.0, 50.0), tool=(0.0, 0.0, 0.0))
+    errors.write("map.csv", chain=CHAINS[0], volume=SMALL_VOLUME, tool=(0.0, 0.0, 0.0))
     assert main(["export", "map.csv", "--to", "linuxcnc-comp", "-o", "comp"]) == 0
     assert Path("comp/joint0.comp").read_text().endswith("80.000000000 80.009998750 80.009998750\n")
     assert "NOT COMPENSATED" not in capsys.readouterr().out
@@ -145,7 +146,7 @@ def test_tables_of_the_conventional_method_hold_for_their_tool_only(tmp_path: Pa
 
 
 def test_the_kinematics_table_is_the_calibration_to_the_last_bit(tmp_path: Path) -> None:
-    plan = sd.Plan((80.0, 60.0, 50.0), ["ppp", "npp", "pnp", "nnp"], 5, scale_lines=["p00", "0p0", "00p"])
+    plan = small_plan()
     calibration = sd.adjust(
         simulate(2, plan=plan, backward=True), plan, sd.Head(), CHAINS[0], (1.0, -2.0, 30.0)
     ).calibration
@@ -177,7 +178,7 @@ def test_an_export_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
 
 
 def test_a_machine_without_errors_needs_no_correction(tmp_path: Path) -> None:
-    edges = zip("XYZ", (80.0, 60.0, 50.0), strict=True)
+    edges = zip("XYZ", SMALL_VOLUME, strict=True)
     functions = {f"E{c}{a}": ([0.0, edge], [0.0, 0.0]) for a, edge in edges for c in "XYZABC"}
     calibration = calibration_of(sd.ErrorMap(functions, dict.fromkeys(("C0Y", "B0Z", "A0Z"), 0.0)))
     for to in FORMATS:
@@ -188,9 +189,7 @@ def test_a_machine_without_errors_needs_no_correction(tmp_path: Path) -> None:
 def test_table_that_the_module_would_refuse_is_refused(tmp_path: Path) -> None:
     """And what is written is loaded: the report tells its id."""
     functions = {
-        f"E{c}{a}": ([0.0, edge], [0.0, 0.0])
-        for a, edge in zip("XYZ", (80.0, 60.0, 50.0), strict=True)
-        for c in "XYZABC"
+        f"E{c}{a}": ([0.0, edge], [0.0, 0.0]) for a, edge in zip("XYZ", SMALL_VOLUME, strict=True) for c in "XYZABC"
     }
     squareness = dict.fromkeys(("C0Y", "B0Z", "A0Z"), 0.0)
     steep = calibration_of(sd.ErrorMap(functions | {"EXX": ([0.0, 80.0], [0.0, 40.0])}, squareness))

@@ -16,7 +16,8 @@ from reference_optics import (
 )
 from shipped_heads import ASSUMED_AIR, SHIPPED, TRUE_AIR, Errors, Reference, Shipped
 from simulated_runs import table_of, with_reversal
-from truth import DIAGONALS, VOLUME, Setup
+from truth import Setup
+from usual import DIAGONALS, VOLUME
 
 import stepdiag as sd
 
@@ -34,6 +35,7 @@ def errors_of(description: Description, seed: int) -> Errors:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("steps", "backward"), [(50, False), (8, True)], ids=["forward", "backward"])
 @pytest.mark.parametrize("shipped", SHIPPED, ids=lambda shipped: shipped.file)
 def test_signals_of_a_whole_run_hold_against_forty_digits(shipped: Shipped, steps: int, backward: bool) -> None:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from reference_optics import glass_index
 from small_heads import OFFSETS, SpotHead, definition, read, spot_of, three_beams, window
-from truth import DIAGONALS, MICRORADIAN, Setup
+from truth import MICRORADIAN, Setup
+from usual import DIAGONALS
 
 import stepdiag as sd
 

@@ -12,8 +12,7 @@ from truth import Worst, worst
 from virtual_runs import head_of, plan_of
 
 import stepdiag as sd
-
-FUNCTIONS = [f"E{c}{a}" for a in "XYZ" for c in "XYZABC"]
+from stepdiag.parameters import FUNCTIONS
 
 
 def adjust(

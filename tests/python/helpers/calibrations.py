@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from usual import CHAIN, small_plan
+from usual import SMALL_VOLUME as VOLUME
 
 import stepdiag as sd
 
-VOLUME = (80.0, 60.0, 50.0)
-CHAIN = "[w X' b Y Z t]"
 TOOL = (1.0, -2.0, 30.0)
-LINES = ["ppp", "npp", "pnp", "nnp"]
-PLAN = sd.Plan(VOLUME, LINES, 5, scale_lines=["p00", "0p0", "00p"])
-FUNCTIONS = [f"E{component}{axis}" for axis in "XYZ" for component in "XYZABC"]
+PLAN = small_plan()
 
 
 def simulate(seed: int, *, plan: sd.Plan = PLAN, head: sd.Head | None = None, **options: Any) -> sd.Measurement:

@@ -12,12 +12,13 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from virtual_runs import BEAMS, CHAINS, DIAGONALS, ORDERS, SCALE_LINES
+from usual import ALL_CHAINS, DIAGONALS, ORDERS, SCALE_LINES
+from virtual_runs import BEAMS
 
 import stepdiag as sd
+from stepdiag.parameters import FUNCTIONS
 
 STEPS = 10
-FUNCTIONS = [f"E{c}{a}" for a in "XYZ" for c in "XYZABC"]
 SQUARENESS = ["C0Y", "B0Z", "A0Z"]
 PROBABILITY = 0.95
 FACTOR = 1.959963984540054  # of a normal distribution, whose standard deviation is known
@@ -150,7 +151,7 @@ def draw(case: Case, seed: int, steps: int = STEPS) -> tuple[Drawn, np.random.Ge
         squareness=60e-6,
         intervals=steps,
     )
-    chain = str(rng.choice(CHAINS))
+    chain = str(rng.choice(ALL_CHAINS))
     psd, beams = case.layout == "psd", case.layout == "multi_beam"
     head = sd.Head(
         case.layout,

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from coverage_cases import STEPS, Case, Drawn, draw, known_to, labels, log_uniform
-from virtual_runs import DIAGONALS, SCALE_LINES
+from usual import DIAGONALS, SCALE_LINES
 
 import stepdiag as sd
 from stepdiag import _core

@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import permutations
 
 import numpy as np
+from usual import CHAIN, VOLUME
 
 COLUMNS = "parameter,position_mm,value,unit,standard_uncertainty"
 NAMES = [f"E{component}{axis}" for axis in "XYZ" for component in "XYZABC"]
 SQUARENESSES = ["C0Y", "B0Z", "A0Z"]
-VOLUME = (800.0, 600.0, 500.0)
 TOOL = (12.5, -30.0, 80.0)
-
-
-def all_chains() -> list[str]:
-    """The six orders of the axes, with the bed at each of its four places."""
-    chains = []
-    for order in permutations("XYZ"):
-        for bed in range(4):
-            links = [f"{axis}'" for axis in order[:bed]] + ["b", *order[bed:]]
-            chains.append(f"[w {' '.join(links)} t]")
-    return chains
 
 
 @dataclass(frozen=True)
@@ -29,7 +18,7 @@ class RandomTable:
     """Nodes of its own for each function: not equidistant, some beyond the travel, some short of its ends."""
 
     seed: int
-    chain: str = "[w X' b Y Z t]"
+    chain: str = CHAIN
     volume: tuple[float, float, float] = VOLUME
     tool: tuple[float, float, float] = TOOL
     translation_um: float = 40.0

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import RegularGridInterpolator
+from usual import SMALL_VOLUME as VOLUME
 
 import stepdiag as sd
 from stepdiag.export.common import ExportOptions
 from stepdiag.export.write import export_calibration
 
-VOLUME = (80.0, 60.0, 50.0)
 TOOL = (3.0, -5.0, 40.0)
 CHAINS = ["[w X' b Y Z t]", "[w b X Y Z t]", "[w Y' X' b Z t]", "[w Z' b Y X t]", "[w X' Z' Y' b t]"]
 Vectors = npt.NDArray[np.float64]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import permutations
 from typing import Any
 
 import reference
 from hypothesis import strategies as st
+from usual import ALL_CHAINS, ALL_LINES, ORDERS
 
 import stepdiag as sd
 
@@ -49,14 +49,6 @@ def table_of(errors: sd.ErrorMap) -> reference.ErrorTable:
     return reference.ErrorTable(functions, dict(errors.squareness), negative)
 
 
-CHAINS = [
-    f"[w {' '.join(axis + chr(39) for axis in order[:bed])} b {' '.join(order[bed:])} t]"
-    for order in permutations("XYZ")
-    for bed in range(4)
-]
-LINES = [a + b + c for a in "pn0" for b in "pn0" for c in "pn0" if a + b + c != "000"]
-
-
 def symmetric(size: float) -> st.SearchStrategy[float]:
     return st.floats(-size, size)
 
@@ -64,16 +56,16 @@ def symmetric(size: float) -> st.SearchStrategy[float]:
 @st.composite
 def scenarios(draw: st.DrawFn, layouts: tuple[str, ...] = ("ideal",)) -> reference.Scenario:
     volume = draw(st.tuples(*[st.floats(100.0, 1000.0)] * 3))
-    lines = draw(st.lists(st.sampled_from(LINES), min_size=1, max_size=3, unique=True))
+    lines = draw(st.lists(st.sampled_from(ALL_LINES), min_size=1, max_size=3, unique=True))
     pair = st.tuples(symmetric(1e-3), symmetric(1e-3))
     layout = draw(st.sampled_from(layouts))
     return reference.Scenario(
         volume=volume,
-        chain=draw(st.sampled_from(CHAINS)),
+        chain=draw(st.sampled_from(ALL_CHAINS)),
         tool=draw(st.tuples(*[symmetric(100.0)] * 3)),
         lines=lines,
         steps=draw(st.integers(5, 12)),
-        order=draw(st.sampled_from(["".join(p) for p in permutations("XYZ")])),
+        order=draw(st.sampled_from(ORDERS)),
         layout=layout,
         standoff=draw(st.floats(20.0, 300.0)),
         psd_distance=draw(st.floats(0.0, 100.0)) if layout == "psd" else 0.0,

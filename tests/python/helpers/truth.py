@@ -7,14 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from usual import CHAIN, DIAGONALS, SCALE_LINES, VOLUME
 
 import stepdiag as sd
 
-VOLUME = (800.0, 600.0, 500.0)
-DIAGONALS = ["ppp", "npp", "pnp", "nnp"]
-SCALE_LINES = ["p00", "0p0", "00p"]
-FACES = ["pp0", "np0", "p0p", "n0p", "0pp", "0np"]
-CHAIN = "[w X' b Y Z t]"
 SQUARENESS_AXIS = {"C0Y": 1, "B0Z": 2, "A0Z": 2}
 
 NANOMETRE, MICROMETRE = 1e-6, 1e-3  # mm

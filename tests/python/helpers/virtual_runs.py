@@ -6,24 +6,15 @@ Everything comes from a seed. mm, rad, s.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from itertools import permutations
 from typing import Any
 
 import numpy as np
 import reference
 from dense_model import Setup, Table, Unknown
+from usual import ALL_CHAINS, DIAGONALS, ORDERS, SCALE_LINES
 
 import stepdiag as sd
 
-DIAGONALS = ["ppp", "npp", "pnp", "nnp"]
-FACES = ["pp0", "np0", "p0p", "n0p", "0pp", "0np"]
-SCALE_LINES = ["p00", "0p0", "00p"]
-ORDERS = ["".join(p) for p in permutations("XYZ")]
-CHAINS = [
-    f"[w {' '.join(axis + chr(39) for axis in order[:bed])} b {' '.join(order[bed:])} t]"
-    for order in ORDERS
-    for bed in range(4)
-]
 BEAMS = [[0.0, 0.0], [20.0, 0.0], [0.0, 20.0]]
 
 
@@ -82,7 +73,7 @@ def random_scenario(rng: np.random.Generator, **given: Any) -> reference.Scenari
     }
     drawn: dict[str, Any] = {
         "volume": tuple(float(v) for v in rng.uniform(250.0, 1000.0, 3)),
-        "chain": str(rng.choice(CHAINS)),
+        "chain": str(rng.choice(ALL_CHAINS)),
         "tool": tuple(float(v) for v in rng.uniform(-100.0, 100.0, 3)),
         "order": str(rng.choice(ORDERS)),
         "steps": int(rng.integers(4, 24)),

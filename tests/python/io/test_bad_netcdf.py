@@ -206,6 +206,7 @@ def test_damaged_number_is_noticed(folder: Path, tmp_path: Path) -> None:
     refused(sd.read_measurement, tmp_path / "damaged.nc", names="damaged.nc: distance: cannot be read")
 
 
+@pytest.mark.slow
 def test_damaged_heap_does_not_hang_the_reader(folder: Path, tmp_path: Path) -> None:
     """An object of a heap gets a length, or a free space of a length, with which HDF5 may search forever."""
     content = bytearray((folder / "calibration.nc").read_bytes())

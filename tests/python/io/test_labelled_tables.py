@@ -4,23 +4,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from usual import CHAIN, DIAGONALS, small_plan
+from usual import SMALL_VOLUME as VOLUME
 
 import stepdiag as sd
 from stepdiag.parameters import kind_of
 
-VOLUME = (80.0, 60.0, 50.0)
-LINES = ["ppp", "npp", "pnp", "nnp"]
-
 
 def calibrate(plan: sd.Plan) -> sd.Calibration:
-    machine = sd.Machine("[w X' b Y Z t]", sd.random_error_map(VOLUME, seed=3), (1.0, 2.0, 3.0))
+    machine = sd.Machine(CHAIN, sd.random_error_map(VOLUME, seed=3), (1.0, 2.0, 3.0))
     head = sd.Head()
     return sd.evaluate(sd.simulate(machine, plan, head), plan, head, machine.chain, machine.tool)
 
 
 @pytest.fixture(scope="module")
 def calibration() -> sd.Calibration:
-    return calibrate(sd.Plan(VOLUME, LINES, 5, scale_lines=["p00", "0p0", "00p"]))
+    return calibrate(small_plan())
 
 
 def test_calibration_table_has_all_parameters_over_their_axes(calibration: sd.Calibration) -> None:
@@ -54,7 +53,7 @@ def test_calibration_table_carries_units_and_names(calibration: sd.Calibration) 
 
 
 def test_calibration_table_says_what_is_not_determined() -> None:
-    calibration = calibrate(sd.Plan(VOLUME, LINES, 5))
+    calibration = calibrate(sd.Plan(VOLUME, DIAGONALS, 5))
     table = calibration.to_xarray()
     assert table["EXX"].attrs["slope_determined"] == "false"
     assert table["EXY"].attrs["slope_determined"] == "true"
@@ -124,6 +123,6 @@ def test_largest_deviation_names_parameter_and_position(calibration: sd.Calibrat
 
 
 def test_function_without_a_slope_is_not_compared() -> None:
-    largest = sd.largest_deviations(calibrate(sd.Plan(VOLUME, LINES, 5)), sd.ErrorMap())
+    largest = sd.largest_deviations(calibrate(sd.Plan(VOLUME, DIAGONALS, 5)), sd.ErrorMap())
     assert "positioning" not in largest
     assert largest["angle"].value != 0.0

@@ -8,7 +8,8 @@ import reference
 from reference_optics import MP, Plane, mirror_in_sensor_frame
 from simulated_runs import table_of
 from small_heads import APERTURE, OFFSETS, SpotHead, read, three_beams, window
-from truth import CHAIN, VOLUME, Setup
+from truth import Setup
+from usual import CHAIN, VOLUME
 
 import stepdiag as sd
 

@@ -213,6 +213,7 @@ def test_command_says_which_plan_to_take(scenario: str, capsys: pytest.CaptureFi
     assert float(row.split()[1]) <= 20.0
 
 
+@pytest.mark.slow
 def test_page_has_the_table_of_the_example(capsys: pytest.CaptureFixture[str]) -> None:
     root = ROOT
     assert main(["plan", str(root / "examples" / "scenario.toml")]) == 0

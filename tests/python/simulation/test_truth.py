@@ -11,7 +11,8 @@ import reference_files
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from places import RUNS
-from simulated_runs import LIMIT, LINES, errors_of, plan_of, scenarios, simulated, table_of
+from simulated_runs import LIMIT, errors_of, plan_of, scenarios, simulated, table_of
+from usual import ALL_LINES
 
 import stepdiag as sd
 
@@ -106,7 +107,7 @@ def test_pose_holds_against_forty_digits(
     assert np.max(np.abs((rotation[0] - exact_rotation).astype(float))) <= 1e-15
 
 
-@pytest.mark.parametrize("line", LINES)
+@pytest.mark.parametrize("line", ALL_LINES)
 @pytest.mark.parametrize("volume", [(800.0, 600.0, 500.0), (1.0, 1.0, 1.0), (260.0, 420.0, 160.0)])
 def test_frame_of_every_line_is_the_one_built_from_cross_products(
     line: str, volume: tuple[float, float, float]

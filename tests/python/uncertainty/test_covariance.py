@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 from places import ROOT
-from truth import DIAGONALS, SCALE_LINES, VOLUME
+from usual import DIAGONALS, SCALE_LINES, VOLUME
 
 import stepdiag as sd
 

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from truth import DIAGONALS, SCALE_LINES, Setup, changed
+from truth import Setup, changed
+from usual import DIAGONALS, SCALE_LINES
 
 import stepdiag as sd
 from stepdiag import _core as core

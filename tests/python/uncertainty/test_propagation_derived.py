@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 import pytest
+import usual
 from reference import DOUBLE, ErrorTable, pose
 from truth import Setup
 
@@ -14,7 +15,7 @@ from stepdiag import _core as core
 
 CHAINS = ["[w X' b Y Z t]", "[w b X Y Z t]", "[w Y' X' b Z t]"]
 TOOL = (20.0, -30.0, -150.0)
-VOLUME = np.array((800.0, 600.0, 500.0))
+VOLUME = np.array(usual.VOLUME)
 
 
 def calibration_of(chain: str, seed: int = 1, steps: int = 5, method: str = "enhanced") -> sd.Calibration:

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from small_heads import three_beams, window
+from usual import CHAIN, VOLUME
 
 import stepdiag as sd
 from stepdiag import _core
 
-VOLUME = (800.0, 600.0, 500.0)
 TOOL = (5.0, -3.0, 70.0)
 SECONDS = 2.0
 # Readings are traced over some metres: 1e-12 mm, 1e-15 rad; differences of two of them.
@@ -19,7 +19,7 @@ ROUNDING = 5e-12
 
 
 def machine() -> sd.Machine:
-    return sd.Machine("[w X' b Y Z t]", sd.random_error_map(VOLUME, seed=4), TOOL)
+    return sd.Machine(CHAIN, sd.random_error_map(VOLUME, seed=4), TOOL)
 
 
 def plan() -> sd.Plan:

@@ -3,7 +3,7 @@
 //   sum over readings ((read - model(x))/u)^2 + sum over priors (x_j/u_j)^2 -> minimum,
 // with the exact pose (machine/machine.hpp) and the exact definition of every reading (measurement/reading.hpp), solved
 // by Gauss-Newton to the floor of double precision. Frame choice and signs as in machine/error_map.hpp. Every published
-// variant of the method is this with fewer readings or unknowns. What the readings do not determine is said in words.
+// variant of the method is this with fewer readings or unknowns. Findings say what the readings do not determine.
 #pragma once
 
 #include <Eigen/Core>
@@ -130,6 +130,21 @@ struct Verdict {
     std::vector<FitReason> reasons = {};
 };
 
+// A sum of unknowns that are not determined one by one: slopes of positioning errors and straightnesses, or two
+// unknowns of one set-up.
+struct KnownCombination {
+    struct Term {
+        double weight;
+        std::string parameter;  // "EXX", ...; of a set-up its quantity: "reflector", ...
+    };
+    std::vector<Term> terms = {};
+    int component = 0;  // of a set-up: as in SetupEstimate; its first run, and its line, which is empty for slopes
+    int run = 0;
+    std::string line = {};
+    double value = 0.0;  // rad; of slopes mm/mm
+    double standard_uncertainty = 0.0;
+};
+
 struct Adjustment {
     Calibration calibration;  // carries fit and variance factor
     std::vector<SetupEstimate> setup;
@@ -138,7 +153,7 @@ struct Adjustment {
     int degrees_of_freedom;
     double chi_square_probability;  // of a larger square sum, if model and uncertainties are right; 1 without freedom
     int iterations;                 // steps from zero
-    std::vector<std::string> combinations;               // what is known of unknowns that are not determined one by one
+    std::vector<KnownCombination> combinations;
     std::array<double, function_count> smoothness = {};  // deviations of second differences in force; 0: none
     Verdict verdict = {};
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "stepdiag/evaluation/undetermined.hpp"
 #include "stepdiag/machine/chain.hpp"
 #include "stepdiag/machine/error_map.hpp"
 #include "stepdiag/machine/fit.hpp"
@@ -50,11 +51,13 @@ struct Calibration {
 
     std::array<std::optional<CalibratedFunction>, function_count> functions;
     std::array<std::optional<CalibratedSquareness>, squareness_count> squarenesses;
-    std::vector<std::string> undetermined;  // one sentence each: what is missing, why, and what would help
+    std::vector<Undetermined> findings = {};  // of an evaluation: what is missing, why, and what would help
+    // The same in words, one sentence each, as files hold them; an evaluation leaves the words to its caller.
+    std::vector<std::string> undetermined = {};
 
     // Of all values in the order of the tables (functions by FunctionId::index, nodes ascending, then C0Y, B0Z, A0Z);
     // native units. Empty unless asked for.
-    Eigen::MatrixXd covariance;
+    Eigen::MatrixXd covariance = {};
 
     std::array<std::optional<CalibratedReversal>, function_count> reversal = {};  // where backward runs tell it
     std::string date = {};  // of the evaluation: ISO 8601, UTC; empty where it is not known

@@ -16,6 +16,13 @@
 
 namespace stepdiag {
 
+// A value that is not 0 where the frame choice has 0.
+struct FrameDeviation {
+    FunctionId function;
+    double position;  // mm
+    double value;     // mm or rad
+};
+
 class ErrorMap {
 public:
     ErrorMap() = default;                     // no errors
@@ -27,10 +34,10 @@ public:
     double squareness(Squareness squareness) const;
     const ParameterTable& table() const { return table_; }
 
-    // Where the map breaks the frame choice (a function not 0 at home, a straightness not 0 at the end of travel
-    // `volume`, approached in + direction): one sentence each. Such a map is used as given. Throws InvalidArgument for
-    // a volume that is not finite.
-    std::vector<std::string> warnings(const Eigen::Vector3d& volume) const;
+    // Where the map breaks the frame choice: functions that are not 0 at home, straightnesses that are not 0 at the end
+    // of travel `volume`, approached in + direction. Such a map is used as given. Throws InvalidArgument for a volume
+    // that is not finite.
+    std::vector<FrameDeviation> frame_deviations(const Eigen::Vector3d& volume) const;
 
 private:
     ParameterTable table_;

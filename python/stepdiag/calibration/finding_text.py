@@ -1,0 +1,203 @@
+"""The core's findings in words: what the readings leave open (`Undetermined`, `KnownCombination`) and the verdict of a
+fit (`FitReason`; docs/conventions.md, "Verdict of a fit"), and where an error map breaks the frame choice. All
+sentences about them are here."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Final
+
+from stepdiag._core import Adjustment, Calibration, ErrorMap, FitReason, KnownCombination, Undetermined
+from stepdiag.parameters import kind_of, units_of
+from stepdiag.units import MICRO, report_value
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+# By Undetermined.reasons(); empty where "undetermined" says it all.
+REASONS: Final = {
+    "not_seen": "",
+    "not_moved": "no reading on a line that moves the axis to its end",
+    "not_separated": "the readings do not tell them apart",
+    "tool_rotations": "its line does not tell it from rotations that move the tool",
+    "few_tilts": "with tilts",
+    "few_lengths": "with distance, tilts and known angles",
+    "few_diagonals": "among the body diagonals",
+    "laser_angles": "readings were lost, and the laser angles of the lines that bridge them are not determined",
+    "distances_alone": "the conventional evaluation uses distances only",
+}
+# By Undetermined.all_remedies().
+REMEDIES: Final = {
+    "axis_line": "add the line {line}",
+    "scale_line": "add the scale line {line}",
+    "scale_line_ends": "measure both ends of its scale line",
+    "body_diagonals": "add body diagonals",
+    "face_diagonals": "add the two face diagonals of its plane",
+    "lines_to_the_end": "add such lines",
+    "lines_there": "measure more lines that visit them",
+    "lost_points": "measure the lost points again",
+    "tilts": "read tilts too",
+    "tilts_of_other_directions": "read tilts on lines of other directions",
+    "other_directions": "add lines of other directions",
+    "other_order": "add lines with another order of steps",
+    "two_directions": "two lines of different direction are needed at every step",
+    "three_directions": "three lines of different direction are needed at every step",
+    "three_diagonals": "three body diagonals of different direction are needed at every step",
+    "both_ways": "measure more lines forward and backward",
+    "single_axes_both_ways": "only its change along the axis is known; measure single-axis lines forward and backward",
+    "prior": "give a prior",
+    "line_priors": "give priors to the line's set-up",
+    "fixed": "take it as fixed",
+    "scales": "make the scales known",
+}
+# Unknowns of a set-up, by component.
+SETUP: Final = {
+    "reflector": ("reflector tilt about local x", "reflector tilt about local y"),
+    "laser": ("laser tilt about local x", "laser tilt about local y"),
+    "psd_zero": (
+        "zero offset of the position sensing device along local x",
+        "zero offset of the position sensing device along local y",
+    ),
+    "lateral": ("lateral beam offset along local x", "lateral beam offset along local y"),
+    "roll": ("head roll",),
+    "gain": ("tilt gain",),
+}
+
+# Of a calibration whose reasons are not at hand.
+MEANING: Final = {
+    "accepted": "the readings agree with each other and with the scenario",
+    "doubtful": "the readings scatter more, or less, than their stated uncertainties allow",
+    "rejected": "the readings contradict each other or the scenario; do not use this calibration",
+    "unchecked": "nothing controls the readings",
+}
+
+
+def undetermined_text(finding: Undetermined) -> str:
+    """What is open, why, and what would help; without a full stop."""
+    remedies = ", or ".join(REMEDIES[remedy].format(line=finding.line) for remedy in finding.remedies)
+    return f"{_what(finding)}: {'; '.join(filter(None, (_why(finding), remedies)))}"
+
+
+def _what(finding: Undetermined) -> str:
+    names = ", ".join(finding.parameters)
+    match finding.part:
+        case "slope":
+            return f"{_slope(names)} ({names})" if kind_of(names) == "positioning" else _slope(names)
+        case "positions":
+            shown = [f"{position:g}" for position in finding.positions[:4]]
+            count = len(finding.positions)
+            return f"{names} at {count} of its positions ({', '.join(shown)}{', ...' if count > 4 else ''} mm)"
+        case "reversal":
+            return f"reversal of {names}"
+        case "reversal_at_home":
+            return f"reversal of {names} at home"
+        case "setup":
+            lines = [line + (f" (run {run})" if run else "") for run, line in finding.setups]
+            return f"{_setup(finding.parameters[0], finding.component)} on {', '.join(lines)}"
+        case _:
+            return "rotations" if finding.reason == "distances_alone" else names
+
+
+def _why(finding: Undetermined) -> str:
+    why = REASONS[finding.reason]
+    if not finding.step:
+        return why
+    read, planned = finding.lines_read, finding.lines_planned
+    first, last = finding.positions
+    lines = f"{read} line{'' if read == 1 else 's'}" + (f" of {planned}" if read < planned else "")
+    return f"step {finding.step} of {finding.parameters[0][2]} ({first:g} to {last:g} mm) was read on {lines} {why}"
+
+
+def _slope(parameter: str) -> str:
+    return f"scale of {parameter[2]}" if kind_of(parameter) == "positioning" else f"slope of {parameter}"
+
+
+def _setup(quantity: str, component: int) -> str:
+    if quantity == "beam_constants":
+        return f"constant of beam d{component + 1}"
+    names = SETUP.get(quantity, (quantity.replace("_", " "),))
+    return names[component]
+
+
+def combination_text(known: KnownCombination, *, value: bool = True) -> str:
+    """What is known of unknowns that are not determined one by one; without `value` its standard uncertainty alone."""
+    if known.line:
+        what = " - ".join(_setup(quantity, known.component) for _, quantity in known.terms)
+        what += f" on {known.line}" + (f" (run {known.run})" if known.run else "")
+    else:
+        terms = (f"{'-' if weight < 0 else '+'} {abs(weight):.3g} {_slope(name)}" for weight, name in known.terms)
+        what = " ".join(terms).removeprefix("+ ")
+    unit = "µrad" if known.line else "µm/m"
+    shown = f" = {known.value * MICRO:.4g} ±" if value else ", ±"
+    return f"{what}{shown} {known.standard_uncertainty * MICRO:.4g} {unit}"
+
+
+def frame_deviation_texts(errors: ErrorMap, volume: "npt.ArrayLike") -> Iterator[str]:
+    """Where an error map breaks the frame choice."""
+    for name, position, value in errors.frame_deviations(volume):
+        shown, unit = report_value(units_of(name), value)
+        place = "at home" if position == 0.0 else "at the end of travel"
+        yield f"{name} is {shown:g} {unit} {place}, where the frame choice has 0; used as given"
+
+
+def fit_row(calibration: Calibration) -> str:
+    """What the file of a calibration says of its fit."""
+    if calibration.fit is None:
+        return "fit: not known"
+    factor = calibration.variance_factor
+    figures = "" if factor is None else f" (variance factor {factor:.3g})"
+    return f"fit: {_shown(calibration.fit)}: {MEANING[calibration.fit]}{figures}"
+
+
+def verdict_rows(adjustment: Adjustment) -> Iterator[str]:
+    """The verdict of an adjustment with its reasons, and what no verdict tells."""
+    verdict = adjustment.verdict
+    if verdict.fit == "unchecked":
+        yield "fit: unchecked: there are no more readings than unknowns, so that nothing controls them"
+        return
+    said = MEANING[verdict.fit] if verdict.fit != "doubtful" else next(map(reason_text, verdict.reasons))
+    yield (
+        f"fit: {_shown(verdict.fit)}: {said} (variance factor {adjustment.variance_factor:.3g} with "
+        f"{adjustment.degrees_of_freedom} degrees of freedom, probability {adjustment.chi_square_probability:.2g})"
+    )
+    if verdict.fit == "rejected":
+        yield from (f"rejected because {reason_text(reason)}" for reason in verdict.reasons)
+    if verdict.fit == "accepted":
+        yield "note: no fit shows a wrong wavelength, temperature, chain or tool offset: the parameters absorb them"
+
+
+def reason_text(reason: FitReason) -> str:
+    """One reason, without a full stop."""
+    place = f"line {reason.line}" if reason.line else f"channel {reason.channel}"
+    match reason.finding:
+        case "noise_factor":
+            return (
+                f"the readings scatter {reason.value:.3g} times as much as their stated uncertainties "
+                f"(at most {reason.limit:g} times is credible)"
+            )
+        case "uneven_misfit":
+            return (
+                f"the readings do not fit, and not evenly: {place} scatters {reason.value:.3g} times as much as its "
+                f"stated uncertainties, the others {reason.limit:.3g} times"
+            )
+        case "prior":
+            name = f"{reason.channel.replace('_', ' ')}{_component(reason)}"
+            return (
+                f"{name} of {place} is {reason.value:.3g} standard uncertainties from what [adjustment] takes it for "
+                f"(at most {reason.limit:g} is credible)"
+            )
+        case "misfit":
+            return f"the readings scatter more than their stated uncertainties say: chance {reason.value:.2g}"
+        case "no_misfit":
+            return f"the readings scatter less than their stated uncertainties say: chance {reason.value:.2g}"
+        case _:
+            return "nothing controls the readings"
+
+
+def _component(reason: FitReason) -> str:
+    pairs = ("reflector", "laser", "psd_zero", "lateral")
+    if reason.channel in pairs:
+        return " " + ("a" if reason.component == 0 else "b")
+    return f" of d{reason.component + 1}" if reason.channel == "beam_constants" else ""
+
+
+def _shown(fit: str) -> str:
+    return fit.upper() if fit == "rejected" else fit
