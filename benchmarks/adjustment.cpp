@@ -1,13 +1,16 @@
-// The exact adjustment of the run of adjustment_run.hpp, without noise, 50 ... 1,000 steps per axis.
+// Benchmarks of the exact adjustment for the run of adjustment_run.hpp, without noise, 50 ... 1,000 steps per axis.
 //   adjusted   from the measurement to the calibration with the variance of every value, residuals and redundancies
-//   solve      of that the unknowns alone: Gauss-Newton from zero to the floor of double precision
-//   variances  of that the variances of all unknowns: factor and inverse on its pattern
-//   samples    sets of readings with noise and set-ups of their own, as a Monte Carlo evaluates them: time of each;
-//              beside each adjusted alone; layout ideal or b, set-ups normally distributed with this deviation, urad
-//   one_step   the same by the gain: how much mean and deviation of 2,000 samples are off, in standard uncertainties
-//   exponent   of `adjusted` against the number of steps, from 50 to 1,000
-// three_quantities: reflector, laser and distance constant of the set-ups free, all others fixed, 20 and three
-// unknowns; defaults: also lateral offset, roll and gain, and the lasers of scale lines, all of which have priors.
+//   solve      part of `adjusted`: the unknowns, by Gauss-Newton from zero to the limit of double precision
+//   variances  part of `adjusted`: variances of all unknowns, by factorisation and inverse on the factor's pattern
+//   samples    time per sample of many samples with different noise and set-ups, as in a Monte Carlo run; compared with
+//              the adjustment of each sample. Layout ideal or b; the argument is the standard deviation of set-ups,
+//              urad
+//   one_step   the same with the gain; reports the errors of mean and standard deviation of 2,000 samples, in standard
+//              uncertainties
+//   exponent   growth exponent of the time of `adjusted` with the number of steps, from 50 to 1,000
+// three_quantities: reflector, laser and distance constant of the set-ups are free, all others are fixed; 20 unknowns
+// for the diagonals, three for the scale lines. defaults: also lateral offset, roll and gain, and the lasers of scale
+// lines, all with priors.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -59,12 +62,12 @@ void variances(benchmark::State& state) {
     }
 }
 
-// Sets of readings that differ in noise and set-ups, in lanes.
+// Sets of readings with different noise and set-ups, arranged in SIMD lanes.
 struct Samples {
     AdjustmentRun bench{50};
     stepdiag::BatchOptions options;
     std::vector<stepdiag::Measurement> runs;
-    std::vector<double> readings;  // of lane_group sets after another
+    std::vector<double> readings;  // groups of lane_group sets, one after the other
 
     Samples(bool layout_b, double angle, int count, bool defaults) {
         if (layout_b) {

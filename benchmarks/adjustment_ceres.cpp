@@ -1,8 +1,8 @@
-// The run of adjustment.cpp by Ceres: the same unknowns, readings and weights, the library's own model with its
-// analytic derivatives; a residual block for each point, a parameter block for each node of an axis and each set-up.
-// Settings are those that were found fastest. Processor time of one thread.
-//   solve      from zero to the floor of double precision, problem made anew
-//   variances  of all unknowns, after that
+// Benchmark of Ceres for the run of adjustment.cpp, with the same unknowns, readings and weights. It uses the library's
+// own model with analytic derivatives, one residual block for each point, and one parameter block for each node of an
+// axis and each set-up. The settings are the fastest ones found. Times are processor time of one thread.
+//   solve      from zero to the limit of double precision, including construction of the problem
+//   variances  of all unknowns, after the solution
 #include <benchmark/benchmark.h>
 #include <ceres/ceres.h>
 
@@ -17,7 +17,7 @@ using stepdiag::AdjustedPoint;
 using stepdiag::AdjustmentProblem;
 using stepdiag::no_unknown;
 
-// The values of a node or a set-up that are unknown, and which these are.
+// The unknown values of a node or a set-up, and their indices.
 struct Unknowns {
     std::vector<int> components;
     std::vector<double> value;
@@ -25,7 +25,7 @@ struct Unknowns {
     void add(int component) { components.push_back(component), value.push_back(0.0); }
 };
 
-// All unknowns, and the set-ups' models for their values: these are prepared once an evaluation, not once a point.
+// All unknowns, and the models of the set-ups. The models are prepared once per evaluation, not once per point.
 struct State : ceres::EvaluationCallback {
     const AdjustmentProblem& problem;
     std::deque<Unknowns> nodes, setups;
@@ -62,7 +62,7 @@ struct Point : ceres::CostFunction {
         for (const Unknowns* block : blocks()) mutable_parameter_block_sizes()->push_back(int(block->value.size()));
     }
 
-    // Of the axes that are not at home, and of the set-up.
+    // Parameter blocks of the axes that are not at home, and of the set-up.
     std::vector<const Unknowns*> blocks() const {
         std::vector<const Unknowns*> blocks;
         for (const int node : point.node)
@@ -137,7 +137,7 @@ struct Solution {
         solver.min_lm_diagonal = 1e-32;
         solver.function_tolerance = 0.0;
         solver.gradient_tolerance = 0.0;
-        solver.parameter_tolerance = 1e-9;  // steps go 1, 1e-1, 1e-6, 1e-11: the last one is rounding
+        solver.parameter_tolerance = 1e-9;  // the steps are 1, 1e-1, 1e-6, 1e-11; the last one is rounding
         solver.num_threads = 1;
         solver.logging_type = ceres::SILENT;
         Solve(solver, ceres.get(), &summary);
@@ -201,7 +201,7 @@ void variances(benchmark::State& state) {
         const Unknowns& unknowns = solution.state.nodes[i];
         std::vector<double> block(unknowns.value.size() * unknowns.value.size());
         covariance.GetCovarianceBlock(unknowns.value.data(), unknowns.value.data(), block.data());
-        // Roundings of 1e-16 by the squared condition, 1e8.
+        // Rounding of 1e-16 times the squared condition number, 1e8.
         expect_near(std::sqrt(block[0]) / exx.standard_uncertainty[node.node], 1.0, 1e-8, "u(EXX)");
     }
 }

@@ -1,5 +1,5 @@
-// What the adjustment's benchmarks share: a run of four body diagonals of 800 x 600 x 500 mm and three scale lines with
-// the ideal head, set-ups up to 1 mrad off. benchmarks/peers/adjustment.py makes the same.
+// Run for the benchmarks of the adjustment: four body diagonals of 800 x 600 x 500 mm and three scale lines with the
+// ideal head, set-ups misaligned by up to 1 mrad. benchmarks/peers/adjustment.py makes the same run.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 #include "stepdiag/adjustment/adjustment.hpp"
 #include "stepdiag/simulation/simulate.hpp"
 
-// Of the set-ups reflector, laser and distance constant free, on scale lines distance constant only.
+// Unknowns of the set-ups: reflector, laser and distance constant; on scale lines the distance constant only.
 inline stepdiag::AdjustmentOptions three_quantities() {
     using stepdiag::SetupQuantity;
     stepdiag::AdjustmentOptions options;
@@ -64,7 +64,7 @@ struct AdjustmentRun {
     }
 
     void check(const Eigen::Vector2d& worst) const {
-        // Roundings of 1e-13 mm a reading, of which a function adds up as many as there are steps.
+        // Each reading has a rounding of 1e-13 mm. A function is a sum over as many readings as there are steps.
         const double roundings = plan.steps() / 50.0;
         expect_near(worst[0], 0.0, 2e-11 * roundings, "largest error of position");
         expect_near(worst[1], 0.0, 1e-13 * roundings, "largest error of angle");

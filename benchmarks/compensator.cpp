@@ -1,8 +1,8 @@
-// What a controller asks of a compensator, one position at a time, at random points of the volume: 21 errors, 50 steps
-// an axis (51 nodes; `fine`: 1,000). Answers are compared with Machine::error, and commands with their forward.
-//   error_vector   the error vector alone           command    the compensated position
-//   error          error vector and orientation     forward    where the tool is
-//   *_chain        each position follows from the last answer: what one call takes when nothing else is under way
+// Benchmarks of a compensator, one position at a time, at random points of the volume. The table has 21 errors and 50
+// steps per axis (51 nodes; `fine`: 1,000). Results are compared with Machine::error, and commands with their forward.
+//   error_vector   the error vector only            command    the compensated position
+//   error          error vector and orientation     forward    position of the tool
+//   *_chain        each position depends on the previous result: latency of one call
 
 #include "stepdiag/controller/compensator.hpp"
 
@@ -49,7 +49,7 @@ struct Bench {
             positions.push_back({800.0 * unit(engine), 600.0 * unit(engine), 500.0 * unit(engine)});
         const stepdiag::Machine machine(stepdiag::Chain::parse(chain), stepdiag::ErrorMap(parameters), tool_offset);
         for (const Position& p : positions) {
-            // The machine adds up positions of 1,000 mm, each rounded to 1e-13 mm.
+            // Machine adds positions of 1,000 mm, each with a rounding of 1e-13 mm.
             const Vector3d e = vector(compensator.error(p, tool).position);
             expect_near((e - machine.error(vector(p))).norm(), 0.0, 2e-12, "error");
             const Vector3d back = vector(compensator.forward(compensator.command(p, tool).position, tool).position);
@@ -65,7 +65,7 @@ void run(benchmark::State& state, int intervals, Ask&& ask) {
     for (auto _ : state) benchmark::DoNotOptimize(ask(bench.compensator, bench.positions[i++ % points]));
 }
 
-// The next position waits for the last answer.
+// Each position depends on the previous result.
 template <class Ask>
 void run_chain(benchmark::State& state, Ask&& ask) {
     const Bench bench(50);
@@ -98,7 +98,7 @@ void command_fine(benchmark::State& state) { run(state, 1000, ask_command); }
 void command_chain(benchmark::State& state) { run_chain(state, ask_command); }
 void forward_chain(benchmark::State& state) { run_chain(state, ask_forward); }
 
-// What an error vector takes by the machine itself, searching each of eighteen tables.
+// Time of an error vector from Machine, which searches each of the eighteen tables.
 void machine_error(benchmark::State& state) {
     const Bench bench(50);
     const stepdiag::Machine machine(stepdiag::Chain::parse(chain), stepdiag::ErrorMap(bench.parameters), tool_offset);

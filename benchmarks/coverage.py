@@ -1,13 +1,12 @@
-"""Do the 95 % intervals cover the truth? Random machines, set-ups and noise, each simulated and evaluated once.
+"""Coverage of the 95 % intervals, from random machines, set-ups and noise, each simulated and evaluated once.
 
     ./run python benchmarks/coverage.py [--machines 10000] [--case NAME]... [--workers N]
 
-Of every parameter family the share of machines is given whose interval covers the truth: at the node where it is
-lowest, in the mean over nodes, and where it is highest. A node by itself is a binomial count over machines, four
-standard deviations of which are allowed; nodes of one machine are correlated, and are not counted as if they were so
-many machines. Where the model of an evaluator does not hold it is shown what that does. Ends with 1 where one of these
-is not so. Intervals that are propagated from uncertain inputs (set-ups, scales, air, drift, walks, repeatability) are
-counted at a fifth of the machines.
+For every parameter family the table shows the share of machines whose interval covers the truth: the lowest share of
+all nodes, the mean over the nodes, and the highest share. The share of a single node is a binomial count over machines;
+four standard deviations are allowed. The nodes of one machine are correlated and do not count as separate machines.
+Some cases show the effect of a wrong model. The exit code is 1 if a result is not as expected. Intervals propagated
+from uncertain inputs (set-ups, scales, air, drift, walks, repeatability) use a fifth of the machines.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ import stepdiag as sd
 
 CHUNK = 50
 MANY = 10_000
-SLOWER = 5  # so many times less often: propagation differentiates whole calibrations by some sixty inputs
+SLOWER = 5  # divisor of the machines: propagation differentiates whole calibrations with respect to about sixty inputs
 CASES = coverage_cases.CASES | coverage_propagated.CASES
 
 
@@ -47,7 +46,7 @@ def of_machine(name: str, seed: int, steps: int) -> np.ndarray:
     except sd.InvalidArgument:
         if not CASES[name].wrong:
             raise
-        return np.full(len(labels(steps)), np.nan)  # nothing was found that explains the readings
+        return np.full(len(labels(steps)), np.nan)  # no solution explains the readings
 
 
 def all_outcomes(pool: multiprocessing.pool.Pool, name: str, machines: int, steps: int) -> np.ndarray:
@@ -64,7 +63,7 @@ def all_outcomes(pool: multiprocessing.pool.Pool, name: str, machines: int, step
 
 
 def report(name: str, z: np.ndarray, steps: int, seconds: float) -> bool:
-    """Prints the table of a case; whether it is as it should be."""
+    """Prints the table of a case. Returns whether the results are as expected."""
     nothing = np.all(np.isnan(z), axis=1)
     case, found = CASES[name], coverages(z[~nothing], steps)
     tolerance = next(iter(found.values())).tolerance
@@ -79,7 +78,7 @@ def report(name: str, z: np.ndarray, steps: int, seconds: float) -> bool:
         verdict = f"within {allowed}" if c.holds else f"not within {allowed}"
         shares = "".join(f"{100 * share:8.2f}%" for share in (c.lowest, c.pooled, c.highest))
         print(f"  {family:15}{shares}{c.spread:8.3f}  {verdict}")
-    if case.wrong:  # which need not spoil every family; fewer machines may not show it
+    if case.wrong:  # a wrong model need not affect every family, and few machines may not show it
         return len(z) < MANY or not any(found[family].holds for family in case.concerned)
     return all(c.holds for c in found.values())
 

@@ -1,5 +1,5 @@
-// What one reading of a detector costs: images and centroids of spots of 5 and 20 pixels radius, position device,
-// coupled mode.
+// Benchmarks of one detector reading: images and centroids of spots with a radius of 5 and 20 pixels, position sensing
+// device, coupled mode.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -61,7 +61,8 @@ void locate_spot(benchmark::State& state, stepdiag::Centroid centroid, double al
 
 void bound_of_a_spot(benchmark::State& state) {
     const Bench bench(double(state.range(0)));
-    // Read noise adds to what the electrons alone would leave, a quarter of the diameter over their root.
+    // Bound for shot noise only: a quarter of the diameter divided by the root of the electrons. Read noise increases
+    // it.
     const double electrons_alone = bench.spot.radius / 2.0 / std::sqrt(1e5);
     if (!(cramer_rao_bound(bench.camera, bench.spot) > electrons_alone))
         expect_near(cramer_rao_bound(bench.camera, bench.spot), electrons_alone, 0.0, "bound");
@@ -90,7 +91,8 @@ void coupled_mode(benchmark::State& state) {
 
 BENCHMARK(expose_without_noise)->Arg(5)->Arg(20)->Unit(benchmark::kMicrosecond);
 BENCHMARK(expose_with_noise)->Arg(5)->Arg(20)->Unit(benchmark::kMicrosecond);
-// Six standard deviations; the centre of gravity has some 1.1 of the bound at 5 pixels, and more in the read noise.
+// The limit is six standard deviations. The centre of gravity has about 1.1 times the bound at 5 pixels, and more if
+// read noise dominates.
 BENCHMARK_CAPTURE(locate_spot, gaussian_fit, stepdiag::Centroid::gaussian_fit, 6.0)
     ->Arg(5)
     ->Arg(20)

@@ -1,4 +1,5 @@
-// The demo's run of 604 readings on four diagonals of 800 x 600 x 500 mm, and six on scale lines: made and evaluated.
+// Benchmarks of simulation and evaluation for the demonstration's run: 604 readings on four diagonals of 800 x 600 x
+// 500 mm, and six on scale lines.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -35,7 +36,7 @@ struct Bench {
         return evaluate_conventional(run, plan, machine.chain(), machine.tool(), head.calibration(), options);
     }
 
-    // Largest deviation of positions from the machine's errors, mm.
+    // Largest deviation of the translations from the machine's errors, mm.
     double worst_position(const stepdiag::Calibration& calibration) const {
         double worst = 0.0;
         for (int i = 0; i < stepdiag::function_count; ++i) {

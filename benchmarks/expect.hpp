@@ -1,4 +1,4 @@
-// A benchmark that times a wrong answer times nothing: it stops instead.
+// Check of results in benchmarks. A wrong result aborts the program.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
-// The pose of a machine with all 21 errors (50 steps an axis), exact and to first order, at random points.
+// Benchmarks of the pose of a machine with all 21 errors (50 steps per axis), exact and to first order, at random
+// points.
 #include "stepdiag/machine/machine.hpp"
 
 #include <benchmark/benchmark.h>
@@ -29,7 +30,7 @@ struct Bench {
             commanded.push_back(volume.cwiseProduct(Vector3d(unit(engine), unit(engine), unit(engine))));
     }
 
-    // The chain as a product of Eigen's own transforms.
+    // The chain as a product of Eigen's transforms.
     Eigen::Isometry3d product(const Vector3d& c) const {
         const auto& map = machine.errors();
         const auto turn = [&](Axis a) {
@@ -55,7 +56,7 @@ void pose(benchmark::State& state) {
 
 void first_order_error(benchmark::State& state) {
     const Bench bench;
-    for (const auto& c : bench.commanded)  // products of 60 urad with 60 urad over 1 m are left out: some times 4 nm
+    for (const auto& c : bench.commanded)  // first order neglects several products of 60 urad x 60 urad x 1 m = 4 nm
         expect_near((bench.machine.first_order_error(c) - bench.machine.error(c)).norm(), 0.0, 100e-6, "error");
     int i = 0;
     for (auto _ : state) benchmark::DoNotOptimize(bench.machine.first_order_error(bench.commanded[i++ % points]));

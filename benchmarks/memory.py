@@ -1,10 +1,10 @@
-"""Memory of a Monte Carlo run does not grow with its samples: peak resident memory at 10^4 and 10^6 samples.
+"""Peak resident memory of a Monte Carlo run at 10^4 and 10^6 samples, which must not grow with the samples.
 
     ./run python benchmarks/memory.py [--samples 10000 1000000] [--threads 2] [--covariance]
 
-Each run is a process of its own: virtual calibrations of the demonstration (921 outputs), then their intervals. Ends
-with 1 where a run takes 5 % more than the first one. The covariance is another matter: partial sums of a tree, 6.8 MB
-each, as many as the logarithm of the samples.
+Each run is a separate process: virtual calibrations of the demonstration (921 outputs), then their intervals. The exit
+code is 1 if a run takes 5 % more than the first one. A covariance takes additional memory: partial sums of a tree, each
+6.8 MB, in a number proportional to the logarithm of the samples.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import stepdiag as sd
 
 
 def measure(samples: int, threads: int, covariance: bool) -> None:
-    """Prints peak resident memory in MiB, of this process."""
+    """Prints the peak resident memory of this process in MiB."""
     model = virtual("enhanced", "psd", 50)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     start = time.monotonic()

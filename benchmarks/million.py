@@ -1,10 +1,11 @@
-"""A million virtual calibrations with noise only, their covariance beside linear propagation.
+"""Covariance of a million virtual calibrations with noise only, compared with linear propagation.
 
     ./run python benchmarks/million.py [--samples 1000000] [--method enhanced]... [--layout ideal]... [--steps 50]
 
-For each method and layout: rate, memory, the largest deviation of a standard uncertainty (0.5 % is allowed) and of a
-correlation (0.01 is). Those of n samples scatter by 1/sqrt(2 n), 0.07 % of a million, and (1 - r^2)/sqrt(n), 0.001: of
-so many of them that the largest of hundreds of thousands is five times that. Ends with 1 where more is found.
+For each method and layout it prints rate, memory, and the largest deviation of a standard uncertainty (limit 0.5 %) and
+of a correlation (limit 0.01). For n samples they scatter by 1/sqrt(2 n), which is 0.07 % for a million, and by
+(1 - r^2)/sqrt(n), which is 0.001. The largest of hundreds of thousands of deviations is five times as large. The exit
+code is 1 if a limit is exceeded.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ ALLOWED_UNCERTAINTY, ALLOWED_CORRELATION = 0.005, 0.01
 
 
 def virtual(method: str, layout: str, steps: int, seed: int = 1) -> _core.VirtualCalibrations:
-    """The demonstration's machine, its mirror out by 300 urad, noise on every channel."""
+    """The demonstration's machine with a mirror misaligned by 300 urad and noise on every channel."""
     head = HEADS[layout]
     errors = sd.random_error_map(VOLUME, seed=7, intervals=steps)
     noise = [
@@ -58,7 +59,7 @@ def correlations(covariance: np.ndarray, moves: np.ndarray) -> np.ndarray:
 
 
 def compare(calibrations: _core.VirtualCalibrations, samples: int, threads: int) -> tuple[float, float, float]:
-    """Largest relative deviation of u, largest of a correlation, seconds."""
+    """Largest relative deviation of u, largest deviation of a correlation, time in s."""
     expected = _core.propagate(calibrations, covariance=True)
     options = _core.StatisticsOptions(covariance=True)
     start = time.monotonic()
@@ -68,7 +69,7 @@ def compare(calibrations: _core.VirtualCalibrations, samples: int, threads: int)
     covariance = np.asarray(expected.covariance)
     u = np.asarray(expected.standard_uncertainty)
     angle = np.array([o.unit == "rad" for o in calibrations.outputs])
-    # What is 0 by the frame choice does not move but for roundings.
+    # Values that are 0 by the choice of frame vary by rounding only.
     moves = u > np.where(angle, 1e-12, 1e-9)
     found = np.sqrt(np.diag(np.asarray(result.covariance)))
     assert np.allclose(found, result.standard_uncertainty, rtol=1e-6, atol=1e-15)

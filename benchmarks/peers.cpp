@@ -1,8 +1,8 @@
-// The scene of benchmarks/peers: one beam of a head with a position sensing device, 12 interactions from the source to
-// the sensor: out through cube splitter and window to the mirror, back over the splitting face. peers.py traces it with
-// other packages as well, and takes the answers that are to be compared from here. Times are a share of one interaction
-// of the path that comes to the sensor. What they contain:
-//   ray tree  all branches by Embree, powers, every face found; a pose's mirror is added to the scene that stands
+// The scene of benchmarks/peers: one beam of a head with a position sensing device. The path from source to sensor has
+// 12 interactions: through cube splitter and window to the mirror, and back over the splitting face. peers.py traces
+// the scene with other packages as well, and takes the reference results from this program. Times are per interaction
+// of the path to the sensor. They include:
+//   ray tree  all branches by Embree with powers; every face is searched; the mirror is added to the fixed scene
 //   replay    many poses at once: record, replay, verify one in a thousand by ray tree (TracedHead::replay)
 #include <benchmark/benchmark.h>
 
@@ -25,7 +25,7 @@ TracedHead make_head() {
     stepdiag::HeadDesign design;
     design.layout = stepdiag::HeadLayout::psd;
     const double glass = 1.500902;
-    const Eigen::Matrix3d half_turn = stepdiag::rotation_exp({0.0, 0.0, stepdiag::pi});  // returned light goes to +x
+    const Eigen::Matrix3d half_turn = stepdiag::rotation_exp({0.0, 0.0, stepdiag::pi});  // sends returned light to +x
     design.bodies = {
         {"splitter", stepdiag::make_cube_splitter(20.0, {glass}), glass, {{0.0, 0.0, -25.0}, half_turn}},
         {"window", stepdiag::make_plate(60.0, 60.0, 6.0, {glass}), glass, {{0.0, 0.0, 20.0}}},
@@ -38,7 +38,7 @@ TracedHead make_head() {
     return TracedHead(design, {}, {1.000268}, {100.0, 100.0});
 }
 
-// A mirror on its way from 0.3 to 1.5 m, tilted by up to 1 mrad.
+// Poses of a mirror from 0.3 to 1.5 m, tilted by up to 1 mrad.
 MirrorPose pose(int i) {
     return stepdiag::tilted_mirror({1.4 * std::sin(0.9 * i), 2.1 * std::cos(1.3 * i), 300.0 + 1200.0 * i / (poses - 1)},
                                    0.7e-3 * std::sin(1.7 * i), 0.7e-3 * std::cos(2.3 * i));
@@ -50,7 +50,7 @@ std::vector<MirrorPose> all_poses() {
     return all;
 }
 
-// Light that came over the mirror: the strongest on the sensor.
+// Path of the strongest light on the sensor, which is the light from the mirror.
 stepdiag::Path traced(const TracedHead& head, const MirrorPose& mirror) {
     const stepdiag::RayTree tree = head.trace(0, mirror);
     return tree.path_to(tree.arrivals(head.detector_face(0)).front());
@@ -82,7 +82,7 @@ void replay_with_moving_mirror(benchmark::State& state) {
     const auto replayed = head.replay(0, mirrors, {}, &counted);
     expect_near(double(counted.replayed), poses, 0.0, "poses replayed");
     for (int i = 0; i < poses; ++i) {
-        // Twelve planes, roundings of 1e-13 mm at a metre each.
+        // Twelve planes, each with a rounding of 1e-13 mm at one metre.
         expect_near(replayed[i][0].beam.optical_length, traced(head, mirrors[i]).optical_length, 5e-12, "path");
         expect_near(double(traced(head, mirrors[i]).hits.size()), interactions, 0.0, "interactions");
     }
@@ -90,7 +90,7 @@ void replay_with_moving_mirror(benchmark::State& state) {
     count(state, poses);
 }
 
-// No time, but an answer: optical path and place of the spot, mm.
+// Reports results instead of a time: optical path and position of the spot, mm.
 void answer(benchmark::State& state) {
     const TracedHead head = make_head();
     const stepdiag::Path path = traced(head, pose(int(state.range(0))));

@@ -1,9 +1,9 @@
-// One beam of a head with a position sensing device, 12 interactions a pose: out through cube splitter and window to
-// the mirror, back over the splitting face to the sensor; 40 triangles, mirror at 0.3 to 1.5 m, tilts up to 1 mrad.
-// Times are a share of one interaction. What they contain:
-//   replay  the recorded faces in double: Snell, outlines, recorded events and NaN checked in each lane; finds no face
-//   embree  finds each face in the scene (single precision), hits in double; a moved mirror stands beside the scene
-//   closed  distance and spot of the perfect head without any glass: the formulas of reading.hpp, no face at all
+// Benchmarks of one beam of a head with a position sensing device, with 12 interactions per pose: through cube splitter
+// and window to the mirror, and back over the splitting face to the sensor. The scene has 40 triangles; the mirror is
+// at 0.3 to 1.5 m with tilts up to 1 mrad. Times are per interaction. They include:
+//   replay  recorded faces in double precision; Snell's law, outlines, events and NaN checked in each SIMD lane; no
+//   search embree  search for each face (single precision), hits in double precision; a moving mirror is added to the
+//   scene closed  distance and spot of the ideal head without glass: the formulas of reading.hpp, without faces
 #include "stepdiag/optics/replay.hpp"
 
 #include <benchmark/benchmark.h>
@@ -40,7 +40,7 @@ struct Step {
     int face;
 };
 
-// Where a beam ends, and how far that is.
+// End of a beam, and its path lengths.
 struct Arrival {
     Vector3d point;
     double optical_length;
@@ -53,7 +53,7 @@ struct Bench {
     std::optional<stepdiag::Scene> without_mirror;
     stepdiag::Ray ray{{0.0, 0.0, source_z}, {0.0, 0.0, 1.0}};
     std::vector<Step> steps;
-    std::vector<Arrival> truth;  // by Embree
+    std::vector<Arrival> truth;  // from Embree
 
     Bench() {
         std::mt19937 random(1);
@@ -93,7 +93,7 @@ struct Bench {
     stepdiag::Scene scene(int i) const { return without_mirror->with({mirror(i)}); }
     bool is_mirror(int face) const { return face + 1 == int(faces.size()); }
 
-    // The branch of the ray tree that comes to the sensor: on through the splitting face, later reflected by it.
+    // The branch of the ray tree to the sensor: transmitted by the splitting face, later reflected by it.
     static Arrival follow(const stepdiag::Scene& scene, std::vector<Step>* record) {
         stepdiag::Ray ray{{0.0, 0.0, source_z}, {0.0, 0.0, 1.0}};
         double index = air, optical_length = 0.0;
@@ -130,7 +130,7 @@ const Bench& bench() {
 
 enum class Varies { mirror, planes, planes_and_indices };
 
-// The recorded route, with planes of each lane for the mirror only or for all faces.
+// The recorded route. Each lane has its own plane for the mirror only, or for all faces.
 struct Replay {
     std::deque<stepdiag::FaceFrame> frames;
     std::deque<stepdiag::Outline> outlines;
@@ -194,10 +194,10 @@ struct Replay {
         for (int i = 0; i < poses; ++i) {
             const Arrival& truth = bench().truth[i];
             expect_near(followed[i], 1.0, 0.0, "followed");
-            // Twelve planes, roundings of 1e-13 mm at a metre each; a beam of 3 m that turns by roundings of 1e-16.
+            // Twelve planes, each with a rounding of 1e-13 mm at one metre; rounding of 1e-16 rad on a beam of 3 m.
             expect_near(number[6][i], truth.optical_length, 5e-12, "path of the replay");
             for (int k = 0; k < 3; ++k) expect_near(number[k][i], truth.point[k], 1e-11, "spot of the replay");
-            // Square glass is reduced path to second order of the tilts: what is left is mm / 2 * (2e-3)^3.
+            // Perpendicular glass acts as reduced path to second order in the tilts. The rest is mm / 2 * (2e-3)^3.
             const auto reading = stepdiag::read_mirror(bench().point[i], bench().rotation[i].col(2));
             const double out = reading->beam_length() - source_z - (cube + window) * (1.0 - air / glass);
             const double t = reading->tan2_phi(), cos_2phi = (1.0 - t) / (1.0 + t);
@@ -208,7 +208,7 @@ struct Replay {
     }
 };
 
-// Seconds an interaction.
+// Reports the time per interaction.
 void count(benchmark::State& state, double each_time) {
     state.counters["interaction"] = benchmark::Counter(
         each_time * interactions, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);

@@ -1,5 +1,5 @@
-// What statistics cost: 921 outputs (a calibration of 50 steps per axis) of a model that costs next to nothing, one
-// thread; by processor time. us_a_sample includes what model_alone takes.
+// Benchmarks of the statistics for 921 outputs (a calibration with 50 steps per axis) of a very cheap model. Processor
+// time of one thread. us_a_sample includes the time of model_alone.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -14,7 +14,7 @@ namespace {
 
 using namespace stepdiag;
 
-// Normal numbers from a table, times a spread of each output's own: u has all the digits that it may have.
+// Normal numbers from a table, multiplied by a different spread for each output, so that u takes all digits.
 class TableModel : public SampleModel {
 public:
     explicit TableModel(std::size_t count) {
@@ -31,7 +31,7 @@ public:
     std::unique_ptr<SampleModel::Worker> worker() const override { return std::make_unique<TableWorker>(*this); }
 
 private:
-    static constexpr std::size_t table_size = 1 << 14;  // stays in a cache
+    static constexpr std::size_t table_size = 1 << 14;  // fits a cache
 
     class TableWorker : public SampleModel::Worker {
     public:

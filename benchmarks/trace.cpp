@@ -1,5 +1,5 @@
-// From one Embree query to a traced reading, and the closed definition of the same reading beside it; and what a mirror
-// costs that moves in front of a head of many faces.
+// Benchmarks from one Embree query to a traced reading, compared with the closed definition of the same reading, and of
+// a moving mirror in front of a head with many faces.
 #include <benchmark/benchmark.h>
 
 #include <vector>
@@ -19,7 +19,7 @@ using stepdiag::Surface;
 
 constexpr int poses = 64;
 
-// A head on the body diagonal of 800 x 600 x 500 mm, misaligned as in the paper, and a tool at some poses along it.
+// A head on the body diagonal of 800 x 600 x 500 mm, misaligned as in the paper, and poses of the tool along it.
 struct Bench {
     stepdiag::Head head;
     Matrix3d frame = stepdiag::line_frame(stepdiag::Line::parse("ppp"), {800.0, 600.0, 500.0});
@@ -96,7 +96,7 @@ void closed_definition_of_a_reading(benchmark::State& state) {
     for (auto _ : state) benchmark::DoNotOptimize(bench.closed(i++ % poses));
 }
 
-// Squares in rows of ten along z, each row a plane.
+// Squares in rows of ten along z. Each row is a plane.
 std::vector<stepdiag::Face> squares(int count) {
     std::vector<stepdiag::Face> faces;
     for (int i = 0; i < count; ++i)
@@ -126,7 +126,7 @@ void scene_with_another_mirror(benchmark::State& state) {
     for (auto _ : state) benchmark::DoNotOptimize(fixed.with({moving_mirror(i++)}));
 }
 
-// A query that the mirror answers, and one that the fixed faces do.
+// One query that meets the mirror, and one that meets a fixed face.
 void query_of(benchmark::State& state, const stepdiag::Scene& scene) {
     const stepdiag::Ray out{{1.0, 0.0, 5.0}, Vector3d::UnitZ()}, back{{1.0, 0.0, 5.0}, -Vector3d::UnitZ()};
     expect_near(scene.first_hit(out)->distance, 295.0, 1e-12, "distance of the mirror");

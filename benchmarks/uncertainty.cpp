@@ -1,6 +1,7 @@
-// Whole virtual calibrations a second of one core: 50 steps, four body diagonals and three scale lines (610 poses),
-// set-up angles of every diagonal and noise of every reading uncertain, the enhanced evaluation; with the ideal
-// one-beam head, and with a head of bodies and detectors like the shipped layout b (beam_and_psd.toml).
+// Benchmarks of complete virtual calibrations per second on one core: 50 steps, four body diagonals and three scale
+// lines (610 poses), enhanced evaluation. The set-up angles of every diagonal and the noise of every reading are
+// uncertain. The heads are the ideal one-beam head, and a ray-traced head like the shipped layout b
+// (beam_and_psd.toml).
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -26,7 +27,7 @@ using namespace stepdiag;
 
 constexpr int steps = 50;
 constexpr std::uint64_t seed = 1;
-constexpr std::size_t block = 80;  // what the statistics take at a time: 0.6 MB of outputs
+constexpr std::size_t block = 80;  // block size of the statistics: 0.6 MB of outputs
 
 // python/stepdiag/head/shipped/beam_and_psd.toml
 Head layout_b() {
@@ -84,7 +85,7 @@ void count(benchmark::State& state, double calibrations) {
     state.counters["calibrations/s"] = benchmark::Counter(calibrations, benchmark::Counter::kIsIterationInvariantRate);
 }
 
-// A sample against simulate() with what was drawn for it, its noise and evaluate_enhanced().
+// Compares a sample with simulate() for its drawn inputs, plus its noise, and evaluate_enhanced().
 void check(Layout layout) {
     const VirtualRun run = run_of(layout);
     const VirtualCalibrations& model = model_of(layout);
@@ -141,7 +142,7 @@ void virtual_calibrations(benchmark::State& state, Layout layout) {
     count(state, double(block));
 }
 
-// The same and the statistics of all parameters: means, standard uncertainties and both coverage intervals.
+// The same with the statistics of all parameters: means, standard uncertainties and both coverage intervals.
 void with_statistics(benchmark::State& state, Layout layout) {
     check(layout);
     const VirtualCalibrations& model = model_of(layout);
@@ -156,7 +157,7 @@ void with_statistics(benchmark::State& state, Layout layout) {
     count(state, double(leaves * leaf_samples));
 }
 
-// --- the parts ---
+// --- parts ---
 
 struct Parts {
     explicit Parts(Layout layout)
@@ -203,7 +204,7 @@ void part_trace(benchmark::State& state, Layout layout) {
     count(state, double(lane_group));
 }
 
-// Random numbers once more, and their addition.
+// Random numbers and their addition to the readings.
 void part_noise(benchmark::State& state, Layout layout) {
     Parts parts(layout);
     parts.lanes->trace(parts.deviations.data(), 0, parts.scratch, parts.readings.data(), parts.followed);
@@ -217,7 +218,7 @@ void part_noise(benchmark::State& state, Layout layout) {
     count(state, double(lane_group));
 }
 
-// Reduction to distance and tilts, and the linear map.
+// Reduction to distance and tilts, and linear map.
 void part_evaluation(benchmark::State& state, Layout layout) {
     Parts parts(layout);
     parts.lanes->trace(parts.deviations.data(), 0, parts.scratch, parts.readings.data(), parts.followed);

@@ -1,8 +1,8 @@
-"""The exact adjustment by stepdiag, Ceres, and two ways with SciPy: milliseconds, and how far from truth.
+"""Time and errors of the exact adjustment by stepdiag, Ceres, and two methods with SciPy.
 
-The run is that of benchmarks/adjustment_run.hpp, without noise; unknowns are the 18 functions and 3 squarenesses at all
-nodes and, of the set-ups, reflector, laser and distance constant. All start from zero. Times are processor time of one
-thread.
+The run is that of benchmarks/adjustment_run.hpp, without noise. The unknowns are the 18 functions and 3 squarenesses at
+all nodes, and reflector, laser and distance constant of the set-ups. All programs start from zero. Times are processor
+time of one thread, ms.
 """
 
 import argparse
@@ -51,7 +51,7 @@ def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def rotation(vector: np.ndarray) -> np.ndarray:
-    """Exp of small rotation vectors, also complex ones: to the eighth order, 1e-24 of what a milliradian does."""
+    """Exp of small rotation vectors, also complex ones, to eighth order: relative error 1e-24 for a milliradian."""
     square = dot(vector, vector)[..., None, None]
     x, y, z = np.moveaxis(vector, -1, 0)
     zero = np.zeros_like(x)
@@ -62,7 +62,7 @@ def rotation(vector: np.ndarray) -> np.ndarray:
 
 
 class Problem:
-    """Readings of a run, and what they should be for errors of the nodes and set-ups; all at once in NumPy."""
+    """Readings of a run, and their model for errors of the nodes and set-ups, vectorised with NumPy."""
 
     def __init__(self, steps: int) -> None:
         self.steps = steps
@@ -85,7 +85,7 @@ class Problem:
         self._make_pattern()
 
     def _number_unknowns(self, lines: int) -> None:
-        """Of node k of an axis the six errors, of a set-up reflector, laser and distance constant; -1: known."""
+        """Indices of the unknowns: six errors of a node; reflector, laser, distance constant of a set-up; -1: known."""
         free = np.ones((3, self.steps + 1, 6), dtype=bool)
         free[:, 0] = False  # home
         free[0, -1, 1:3] = free[1, -1, 2] = False  # the choice of frame: EYX, EZX and EZY are 0 at the end of travel
@@ -98,7 +98,7 @@ class Problem:
         self.size = int(free.sum() + free_setup.sum())
 
     def _make_pattern(self) -> None:
-        """Each reading sees one node of every axis and one set-up: 23 columns, some of them known."""
+        """Each reading depends on one node of every axis and one set-up: 23 columns, some of them known."""
         nodes = [self.node_unknown[a, self.node[:, a]] for a in range(3)]
         columns = np.concatenate([*nodes, self.setup_unknown[self.setup]], axis=1)
         columns = np.broadcast_to(columns[:, None, :], (*self.reading.shape, 23))[self.used]
@@ -108,7 +108,7 @@ class Problem:
 
     def unpack(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Errors of the nodes and of the set-ups."""
-        padded = np.append(x, 0.0)  # where -1 points
+        padded = np.append(x, 0.0)  # the 0 at index -1 is for known values
         return padded[self.node_unknown], padded[self.setup_unknown]
 
     def model(self, nodes: np.ndarray, setups: np.ndarray) -> np.ndarray:
@@ -118,7 +118,7 @@ class Problem:
         for axis in range(3):
             errors = nodes[axis, self.node[:, axis]]
             shift = errors[:, :3] + self.commanded[:, axis, None] * np.eye(3)[axis]
-            if axis == 0:  # the one that carries the workpiece
+            if axis == 0:  # the axis that carries the workpiece
                 turn = rotation(errors[:, 3:])
                 position = (turn @ shift[:, :, None])[:, :, 0]
             else:
@@ -141,7 +141,7 @@ class Problem:
         return ((self.model(*self.unpack(x)) - self.reading) / UNCERTAINTY)[self.used]
 
     def jacobian(self, x: np.ndarray) -> csr_matrix:
-        """Exact: the imaginary parts of 23 evaluations, each with one column of every reading made complex."""
+        """Exact derivatives by complex steps: imaginary parts of 23 evaluations, one for each column."""
         nodes, setups = (part.astype(complex) for part in self.unpack(x))
         tiny = 1e-30
         by_column = np.empty((*self.reading.shape, 23))
@@ -154,7 +154,7 @@ class Problem:
         return csr_matrix((values, self.columns, self.row_ends), shape=(int(self.used.sum()), self.size))
 
     def answer(self, x: np.ndarray, seconds: float) -> Answer:
-        """Node values are compared with the machine's errors, squareness terms included."""
+        """Compares the node values with the machine's errors, including squareness terms."""
         nodes, _ = self.unpack(x)
         worst = np.zeros(2)
         for axis, name in enumerate("XYZ"):
@@ -170,7 +170,7 @@ class Problem:
 
 
 def gauss_newton(problem: Problem) -> np.ndarray:
-    """Normal equations of scaled columns, SuperLU; stops where steps no longer shrink."""
+    """Normal equations with scaled columns, solved by SuperLU. Stops when the steps no longer become smaller."""
     x = np.zeros(problem.size)
     before = math.inf
     while True:
@@ -188,8 +188,9 @@ def gauss_newton(problem: Problem) -> np.ndarray:
 
 
 def trust_region(problem: Problem) -> np.ndarray:
-    """scipy.optimize.least_squares; for sparse derivatives it has LSMR. Scales of a million times the columns' make the
-    first trust region large enough for Gauss-Newton steps; these go 1, 1e-1, 1e-6, 1e-11: the last one is rounding."""
+    """scipy.optimize.least_squares, which uses LSMR for sparse derivatives. Scales of a million times those of the
+    columns make the first trust region large enough for Gauss-Newton steps: 1, 1e-1, 1e-6, 1e-11; the last one is
+    rounding."""
     start = np.zeros(problem.size)
     jacobian = problem.jacobian(start)
     found = least_squares(
@@ -217,7 +218,7 @@ def timed(job: Callable[[Problem], np.ndarray], steps: int, repeats: int) -> Ans
 
 
 def run_benchmark(executable: Path, leave_out: str) -> dict[str, dict[str, Any]]:
-    """Results of a benchmark executable by name; of each the fastest of some repetitions."""
+    """Results of a benchmark executable by name: the fastest of several repetitions."""
     command = [executable, "--benchmark_format=json", "--benchmark_repetitions=5", "--benchmark_min_time=0.2"]
     command.append(f"--benchmark_filter=-{leave_out}")
     output = subprocess.run([str(part) for part in command], check=True, capture_output=True, text=True).stdout
@@ -232,7 +233,7 @@ def run_benchmark(executable: Path, leave_out: str) -> dict[str, dict[str, Any]]
 
 
 class Row(NamedTuple):
-    """A line of the table, ms; none where it is not measured."""
+    """A line of the table, ms; None if it is not measured."""
 
     name: str
     unknowns: list[float | None]

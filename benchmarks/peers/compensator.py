@@ -1,6 +1,8 @@
-"""The compensator beside NumPy: the error vector of 1,000 positions at once from the same 18 tables by numpy.interp, to
-first order and as the exact pose, and one at a time as a controller asks. Nanoseconds an error vector, of one thread's
-processor time, all in one run with benchmarks/compensator.cpp.
+"""Compares the compensator with NumPy.
+
+NumPy computes the error vector from the same 18 tables by numpy.interp: 1,000 positions at once, to first order and
+exactly, and one position at a time as for a controller. Times are in ns of one thread's processor time per error
+vector, measured in one run with benchmarks/compensator.cpp.
 """
 
 import argparse
@@ -64,7 +66,7 @@ def turned(theta: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def cpu_time(job: Callable[[], Any], count: int, repeats: int = 7) -> float:
-    """Nanoseconds for each of `count` answers; the fastest of some repeats of at least 50 ms."""
+    """Time in ns for each of `count` results: the fastest of several repetitions of at least 50 ms."""
     times = []
     for _ in range(repeats):
         start, rounds = time.process_time(), 0
@@ -82,7 +84,7 @@ def main() -> int:
     sys.path.insert(0, str(ROOT / "python"))
     core = importlib.import_module("stepdiag._core")
 
-    errors = core.random_error_map(VOLUME, seed=0)  # that of benchmarks/compensator.cpp
+    errors = core.random_error_map(VOLUME, seed=0)  # as in benchmarks/compensator.cpp
     with tempfile.TemporaryDirectory() as folder:
         path = f"{folder}/table.csv"
         errors.write(path, chain=CHAIN, volume=VOLUME, tool=TOOL)
@@ -91,7 +93,7 @@ def main() -> int:
     positions = np.random.default_rng(1).uniform(0.0, VOLUME, (POINTS, 3))
     own = compensator.error(positions)
     exact, first = (float(np.abs(other(positions) - own).max()) for other in (tables.exact, tables.first_order))
-    # Positions of 1,000 mm are rounded to 1e-13 mm; the second order is some 60 urad of 100 um.
+    # Positions of 1,000 mm are rounded to 1e-13 mm. The second order is about 60 urad times 100 um.
     if not (exact < 5e-12 and first < 5e-5):
         sys.exit(f"NumPy's errors are not ours: {exact:.1e} mm, to first order {first:.1e} mm")
 

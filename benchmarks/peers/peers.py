@@ -1,8 +1,9 @@
-"""The same beam by stepdiag, raysect and optiland: nanoseconds an interaction, and whether the answers agree.
+"""Traces one beam with stepdiag, raysect and optiland, and compares times and results.
 
 The scene is that of benchmarks/peers.cpp: a ray from a laser through a cube beam splitter (N-BK7 at 1530 nm) and a
-window to a mirror and back over the splitting face to a position sensing device, 12 interactions; the mirror goes from
-0.3 to 1.5 m in 604 poses, tilted by up to 1 mrad. Times are processor time of one thread.
+window to a mirror, and back over the splitting face to a position sensing device, with 12 interactions. The mirror
+moves from 0.3 to 1.5 m in 604 poses, tilted by up to 1 mrad. Times are in ns of one thread's processor time per
+interaction.
 """
 
 import argparse
@@ -21,12 +22,12 @@ os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", NUMBA_NUM_THREA
 import numpy as np  # reads the variables above
 
 POSES, INTERACTIONS = 604, 12
-FIXED = POSES // 2  # the pose at which a mirror stands that does not move
+FIXED = POSES // 2  # pose of the fixed mirror
 AIR, GLASS = 1.000268, 1.500902
 
 
 class Answer(NamedTuple):
-    """Optical path from the source to the sensor and place of the spot, mm."""
+    """Optical path from the source to the sensor, and position of the spot, mm."""
 
     path: float
     y: float
@@ -34,7 +35,7 @@ class Answer(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A line of the table: ns an interaction, and the largest difference of an answer from stepdiag's ray tree, mm."""
+    """A line of the table: ns per interaction, and the largest difference of a result from stepdiag's ray tree, mm."""
 
     name: str
     fixed: float
@@ -44,7 +45,7 @@ class Row(NamedTuple):
 
 
 def mirror_pose(i: int) -> tuple[np.ndarray, np.ndarray]:
-    """The mirror's centre, and its axes as columns, the normal last."""
+    """Centre of the mirror, and its axes as columns; the last one is the normal."""
     alpha, beta = 0.7e-3 * math.sin(1.7 * i), 0.7e-3 * math.cos(2.3 * i)
     point = np.array([1.4 * math.sin(0.9 * i), 2.1 * math.cos(1.3 * i), 300.0 + 1200.0 * i / (POSES - 1)])
     normal = np.array([beta, -alpha, 1.0])
@@ -55,7 +56,7 @@ def mirror_pose(i: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def cpu_time(job: Callable[[], float], repeats: int = 5) -> float:
-    """Nanoseconds for each of what the job says that it did; the fastest of some repeats."""
+    """Time in ns for each item of the job, which returns their number: the fastest of several repetitions."""
     times = []
     for _ in range(repeats):
         start = time.process_time()
@@ -65,9 +66,9 @@ def cpu_time(job: Callable[[], float], repeats: int = 5) -> float:
 
 
 class Raysect:
-    """Materials of raysect.optical alone, compiled: a dielectric that transmits only, a perfect mirror, and for the
-    splitting face a blend of mirror and nothing, which decides at random. It is 1 um thick, so that light which passes
-    it meets one face more than there are."""
+    """Compiled materials of raysect.optical only: a transmitting dielectric, a perfect mirror, and for the splitting
+    face a blend of mirror and nothing, which chooses at random. It is 1 um thick, so transmitted light meets one more
+    face than in the scene."""
 
     def __init__(self) -> None:
         from raysect.core import AffineMatrix3D, Point3D, Vector3D, rotate_y, translate
@@ -101,9 +102,9 @@ class Raysect:
         self.logging_ray = lambda: LoggingRay(Point3D(0, 0, -60), Vector3D(0, 0, 1), **settings)
 
     def answer(self, i: int) -> Answer:
-        """Rays until one goes on at the splitting face, and is reflected when it comes back."""
+        """Traces rays until the splitting face transmits one, and reflects it on its return."""
         self.mirror.transform = self.poses[i]
-        in_glass = [1, 2, 3, 5, 8, 10, 11]  # pieces of the way; those of 1 um inside the splitting face are one
+        in_glass = [1, 2, 3, 5, 8, 10, 11]  # sections of the path, with that of 1 um inside the splitting face
         while True:
             ray = self.logging_ray()
             ray.trace(self.world)
@@ -116,7 +117,7 @@ class Raysect:
             return Answer(float(index @ lengths), *map(float, points[-1, 1:]))
 
     def times(self) -> tuple[float, float]:
-        """Of each interaction that there was, on whatever way; a mirror's move counts for a path of twelve."""
+        """Time per interaction, on any path. A motion of the mirror counts for a path of twelve interactions."""
         traces = 4000
 
         def fixed() -> float:
@@ -145,7 +146,7 @@ class Raysect:
 
 
 class Optiland:
-    """Sequential: twelve surfaces in the order in which the ray meets them, without outlines; NumPy arrays of rays."""
+    """Sequential trace of NumPy arrays of rays: twelve surfaces in the order of the path, without outlines."""
 
     def __init__(self) -> None:
         from optiland.materials import IdealMaterial
@@ -195,7 +196,7 @@ class Optiland:
         return Answer(float(rays.opd[0]), float(rays.y[0]), float(rays.z[0]))
 
     def times(self) -> tuple[float, float]:
-        """With a fixed mirror ten thousand rays at once, where it is fastest; a mirror that moves takes a ray each."""
+        """Fixed mirror: ten thousand rays at once, the fastest number. Moving mirror: one ray for each pose."""
         together, moves = 10_000, 100
         rays = self.rays(together)
 
@@ -221,7 +222,7 @@ def run_own(executable: Path, seconds: float) -> dict[str, dict[str, Any]]:
 
 
 def own_rows(build: Path) -> tuple[list[Row], dict[int, Answer]]:
-    """Stepdiag's lines, and its answers by pose."""
+    """The lines of stepdiag, and its results for each pose."""
     head = run_own(build / "bench_peers", 0.5)
     kernels = run_own(build / "bench_replay", 0.3)
 
@@ -279,7 +280,8 @@ def main() -> int:
             f"{raysect.moving / row.moving:.0f} times with a moving one; "
             f"than optiland {optiland.fixed / row.fixed:.2g} and {optiland.moving / row.moving:.2g} times"
         )
-    # raysect steps 1e-9 mm off each face that it leaves; of optiland's and our roundings over 3 m remain 1e-11 mm.
+    # raysect moves rays 1e-9 mm away from each face that they leave. For optiland and stepdiag, rounding over 3 m is
+    # 1e-11 mm.
     if raysect.difference is None or raysect.difference > 1e-7:
         sys.exit("raysect's answers are not ours")
     if optiland.difference is None or optiland.difference > 1e-10:

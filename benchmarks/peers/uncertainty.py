@@ -1,9 +1,9 @@
-"""Whole virtual calibrations by stepdiag beside parts of them by others: NumPy with the linear model and noise alone,
-raysect with the traces alone. Microseconds of one thread's processor time for a calibration, all in one run.
+"""Compares complete virtual calibrations by stepdiag with parts of them by other packages.
 
-The plan is that of benchmarks/uncertainty.cpp: four body diagonals at 50 steps and three scale lines, 610 poses. NumPy
-multiplies the gain of the enhanced evaluation (900 values by 1,830 readings) with normal numbers; there is no set-up,
-no trace, nothing of second order in it. raysect traces what a head's beams do, without any evaluation.
+NumPy calculates the linear model with noise only, raysect the traces only. Times are in us of one thread's processor
+time per calibration. The plan is that of benchmarks/uncertainty.cpp: four body diagonals at 50 steps and three scale
+lines, 610 poses. NumPy multiplies the gain of the enhanced evaluation (900 values by 1,830 readings) by normal
+numbers, without set-ups, traces and second-order effects. raysect traces the beams of a head, without evaluation.
 """
 
 import argparse
@@ -28,7 +28,7 @@ SIGMA = {"distance": 0.1e-3, "alpha": 1e-6, "beta": 1e-6, "spot_x": 1e-3, "spot_
 
 
 class Row(NamedTuple):
-    """A line of the table: microseconds a calibration."""
+    """A line of the table: us per calibration."""
 
     name: str
     one_beam: float
@@ -37,7 +37,7 @@ class Row(NamedTuple):
 
 
 def cpu_time(job: Callable[[], float], repeats: int = 3) -> float:
-    """Microseconds for each of what the job says that it did; the fastest of some repeats."""
+    """Time in us for each item of the job, which returns their number: the fastest of several repetitions."""
     times = []
     for _ in range(repeats):
         start = time.process_time()
@@ -47,7 +47,7 @@ def cpu_time(job: Callable[[], float], repeats: int = 3) -> float:
 
 
 class Linear:
-    """y = y0 + A e: noise of every reading through the gain of the enhanced evaluation."""
+    """y = y0 + A e: noise e of every reading, and gain A of the enhanced evaluation."""
 
     def __init__(self, core: Any, layout: str) -> None:
         errors = core.random_error_map(VOLUME, seed=1)
@@ -73,7 +73,7 @@ class Linear:
         return self.nominal[:, np.newaxis] + self.gain @ (self.sigma[:, np.newaxis] * noise)
 
     def check(self, count: int = 4000) -> float:
-        """The largest difference of a standard uncertainty from stepdiag's noise alone, as a share of it."""
+        """Largest relative difference of a standard uncertainty from that of stepdiag with noise only."""
         u = np.std(self.samples(count), axis=1)
         own = np.std(self.own.evaluate(0, count), axis=1)
         known = own > 1e-15
@@ -84,14 +84,14 @@ class Linear:
         return self.samples(count).shape[1]
 
     def with_statistics(self) -> float:
-        """Mean, standard deviation and the ends of the symmetric interval, of samples that are all kept."""
+        """Mean, standard deviation and ends of the symmetric interval, from stored samples."""
         values = self.samples(10_000)
         values.mean(axis=1), values.std(axis=1), np.quantile(values, [0.025, 0.975], axis=1)
         return values.shape[1]
 
 
 class OneBeam:
-    """raysect: a beam to a mirror that moves and back to a plane, two interactions a pose."""
+    """raysect: a beam to a moving mirror and back to a plane, with two interactions per pose."""
 
     def __init__(self) -> None:
         from raysect.core import AffineMatrix3D, Point3D, Vector3D, translate
@@ -123,7 +123,7 @@ class OneBeam:
 
 
 def own_rows(build: Path) -> list[Row]:
-    """Whole calibrations, their parts, and the statistics of all parameters."""
+    """Complete calibrations, their parts, and the statistics of all parameters."""
     results = run_own(build / "bench_uncertainty", 0.5)
 
     def row(part: str, name: str, does: str) -> Row:
@@ -154,7 +154,8 @@ def main() -> int:
     rows = own_rows(build)
     linear = {layout: Linear(core, layout) for layout in ("ideal", "psd")}
     for layout, model in linear.items():
-        # 4,000 samples each: 1.6 % of the quotient of two standard deviations; six of them, of 900 values.
+        # With 4,000 samples, the quotient of two standard deviations scatters by 1.6 %. For 900 values, the limit is
+        # six times that.
         if (difference := model.check()) > 0.1:
             sys.exit(f"NumPy's uncertainties of {layout} are not ours: {difference:.1%}")
     numpy = f"NumPy {version('numpy')}"

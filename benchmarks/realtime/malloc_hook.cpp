@@ -1,4 +1,4 @@
-// Every way to memory counted: these stand in for the C library's functions in the whole program, libraries included.
+// Counts all allocations: these functions replace those of the C library in the whole program, including libraries.
 #include "malloc_hook.hpp"
 
 #include <atomic>

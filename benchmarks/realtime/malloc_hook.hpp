@@ -1,4 +1,5 @@
 #pragma once
 
-// Calls of malloc, calloc, realloc, their aligned kin, operator new (which calls malloc) and free up to now.
+// Number of calls so far of malloc, calloc, realloc, their aligned variants, operator new (which calls malloc) and
+// free.
 long allocation_calls();

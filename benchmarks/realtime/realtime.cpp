@@ -1,11 +1,12 @@
-// Is the compensator fit for a real-time thread? A table is loaded, memory is locked, the thread made SCHED_FIFO where
-// that is permitted; then CALLS calls of stepdiag_error, _command and _forward at random positions, during which
-//   - no allocation takes place: malloc and its kin are hooked;
-//   - no page fault takes place: getrusage before and after;
-//   - no system call takes place: seccomp's strict mode, in which a call other than read, write and _exit kills the
-//     program; results leave it by one write.
-// Every answer is checked: forward(command(t)) is t. Times of single calls are told and not judged: they are those of
-// this machine and of what else it does.
+// Tests whether the compensator is suitable for a real-time thread. The program loads a table, locks its memory, and
+// selects the scheduler SCHED_FIFO if permitted. It then makes CALLS calls of stepdiag_error, _command and _forward at
+// random positions and checks that there is
+//   - no allocation: malloc and its variants are hooked;
+//   - no page fault: getrusage before and after;
+//   - no system call: seccomp's strict mode kills the program for calls other than read, write and _exit; the program
+//     returns its results by one write.
+// It also checks all results: forward(command(t)) is t. It reports the times of single calls without assessing them,
+// because they depend on the computer and its load.
 #include <fcntl.h>
 #include <linux/seccomp.h>
 #include <sched.h>
@@ -36,17 +37,17 @@ namespace {
 
 using Position = std::array<double, 3>;
 
-// What a run found out; plain, so that a child can write it to its parent.
+// Results of a run, in a plain structure that a child process can write to its parent.
 struct Findings {
     long allocations, minor_faults, major_faults;
     double largest_residual;          // mm
-    long wrong;                       // statuses that are not 0
-    double seconds, longest;          // of all calls, of the longest
-    std::array<long, 5> slower_than;  // how many calls took more than 0.2, 1, 10, 100, 1000 us
+    long wrong;                       // number of statuses other than 0
+    double seconds, longest;          // time of all calls, time of the longest call
+    std::array<long, 5> slower_than;  // number of calls above 0.2, 1, 10, 100, 1000 us
 };
 constexpr std::array<double, 5> limits = {0.2e-6, 1e-6, 10e-6, 100e-6, 1000e-6};
 
-// By the vDSO: no system call. But it reads the time stamp counter, which strict mode forbids as well.
+// Uses the vDSO without a system call. It reads the time stamp counter, which strict mode forbids.
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 std::string write_table(const std::string& path) {
@@ -58,7 +59,7 @@ std::string write_table(const std::string& path) {
     return path;
 }
 
-// `count` calls, a third of each kind. Nothing in here may touch memory for the first time.
+// Makes `count` calls, a third of each kind. This function must not touch memory for the first time.
 template <bool timed>
 void call(const stepdiag_compensator* compensator, const std::vector<Position>& targets, long count,
           Findings& findings) {
@@ -80,13 +81,13 @@ void call(const stepdiag_compensator* compensator, const std::vector<Position>& 
     }
 }
 
-// The calls in a process of their own, which seccomp ends if there is a system call among them.
+// Makes the calls in a separate process. seccomp kills it if one of them is a system call.
 void measure(const stepdiag_compensator* compensator, const std::vector<Position>& targets, long count, bool strict,
              int out) {
     Findings warm = {}, findings = {};
     call<true>(compensator, targets, 3 * long(targets.size()), warm);
     rusage before = {}, after = {};
-    getrusage(RUSAGE_SELF, &after);  // once, so that its own pages are there
+    getrusage(RUSAGE_SELF, &after);  // first call loads its own pages
     getrusage(RUSAGE_SELF, &before);
     const long allocations = allocation_calls();
     const double start = now();
@@ -101,10 +102,11 @@ void measure(const stepdiag_compensator* compensator, const std::vector<Position
         findings.major_faults = after.ru_majflt - before.ru_majflt;
     }
     const bool written = write(out, &findings, sizeof findings) == ssize_t(sizeof findings);
-    syscall(SYS_exit, written ? 0 : 4);  // not exit_group, which strict mode does not know
+    syscall(SYS_exit, written ? 0 : 4);  // strict mode does not permit exit_group
 }
 
-// Both proofs, each by its own child: page faults cannot be asked for once system calls are forbidden.
+// Runs one test in a child process. Page faults and system calls need separate runs, because getrusage is a system
+// call.
 bool run(const stepdiag_compensator* compensator, const std::vector<Position>& targets, long count, bool strict,
          Findings& findings, int& status) {
     int ends[2];
@@ -112,7 +114,7 @@ bool run(const stepdiag_compensator* compensator, const std::vector<Position>& t
     const pid_t child = fork();
     if (child == 0) {
         close(ends[0]);
-        // Locked memory is not inherited.
+        // A child does not inherit locked memory.
         if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) std::fprintf(stderr, "mlockall: %s\n", std::strerror(errno));
         measure(compensator, targets, count, strict, ends[1]);
     }
@@ -123,7 +125,7 @@ bool run(const stepdiag_compensator* compensator, const std::vector<Position>& t
            WEXITSTATUS(status) == 0;
 }
 
-// Whether strict mode does what is said of it.
+// Checks that strict mode kills a process that makes a system call.
 bool is_a_system_call_deadly() {
     const pid_t child = fork();
     if (child == 0) {
@@ -155,7 +157,7 @@ int main(int count, char** arguments) {
         std::fprintf(stderr, "realtime: %s\n", compensator ? "usage: realtime [CALLS [FOLDER]]" : message);
         return 2;
     }
-    const bool is_counting = allocation_calls() > 100;  // by loading alone
+    const bool is_counting = allocation_calls() > 100;  // loading a table makes more than 100
     std::mt19937_64 engine(1);
     std::uniform_real_distribution<double> unit(0.0, 1.0);
     std::vector<Position> targets(10'000);

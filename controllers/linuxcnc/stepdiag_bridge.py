@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""HAL component between a measuring program in LinuxCNC and `stepdiag acquire --trigger`: a reading is taken while the
-program waits.
+"""HAL component between a measuring program in LinuxCNC and `stepdiag acquire --trigger`. It requests a reading while
+the program waits.
 
     loadusr -Wn stepdiag-bridge /usr/bin/python3 stepdiag_bridge.py --acquire 127.0.0.1:7000
 
@@ -9,12 +9,12 @@ program waits.
     net wanted  motion.digital-out-00  => stepdiag-bridge.request
     net stored  stepdiag-bridge.done   => motion.digital-in-00
 
-When `request` rises, "READ <visit> <point>" goes to the acquisition; its "DONE" sets `done` until `request` falls.
-A "FAIL", a broken connection or a time limit sets `failed` until `request` falls, and prints the reason.
+When `request` rises, the component sends "READ <visit> <point>" to the acquisition. The answer "DONE" sets `done` until
+`request` falls. A "FAIL", a broken connection or a timeout sets `failed` until `request` falls, and prints the reason.
 
-In simulation, --twin HOST:PORT moves a virtual machine first (`stepdiag twin`): to the joints, joint-x, -y, -z, once
-they stand. They do when they have not changed for --rest servo cycles as counted by the pin `clock`, s; without a clock
-for as many ms.
+In simulation, --twin HOST:PORT first moves a virtual machine (`stepdiag twin`) to the position of the joints (pins
+joint-x, -y, -z), as soon as they are at rest. They are at rest if they have not changed for --rest servo cycles. The
+pin `clock` gives the time in s; without it, a cycle is --period of real time.
 """
 
 import argparse
@@ -42,7 +42,7 @@ def address(text: str) -> tuple[str, int]:
 
 
 class Peer:
-    """A connection that is made when it is first needed, and anew after it broke."""
+    """A connection that is opened on first use, and opened again after a failure."""
 
     def __init__(self, name: str, where: tuple[str, int], timeout: float) -> None:
         self.name, self.where, self.timeout = name, where, timeout
@@ -144,7 +144,7 @@ class Bridge:
             raise Failure(f"acquisition: visit {round(visit)}, point {round(point)}: {answer}")
 
     def serve(self) -> None:
-        """Until the component is unloaded."""
+        """Serves requests until the component is unloaded."""
         pins, handled = self.pins, False
         while True:
             if not pins["request"]:
@@ -183,7 +183,7 @@ def main() -> int:
     parser.add_argument("--period", type=float, default=0.001, metavar="S", help="servo period, with --twin (0.001)")
     parser.add_argument("--name", default="stepdiag-bridge", help="of the component (stepdiag-bridge)")
     options = parser.parse_args()
-    # Unloading sends SIGTERM; the component must leave HAL's memory in order.
+    # Unloading sends SIGTERM; the component must then release HAL's shared memory.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
     component = make_component(options.name)

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Kinematics of a three-axis machine whose errors are compensated, for LinuxCNC: trivial Cartesian kinematics plus
-// volumetric compensation by a table of stepdiag (compensator.h, BSD-3-Clause).
-//   inverse   joints = command(world)      where the axes must stand for the tool to be at world
-//   forward   world  = forward(joints)     where the tool is when the axes stand at joints
-// Both with a share s in 0..1 of the correction and a tool, the same in either direction at any time:
+// Kinematics module for LinuxCNC: trivial Cartesian kinematics of a three-axis machine with volumetric compensation by
+// a table of stepdiag (compensator.h, BSD-3-Clause). Lengths in mm.
+//   inverse   joints = command(world)      axis positions that bring the tool to world
+//   forward   world  = forward(joints)     position of the tool if the axes are at joints
+// Both use a share s in 0..1 of the correction and a tool, which are the same in both directions at any time:
 //   joints = world + s (command(world) - world)
-// s and tool change only by ramps, in small steps, one a servo cycle. docs/linuxcnc.md tells the rest.
+// s and tool change only by ramps, in one small step per servo cycle. See docs/linuxcnc.md.
 //
-// LinuxCNC calls both directions from its servo thread only: the inverse also for targets that it merely checks, the
-// forward once a cycle with the joints' feedback (in joint mode again with their commands) as soon as all joints are
-// homed. So what "now" means to the pins, and time, are the forward's.
+// LinuxCNC calls both directions from its servo thread only. It calls the inverse also for targets that it only checks.
+// As soon as all joints are homed, it calls the forward once per cycle with the joints' feedback (in joint mode a
+// second time, with their commands). For this reason the forward advances the ramp and sets the pins.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -50,7 +50,7 @@ RTAPI_MP_STRING(units, "the machine's linear unit: mm or inch");
 enum { MAX_JOINTS = 16, TOOL_IGNORED = 8 };
 static const char LETTERS[] = "XYZABCUVW";
 
-// What the compensation is made with. The tool is that of the functional point, from the tool's origin, mm.
+// Settings of the compensation. `tool`: offset of the functional point from the tool's origin, mm.
 typedef struct {
     double share;
     double tool[3];
@@ -67,27 +67,27 @@ static stepdiag_compensator* compensator;
 static pins* pin;
 static int axis_of_joint[MAX_JOINTS], joint_count;
 static double mm_per_unit = 1.0, ramp_ns = 1e9, tool_limit = 1000.0;
-static setting before, now, wanted;  // `now` goes from `before` to `wanted` by the ramp that began at `begun`
-static double own_tool[3];           // of the calibration
+static setting before, now, wanted;  // a ramp changes `now` from `before` to `wanted`; it began at the time `begun`
+static double own_tool[3];           // tool of the calibration
 static long long begun;
 static int ramping, started;
 
-// --- the setting in force ---
-// The tool that the pins ask for; 0 if they do not say a tool. motion.tooloffset is what LinuxCNC adds to the point of
-// the tool to get its origin: the other way round.
+// --- current setting ---
+// Reads the tool from the pins; returns 0 if it is not a valid tool. The sign changes, because LinuxCNC adds
+// motion.tooloffset to the point of the tool to get the tool's origin.
 static int tool_of_pins(double tool[3]) {
     double square = 0.0;
     for (int i = 0; i < 3; ++i) {
         tool[i] = -*pin->tool_offset[i] * mm_per_unit;
         square += tool[i] * tool[i];
     }
-    return square <= tool_limit * tool_limit;  // false for a NaN too
+    return square <= tool_limit * tool_limit;  // false for a NaN
 }
 
 static int same(const setting* a, const setting* b) { return memcmp(a, b, sizeof *a) == 0; }
 
-// One step of the ramp: a half period of 3u² - 2u³, without a jump of speed at either end. A ramp that has begun is
-// finished before the pins are looked at again. Returns flags for the status.
+// Makes one step of the ramp 3u² - 2u³, which has no jump of speed at its ends. A ramp always finishes before the pins
+// are read again. Returns flags for the status.
 static unsigned advance(void) {
     setting asked = now;
     unsigned flags = 0;
@@ -97,7 +97,7 @@ static unsigned advance(void) {
         memcpy(asked.tool, now.tool, sizeof asked.tool);
         flags = TOOL_IGNORED;
     }
-    if (!started) now = asked;  // the first cycle after homing: nothing moves by kinematics yet
+    if (!started) now = asked;  // first cycle after homing: kinematics do not move the machine yet
     started = 1;
     const long long time = rtapi_get_time();
     if (!ramping && !same(&asked, &now)) {
@@ -130,9 +130,9 @@ static unsigned joints_of(const double world[3], double joints[3]) {
     return status;
 }
 
-// With a share of the correction: the fixed point of world <- joints - s (command(world) - world). The errors' slopes
-// are below 0.1 (a table with steeper ones does not load), so that each turn gains a digit. At the edge of the volume
-// the forward, for all of the correction, may be refused where the world is not.
+// For a share s of the correction, the world is the fixed point of world <- joints - s (command(world) - world). The
+// slopes of the errors are below 0.1 (tables with larger slopes do not load), so each iteration gains one digit. At the
+// edge of the volume, the forward of the full correction may be refused although the world is inside.
 static unsigned world_of(const double joints[3], double world[3]) {
     enum { TURNS = 16 };
     unsigned status = stepdiag_forward(compensator, joints, now.tool, world);
@@ -182,11 +182,11 @@ int kinematicsForward(const double* joint, EmcPose* pose, const KINEMATICS_FORWA
     (void)fflags, (void)iflags;
     double joints[3], world[3];
     for (int j = joint_count - 1; j >= 0; --j)
-        *coordinate(pose, axis_of_joint[j]) = joint[j];  // the first of two counts
+        *coordinate(pose, axis_of_joint[j]) = joint[j];  // of two joints of an axis, the first is used
     for (int i = 0; i < 3; ++i) joints[i] = *coordinate(pose, i) * mm_per_unit;
     const unsigned flags = advance();
-    // Where there is no answer the world is the joints, so that a machine out there can still be seen and jogged back
-    // by its joints; moving there in world coordinates is refused by the inverse.
+    // If the compensator refuses the position, the world is set to the joints. The position remains visible and the
+    // machine can be jogged back in joint mode; the inverse refuses moves there in world coordinates.
     const unsigned status = world_of(joints, world) | flags;
     if (!(status & STEPDIAG_REFUSED))
         for (int i = 0; i < 3; ++i) *coordinate(pose, i) = world[i] / mm_per_unit;

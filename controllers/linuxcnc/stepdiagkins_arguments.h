@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// The load-time arguments of stepdiagkins.c, which alone includes this: read, checked, and the table loaded. Each
-// mistake is told by LinuxCNC's error output, and the module does not load.
+// Load-time arguments of stepdiagkins.c, the only file that includes this one: reads and checks them, and loads the
+// table. For a mistake, a message goes to LinuxCNC's error output and the module does not load.
 #include <ctype.h>
 #include <errno.h>
 
 #define COMPLAIN(...) rtapi_print_msg(RTAPI_MSG_ERR, "stepdiagkins: " __VA_ARGS__)
 
-// "1.5", or "0,0,-200" for count = 3.
+// Reads `count` numbers separated by commas: "1.5", or "0,0,-200" for count = 3.
 static int read_numbers(const char* name, const char* text, double* values, int count) {
     const char* rest = text;
     for (int i = 0; i < count; ++i) {
@@ -29,7 +29,7 @@ static int read_choice(const char* name, const char* text, const char* const cho
     return -1;
 }
 
-// INI files and HAL do not pass on every quote: an axis before b has its prime whether it is written or not.
+// Adds the primes of the axes before b, because INI files and HAL do not always pass on quotes.
 static int read_chain(char* spelled, size_t size) {
     const char* const bed = strchr(chain, 'b');
     size_t n = 0;

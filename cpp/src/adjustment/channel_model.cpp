@@ -2,40 +2,41 @@
 
 #include <Eigen/Geometry>
 
-#include "stepdiag/core/rotation.hpp"
+#include "machine/pose-inl.hpp"
+#include "measurement/reading-inl.hpp"
 
 namespace stepdiag {
 
+using namespace STEPDIAG_NAMESPACE;
+
 PoseDerivative differentiate_pose(const Chain& chain, const Eigen::Vector3d& tool, const Eigen::Vector3d& commanded,
                                   const MachineErrors& errors, bool derivatives) {
-    PoseDerivative result;
-    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-    Eigen::Vector3d position = Eigen::Vector3d::Zero();
-    for (const Axis axis : chain.order()) {
-        const int a = index(axis);
+    const auto motion = [&](int rank) -> AxisMotion<double> {
+        const int a = index(chain.order()[rank]);
         const Eigen::Vector3d shift = commanded[a] * Eigen::Vector3d::Unit(a) + errors[a].head<3>();
-        const Eigen::Vector3d theta = errors[a].tail<3>();
-        if (derivatives) result.turn[a] = rotation * rotation_jacobian(theta);
-        if (chain.carries_workpiece(axis)) {
-            result.pivot[a] = position;
-            rotation = rotation * rotation_exp(theta);
-            result.shift[a] = rotation;
-            position += rotation * shift;
-        } else {
-            result.shift[a] = rotation;
-            position += rotation * shift;
-            result.pivot[a] = position;
-            rotation = rotation * rotation_exp(theta);
-        }
+        return {rotation_exp(broadcast3<double>(errors[a].data() + 3)), broadcast3<double>(shift),
+                chain.carries_workpiece(chain.order()[rank])};
+    };
+    const AxisMotion<double> motions[] = {motion(0), motion(1), motion(2)};
+    const ChainPose<double> pose = chain_pose(motions, broadcast3<double>(tool));
+    PoseDerivative result;
+    result.pose = {to_eigen(pose.rotation), to_eigen(pose.position)};
+    if (!derivatives) return result;
+    Eigen::Matrix3d before = Eigen::Matrix3d::Identity();
+    for (int rank = 0; rank < 3; ++rank) {
+        const int a = index(chain.order()[rank]);
+        const Eigen::Matrix3d after = before * to_eigen(motions[rank].rotation);
+        result.shift[a] = motions[rank].carries_workpiece ? after : before;
+        result.turn[a] = before * to_eigen(rotation_jacobian(broadcast3<double>(errors[a].data() + 3)));
+        result.lever[a] = before * to_eigen(pose.arm[rank]);
+        before = after;
     }
-    result.pose.rotation = rotation;
-    result.pose.position = position + rotation * tool;
     return result;
 }
 
-// Length and tilts of a reading, and their derivatives by everything: rows L, alpha, beta.
+// A reading, and the derivatives of its length and tilts by everything: rows L, alpha, beta.
 struct ChannelModel::Tilt {
-    double length, alpha, beta;
+    MirrorReading<double> mirror;
     Eigen::Matrix<double, 3, 18> by_axes;
     Eigen::Matrix<double, 3, 8> by_setup;  // reflector, laser, lateral, roll: 2, 2, 2, 1; the last column is not used
 };
@@ -52,22 +53,23 @@ int ChannelModel::setup_size(ChannelKind kind, const HeadCalibration& head) {
 
 void ChannelModel::set_up(const Eigen::Ref<const Eigen::VectorXd>& values) {
     setup_ = values;
-    const Eigen::Vector3d reflector(values[setup::reflector], values[setup::reflector + 1], 0.0);
-    const Eigen::Vector3d laser(values[setup::laser], values[setup::laser + 1], 0.0);
-    const Eigen::Vector3d roll(0.0, 0.0, values[setup::roll]);
-    const Eigen::Matrix3d rolled = rotation_exp(roll);
+    const auto pair = [&](int column) { return Vector3<double>{values[column], values[column + 1], 0.0}; };
+    const Placing<double> placing{
+        pair(setup::reflector), pair(setup::laser), {0.0, 0.0, values[setup::roll]}, pair(setup::lateral)};
+    const Placed<double> placed = place_setup(broadcast9<double>(line_), broadcast3<double>(origin_), placing);
+    sensor_ = to_eigen(placed.machine_R_sensor);
+    beam_origin_ = to_eigen(placed.origin);
 
-    const Eigen::Matrix3d mirror = line_ * rotation_exp(reflector);
+    const Eigen::Matrix3d mirror = to_eigen(placed.tool_R_mirror);
     normal_ = mirror.col(2);
     // Exp(r + dr) = Exp(r) Exp(J^T dr), so that z turns by (J^T dr) x z in the mirror's own frame.
-    const Eigen::Matrix3d own = rotation_jacobian(reflector).transpose();
+    const Eigen::Matrix3d own = to_eigen(rotation_jacobian(placing.reflector)).transpose();
     for (int i = 0; i < 2; ++i)
         normal_by_reflector_.col(i) = mirror * Eigen::Vector3d(own.col(i)).cross(Eigen::Vector3d::UnitZ());
-
-    sensor_ = line_ * rotation_exp(laser) * rolled;
-    sensor_turn_.leftCols<2>() = rolled.transpose() * rotation_jacobian(laser).transpose().leftCols<2>();
+    const Eigen::Matrix3d rolled = to_eigen(rotation_exp(placing.roll));
+    sensor_turn_.leftCols<2>() =
+        rolled.transpose() * to_eigen(rotation_jacobian(placing.laser)).transpose().leftCols<2>();
     sensor_turn_.col(2) = Eigen::Vector3d::UnitZ();
-    beam_origin_ = origin_ + values[setup::lateral] * line_.col(0) + values[setup::lateral + 1] * line_.col(1);
 }
 
 void ChannelModel::read(const PoseDerivative& pose, const ReadingPlace& place, Eigen::Ref<Eigen::VectorXd> reading,
@@ -75,15 +77,15 @@ void ChannelModel::read(const PoseDerivative& pose, const ReadingPlace& place, E
     const Eigen::Vector3d normal = pose.pose.rotation * normal_;
     const Eigen::Vector3d q = sensor_.transpose() * (pose.pose.position - beam_origin_);
     const Eigen::Vector3d m = sensor_.transpose() * normal;
+    const double inverse_z = 1.0 / m.z();
     Tilt tilt;
-    tilt.beta = m.x() / m.z();
-    tilt.alpha = -m.y() / m.z();
-    tilt.length = q.z() + tilt.beta * q.x() - tilt.alpha * q.y();
+    const MirrorReading<double>& mirror = tilt.mirror =
+        read_plane(broadcast3<double>(q), broadcast3<double>(m), inverse_z);
     if (derivative) {
         // Gradients by q and m in the sensor frame, then as vectors of the machine frame.
-        const Eigen::Vector3d beta_by_m = Eigen::Vector3d(1.0, 0.0, -tilt.beta) / m.z();
-        const Eigen::Vector3d alpha_by_m = -Eigen::Vector3d(0.0, 1.0, tilt.alpha) / m.z();
-        const Eigen::Vector3d length_by_q(tilt.beta, -tilt.alpha, 1.0);
+        const Eigen::Vector3d beta_by_m = Eigen::Vector3d(1.0, 0.0, -mirror.beta) * inverse_z;
+        const Eigen::Vector3d alpha_by_m = -Eigen::Vector3d(0.0, 1.0, mirror.alpha) * inverse_z;
+        const Eigen::Vector3d length_by_q(mirror.beta, -mirror.alpha, 1.0);
         const Eigen::Vector3d length_by_m = q.x() * beta_by_m - q.y() * alpha_by_m;
         const Eigen::Vector3d length_by_point = sensor_ * length_by_q;
         const Eigen::Vector3d length_by_normal = sensor_ * length_by_m;
@@ -92,11 +94,10 @@ void ChannelModel::read(const PoseDerivative& pose, const ReadingPlace& place, E
         const Eigen::Vector3d turned_length = normal.cross(length_by_normal);
         const Eigen::Vector3d turned_alpha = normal.cross(alpha_by_normal), turned_beta = normal.cross(beta_by_normal);
         for (int a = 0; a < 3; ++a) {
-            const Eigen::Vector3d lever = pose.pose.position - pose.pivot[a];
             tilt.by_axes.block<1, 3>(0, 6 * a) = length_by_point.transpose() * pose.shift[a];
             tilt.by_axes.block<2, 3>(1, 6 * a).setZero();
             tilt.by_axes.block<1, 3>(0, 6 * a + 3) =
-                (lever.cross(length_by_point) + turned_length).transpose() * pose.turn[a];
+                (pose.lever[a].cross(length_by_point) + turned_length).transpose() * pose.turn[a];
             tilt.by_axes.block<1, 3>(1, 6 * a + 3) = turned_alpha.transpose() * pose.turn[a];
             tilt.by_axes.block<1, 3>(2, 6 * a + 3) = turned_beta.transpose() * pose.turn[a];
         }
@@ -118,13 +119,13 @@ void ChannelModel::read(const PoseDerivative& pose, const ReadingPlace& place, E
     read_channels(tilt, place, reading, derivative);
 }
 
-// From length and tilts to the channels (measurement/reading.hpp), with what the set-up adds to them.
+// From length and tilts to the channels, with what the set-up adds to them.
 void ChannelModel::read_channels(const Tilt& tilt, const ReadingPlace& place, Eigen::Ref<Eigen::VectorXd> reading,
                                  ChannelDerivative* derivative) const {
-    const double w = 1.0 - tilt.alpha * tilt.alpha - tilt.beta * tilt.beta;
+    const MirrorReading<double>& mirror = tilt.mirror;
     const double scale = 1.0 + setup_[setup::gain];
-    const double constant =
-        setup_[setup::distance_constant] + setup_[setup::drift] * place.time - setup_[setup::cosine] * place.travel;
+    const double added = distance_added(setup_[setup::distance_constant], setup_[setup::drift], place.time,
+                                        -setup_[setup::cosine], place.travel);
     if (derivative) derivative->setZero();
     // The channel's value, and its gradient by (L, alpha, beta).
     const auto put = [&](int channel, double value, const Eigen::RowVector3d& gradient) {
@@ -138,17 +139,18 @@ void ChannelModel::read_channels(const Tilt& tilt, const ReadingPlace& place, Ei
         row[18 + setup::roll] = by_setup[6];
     };
     const auto put_distance = [&](int channel, const Eigen::Vector2d& offset) {
-        const double at = tilt.length - scale * (tilt.beta * offset.x() - tilt.alpha * offset.y());
-        put(channel, at / w + constant,
-            Eigen::RowVector3d(1.0, scale * offset.y() + 2.0 * tilt.alpha * at / w,
-                               -scale * offset.x() + 2.0 * tilt.beta * at / w) /
-                w);
+        const double arm = beam_arm(mirror, offset.x(), offset.y());
+        const double distance = beam_distance(mirror, scale * arm), twice = 2.0 * distance;
+        put(channel, distance + added,
+            Eigen::RowVector3d(1.0, scale * offset.y() + twice * mirror.alpha,
+                               -scale * offset.x() + twice * mirror.beta) *
+                mirror.inverse_w);
         if (!derivative) return;
         auto row = derivative->row(channel);
         row[18 + setup::distance_constant] = 1.0;
         row[18 + setup::drift] = place.time;
         row[18 + setup::cosine] = -place.travel;
-        row[18 + setup::gain] = (tilt.alpha * offset.y() - tilt.beta * offset.x()) / w;
+        row[18 + setup::gain] = arm * mirror.inverse_w;
     };
 
     if (kind_ == ChannelKind::multi_beam) {
@@ -162,30 +164,26 @@ void ChannelModel::read_channels(const Tilt& tilt, const ReadingPlace& place, Ei
     }
     put_distance(0, Eigen::Vector2d::Zero());
     if (kind_ == ChannelKind::ideal) {
-        put(1, scale * tilt.alpha, {0.0, scale, 0.0});
-        put(2, scale * tilt.beta, {0.0, 0.0, scale});
+        put(1, scale * mirror.alpha, {0.0, scale, 0.0});
+        put(2, scale * mirror.beta, {0.0, 0.0, scale});
         if (derivative) {
-            (*derivative)(1, 18 + setup::gain) = tilt.alpha;
-            (*derivative)(2, 18 + setup::gain) = tilt.beta;
+            (*derivative)(1, 18 + setup::gain) = mirror.alpha;
+            (*derivative)(2, 18 + setup::gain) = mirror.beta;
         }
         return;
     }
     const Eigen::Vector2d& beam = head_->spot_beam;
-    const double beyond = tilt.length - tilt.beta * beam.x() + tilt.alpha * beam.y() + *head_->psd_distance;
-    const double lever = 2.0 * beyond / w;
+    const double lever = spot_lever(mirror, beam_arm(mirror, beam.x(), beam.y()), *head_->psd_distance);
     const Eigen::RowVector3d lever_gradient =
-        2.0 / w *
-        Eigen::RowVector3d(1.0, beam.y() + 2.0 * tilt.alpha * beyond / w, -beam.x() + 2.0 * tilt.beta * beyond / w);
-    const Eigen::Vector2d spot(-lever * tilt.beta, lever * tilt.alpha);
-    put(1, scale * spot.x() + setup_[setup::psd_zero],
-        scale * (-tilt.beta * lever_gradient - Eigen::RowVector3d(0.0, 0.0, lever)));
-    put(2, scale * spot.y() + setup_[setup::psd_zero + 1],
-        scale * (tilt.alpha * lever_gradient + Eigen::RowVector3d(0.0, lever, 0.0)));
+        2.0 * mirror.inverse_w *
+        Eigen::RowVector3d(1.0, beam.y() + mirror.alpha * lever, -beam.x() + mirror.beta * lever);
+    const auto spot = spot_reading(mirror, scale * lever, setup_[setup::psd_zero], setup_[setup::psd_zero + 1]);
+    put(1, spot.x, scale * (-mirror.beta * lever_gradient - Eigen::RowVector3d(0.0, 0.0, lever)));
+    put(2, spot.y, scale * (mirror.alpha * lever_gradient + Eigen::RowVector3d(0.0, lever, 0.0)));
     if (!derivative) return;
-    for (int i = 0; i < 2; ++i) {
-        (*derivative)(1 + i, 18 + setup::psd_zero + i) = 1.0;
-        (*derivative)(1 + i, 18 + setup::gain) = spot[i];
-    }
+    for (int i = 0; i < 2; ++i) (*derivative)(1 + i, 18 + setup::psd_zero + i) = 1.0;
+    (*derivative)(1, 18 + setup::gain) = -lever * mirror.beta;
+    (*derivative)(2, 18 + setup::gain) = lever * mirror.alpha;
 }
 
 }  // namespace stepdiag

@@ -50,7 +50,7 @@ struct PoseDerivative {
     Pose pose;
     std::array<Eigen::Matrix3d, 3> shift;  // by delta_a
     std::array<Eigen::Matrix3d, 3> turn;   // by theta_a
-    std::array<Eigen::Vector3d, 3> pivot;  // about which theta_a turns
+    std::array<Eigen::Vector3d, 3> lever;  // of the functional point, to which theta_a turns it
 };
 // `derivatives` false: the pose only.
 PoseDerivative differentiate_pose(const Chain& chain, const Eigen::Vector3d& tool, const Eigen::Vector3d& commanded,

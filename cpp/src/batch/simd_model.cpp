@@ -2,19 +2,12 @@
 
 #include <algorithm>
 
-// Not those instruction sets that differ from another one only in what is not used here.
-#include <hwy/detect_targets.h>
-#undef HWY_DISABLED_TARGETS
-#ifdef HWY_AVX3_ZEN4  // since Highway 1.1
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4 | HWY_AVX3_SPR)
-#else
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
-#endif
-#undef HWY_TARGET_INCLUDE
+#include "core/simd_targets.hpp"
 #define HWY_TARGET_INCLUDE "batch/simd_model.cpp"
 #include <hwy/foreach_target.h>  // compiles this file once for every instruction set
 //
 #include "batch/simd_channels-inl.hpp"
+#include "machine/pose-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace stepdiag {
@@ -24,26 +17,22 @@ void prepare_nodes(Chunk& chunk) {
     for (std::size_t n = 0; n < chunk.problem.nodes.size(); ++n) {
         const SimdProblem::Node& node = chunk.problem.nodes[n];
         const auto unknown = [&](int c) HWY_ATTR { return chunk.unknown(node.unknown[c]); };
-        const Vector3 turn{unknown(3), unknown(4), unknown(5)};
-        const Vector angle2 = dot(turn, turn);
-        chunk.largest_turn = hn::Max(chunk.largest_turn, angle2);
+        const Lanes3 turn{unknown(3), unknown(4), unknown(5)};
+        chunk.largest_turn = hn::Max(chunk.largest_turn, dot(turn, turn));
         double* to = chunk.node(int(n));
-        put9(to, node_rotation, rotation_exp(turn, angle2));
-        put3(to, node_shift, Vector3{unknown(0), unknown(1), unknown(2)} + common3(node.position.data()));
+        put9(to, node_rotation, rotation_exp(turn));
+        put3(to, node_shift, Lanes3{unknown(0), unknown(1), unknown(2)} + broadcast3<Vector>(node.position.data()));
         for (int k = node_turn_pull; k < node_parts; ++k) put(to, k, hn::Zero(Tag()));
     }
 }
 
-struct SetupAngles {
-    Vector3 reflector, laser, roll;
-};
-
-HWY_INLINE SetupAngles angles_of(const double* from) {
+STEPDIAG_INLINE Placing<Vector> placing_of(const double* from) {
     const Vector zero = hn::Zero(Tag());
     const auto value = [&](int column) HWY_ATTR { return part(from, setup_columns + column); };
     return {{value(setup::reflector), value(setup::reflector + 1), zero},
             {value(setup::laser), value(setup::laser + 1), zero},
-            {zero, zero, value(setup::roll)}};
+            {zero, zero, value(setup::roll)},
+            {value(setup::lateral), value(setup::lateral + 1), zero}};
 }
 
 void prepare_setups(Chunk& chunk) {
@@ -56,47 +45,38 @@ void prepare_setups(Chunk& chunk) {
             put(to, setup_columns + chunk.problem.setup_size + c, hn::Zero(Tag()));
         }
         for (int k = normal_pull; k < setup_columns; ++k) put(to, k, hn::Zero(Tag()));
-        const SetupAngles angles = angles_of(to);
-        Vector angle2[3] = {dot(angles.reflector, angles.reflector), dot(angles.laser, angles.laser),
-                            dot(angles.roll, angles.roll)};
-        for (const Vector each : angle2) chunk.largest_turn = hn::Max(chunk.largest_turn, each);
-
-        const Matrix3 line = common9(setup.machine_R_line);
-        const Matrix3 mirror = rotation_exp(angles.reflector, angle2[0]);
-        put3(to, mirror_normal, line * Vector3{mirror.row0.z, mirror.row1.z, mirror.row2.z});
-        put9(to, sensor, line * (rotation_exp(angles.laser, angle2[1]) * rotation_exp(angles.roll, angle2[2])));
-        const Vector3 lateral{part(to, setup_columns + setup::lateral), part(to, setup_columns + setup::lateral + 1),
-                              hn::Zero(Tag())};
-        put3(to, beam_origin, line * lateral + common3(setup.origin.data()));
+        const Placing<Vector> placing = placing_of(to);
+        for (const Lanes3& angles : {placing.reflector, placing.laser, placing.roll})
+            chunk.largest_turn = hn::Max(chunk.largest_turn, dot(angles, angles));
+        const Placed<Vector> placed =
+            place_setup(broadcast9<Vector>(setup.machine_R_line), broadcast3<Vector>(setup.origin), placing);
+        put9(to, sensor, placed.machine_R_sensor);
+        put3(to, beam_origin, placed.origin);
+        put3(to, mirror_normal, transpose(placed.tool_R_mirror).row2);
     }
 }
 
 // A force on the functional point and one on the normal's tip.
 struct MirrorPull {
-    Vector3 point, normal;
+    Lanes3 point, normal;
 };
 
 // From the mirror's pose to the readings and back (ChannelModel::read).
-HWY_INLINE MirrorPull pull_mirror(const Chunk& chunk, const SimdProblem::Point& point, const Vector3& position,
-                                  const Vector3& normal) {
+STEPDIAG_INLINE MirrorPull pull_mirror(const Chunk& chunk, const SimdProblem::Point& point, const Lanes3& position,
+                                       const Lanes3& normal) {
     double* setup = chunk.setup(point.setup);
-    const Matrix3 machine_R_sensor = part9(setup, sensor);
-    const Vector3 q = transposed_product(machine_R_sensor, position - part3(setup, beam_origin));
-    const Vector3 m = transposed_product(machine_R_sensor, normal);
+    const Lanes9 machine_R_sensor = part9(setup, sensor);
+    const Lanes3 q = transposed_product(machine_R_sensor, position - part3(setup, beam_origin));
+    const Lanes3 m = transposed_product(machine_R_sensor, normal);
     const Vector inverse = hn::Div(hn::Set(Tag(), 1.0), m.z);
-    Tilt tilt;
-    tilt.beta = hn::Mul(m.x, inverse);
-    tilt.alpha = hn::Neg(hn::Mul(m.y, inverse));
-    tilt.length = hn::MulAdd(tilt.beta, q.x, hn::NegMulAdd(tilt.alpha, q.y, q.z));
-    pull_channels(chunk, point, setup, tilt);
+    const MirrorReading<Vector> mirror = read_plane(q, m, inverse);
+    const TiltPull pulled = pull_channels(chunk, point, setup, mirror);
 
-    const Vector beta_pull = hn::MulAdd(tilt.length_pull, q.x, tilt.beta_pull);
-    const Vector alpha_pull = hn::NegMulAdd(tilt.length_pull, q.y, tilt.alpha_pull);
-    const Vector3 q_pull{hn::Mul(tilt.length_pull, tilt.beta), hn::Neg(hn::Mul(tilt.length_pull, tilt.alpha)),
-                         tilt.length_pull};
-    const Vector m_by_z = hn::MulAdd(beta_pull, tilt.beta, hn::Mul(alpha_pull, tilt.alpha));
-    const Vector3 m_pull{hn::Mul(beta_pull, inverse), hn::Neg(hn::Mul(alpha_pull, inverse)),
-                         hn::Neg(hn::Mul(m_by_z, inverse))};
+    const Vector beta_pull = mul_add(pulled.length, q.x, pulled.beta);
+    const Vector alpha_pull = sub_mul(pulled.length, q.y, pulled.alpha);
+    const Lanes3 q_pull{pulled.length * mirror.beta, negative(pulled.length * mirror.alpha), pulled.length};
+    const Vector m_by_z = mul_add(beta_pull, mirror.beta, alpha_pull * mirror.alpha);
+    const Lanes3 m_pull{beta_pull * inverse, negative(alpha_pull * inverse), negative(m_by_z * inverse)};
     // The sensor turned sees everything turned the other way.
     add3(setup, sensor_pull, cross(q_pull, q) + cross(m_pull, m));
     const MirrorPull pull{machine_R_sensor * q_pull, machine_R_sensor * m_pull};
@@ -105,28 +85,24 @@ HWY_INLINE MirrorPull pull_mirror(const Chunk& chunk, const SimdProblem::Point& 
 }
 
 // Through the chain from the tool to the workpiece, and the forces back to the tool.
-HWY_INLINE void pull_point(const Chunk& chunk, const SimdProblem::Point& point) {
+STEPDIAG_INLINE void pull_point(const Chunk& chunk, const SimdProblem::Point& point) {
     const SimdProblem& problem = chunk.problem;
     double* setup = chunk.setup(point.setup);
-    Vector3 position = common3(problem.tool.data());
-    Vector3 normal = part3(setup, mirror_normal);
-    Vector3 position_arm[3], normal_arm[3];  // what turns with an axis
+    Lanes3 position = broadcast3<Vector>(problem.tool);
+    Lanes3 normal = part3(setup, mirror_normal);
+    Lanes3 position_arm[3], normal_arm[3];  // what turns with an axis
     for (int place = 2; place >= 0; --place) {
         const double* node = chunk.node(point.node[place]);
-        const Matrix3 rotation = part9(node, node_rotation);
-        const Vector3 shift = part3(node, node_shift);
-        normal = normal_arm[place] = rotation * normal;
-        if (problem.carries_workpiece[place]) {
-            position = position_arm[place] = rotation * (position + shift);
-        } else {
-            position_arm[place] = rotation * position;
-            position = position_arm[place] + shift;
-        }
+        const AxisMotion<Vector> axis{part9(node, node_rotation), part3(node, node_shift),
+                                      problem.carries_workpiece[place]};
+        const MovedPoint<Vector> moved = move_point(axis, position);
+        position_arm[place] = moved.arm, position = moved.point;
+        normal = normal_arm[place] = axis.rotation * normal;
     }
     MirrorPull pull = pull_mirror(chunk, point, position, normal);
     for (int place = 0; place < 3; ++place) {
         double* node = chunk.node(point.node[place]);
-        const Matrix3 rotation = part9(node, node_rotation);
+        const Lanes9 rotation = part9(node, node_rotation);
         add3(node, node_turn_pull, cross(position_arm[place], pull.point) + cross(normal_arm[place], pull.normal));
         if (!problem.carries_workpiece[place]) add3(node, node_shift_pull, pull.point);
         pull = {transposed_product(rotation, pull.point), transposed_product(rotation, pull.normal)};
@@ -139,10 +115,10 @@ void finish_nodes(const Chunk& chunk) {
     for (std::size_t n = 0; n < chunk.problem.nodes.size(); ++n) {
         const auto& unknown = chunk.problem.nodes[n].unknown;
         const double* from = chunk.node(int(n));
-        const Vector3 shift = part3(from, node_shift_pull);
+        const Lanes3 shift = part3(from, node_shift_pull);
         chunk.pull(unknown[0], shift.x), chunk.pull(unknown[1], shift.y), chunk.pull(unknown[2], shift.z);
-        const Vector3 angles{chunk.unknown(unknown[3]), chunk.unknown(unknown[4]), chunk.unknown(unknown[5])};
-        const Vector3 turn = transposed_jacobian(angles, dot(angles, angles), part3(from, node_turn_pull));
+        const Lanes3 angles{chunk.unknown(unknown[3]), chunk.unknown(unknown[4]), chunk.unknown(unknown[5])};
+        const Lanes3 turn = transposed_jacobian(angles, part3(from, node_turn_pull));
         chunk.pull(unknown[3], turn.x), chunk.pull(unknown[4], turn.y), chunk.pull(unknown[5], turn.z);
     }
 }
@@ -152,23 +128,22 @@ void finish_setups(const Chunk& chunk) {
         const SimdProblem::Setup& setup = chunk.problem.setups[s];
         double* at = chunk.setup(int(s));
         const int pulls = setup_columns + chunk.problem.setup_size;
-        const SetupAngles angles = angles_of(at);
-        const Matrix3 line = common9(setup.machine_R_line);
+        const Placing<Vector> angles = placing_of(at);
+        const Lanes9 line = broadcast9<Vector>(setup.machine_R_line);
 
-        const Vector3 normal = transposed_product(line, part3(at, mirror_normal));
-        const Vector3 torque = cross(normal, transposed_product(line, part3(at, normal_pull)));
-        const Vector3 reflector =
-            transposed_jacobian(angles.reflector, dot(angles.reflector, angles.reflector), torque);
+        const Lanes3 normal = transposed_product(line, part3(at, mirror_normal));
+        const Lanes3 torque = cross(normal, transposed_product(line, part3(at, normal_pull)));
+        const Lanes3 reflector = transposed_jacobian(angles.reflector, torque);
         put(at, pulls + setup::reflector, reflector.x), put(at, pulls + setup::reflector + 1, reflector.y);
 
-        const Vector3 sensor_torque = part3(at, sensor_pull);
-        const Vector3 unrolled = rotation_exp(angles.roll, dot(angles.roll, angles.roll)) * sensor_torque;
+        const Lanes3 sensor_torque = part3(at, sensor_pull);
+        const Lanes3 unrolled = rotate(angles.roll, sensor_torque);
         // Exp(v + dv) = Exp(v) Exp(J(v)^T dv), and J(v)^T = J(-v).
-        const Vector3 laser = transposed_jacobian(-angles.laser, dot(angles.laser, angles.laser), unrolled);
+        const Lanes3 laser = transposed_jacobian(-angles.laser, unrolled);
         put(at, pulls + setup::laser, laser.x), put(at, pulls + setup::laser + 1, laser.y);
         put(at, pulls + setup::roll, sensor_torque.z);
 
-        const Vector3 lateral = transposed_product(line, part3(at, origin_pull));
+        const Lanes3 lateral = transposed_product(line, part3(at, origin_pull));
         put(at, pulls + setup::lateral, lateral.x), put(at, pulls + setup::lateral + 1, lateral.y);
         for (std::size_t c = 0; c < setup.unknown.size(); ++c) chunk.pull(setup.unknown[c], part(at, pulls + int(c)));
     }

@@ -1,18 +1,9 @@
 #include "batch/simd_reduction.hpp"
 
 #include "batch/batch_method.hpp"
+#include "core/simd_targets.hpp"
 #include "evaluation/linear_evaluation.hpp"
 #include "evaluation/measurement_rows.hpp"
-
-// Not those instruction sets that differ from another one only in what is not used here.
-#include <hwy/detect_targets.h>
-#undef HWY_DISABLED_TARGETS
-#ifdef HWY_AVX3_ZEN4  // since Highway 1.1
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4 | HWY_AVX3_SPR)
-#else
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
-#endif
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "batch/simd_reduction.cpp"
 #include <hwy/foreach_target.h>  // compiles this file once for every instruction set
 //
@@ -24,13 +15,6 @@ namespace HWY_NAMESPACE {
 namespace {
 
 STEPDIAG_INLINE Pair square_sum(Pair x, Pair y) { return mul_add(x, x, y * y); }
-STEPDIAG_INLINE Pair select(MaskPair which, Pair yes, Pair no) {
-    return {hn::IfThenElse(which.a, yes.a, no.a), hn::IfThenElse(which.b, yes.b, no.b)};
-}
-STEPDIAG_INLINE MaskPair either(MaskPair x, MaskPair y) { return {hn::Or(x.a, y.a), hn::Or(x.b, y.b)}; }
-STEPDIAG_INLINE MaskPair no(MaskPair x) { return {hn::Not(x.a), hn::Not(x.b)}; }
-STEPDIAG_INLINE bool is_everywhere(MaskPair x) { return hn::AllTrue(Tag(), hn::And(x.a, x.b)); }
-STEPDIAG_INLINE Pair none() { return {hn::NaN(Tag()), hn::NaN(Tag())}; }
 
 struct Tilts {
     Pair alpha, beta;
@@ -50,7 +34,7 @@ struct SpotEquation {
 // Newton's method. Lanes stop by themselves: `done`. Those that no mirror gives end with NaN.
 HWY_NOINLINE Pair solve_by_newton(const SpotEquation& spot, MaskPair done, Pair c) {
     const Pair zero = all(0.0), one = all(1.0);
-    MaskPair possible = zero <= zero;
+    MaskPair possible = all_true();
     for (int iteration = 0; iteration < 20 && !is_everywhere(done); ++iteration) {
         const Pair slope = mul_add(sub_mul(all(3.0) * spot.q, c, spot.p + spot.p), c, one);
         const Pair change = spot.f(c) / slope;

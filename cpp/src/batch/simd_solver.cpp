@@ -2,57 +2,24 @@
 
 #include <algorithm>
 
+#include "core/simd_targets.hpp"
 #include "stepdiag/core/random_blocks.hpp"
-
-// Not those instruction sets that differ from another one only in what is not used here.
-#include <hwy/detect_targets.h>
-#undef HWY_DISABLED_TARGETS
-#ifdef HWY_AVX3_ZEN4  // since Highway 1.1
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4 | HWY_AVX3_SPR)
-#else
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
-#endif
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "batch/simd_solver.cpp"
 #include <hwy/foreach_target.h>  // compiles this file once for every instruction set
 //
-#include <hwy/highway.h>
+#include "core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace stepdiag {
 namespace HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using Tag = hn::ScalableTag<double>;
-using Vector = hn::Vec<Tag>;
 constexpr int six = BorderedBand::block_size;
 
-// Two vectors of lanes of one number: while one waits for a sum, the other goes on.
-struct Pair {
-    Vector a, b;
-};
-HWY_INLINE Pair load(const double* from) { return {hn::LoadU(Tag(), from), hn::LoadU(Tag(), from + hn::Lanes(Tag()))}; }
-HWY_INLINE void store(const Pair& x, double* to) {
-    hn::StoreU(x.a, Tag(), to);
-    hn::StoreU(x.b, Tag(), to + hn::Lanes(Tag()));
-}
-HWY_INLINE void add_product(double factor, const Pair& x, Pair& sum) {
-    const Vector all = hn::Set(Tag(), factor);
-    sum.a = hn::MulAdd(all, x.a, sum.a), sum.b = hn::MulAdd(all, x.b, sum.b);
-}
-HWY_INLINE void subtract_product(double factor, const Pair& x, Pair& sum) {
-    const Vector all = hn::Set(Tag(), factor);
-    sum.a = hn::NegMulAdd(all, x.a, sum.a), sum.b = hn::NegMulAdd(all, x.b, sum.b);
-}
-HWY_INLINE void scale(double factor, Pair& x) {
-    const Vector all = hn::Set(Tag(), factor);
-    x.a = hn::Mul(all, x.a), x.b = hn::Mul(all, x.b);
-}
-HWY_INLINE std::size_t pair_lanes() { return 2 * hn::Lanes(Tag()); }
+STEPDIAG_INLINE std::size_t pair_lanes() { return 2 * hn::Lanes(Tag()); }
 
 template <int Rows>
-HWY_INLINE void add_transposed_bundle(const SimdJacobian::Numbers& jacobian, const SimdJacobian::Bundle& bundle,
-                                      const double* readings, double* unknowns) {
+STEPDIAG_INLINE void add_transposed_bundle(const SimdJacobian::Numbers& jacobian, const SimdJacobian::Bundle& bundle,
+                                           const double* readings, double* unknowns) {
     Pair force[Rows];
     for (int i = 0; i < Rows; ++i) force[i] = load(readings + lane_group * std::size_t(bundle.first_reading + i));
     const double* derivative = jacobian.derivative.data() + bundle.first_derivative;
@@ -60,21 +27,21 @@ HWY_INLINE void add_transposed_bundle(const SimdJacobian::Numbers& jacobian, con
     for (int k = 0; k < bundle.unknowns; ++k, derivative += Rows) {
         double* to = unknowns + lane_group * std::size_t(unknown[k]);
         Pair sum = load(to);
-        for (int i = 0; i < Rows; ++i) add_product(derivative[i], force[i], sum);
+        for (int i = 0; i < Rows; ++i) sum = mul_add(all(derivative[i]), force[i], sum);
         store(sum, to);
     }
 }
 
 template <int Rows>
-HWY_INLINE void multiply_bundle(const SimdJacobian::Numbers& jacobian, const SimdJacobian::Bundle& bundle,
-                                const double* unknowns, double* readings) {
+STEPDIAG_INLINE void multiply_bundle(const SimdJacobian::Numbers& jacobian, const SimdJacobian::Bundle& bundle,
+                                     const double* unknowns, double* readings) {
     Pair sum[Rows];
-    for (int i = 0; i < Rows; ++i) sum[i] = {hn::Zero(Tag()), hn::Zero(Tag())};
+    for (int i = 0; i < Rows; ++i) sum[i] = all(0.0);
     const double* derivative = jacobian.derivative.data() + bundle.first_derivative;
     const int* unknown = jacobian.unknown.data() + bundle.first_unknown;
     for (int k = 0; k < bundle.unknowns; ++k, derivative += Rows) {
         const Pair x = load(unknowns + lane_group * std::size_t(unknown[k]));
-        for (int i = 0; i < Rows; ++i) add_product(derivative[i], x, sum[i]);
+        for (int i = 0; i < Rows; ++i) sum[i] = mul_add(all(derivative[i]), x, sum[i]);
     }
     for (int i = 0; i < Rows; ++i) store(sum[i], readings + lane_group * std::size_t(bundle.first_reading + i));
 }
@@ -98,20 +65,20 @@ void multiply(const SimdJacobian::Numbers& jacobian, const double* unknowns, dou
 }
 
 // Rows of L right of one block column: y -= L x.
-HWY_INLINE const double* eliminate(const double* l, int rows, const Pair (&own)[six], double* y) {
+STEPDIAG_INLINE const double* eliminate(const double* l, int rows, const Pair (&own)[six], double* y) {
     for (int i = 0; i < rows; ++i, l += six, y += lane_group) {
         Pair sum = load(y);
-        for (int k = 0; k < six; ++k) subtract_product(l[k], own[k], sum);
+        for (int k = 0; k < six; ++k) sum = sub_mul(all(l[k]), own[k], sum);
         store(sum, y);
     }
     return l;
 }
 
 // x -= L^T y
-HWY_INLINE const double* collect(const double* l, int rows, const double* y, Pair (&own)[six]) {
+STEPDIAG_INLINE const double* collect(const double* l, int rows, const double* y, Pair (&own)[six]) {
     for (int i = 0; i < rows; ++i, l += six, y += lane_group) {
         const Pair from = load(y);
-        for (int k = 0; k < six; ++k) subtract_product(l[k], from, own[k]);
+        for (int k = 0; k < six; ++k) own[k] = sub_mul(all(l[k]), from, own[k]);
     }
     return l;
 }
@@ -125,18 +92,17 @@ void solve_corner(const SimdFactor::Numbers& factor, double* border) {
     for (int i = 0; i < rank; ++i) store(load(border + lane_group * std::size_t(factor.corner_order[i])), at(i));
     const auto step = [&](int k, int from, int to, bool transposed) HWY_ATTR {
         Pair own = load(at(k));
-        scale(l(k, k), own);
+        own = all(l(k, k)) * own;
         store(own, at(k));
         for (int i = from; i < to; ++i) {
             Pair sum = load(at(i));
-            subtract_product(transposed ? l(k, i) : l(i, k), own, sum);
+            sum = sub_mul(all(transposed ? l(k, i) : l(i, k)), own, sum);
             store(sum, at(i));
         }
     };
     for (int k = 0; k < rank; ++k) step(k, k + 1, rank, false);
     for (int k = rank; k-- > 0;) step(k, 0, k, true);
-    const Vector zero = hn::Zero(Tag());
-    for (int i = 0; i < factor.border; ++i) store({zero, zero}, border + lane_group * std::size_t(i));
+    for (int i = 0; i < factor.border; ++i) store(all(0.0), border + lane_group * std::size_t(i));
     for (int i = 0; i < rank; ++i) store(load(at(i)), border + lane_group * std::size_t(factor.corner_order[i]));
 }
 
@@ -150,8 +116,8 @@ void solve_pair(const SimdFactor::Numbers& factor, double* x) {
         double* at = block(column);
         for (int i = 0; i < six; ++i) {
             own[i] = load(at + lane_group * std::size_t(i));
-            for (int k = 0; k < i; ++k) subtract_product(l[six * i + k], own[k], own[i]);
-            scale(l[six * i + i], own[i]);
+            for (int k = 0; k < i; ++k) own[i] = sub_mul(all(l[six * i + k]), own[k], own[i]);
+            own[i] = all(l[six * i + i]) * own[i];
             store(own[i], at + lane_group * std::size_t(i));
         }
         l = eliminate(l + six * six, factor.rows[column], own, block(column + 1));
@@ -164,8 +130,8 @@ void solve_pair(const SimdFactor::Numbers& factor, double* x) {
         for (int i = 0; i < six; ++i) own[i] = load(at + lane_group * std::size_t(i));
         collect(collect(l + six * six, factor.rows[column], block(column + 1), own), factor.border, border, own);
         for (int i = six; i-- > 0;) {
-            for (int k = i + 1; k < six; ++k) subtract_product(l[six * k + i], own[k], own[i]);
-            scale(l[six * i + i], own[i]);
+            for (int k = i + 1; k < six; ++k) own[i] = sub_mul(all(l[six * k + i]), own[k], own[i]);
+            own[i] = all(l[six * i + i]) * own[i];
             store(own[i], at + lane_group * std::size_t(i));
         }
     }

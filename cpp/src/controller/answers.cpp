@@ -5,7 +5,7 @@ namespace {
 
 using Tables = CompensatorTables;
 
-// For any processor that the library is built for.
+// Baseline functions for all processors that the library supports.
 template <class Order>
 struct Plain {
     static unsigned error(const Tables& t, const double* p, const double* tool, double* e, double* turn) noexcept {

@@ -11,13 +11,13 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// A function where it is linear: from `start` on with this value and slope.
+// A linear piece of a function: value and slope at its start.
 struct Piece {
     double value, slope;
 };
 
-// What `interpolate` says from `start` to the next boundary, by the function's own nodes: the distance of two
-// boundaries may be next to nothing.
+// The piece of `interpolate` from `start` to the next boundary. The slope follows from the function's own nodes,
+// because two boundaries can be almost equal.
 Piece piece_of(const FunctionTable& table, double start) {
     const auto after = std::upper_bound(table.position.begin(), table.position.end(), start);
     if (after == table.position.begin()) return {table.value.front(), 0.0};
@@ -27,7 +27,7 @@ Piece piece_of(const FunctionTable& table, double start) {
     return {table.value[j - 1] + slope * (start - table.position[j - 1]), slope};
 }
 
-// The directions of approach that a compensator for `approach` takes the mean of.
+// Tables whose mean a compensator for `approach` uses.
 std::vector<const FunctionTable*> tables_of(const ErrorMap& errors, FunctionId id, CompensatedApproach approach) {
     const auto& positive = errors.table().functions[id.index()];
     const auto& negative = errors.table().negative_functions[id.index()];
@@ -86,27 +86,28 @@ AxisTable::AxisTable(const ErrorMap& errors, Axis axis, double edge, double marg
         }
         intervals_.push_back(interval);
     }
-    // One boundary in a bucket at most, where no more than this many buckets an interval bring it about.
+    // Aims at no more than one boundary per bucket, with at most this many buckets per interval.
     constexpr std::size_t buckets_per_interval = 8;
     std::size_t most = 2;
     for (std::size_t factor = 1; factor <= buckets_per_interval && most > 1; factor *= 2)
         most = make_buckets(factor * count_, edge, margin);
     for (largest_step_ = 1; 2 * largest_step_ <= most;) largest_step_ *= 2;
-    intervals_.resize(count_ + 2 * largest_step_, intervals_.back());  // halving looks ahead, and finds no end there
+    intervals_.resize(count_ + 2 * largest_step_, intervals_.back());  // bisection reads beyond the last interval
 }
 
 std::size_t AxisTable::make_buckets(std::size_t count, double edge, double margin) {
-    // A little wider than the edge's share: equidistant boundaries then all come to lie at the very end of a bucket,
-    // however they are rounded, and what `find` asks for has the same answer throughout.
+    // Buckets are slightly wider than the interval. Equidistant boundaries are then at the end of a bucket for any
+    // rounding, and `find` has one answer throughout a bucket.
     constexpr double wider = 1.0 + 1e-14;
     buckets_per_mm_ = double(count) / (edge * wider);
     bucket_of_home_ = std::ceil(margin * buckets_per_mm_);
-    first_.assign(bucket_of(edge + margin) + 2, 0);       // one more: `find` may be compiled to round otherwise
+    first_.assign(bucket_of(edge + margin) + 2, 0);       // one more, because the rounding of `find` may differ
     std::vector<std::uint32_t> inside(first_.size(), 0);  // boundaries in each bucket
     for (std::size_t i = 1; i < count_; ++i) ++inside[bucket_of(intervals_[i].lower)];
     for (std::size_t bucket = 1; bucket < first_.size(); ++bucket)
         first_[bucket] = first_[bucket - 1] + inside[bucket - 1];
-    // One boundary in each bucket is not enough: it must be at the bucket's end, or half a bucket is another interval.
+    // One boundary per bucket is not sufficient. It must be at the end of the bucket; otherwise the bucket contains
+    // parts of two intervals.
     is_regular_ = margin == 0.0 && count == count_;
     for (std::size_t i = 1; i < count && is_regular_; ++i)
         is_regular_ =

@@ -1,6 +1,6 @@
-// The errors of one axis as one table: linear between the union of the nodes of its six functions, the squareness terms
-// folded in, the ends of travel nodes as well. The interval of a position is found in the same few steps anywhere,
-// however the nodes are spread. Beyond the ends the first and last intervals go on.
+// Errors of one axis in one table. Its nodes are the union of the nodes of the six functions and the ends of travel;
+// errors are linear between them and include the squareness terms. Finding the interval of a position takes the same
+// small number of steps for any distribution of nodes. The first and the last interval continue beyond the ends.
 #pragma once
 
 #include <array>
@@ -18,11 +18,11 @@ struct AxisErrors {
     Vector3 delta, theta;
 };
 
-// Two cache lines: whatever a position needs once its interval is known.
+// All data for a position in this interval, in two cache lines.
 struct alignas(64) AxisInterval {
-    // At `start` and by mm: delta x, y, z, then theta x, y, z.
+    // Values at `start` and slopes per mm: delta x, y, z, then theta x, y, z.
     std::array<double, 6> value = {}, slope = {};
-    double lower = 0.0, upper = 0.0;  // positions in [lower, upper) belong here: -inf and +inf where the table ends
+    double lower = 0.0, upper = 0.0;  // range of positions [lower, upper); -inf and +inf at the ends of the table
     double start = 0.0;               // mm
 
     bool holds(double position) const noexcept { return lower <= position && position < upper; }
@@ -41,13 +41,14 @@ class AxisTable {
 public:
     static constexpr std::size_t largest_node_count = 100'000;  // 13 MB
 
-    // `edge`: travel of the axis; `margin`: how far beyond its ends positions may be, mm. Throws InvalidArgument naming
-    // the axis for more nodes than a controller should hold.
+    // `edge`: travel of the axis, mm; `margin`: permitted distance of positions beyond the ends, mm. Throws
+    // InvalidArgument, which names the axis, for more than largest_node_count nodes.
     AxisTable(const ErrorMap& errors, Axis axis, double edge, double margin, CompensatedApproach approach);
 
-    // The interval of a position between -margin and edge + margin; within rounding of a boundary (1e-14 edges) perhaps
-    // its neighbour, which says the same there. Buckets of equal width say between which intervals it is; halving finds
-    // it. Bucketing is monotone: a boundary in a lower bucket is below the position, one in a higher bucket above it.
+    // The interval of a position between -margin and edge + margin. At a boundary, rounding (1e-14 edges) may give the
+    // adjacent interval, which has the same value there. Buckets of equal width limit the candidates; bisection selects
+    // the interval. The bucket number is monotone: boundaries in lower buckets are below the position, those in higher
+    // buckets above it.
     STEPDIAG_INLINED const AxisInterval& find(double position) const noexcept {
         const std::size_t bucket = bucket_of(position);
         if (is_regular_) return intervals_[bucket];
@@ -64,11 +65,12 @@ private:
     STEPDIAG_INLINED std::size_t bucket_of(double position) const noexcept {
         return std::size_t(std::int64_t(position * buckets_per_mm_ + bucket_of_home_));
     }
-    std::size_t make_buckets(std::size_t count, double edge, double margin);  // the most boundaries in one of them
+    // Returns the largest number of boundaries in a bucket.
+    std::size_t make_buckets(std::size_t count, double edge, double margin);
 
-    std::size_t count_ = 0;  // of intervals that hold positions; copies of the last follow
+    std::size_t count_ = 0;  // number of intervals; copies of the last interval follow
     std::vector<AxisInterval> intervals_;
-    std::vector<std::uint32_t> first_;  // of each bucket: the interval that holds its lowest positions
+    std::vector<std::uint32_t> first_;  // for each bucket: the interval of its lowest positions
     double buckets_per_mm_ = 0.0, bucket_of_home_ = 0.0;
     std::size_t largest_step_ = 1;  // a power of two
     bool is_regular_ = false;       // each bucket is an interval

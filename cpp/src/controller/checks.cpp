@@ -12,7 +12,7 @@ namespace stepdiag {
 namespace {
 
 constexpr double shortest_edge = 1e-3;  // mm
-constexpr double node_slack = 1e-6;     // mm: rounding of positions is no missing end of a table
+constexpr double node_slack = 1e-6;     // mm; accepts rounding of the positions at the ends of a table
 
 std::string text(double number) { return format_decimal(number, 0); }
 
@@ -65,7 +65,7 @@ std::string check_fit(const ParameterTable& table, const CompensatorOptions& opt
     if (fit == Fit::rejected && !options.accept_rejected)
         throw InvalidArgument(name +
                               ": fit=rejected: the readings of this calibration contradict each other or the "
-                              "scenario; measure again, or take it all the same with accept_rejected");
+                              "scenario; measure again, or accept it with accept_rejected");
     return fit ? stepdiag::name(*fit) : "";
 }
 
@@ -75,7 +75,7 @@ void check_nodes(const ParameterTable& table, const Eigen::Vector3d& volume, con
         std::none_of(table.squarenesses.begin(), table.squarenesses.end(), told))
         throw InvalidArgument(name + ": expected at least one of the 21 parameters, got none");
     for_each_function(table, [&](FunctionId id, const std::optional<FunctionTable>& function) {
-        if (!function || function->position.empty()) return;  // which ErrorMap refuses
+        if (!function || function->position.empty()) return;  // ErrorMap rejects an empty table
         const double edge = volume[index(id.axis)], first = function->position.front(),
                      last = function->position.back();
         const double inside = std::min(last, edge) - std::max(first, 0.0);

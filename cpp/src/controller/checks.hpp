@@ -1,4 +1,5 @@
-// What a compensator refuses to be made of. Each throws InvalidArgument naming the option, or the table and its key.
+// Checks of a compensator's options and table. Each throws InvalidArgument, which names the option, or the table and
+// the key.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,18 +11,18 @@
 
 namespace stepdiag {
 
-// 100 m: beyond it rounding alone is no longer small beside Compensator::inverse_bound.
+// 100 m. For larger positions, rounding is not small compared with Compensator::inverse_bound.
 inline constexpr double farthest_position = 1e5;  // mm
 
 void check(const CompensatorOptions& options);
 void check_volume(const Eigen::Vector3d& volume, const CompensatorOptions& options, const std::string& name);
 void check_tool(const Eigen::Vector3d& tool, const CompensatorOptions& options, const std::string& name);
-// The verdict of the table's fit; empty where it has none.
+// Verdict of the table's fit; empty if the table has none.
 std::string check_fit(const ParameterTable& table, const CompensatorOptions& options, const std::string& name);
-// Whether the nodes can be those of the volume: a table in metres or micrometres, or of another machine, is not.
+// Checks that the nodes match the volume. This detects tables in metres or micrometres, or of another machine.
 void check_nodes(const ParameterTable& table, const Eigen::Vector3d& volume, const std::string& name);
 
-// Parameters, slopes and ends of axes that the table does not tell.
+// Parameters, slopes and ends of axes that the table does not determine.
 std::vector<std::string> not_told(const ParameterTable& table, const Eigen::Vector3d& volume, const std::string& name);
 
 }  // namespace stepdiag

@@ -12,15 +12,16 @@ namespace stepdiag {
 namespace {
 
 constexpr double inverse_bound_mm = 1e-10;
-constexpr double steepest_contraction = 0.1;  // machine tools are a hundred times flatter
+constexpr double steepest_contraction = 0.1;  // the errors of machine tools have slopes a hundred times smaller
 
-// A position this little outside counts as inside, so that rounding never decides. Of a result twice as much: what
-// command takes, forward gives back.
+// Positions outside by less than this count as inside, so that rounding is not decisive. Results have twice this
+// tolerance, so that forward accepts the results of command.
 constexpr double edge_slack = 1e-6;  // mm
 
 std::array<double, 3> array(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-// Steps after which the residual of the inverse, |e| at first, is small enough whatever the table does: answer_command.
+// Number of steps of answer_command after which the residual of the inverse, initially |e|, is below iteration_bound
+// for any table.
 int largest_step_count(double error, double contraction) {
     const double factor = contraction * (2.0 + contraction);
     int count = 0;
@@ -28,7 +29,7 @@ int largest_step_count(double error, double contraction) {
     return count;
 }
 
-// What `make` makes of a table; what it refuses, said with the table's name.
+// Calls `make`. Prefixes the messages of its exceptions with the table's name.
 template <class Make>
 auto named(const std::string& name, Make&& make) {
     try {

@@ -50,7 +50,7 @@ void tell(const char* reason, char* message, size_t size) noexcept {
     message[length] = '\0';
 }
 
-// Where an answer goes that nobody wants.
+// Replaces null output pointers.
 struct Scratch {
     double numbers[3];
     double* or_else(double* out) noexcept { return out ? out : numbers; }

@@ -1,4 +1,4 @@
-// What a compensator holds once it is loaded, and what a controller asks of it.
+// Data of a loaded compensator, and the functions for the requests of a controller.
 #pragma once
 
 #include <cmath>
@@ -13,13 +13,13 @@
 
 namespace stepdiag {
 
-// What the inverse may leave; the rest of Compensator::inverse_bound is for rounding: t + k and c + e, each to 1.5e-11
-// mm and better where position and origin are within 100 m.
+// Largest residual of the inverse. The rest of Compensator::inverse_bound covers rounding: the errors of t + k and c +
+// e are each below 1.5e-11 mm for position and origin within 100 m.
 inline constexpr double iteration_bound = 4e-11;  // mm
 
 struct CompensatorTables;
 
-// The answers for one order of the axes and one instruction set, chosen once.
+// Functions for one order of the axes and one instruction set, selected when loading.
 struct Answers {
     using Tables = CompensatorTables;
     unsigned (*error)(const Tables&, const double* position, const double* tool, double* error,
@@ -32,9 +32,9 @@ struct CompensatorTables {
     ErrorModel model;
     Answers answers;
     Vector3 origin;
-    Box known;                      // where the model is asked; the errors beyond are those of the nearest point
-    Box everywhere;                 // what counts as a position
-    Box inside, inside_of_results;  // what counts as inside the volume: where a tool shall be, where it is
+    Box known;                      // the model is evaluated here; positions outside use the nearest point
+    Box everywhere;                 // range of valid positions
+    Box inside, inside_of_results;  // the volume with its tolerance, for requested positions and for results
     Outside outside;
     double margin, largest_correction, largest_correction2, largest_tool2;
     int step_count;
@@ -43,8 +43,8 @@ struct CompensatorTables {
     std::string fit;
     std::vector<std::string> uncompensated;
 
-    // The correction for e. Shortening never takes two vectors farther apart, as clamping never takes two positions: a
-    // table that contracts does so with both.
+    // The correction for e. Shortening vectors and clamping positions never increase a distance, so the iteration of a
+    // contracting table remains contracting.
     STEPDIAG_INLINED Vector3 capped(const Vector3& e, unsigned& status) const noexcept {
         const double length2 = dot(e, e);
         if (length2 <= largest_correction2) return e;
@@ -55,13 +55,13 @@ struct CompensatorTables {
     STEPDIAG_INLINED bool is_usable(const Vector3& p, const Vector3& tool_offset) const noexcept {  // never NaN
         return everywhere.holds(p) && dot(tool_offset, tool_offset) <= largest_tool2;
     }
-    // Of a place in the volume's coordinates that `inside` does not hold.
+    // Status of a position outside `inside`, in the volume's coordinates.
     unsigned status_outside(const Vector3& p, const Box& inside) const noexcept {
         const bool refused =
             outside == Outside::refuse || (outside == Outside::linear && !inside.grown(margin).holds(p));
         return refused ? compensation_outside | compensation_refused : unsigned(compensation_outside);
     }
-    // Of where a tool shall be, or where axes stand; most of them are inside.
+    // Status of a requested tool position, or of an axis position. Most are inside, so this test comes first.
     STEPDIAG_INLINED unsigned status(const Vector3& p, const Vector3& tool_offset) const noexcept {
         if (inside.holds(p) && dot(tool_offset, tool_offset) <= largest_tool2) return 0;
         return is_usable(p, tool_offset) ? status_outside(p, inside) : unsigned(compensation_refused);
@@ -86,11 +86,11 @@ STEPDIAG_INLINED unsigned answer_error(Order order, const CompensatorTables& t, 
     return dot(e, e) > t.largest_correction2 ? status | compensation_capped : status;
 }
 
-// The correction k with k + e(p + k) = 0 by Newton's method with one slope S, that at the target:
+// The correction k with k + e(p + k) = 0, by Newton's method with the constant slope S of the target:
 //   r <- k + e(p + k),   k <- k - (r - S r)
-// Errors at two places differ by q times their distance at most, and |S| <= q, so each step leaves (2 q + q^2) |r| at
-// most, over any number of kinks; within a cell of the table it leaves q^2 |r|, and two steps do. The residual r is
-// what forward will be off by.
+// The errors at two positions differ by at most q times their distance, and |S| <= q. Each step therefore reduces the
+// residual to at most (2 q + q^2) |r|, for any number of nodes between the positions. Within one cell of the table it
+// is at most q^2 |r|, so two steps suffice. The residual r is the error of the subsequent forward.
 template <class Order>
 STEPDIAG_INLINED unsigned answer_command(Order order, const CompensatorTables& t, const double* target,
                                          const double* tool, double* command) noexcept {
@@ -128,9 +128,9 @@ STEPDIAG_INLINED unsigned answer_forward(Order order, const CompensatorTables& t
     return write(result, actual), status | capped;
 }
 
-// Fused: by AVX2 and FMA, a quarter faster; the last digits of an error (1e-16 of it) are others.
+// `fused`: with AVX2 and FMA. This is a quarter faster and changes the last digits of an error (1e-16 relative).
 Answers answers_for(const Chain& chain, bool fused);
-bool are_fused_answers_known();  // to this processor
+bool are_fused_answers_known();  // whether this processor has AVX2 and FMA
 
 std::unique_ptr<CompensatorTables> make_tables(const ParameterTable& table, const std::string& name,
                                                const std::string& chain, const CompensatorOptions& options);

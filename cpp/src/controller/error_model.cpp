@@ -11,12 +11,12 @@ namespace {
 
 double norm(const Vector3& v) { return std::sqrt(dot(v, v)); }
 
-// What one axis does at most, over a range of positions.
+// Largest values of one axis over a range of positions.
 struct Extremes {
     double delta = 0.0, delta_slope = 0.0, theta = 0.0, theta_slope = 0.0;
 };
 
-// Linear pieces are longest at their ends.
+// The largest length of a linear piece is at one of its ends.
 Extremes extremes(const AxisTable& table, double lowest, double highest) {
     Extremes most;
     for (const AxisInterval& interval : table)
@@ -44,12 +44,12 @@ ErrorModel::ErrorModel(const Chain& chain, const ErrorMap& errors, const std::ar
     }
 }
 
-// With the point's distance from the joint of axis a never more than reach_a = |tool| + sum of |p_j| + |delta_j| from a
-// to the tool (rotations keep lengths):
+// The distance of the point from the joint of axis a is at most reach_a = |tool| + sum of |p_j| + |delta_j| over the
+// axes from a to the tool, because rotations preserve lengths. Hence:
 //   |e| <= sum |delta_a| + |theta_a| reach_a
 //   |de/dp_a| <= |delta_a'| + |theta_a'| reach_a + sum of |theta| over the rotations that turn the direction of a
-// (|d Exp(theta)/dp| <= |theta'|). The root of the sum of squares of these three columns bounds the matrix de/dp, and
-// with it, because e is continuous, how far the errors at two positions can differ.
+// (|d Exp(theta)/dp| <= |theta'|). The root of the sum of squares of these three columns is a bound of the matrix
+// de/dp. Because e is continuous, it also bounds the difference of the errors at two positions.
 ErrorModel::Bounds ErrorModel::bounds(double largest_tool) const {
     std::array<Extremes, 3> most;
     for (int axis = 0; axis < 3; ++axis) most[axis] = extremes(tables_[axis], -margin_, volume_[axis] + margin_);

@@ -1,8 +1,8 @@
-// The exact error of the machine (machine.hpp) from tables that are ready for use. From the tool to the workpiece, each
-// axis moves a point that nominally stands at n, the lever of the axis, and really at n + d:
+// Exact error of the machine (machine.hpp) from prepared tables. The calculation goes from the tool to the workpiece.
+// Each axis moves a point with nominal position n (the lever of the axis) and actual position n + d:
 //   after the bed    d <- d + (Exp theta - I)(n + d) + delta(p)
 //   before the bed   d <- d + delta(p),   then   d <- d + (Exp theta - I)(n + d)
-// The last d is the error: no large numbers are ever subtracted.
+// The last d is the error. The calculation does not subtract large numbers.
 #pragma once
 
 #include <array>
@@ -13,13 +13,13 @@
 
 namespace stepdiag {
 
-// Of one axis, rad: machine tools have a tenth of it.
+// Largest rotation of one axis, rad. Machine tools have a tenth of it.
 inline constexpr double largest_angle = 2e-3;
 
 // d + (Exp theta - I) v, where
-//   (Exp theta - I) v = sin|theta|/|theta| theta x (v + tan(|theta|/2)/|theta| theta x v), both factors by their
-//   series.
-// What these leave out is |theta|^5 |v| / 120 at most: 3e-16 |v| at the largest angle, 1e-12 mm at 4 m.
+//   (Exp theta - I) v = sin|theta|/|theta| theta x (v + tan(|theta|/2)/|theta| theta x v)
+// Both factors are truncated series. The error is at most |theta|^5 |v| / 120: 3e-16 |v| at the largest angle, 1e-12 mm
+// at 4 m.
 STEPDIAG_INLINED Vector3 add_turn(const Vector3& d, const Vector3& theta, const Vector3& v) noexcept {
     const double angle2 = dot(theta, theta);
     const Vector3 sine = (1.0 - angle2 * (1.0 / 6.0)) * theta, tangent = (0.5 + angle2 * (1.0 / 24.0)) * theta;
@@ -33,28 +33,27 @@ struct Quaternion {
 STEPDIAG_INLINED Quaternion operator*(const Quaternion& a, const Quaternion& b) noexcept {
     return {a.w * b.w - dot(a.v, b.v), a.w * b.v + b.w * a.v + cross(a.v, b.v)};
 }
-// Exp theta; its series leave out less than 1e-17 at the largest angle.
+// Exp theta. The truncation error of its series is below 1e-17 at the largest angle.
 STEPDIAG_INLINED Quaternion rotation(const Vector3& theta) noexcept {
     const double angle2 = dot(theta, theta);
     return {1.0 - angle2 * (1.0 / 8.0), (0.5 - angle2 * (1.0 / 48.0)) * theta};
 }
-// 2 asin(s)/s v with s = |v|; the next term is 2e-11 of it where three axes turn by the largest angle, 1e-13 rad.
+// 2 asin(s)/s v with s = |v|. If three axes rotate by the largest angle, the next term is 2e-11 of it, or 1e-13 rad.
 STEPDIAG_INLINED Vector3 rotation_vector(const Quaternion& q) noexcept {
     return (2.0 + dot(q.v, q.v) * (1.0 / 3.0)) * q.v;
 }
 
-// Axes from workpiece to tool, X, Y, Z = 0, 1, 2. Where it is known when the code is compiled, no component is looked
-// up.
+// Axes from workpiece to tool, X, Y, Z = 0, 1, 2. As a compile-time constant it avoids looking up components.
 template <int first, int second, int third>
 struct AxisOrder {};
 
 class ErrorModel {
 public:
-    // Of positions up to `margin` outside the volume.
+    // Valid for positions up to `margin` (mm) outside the volume.
     ErrorModel(const Chain& chain, const ErrorMap& errors, const std::array<double, 3>& volume, double margin,
                CompensatedApproach approach);
 
-    // The intervals in which a position's axes are.
+    // The intervals of the three axes for a position.
     struct Cell {
         const AxisInterval *x, *y, *z;
 
@@ -77,8 +76,8 @@ public:
         return d;
     }
 
-    // The derivative of the error by position, to first order in the errors. Column a is
-    //   delta_a' + theta_a' x lever_a + (sum of the thetas that turn the direction of a) x e_a
+    // Derivative of the error with respect to the position, to first order in the errors. Column a is
+    //   delta_a' + theta_a' x lever_a + (sum of the thetas that rotate the direction of a) x e_a
     template <int first, int second, int third>
     STEPDIAG_INLINED Matrix3 slope(AxisOrder<first, second, third>, const Vector3& p, const Vector3& tool,
                                    const Cell& cell) const noexcept {
@@ -96,7 +95,7 @@ public:
         return slope;
     }
 
-    // Rotation vector of the tool: that of the product of the axes' rotations.
+    // Rotation vector of the tool, from the product of the axes' rotations, rad.
     template <int first, int second, int third>
     STEPDIAG_INLINED Vector3 orientation(AxisOrder<first, second, third>, const Vector3& p,
                                          const Cell& cell) const noexcept {
@@ -107,7 +106,7 @@ public:
                                turn(cell.at<third>(), p.at<third>()));
     }
 
-    // Bounds over these positions and tools up to `largest_tool` long; see error_model.cpp.
+    // Bounds for all valid positions and all tools up to the length `largest_tool`, mm; see error_model.cpp.
     struct Bounds {
         double error;        // |e| <= error, mm
         double contraction;  // |e(p) - e(q)| <= contraction |p - q|, and |slope| <= contraction
@@ -117,7 +116,7 @@ public:
 private:
     bool carries_workpiece(int rank) const noexcept { return rank < axes_before_bed_; }
 
-    // What the axis next to the tool does, where d is 0.
+    // Effect of the axis next to the tool, where d is initially 0.
     template <int axis>
     STEPDIAG_INLINED Vector3 start(const Vector3& p, const Cell& cell, Vector3& lever) const noexcept {
         const AxisInterval& interval = cell.at<axis>();
@@ -156,8 +155,8 @@ private:
         if (!carries_workpiece(rank)) lever.at<axis>() += p.at<axis>();
     }
 
-    std::array<AxisTable, 3> tables_;  // by axis
-    std::array<int, 3> order_;         // of axes, from workpiece to tool
+    std::array<AxisTable, 3> tables_;  // X, Y, Z
+    std::array<int, 3> order_;         // axes from workpiece to tool
     int axes_before_bed_ = 0;
     std::array<double, 3> volume_;
     double margin_;

@@ -12,7 +12,7 @@ public:
         for (int byte = 0; byte < 8; ++byte, word >>= 8) value_ = (value_ ^ (word & 0xFF)) * prime;
     }
     void add(double number) {
-        number += 0.0;  // -0 is no other position or error than 0
+        number += 0.0;  // changes -0 to 0, which is the same position or error
         std::uint64_t bits;
         std::memcpy(&bits, &number, sizeof bits);
         add(bits);

@@ -1,6 +1,6 @@
-// Which corrections a table makes, as a number: FNV-1a, 64 bit, over chain, volume, tool and every node and value of
-// both directions of approach, by their bits. The spelling of the file, the order of its rows and columns,
-// uncertainties, method and date leave it as it is.
+// Hash of the corrections that a table makes: 64-bit FNV-1a over the bits of chain, volume, tool, and all nodes and
+// values of both directions of approach. It does not depend on the spelling of the file, the order of its rows and
+// columns, uncertainties, method and date.
 #pragma once
 
 #include <Eigen/Core>

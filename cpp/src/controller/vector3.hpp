@@ -1,10 +1,10 @@
-// Three numbers and what the compensator does with them: as plain scalars, which compilers keep in registers.
+// Vector operations of the compensator. Components are plain scalars, which compilers keep in registers.
 #pragma once
 
 #include <algorithm>
 #include <array>
 
-// Whole evaluations in one piece: what is known of their arguments then shortens them.
+// Inlines whole evaluations, so that the compiler can use the known values of their arguments.
 #define STEPDIAG_INLINED [[gnu::always_inline]] inline
 
 namespace stepdiag {
@@ -12,7 +12,7 @@ namespace stepdiag {
 struct Vector3 {
     double x, y, z;
 
-    // A component that is known when the code is compiled.
+    // A component with an index known at compile time.
     template <int axis>
     double& at() noexcept {
         static_assert(axis >= 0 && axis < 3);
@@ -38,7 +38,7 @@ STEPDIAG_INLINED double dot(const Vector3& a, const Vector3& b) noexcept { retur
 STEPDIAG_INLINED Vector3 cross(const Vector3& a, const Vector3& b) noexcept {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-// v + a x b, in the order that makes two fused multiply-adds of each component.
+// v + a x b, in an order that gives two fused multiply-adds for each component.
 STEPDIAG_INLINED Vector3 add_cross(const Vector3& v, const Vector3& a, const Vector3& b) noexcept {
     return {(v.x - a.z * b.y) + a.y * b.z, (v.y - a.x * b.z) + a.z * b.x, (v.z - a.y * b.x) + a.x * b.y};
 }
@@ -52,7 +52,7 @@ STEPDIAG_INLINED Vector3 cross_unit(const Vector3& v) noexcept {
 STEPDIAG_INLINED Vector3 read(const double* v) noexcept { return {v[0], v[1], v[2]}; }
 STEPDIAG_INLINED void write(const Vector3& v, double* out) noexcept { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
 
-// Positions from `lowest` to `highest` in each component.
+// Box of positions from `lowest` to `highest` in each component.
 struct Box {
     Vector3 lowest, highest;
 
@@ -70,7 +70,7 @@ struct Box {
     }
 };
 
-// Its columns.
+// A 3 x 3 matrix by its columns.
 struct Matrix3 {
     Vector3 x, y, z;
 

@@ -24,8 +24,8 @@ void check(const Air& air, double wavelength) {
     require_range(wavelength, 300.0, 1700.0, "wavelength in nm");
 }
 
-// Over water by the IAPWS formula, over ice below 0 degrees Celsius; Pa. Constants as the NIST Engineering Metrology
-// Toolbox gives them.
+// In Pa: over water by the IAPWS formula, over ice below 0 degrees Celsius. Constants of the NIST Engineering Metrology
+// Toolbox.
 double saturation_vapour_pressure(double temperature) {
     const double T = temperature + celsius_zero;
     if (temperature < 0.0) {
@@ -47,7 +47,7 @@ double ciddor(const Air& air, double S) {
     const double x_v =
         air.relative_humidity * enhancement * saturation_vapour_pressure(t) / p;  // mole fraction of water
 
-    // Refractivities of standard dry air with this carbon dioxide, and of water vapour at its reference state.
+    // Refractivities of standard dry air with this carbon dioxide content, and of water vapour at its reference state.
     const double r_as = 1e-8 * (5792105.0 / (238.0185 - S) + 167917.0 / (57.362 - S));
     const double r_axs = r_as * (1.0 + 5.34e-7 * (air.carbon_dioxide - 450.0));
     const double r_vs = 1.022e-8 * (295.235 + S * (2.6422 + S * (-0.03238 + S * 0.004028)));

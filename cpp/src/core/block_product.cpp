@@ -1,31 +1,20 @@
 #include "core/block_product.hpp"
 
-// Not those instruction sets that differ from another one only in what is not used here.
-#include <hwy/detect_targets.h>
-#undef HWY_DISABLED_TARGETS
-#ifdef HWY_AVX3_ZEN4  // since Highway 1.1
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4 | HWY_AVX3_SPR)
-#else
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
-#endif
-#undef HWY_TARGET_INCLUDE
+#include "core/simd_targets.hpp"
 #define HWY_TARGET_INCLUDE "core/block_product.cpp"
 #include <hwy/foreach_target.h>  // compiles this file once for every instruction set
 //
-#include <hwy/highway.h>
+#include "core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace stepdiag {
 namespace HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using Tag = hn::ScalableTag<double>;
-using Vector = hn::Vec<Tag>;
 using Size = std::ptrdiff_t;
 
 // A tile of C, `Vectors` high and `Columns` wide, stays in registers for the whole sum.
 template <int Vectors, int Columns>
-HWY_INLINE void tile(Size inner, ConstMatrixView a, RightFactor b, MatrixView c) {
+STEPDIAG_INLINE void tile(Size inner, ConstMatrixView a, RightFactor b, MatrixView c) {
     const Tag tag;
     const Size width = hn::Lanes(tag);
     Vector sum[Columns][Vectors];

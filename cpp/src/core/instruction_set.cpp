@@ -2,17 +2,8 @@
 
 #include <cstdint>
 
+#include "core/simd_targets.hpp"
 #include "stepdiag/core/error.hpp"
-
-// Not those instruction sets that differ from another one only in what is not used here.
-#include <hwy/detect_targets.h>
-#undef HWY_DISABLED_TARGETS
-#ifdef HWY_AVX3_ZEN4  // since Highway 1.1
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4 | HWY_AVX3_SPR)
-#else
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
-#endif
-#undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/instruction_set.cpp"
 #include <hwy/foreach_target.h>  // compiles this file once for every instruction set
 //

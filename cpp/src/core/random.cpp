@@ -9,7 +9,7 @@
 namespace stepdiag {
 namespace {
 
-// ln k!, by Stirling's series from 10 on (its first term left out is below 1e-13 there).
+// ln k!. Stirling's series for k >= 10; its first neglected term is below 1e-13 there.
 double log_factorial(double k) {
     static constexpr double factorial[] = {1, 1, 2, 6, 24, 120, 720, 5040, 40320, 362880};
     if (k < 10.0) return std::log(factorial[int(k)]);
@@ -20,7 +20,7 @@ double log_factorial(double k) {
 
 // The smallest k whose cumulative probability is above u.
 double poisson_by_inversion(double mean, double u) {
-    constexpr int farthest = 100;  // for means below 10 beyond any u: probability 1e-60
+    constexpr int farthest = 100;  // never reached: for means below 10 its probability is 1e-60
     double probability = std::exp(-mean), cumulative = probability;
     int k = 0;
     while (u >= cumulative && k < farthest) {
@@ -40,7 +40,7 @@ std::array<double, 2> uniform_pair(std::uint64_t seed, RandomStream stream, cons
     const auto bits = r123::Philox4x32{}(counter, key);
     const auto to_unit = [](std::uint32_t low, std::uint32_t high) {
         const std::uint64_t word = (std::uint64_t(high) << 32) | low;
-        return (double(word >> 11) + 0.5) * 0x1p-53;  // never 0 nor 1, so a logarithm is always finite
+        return (double(word >> 11) + 0.5) * 0x1p-53;  // neither 0 nor 1, so that logarithms are finite
     };
     return {to_unit(bits[0], bits[1]), to_unit(bits[2], bits[3])};
 }
@@ -67,7 +67,7 @@ double poisson(double mean, std::uint64_t seed, RandomStream stream, std::uint64
     const double a = -0.059 + 0.02483 * b;
     const double log_inverse_alpha = std::log(1.1239 + 1.1328 / (b - 3.4));
     const double v_sure = 0.9277 - 3.6224 / (b - 2.0);
-    for (std::uint16_t draw = 0;; ++draw) {  // a draw is accepted with a probability of at least 0.7
+    for (std::uint16_t draw = 0;; ++draw) {  // each draw is accepted with a probability of at least 0.7
         const auto [first, v] = uniform_pair(seed, stream, RandomBlock{counter, item, draw});
         const double u = first - 0.5;
         const double us = 0.5 - std::abs(u);

@@ -1,4 +1,4 @@
-// Random numbers of many samples at once, for loops over vectors of lanes: see stepdiag/core/random_blocks.hpp.
+// Random numbers of many samples at once in SIMD lanes: see stepdiag/core/random_blocks.hpp.
 #if defined(STEPDIAG_RANDOM_BLOCKS_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef STEPDIAG_RANDOM_BLOCKS_INL
 #undef STEPDIAG_RANDOM_BLOCKS_INL
@@ -25,7 +25,7 @@ struct TwoPairs {
     Pair first, second;
 };
 
-// a * b of the low 32 bits; what stands above them is not looked at.
+// a * b of the low 32 bits. The upper bits of the arguments are ignored.
 STEPDIAG_INLINE Words low_product(Words a, Words b) {
 #if HWY_TARGET == HWY_SCALAR  // has no vectors of two halves
     return hn::Set(WordTag(), std::uint64_t(std::uint32_t(hn::GetLane(a))) * std::uint32_t(hn::GetLane(b)));
@@ -61,7 +61,7 @@ STEPDIAG_INLINE TwoPairs uniform_lanes(const RoundKeys& keys, RandomStream strea
                                        std::uint16_t draw) {
     const WordTag tag;
     const Words m0 = hn::Set(tag, 0xD2511F53), m1 = hn::Set(tag, 0xCD9E8D57);
-    // Only the low halves count; above them stands what is left of earlier products.
+    // Only the lower halves are used; the upper halves contain remainders of earlier products.
     const Words last = hn::Set(tag, std::uint32_t(stream) | (std::uint32_t(draw) << 16));
     WordPair c0 = sample, c1 = {hn::ShiftRight<32>(sample.a), hn::ShiftRight<32>(sample.b)};
     WordPair c2 = {hn::Set(tag, item), hn::Set(tag, item)}, c3 = {last, last};
@@ -100,7 +100,7 @@ STEPDIAG_INLINE Split split(Vector u) {
     const Words bits = hn::BitCast(words, u);
     const Words biased = hn::ShiftRight<52>(hn::Add(bits, hn::Set(words, 0x3FF0000000000000 - 0x3FE6A09E667F3BCD)));
     const Words m = hn::Sub(bits, hn::ShiftLeft<52>(hn::Sub(biased, hn::Set(words, 1023))));
-    // Beside the exponent of 2^52 a number's low bits are that number.
+    // With the exponent of 2^52, the low bits of a number are its integer value.
     return {
         hn::Sub(hn::BitCast(tag, hn::Or(biased, hn::Set(words, 0x4330000000000000))), hn::Set(tag, 0x1p52 + 1023.0)),
         hn::Sub(hn::BitCast(tag, m), hn::Set(tag, 1.0))};
@@ -119,7 +119,8 @@ STEPDIAG_INLINE Pair minus_two_log(Pair u) {
     return mul_add(k, all(6.93147180369123816490e-01), f - (half_square - low)) * all(-2.0);
 }
 
-// x turned on by quarters of a turn, which stand in the low bits of `rounded`: that takes cos to -sin and sin to cos.
+// Rotates x by quarters of a turn, whose number is in the low bits of `rounded`. A quarter changes cos to -sin and sin
+// to cos.
 struct CosSin {
     Vector cosine, sine;
 };
@@ -134,10 +135,10 @@ STEPDIAG_INLINE CosSin turn_by_quarters(Vector cosine, Vector sine, Vector round
             hn::Xor(hn::IfThenElse(is_odd, cosine, sine), second_bit_as_sign(quarter))};
 }
 
-// cos and sin of v turns, v in [0, 1], absolute error below 3e-16: of the rest of a quarter turn by the series of
-// fdlibm's k_cos.c and k_sin.c.
+// cos and sin of v turns, v in [0, 1], with an absolute error below 3e-16: series of fdlibm's k_cos.c and k_sin.c for
+// the rest of a quarter turn.
 STEPDIAG_INLINE TwoPairs cos_sin_of_turns(Pair v) {
-    const Pair magic = all(0x1.8p52);  // added, it rounds to integers, and the low bits are that integer
+    const Pair magic = all(0x1.8p52);  // adding it rounds to an integer, which is then in the low bits
     const Pair rounded = mul_add(v, all(4.0), magic);
     const Pair rest = sub_mul(rounded - magic, all(0.25), v);  // exact
     const Pair x = rest * all(6.283185307179586), z = x * x;

@@ -1,14 +1,6 @@
 #include "stepdiag/core/random_blocks.hpp"
 
-// Not those instruction sets that differ from another one only in what is not used here.
-#include <hwy/detect_targets.h>
-#undef HWY_DISABLED_TARGETS
-#ifdef HWY_AVX3_ZEN4  // since Highway 1.1
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4 | HWY_AVX3_SPR)
-#else
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
-#endif
-#undef HWY_TARGET_INCLUDE
+#include "core/simd_targets.hpp"
 #define HWY_TARGET_INCLUDE "core/random_blocks.cpp"
 #include <hwy/foreach_target.h>  // compiles this file once for every instruction set
 //

@@ -1,4 +1,4 @@
-// Vectors of lanes as a number type, two at a time.
+// Vectors of lanes as a number type (number.hpp), one or two at a time.
 #if defined(STEPDIAG_SIMD_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef STEPDIAG_SIMD_INL
 #undef STEPDIAG_SIMD_INL
@@ -10,7 +10,7 @@
 
 #include <cstdint>
 
-#include "core/number.hpp"
+#include "core/number.hpp"  // which looks whether Highway is there
 
 HWY_BEFORE_NAMESPACE();
 namespace stepdiag {
@@ -28,6 +28,7 @@ STEPDIAG_INLINE Vector magnitude(Vector a) { return hn::Abs(a); }
 STEPDIAG_INLINE Vector negative(Vector a) { return hn::Neg(a); }
 STEPDIAG_INLINE Vector with_sign(Vector a, Vector sign) { return hn::CopySignToAbs(a, sign); }
 STEPDIAG_INLINE Mask both(Mask a, Mask b) { return hn::And(a, b); }
+STEPDIAG_INLINE Vector broadcast(Type<Vector>, double value) { return hn::Set(Tag(), value); }
 STEPDIAG_INLINE void store(Mask a, std::uint8_t* to) {
     std::uint8_t bits[8] = {};  // what Highway writes at least
     hn::StoreMaskBits(Tag(), a, bits);
@@ -54,11 +55,19 @@ STEPDIAG_INLINE Pair magnitude(Pair x) { return {magnitude(x.a), magnitude(x.b)}
 STEPDIAG_INLINE Pair negative(Pair x) { return {negative(x.a), negative(x.b)}; }
 STEPDIAG_INLINE Pair with_sign(Pair x, Pair sign) { return {with_sign(x.a, sign.a), with_sign(x.b, sign.b)}; }
 STEPDIAG_INLINE MaskPair both(MaskPair x, MaskPair y) { return {both(x.a, y.a), both(x.b, y.b)}; }
+STEPDIAG_INLINE MaskPair either(MaskPair x, MaskPair y) { return {hn::Or(x.a, y.a), hn::Or(x.b, y.b)}; }
+STEPDIAG_INLINE MaskPair no(MaskPair x) { return {hn::Not(x.a), hn::Not(x.b)}; }
+STEPDIAG_INLINE bool is_everywhere(MaskPair x) { return hn::AllTrue(Tag(), hn::And(x.a, x.b)); }
+STEPDIAG_INLINE Pair select(MaskPair which, Pair yes, Pair no) {
+    return {hn::IfThenElse(which.a, yes.a, no.a), hn::IfThenElse(which.b, yes.b, no.b)};
+}
 STEPDIAG_INLINE Pair broadcast(Type<Pair>, double value) {
     const Vector all = hn::Set(Tag(), value);
     return {all, all};
 }
 STEPDIAG_INLINE Pair all(double value) { return broadcast(Type<Pair>(), value); }
+STEPDIAG_INLINE Pair none() { return {hn::NaN(Tag()), hn::NaN(Tag())}; }
+STEPDIAG_INLINE MaskPair all_true() { return all(0.0) <= all(0.0); }
 STEPDIAG_INLINE Pair load(const double* from) {
     return {hn::LoadU(Tag(), from), hn::LoadU(Tag(), from + hn::Lanes(Tag()))};
 }

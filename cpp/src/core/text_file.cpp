@@ -22,7 +22,7 @@ namespace stepdiag {
 namespace {
 
 constexpr std::size_t largest_file = std::size_t(1) << 30;
-// A spreadsheet may put it before the header.
+// Some spreadsheet programs write it before the header.
 constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 
 std::vector<std::string> parse_record(std::string_view line, const std::string& where) {
@@ -48,7 +48,7 @@ bool write_all(int file, std::string_view text) {
     return true;
 }
 
-// The file behind symbolic links, there or not: it is written, not the link.
+// The target of symbolic links, whether it exists or not. Writing replaces the target, not the link.
 std::string linked_file(const std::string& path) {
     std::filesystem::path file = path;
     std::error_code error;
@@ -60,8 +60,8 @@ std::string linked_file(const std::string& path) {
     return path;
 }
 
-// A new file beside `target` with the permissions of any new file, and its name; -1 where it cannot be made. (mkstemp
-// would give it others, and the umask that says which cannot be asked without changing it for other threads.)
+// Creates a file beside `target` with default permissions; returns its descriptor (-1 on failure) and its name. mkstemp
+// is no alternative: it sets other permissions, and reading the umask to correct them changes it for other threads.
 std::pair<int, std::string> open_temporary(const std::string& target) {
     static std::atomic<unsigned> counter{0};
     for (;;) {
@@ -71,7 +71,7 @@ std::pair<int, std::string> open_temporary(const std::string& target) {
     }
 }
 
-// A whole number with an optional sign; clamped, because a decimal exponent beyond this is 0 or infinite anyway.
+// Parses a whole number with an optional sign. Large values are clamped: as decimal exponents they give 0 or infinity.
 std::optional<int> parse_exponent(std::string_view text) {
     constexpr int limit = 100'000;
     const bool negative = !text.empty() && text.front() == '-';
@@ -90,8 +90,8 @@ bool is_small(std::string_view mantissa, int exponent) {
     return int(point) - int(first) + exponent <= 0;
 }
 
-// Where UTF-8 breaks off, counted in bytes; npos where it does not. Overlong forms and surrogates pass: nothing is
-// decoded.
+// Byte index of the first invalid UTF-8 sequence, or npos. Overlong forms and surrogates are accepted, because the text
+// is not decoded.
 std::size_t first_broken_character(std::string_view text) {
     for (std::size_t i = 0; i < text.size();) {
         const auto lead = static_cast<unsigned char>(text[i]);
@@ -120,7 +120,7 @@ std::string read_text_file(const std::string& path) {
     std::vector<char> chunk(1 << 16);
     while (stream.read(chunk.data(), std::streamsize(chunk.size())) || stream.gcount() > 0) {
         text.append(chunk.data(), std::size_t(stream.gcount()));
-        if (text.size() > largest_file) throw InvalidArgument(path + ": larger than 1 GiB, which no file of ours is");
+        if (text.size() > largest_file) throw InvalidArgument(path + ": larger than 1 GiB");
     }
     if (!stream.eof()) throw InvalidArgument(path + ": cannot be read: " + std::strerror(errno));
     if (text.empty()) throw InvalidArgument(path + ": the file is empty");
@@ -140,7 +140,7 @@ void write_text_file(const std::string& path, std::string_view text) {
     const bool exists = ::stat(path.c_str(), &status) == 0;
     if (!exists && errno != ENOENT) fail("cannot be written");
     if (exists && S_ISDIR(status.st_mode)) throw InvalidArgument(path + ": cannot be written: it is a folder");
-    if (exists && !S_ISREG(status.st_mode)) {  // a pipe or a device is written to, not replaced
+    if (exists && !S_ISREG(status.st_mode)) {  // write to a pipe or a device, do not replace it
         const int file = ::open(path.c_str(), O_WRONLY);
         const bool written = file >= 0 && write_all(file, text);
         if (file < 0 || ::close(file) != 0 || !written) fail("cannot be written");
@@ -189,7 +189,7 @@ CsvFile parse_csv(std::string_view text, const std::string& file_name) {
 }
 
 std::optional<double> parse_decimal(std::string_view text, int exponent_shift) {
-    // Digits and dots only: from_chars alone would take "inf" and "nan" as well.
+    // Only digits and dots: from_chars alone also accepts "inf" and "nan".
     const bool negative = !text.empty() && text.front() == '-';
     if (!text.empty() && (text.front() == '-' || text.front() == '+')) text.remove_prefix(1);
     const auto e = text.find_first_of("eE");

@@ -70,7 +70,7 @@ Assembly assemble(const HeadDesign& design, const PoseErrors& errors, double wav
         const Medium glass{refractive_index(body.material, wavelength)};
         for (Face face : placed(body.faces, moved(body.placement, error_of(errors, body.name)))) {
             face.behind = glass;
-            if (face.before) face.before = glass;  // inside the body
+            if (face.before) face.before = glass;  // a face inside the body
             add(std::move(face));
         }
         ++component;

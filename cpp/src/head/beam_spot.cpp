@@ -8,7 +8,8 @@
 namespace stepdiag {
 namespace {
 
-// Power beyond an edge, on the edge's own side of the centre: small tails keep their relative precision.
+// Share of the power beyond an edge, on the side of the centre where the edge is. Small tails keep their relative
+// precision.
 double tail(double edge, double centre, double radius) {
     return 0.5 * std::erfc(std::sqrt(2.0) * std::abs(edge - centre) / radius);
 }
@@ -43,7 +44,7 @@ double share_between(double low, double high, double centre, double radius) {
 }
 
 double moment_between(double low, double high, double centre, double radius) {
-    // The mean of a truncated normal distribution of standard deviation radius / 2.
+    // From the mean of a truncated normal distribution with standard deviation radius / 2.
     return centre * share_between(low, high, centre, radius) -
            radius * radius / 4.0 * (irradiance(high, centre, radius) - irradiance(low, centre, radius));
 }

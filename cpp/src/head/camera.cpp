@@ -9,7 +9,7 @@
 namespace stepdiag {
 namespace {
 
-// Electrons that each pixel collects on average.
+// Expected number of electrons of each pixel.
 Eigen::MatrixXd expectation(const Camera& camera, const std::vector<BeamSpot>& spots) {
     Eigen::MatrixXd electrons = Eigen::MatrixXd::Constant(camera.rows, camera.columns, camera.background);
     for (const BeamSpot& spot : spots) {
@@ -64,13 +64,13 @@ Eigen::MatrixXd expose(const Camera& camera, const std::vector<BeamSpot>& spots,
     image = image.cwiseMin(camera.full_well);
 
     if (camera.read_noise > 0.0)
-        for (std::uint32_t i = 0; i < count; i += 2) {  // a pair of numbers for two pixels
+        for (std::uint32_t i = 0; i < count; i += 2) {  // one pair of numbers for two pixels
             const auto noise = normal_pair(seed, RandomStream::camera_read_noise, RandomBlock{counter, i / 2});
             pixel[i] += camera.read_noise * noise[0];
             if (i + 1 < count) pixel[i + 1] += camera.read_noise * noise[1];
         }
 
-    image = image.cwiseMin(camera.full_well);  // the converter ends there as well
+    image = image.cwiseMin(camera.full_well);  // also the upper limit of the converter
     if (const double step = converter_step(camera); step > 0.0)
         image = step * (image.cwiseMax(0.0) / step).array().round();
     return image;

@@ -12,12 +12,12 @@
 namespace stepdiag {
 namespace {
 
-// Pixels to mm from the sensor's origin.
+// Converts pixels to mm from the sensor's origin.
 Eigen::Vector2d on_sensor(const Camera& camera, double x, double y) {
     return {camera.pixel * (x - 0.5 * camera.columns), camera.pixel * (y - 0.5 * camera.rows)};
 }
 
-// Weights are electrons above the threshold, so that a pixel that just exceeds it comes in smoothly.
+// The weights are the electrons above the threshold, so that a pixel that just exceeds it has little influence.
 std::optional<Eigen::Vector2d> centre_of_gravity(const Camera& camera, const Eigen::MatrixXd& image) {
     const double brightest = image.maxCoeff() - camera.background;
     const double dark_variance = read_variance(camera) + (camera.shot_noise ? camera.background : 0.0);
@@ -41,10 +41,10 @@ std::optional<Eigen::Vector2d> gaussian_fit(const Camera& camera, const Eigen::M
                                  camera.shot_noise ? camera.background : 0.0, camera.shot_noise);
     if (!found) return std::nullopt;
     PixelNoise noise{camera.shot_noise, read_variance(camera), saturation(camera)};
-    // Shot noise alone would give dark pixels infinite weight; a camera without any noise is fitted by least squares.
+    // With shot noise only, dark pixels would have infinite weight. Without any noise, the fit is a least-squares fit.
     const double peak = image.maxCoeff() - camera.background;
     noise.variance = std::max(noise.variance, camera.shot_noise ? 1e-3 : 1e-12 * peak * peak);
-    // A square of this size holds half of a spot of this radius.
+    // A square of this size contains half of the power of a spot of this radius.
     const PixelSpot start{found->x, found->y, 0.9 * found->size, 2.0 * found->electrons, camera.background};
     const auto spot = fit_gaussian(image, noise, start);
     return spot ? std::optional(on_sensor(camera, spot->x, spot->y)) : std::nullopt;

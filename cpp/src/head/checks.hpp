@@ -1,4 +1,5 @@
-// How a value out of range is refused: by owner and name, with what was expected and what came.
+// Range checks. Each throws InvalidArgument; the message names the owner and the value, and states the expected range
+// and the value given.
 #pragma once
 
 #include <cmath>

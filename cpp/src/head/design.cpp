@@ -21,7 +21,7 @@ void check_placement(const Placement& placement, const std::string& name) {
         throw InvalidArgument(name + ": expected a finite position and a rotation");
 }
 
-// Puts the component's name in front of what its parts have to say.
+// Prefixes the messages about a component's parts with its name.
 template <class Check>
 void check_part(const std::string& name, const Check& check) {
     try {
@@ -60,22 +60,22 @@ void check_layout(const HeadDesign& design) {
         throw InvalidArgument("layout: a head of bodies and beams is \"psd\" or \"multi_beam\", got \"ideal\"");
 }
 
-// A component with the box around it.
+// A component and its bounding box.
 struct Piece {
     std::string name;
     std::vector<Face> faces = {};
     Eigen::Vector3d low = Eigen::Vector3d::Constant(INFINITY), high = -low;
 };
 
-// Pieces nearer than this are refused, although only a scene of metres needs as much (Scene::smallest_separation).
+// Smallest permitted distance between components. Only scenes of metres need this much (Scene::smallest_separation).
 constexpr double smallest_gap = 0.01;  // mm
 
-// Of the boxes around them, which is cheap and never more than that of the pieces.
+// Distance between the bounding boxes: cheap, and never larger than the distance between the components.
 double box_separation(const Piece& a, const Piece& b) {
     return (a.low - b.high).cwiseMax(b.low - a.high).cwiseMax(0.0).norm();
 }
 
-// A scene of each beam is built whenever a head is put together: 1.7 kB and 18 us a face were measured.
+// Making a head builds one scene for each beam. Each face takes 1.7 kB and 18 us (measured).
 void check_size(const HeadDesign& design) {
     constexpr std::size_t most_faces = 200000;
     std::size_t faces = 0;
@@ -84,11 +84,11 @@ void check_size(const HeadDesign& design) {
     const double all = double(faces) * double(design.beams.size());
     std::ostringstream text;
     text << "head: has " << faces << " faces; expected at most " << most_faces << ". They need about "
-         << std::ceil(1.7e-6 * all) << " GB and " << std::ceil(18e-6 * all) << " s whenever the head is put together";
+         << std::ceil(1.7e-6 * all) << " GB and " << std::ceil(18e-6 * all) << " s whenever the head is assembled";
     throw InvalidArgument(text.str());
 }
 
-// A body so thin that its two faces cannot be told apart.
+// Rejects a body that is too thin for the tracer to separate its faces.
 void check_thickness(const HeadBody& body, double least) {
     if (!is_transparent(body)) return;
     for (const Face& face : body.faces) {
@@ -107,8 +107,8 @@ void check_thickness(const HeadBody& body, double least) {
 }  // namespace
 
 double refractive_index(const Material& material, double wavelength) {
-    // Catalogue glasses are relative to air at 20 degrees Celsius and 101325 Pa, dry as the catalogue says nothing
-    // else.
+    // Catalogue indices are relative to air at 20 degrees Celsius and 101325 Pa. The catalogue states no humidity; dry
+    // air is assumed.
     if (const Glass* glass = std::get_if<Glass>(&material))
         return refractive_index(*glass, wavelength) * refractive_index(Air{20.0, 101325.0, 0.0, 450.0}, wavelength);
     const double index = std::get<double>(material);

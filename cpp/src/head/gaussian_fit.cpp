@@ -12,10 +12,10 @@ namespace {
 using Vector5 = Eigen::Matrix<double, 5, 1>;
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
 
-constexpr double window_radii = 2.5;     // beyond it lies 4e-6 of the light
-constexpr double smallest_radius = 0.3;  // pixels; below, shares tell nothing of radius nor of position
+constexpr double window_radii = 2.5;     // 4e-6 of the light is outside the window
+constexpr double smallest_radius = 0.3;  // pixels; for smaller spots the shares determine neither radius nor position
 
-// Mean of the pixels in a window and its derivatives, column by column.
+// Expected value of the pixels in a window and its derivatives, column by column.
 class SpotModel {
 public:
     SpotModel(const PixelWindow& window, const PixelSpot& spot)
@@ -27,7 +27,7 @@ public:
 
     Eigen::ArrayXd mean(int j) const { return spot_.electrons * X_(j, 0) * Y_.col(0).array() + spot_.background; }
 
-    // A column's derivatives are combinations of Y, its derivatives and 1, so that sums of 4 x 4 products suffice.
+    // The derivatives in a column are combinations of Y, its derivatives and 1. Sums of 4 x 4 products are sufficient.
     void add(int j, const Eigen::ArrayXd& weight, const Eigen::ArrayXd& residual, FisherScoring& sum) const {
         const double A = spot_.electrons, share = X_(j, 0);
         Eigen::Matrix<double, 5, 4> from_Y = Eigen::Matrix<double, 5, 4>::Zero();
@@ -63,7 +63,8 @@ PixelWindow window_around(const PixelSpot& spot, const Eigen::MatrixXd& image) {
     return {column, row, columns, rows};
 }
 
-// Half a radius sideways, and a third of the radius, is as far as the derivatives are good for.
+// Share of the step that stays within the range of the linearisation: half a radius sideways, 0.3 of the radius in
+// size.
 double step_share(const PixelSpot& spot, const Vector5& step) {
     const double sideways = std::max(std::abs(step[0]), std::abs(step[1])) / (0.5 * spot.radius);
     return 1.0 / std::max({1.0, sideways, std::abs(step[2]) / (0.3 * spot.radius)});
@@ -79,7 +80,7 @@ bool inside(const PixelSpot& spot, const Eigen::MatrixXd& image) {
     return spot.x >= 0.0 && spot.x <= double(image.cols()) && spot.y >= 0.0 && spot.y <= double(image.rows());
 }
 
-// Steps until one is below a thousandth of the standard deviation that the noise leaves anyway.
+// Iterates until a step is below a thousandth of the standard deviation caused by noise.
 std::optional<PixelSpot> climb(const Eigen::MatrixXd& image, const PixelWindow& window, const PixelNoise& noise,
                                PixelSpot spot) {
     constexpr int most_steps = 50;
@@ -127,7 +128,7 @@ Matrix5 information(const PixelWindow& window, const PixelInformation& of_pixel,
 
 std::optional<Vector5> solve(const Matrix5& information, const Vector5& b) {
     if (!(information.diagonal().minCoeff() > 0.0) || !information.allFinite()) return std::nullopt;
-    const Vector5 scale = information.diagonal().cwiseSqrt().cwiseInverse();  // electrons and pixels in one matrix
+    const Vector5 scale = information.diagonal().cwiseSqrt().cwiseInverse();  // the units differ: electrons and pixels
     const Eigen::LLT<Matrix5> factor(scale.asDiagonal() * information * scale.asDiagonal());
     if (factor.info() != Eigen::Success) return std::nullopt;
     const Vector5 x = scale.asDiagonal() * factor.solve(scale.asDiagonal() * b);
@@ -139,7 +140,7 @@ std::optional<PixelSpot> fit_gaussian(const Eigen::MatrixXd& image, const PixelN
     for (int i = 0; i < most_windows; ++i) {
         const auto spot = climb(image, window_around(start, image), noise, start);
         if (!spot || !inside(*spot, image)) return std::nullopt;
-        // The window is good enough for a spot that is a tenth off what it was made for.
+        // Keep the window if the spot differs by less than a tenth from the one it was made for.
         const double off =
             std::max({std::abs(spot->x - start.x), std::abs(spot->y - start.y), std::abs(spot->radius - start.radius)});
         start = *spot;

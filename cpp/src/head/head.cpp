@@ -3,16 +3,12 @@
 #include <cmath>
 
 #include "head/assembly.hpp"
+#include "measurement/reading-inl.hpp"
 #include "stepdiag/core/error.hpp"
-#include "stepdiag/core/rotation.hpp"
 #include "stepdiag/head/nominal_head.hpp"
 
 namespace stepdiag {
 namespace {
-
-Eigen::Matrix3d turned(const Eigen::Matrix3d& frame, const Eigen::Vector2d& angles) {
-    return frame * rotation_exp({angles.x(), angles.y(), 0.0});
-}
 
 // The rules of define_signals for the beam from `start` in the reference plane, which has a reading.
 bool comes_back(const Reading& reading, const Eigen::Vector2d& start, const MirrorPose& mirror,
@@ -75,9 +71,15 @@ Environment usual_environment(const Head& head) { return head.design ? Environme
 
 HeadSetup set_up(const Head& head, const Eigen::Matrix3d& machine_R_line, const Eigen::Vector3d& first_point,
                  const Eigen::Vector2d& mirror, const Misalignment& misalignment) {
-    return {first_point - head.standoff * machine_R_line.col(2) + machine_R_line.leftCols<2>() * misalignment.lateral,
-            turned(machine_R_line, misalignment.laser) * rotation_exp({0.0, 0.0, misalignment.roll}),
-            turned(machine_R_line, misalignment.reflector), mirror};
+    using namespace STEPDIAG_NAMESPACE;
+    const auto pair = [](const Eigen::Vector2d& v) { return Vector3<double>{v.x(), v.y(), 0.0}; };
+    const Eigen::Vector3d origin = first_point - head.standoff * machine_R_line.col(2);
+    const Placed<double> placed = place_setup<double>(broadcast9<double>(machine_R_line), broadcast3<double>(origin),
+                                                      {pair(misalignment.reflector),
+                                                       pair(misalignment.laser),
+                                                       {0.0, 0.0, misalignment.roll},
+                                                       pair(misalignment.lateral)});
+    return {to_eigen(placed.origin), to_eigen(placed.machine_R_sensor), to_eigen(placed.tool_R_mirror), mirror};
 }
 
 MirrorPose mirror_in_sensor_frame(const HeadSetup& setup, const Eigen::Vector3d& functional_point,

@@ -25,7 +25,7 @@ void check_interferometer(const Interferometer& interferometer) {
     check.not_negative("resolution", interferometer.resolution, "a length in mm");
     check.not_negative("periodic_amplitude", interferometer.periodic_amplitude, "a length in mm");
     check.not_negative("dead_path", interferometer.dead_path, "a length in mm");
-    // An error of 0.5 ppm given as 0.5 is a mistake that would otherwise show as a wrong distance only.
+    // Catches 0.5 ppm given as 0.5, which would otherwise only show as wrong distances.
     check.within("index_error", interferometer.index_error, -0.01, 0.01, "a relative error");
 }
 
@@ -55,7 +55,7 @@ Coupling couple(const GaussianMode& mode, const ReturnedBeam& beam, double index
 std::optional<double> read_distance(const Interferometer& interferometer, const GaussianMode& mode,
                                     const ReturnedBeam& beam, double true_index, double assumed_index) {
     const double angle = std::atan2(beam.direction.head<2>().norm(), -beam.direction.z());
-    // Written so that what is not a number is lost as well.
+    // The negated comparisons also treat NaN as lost.
     if (!(beam.position.cwiseAbs().maxCoeff() <= interferometer.aperture / 2.0)) return std::nullopt;
     if (!(angle <= interferometer.acceptance)) return std::nullopt;
 

@@ -11,13 +11,13 @@
 namespace stepdiag {
 namespace {
 
-// Large enough that rounding of a path (1e-13 mm) does not matter, small enough that third orders in glass do not.
+// Large enough for rounding of a path (1e-13 mm), small enough to neglect third-order terms in glass.
 constexpr double distance_tilt = 1e-3;
 constexpr double spot_tilt = 1e-5;
-constexpr double square = 1e-8;           // mm in 10 mm: rounding, which must not be taken for an angle and grow
+constexpr double square = 1e-8;           // mm in 10 mm: rounding, which must not be extrapolated as an angle
 constexpr double smallest_offset = 1e-3;  // mm: 1 nm of distance at 1 mrad
 
-// Why a beam of the nominal head did not arrive.
+// Throws InvalidArgument with the reason why a beam of the nominal head does not reach its detector.
 [[noreturn]] void refuse(const TracedHead& head, int beam, double distance, const MirrorPose& mirror) {
     const RayTree tree = head.trace(beam, mirror);
     const bool saw_mirror = std::any_of(tree.segments.begin(), tree.segments.end(), [&](const Segment& segment) {
@@ -32,7 +32,7 @@ constexpr double smallest_offset = 1e-3;  // mm: 1 nm of distance at 1 mrad
     throw InvalidArgument(text.str());
 }
 
-// Reads the nominal head at one mirror.
+// Readings of the nominal head for one mirror pose.
 class NominalReader {
 public:
     NominalReader(const HeadDesign& design, const Environment& environment, const Eigen::Vector2d& mirror)
@@ -47,7 +47,7 @@ public:
     double half_path(int beam, double distance, double alpha, double beta) const {
         return read(beam, distance, alpha, beta).optical_length / (2.0 * head_.air_index(beam));
     }
-    // Where a beam meets a mirror that it is square to.
+    // Point at which a beam meets a mirror perpendicular to the head's axis.
     Eigen::Vector2d outgoing(int beam, double distance) const {
         const RayTree tree = head_.trace(beam, tilted_mirror({0.0, 0.0, distance}, 0.0, 0.0));
         for (const Segment& segment : tree.segments)
@@ -61,14 +61,14 @@ private:
 
 Eigen::Vector2d beam_offset(const NominalReader& reader, int beam, double distance) {
     const double h = distance_tilt;
-    const auto slope = [&](double alpha, double beta) {  // odd part, so that (1 - t) drops out exactly
+    const auto slope = [&](double alpha, double beta) {  // odd part in the tilt, so that (1 - t) cancels exactly
         return (reader.half_path(beam, distance, alpha, beta) - reader.half_path(beam, distance, -alpha, -beta)) *
                (1.0 - h * h) / (2.0 * h);
     };
     return {-slope(0.0, h), slope(h, 0.0)};
 }
 
-// d(raw spot)/d(-beta, alpha) at zero tilt; the spot grows as 1/(1 - t), which drops out.
+// d(raw spot)/d(-beta, alpha) at zero tilt. The factor 1/(1 - t) cancels.
 Eigen::Matrix2d spot_slopes(const NominalReader& reader, int beam, double distance) {
     const double h = spot_tilt;
     Eigen::Matrix2d slopes;
@@ -88,8 +88,8 @@ NominalHead nominal_head(const HeadDesign& design, double distance, const Enviro
     }
     const NominalReader reader(design, environment, Eigen::Vector2d::Constant(nominal_mirror(design)));
 
-    // What a beam out of square gains with distance is a tilt of the head, no offset in its reference plane. A short
-    // way tells, so that no beam is lost on it.
+    // A beam that is not parallel to the axis changes its offset with distance. This is a tilt of the head, so the
+    // offset is extrapolated to the reference plane. The distance is short, so that no beam misses the mirror.
     const double beyond = distance + 10.0, farther = distance + 1000.0;
     const auto at_plane = [&](const Eigen::Vector2d& here, const Eigen::Vector2d& there) -> Eigen::Vector2d {
         if ((there - here).norm() < square) return here;
@@ -113,11 +113,12 @@ NominalHead nominal_head(const HeadDesign& design, double distance, const Enviro
         const Eigen::Matrix2d near_slopes = spot_slopes(reader, b, distance);
         const Eigen::Matrix2d gained = (spot_slopes(reader, b, farther) - near_slopes) / (2.0 * (farther - distance));
         if (!(std::abs(gained.determinant()) > 1e-6))
-            throw InvalidArgument("beam " + design.beams[b].name + ": its spot does not follow the mirror's tilts");
+            throw InvalidArgument("beam " + design.beams[b].name + ": its spot does not depend on the mirror's tilts");
         nominal.spot_axes = gained.inverse();
         const double psd_distance = 0.25 * (nominal.spot_axes * near_slopes).trace() - distance;
         nominal.calibration.psd_distance = psd_distance;
-        // A beam out of square moves the spot as the mirror goes away, as a tilt would; what is left is the zero.
+        // If the beam is not parallel to the axis, the spot moves with the mirror's distance, as for a tilt.
+        // Subtracting this motion gives the zero.
         const Eigen::Vector2d spot = reader.read(b, distance, 0.0, 0.0).position;
         const Eigen::Vector2d drift = (reader.read(b, farther, 0.0, 0.0).position - spot) / (farther - distance);
         nominal.spot_zero = spot - (distance + psd_distance) * drift;

@@ -8,18 +8,18 @@
 namespace stepdiag {
 namespace {
 
-constexpr double lowest = 1e-4, highest = 100.0;  // electrons; above, I (m + v) is 1 to some 1e-4
+constexpr double lowest = 1e-4, highest = 100.0;  // electrons; above, I (m + v) is 1 within about 1e-4
 constexpr int per_decade = 16;
 constexpr int entries = 6 * per_decade + 1;
-constexpr double countable = 0.01;  // variance: a noise of 0.1 electrons leaves no doubt of their number
+constexpr double countable = 0.01;  // variance: with a noise of 0.1 electrons, their number is known exactly
 constexpr double least = 1e-9;      // variance: keeps the information of a dark pixel finite
 
-// The integral by the trapezoidal rule, whose error is below 1e-6 with ten steps to a standard deviation.
+// Trapezoidal rule for the integral. Its error is below 1e-6 with ten steps per standard deviation.
 double integrate(double mean, double variance) {
     constexpr double reach = 8.0;  // standard deviations
     const double sigma = std::sqrt(variance), step = sigma / 10.0;
     const double end = std::ceil(mean + 10.0 * std::sqrt(mean) + 20.0 + reach * sigma);
-    std::vector<double> poisson{std::exp(-mean)};  // one number beyond the end, where the slope looks
+    std::vector<double> poisson{std::exp(-mean)};  // one more than the end, for the slope
     for (double k = 1.0; k <= end + 1.0; ++k) poisson.push_back(poisson.back() * mean / k);
 
     double sum = 0.0;

@@ -1,8 +1,9 @@
-// What one pixel tells about its mean: the Fisher information of a Poisson number with Gaussian noise added,
-//   I(m) = integral of p'^2/p,  p = sum of Poisson(k; m) N(z; k, v),  p' = sum of Poisson(k; m) [N(z; k+1, v) - N(z; k,
-//   v)]
-// It lies between 1/(m + v), what the variance alone promises, and 1/m: where electrons can nearly be counted one by
-// one, a dark pixel tells more than its variance says.
+// Fisher information of one pixel about its mean m, for a Poisson number plus Gaussian noise of variance v:
+//   I(m) = integral of p'^2/p over z
+//   p = sum of Poisson(k; m) N(z; k, v)
+//   p' = sum of Poisson(k; m) [N(z; k+1, v) - N(z; k, v)]
+// It is between 1/(m + v), the information from the variance only, and 1/m. If single electrons can almost be counted,
+// a dark pixel has more information than its variance suggests.
 #pragma once
 
 #include <vector>
@@ -11,14 +12,14 @@ namespace stepdiag {
 
 class PixelInformation {
 public:
-    // Without shot noise: 1/variance. `variance`: of the Gaussian, electrons^2, above 0.
+    // `variance`: of the Gaussian noise, electrons^2, above 0. Without shot noise the information is 1/variance.
     PixelInformation(bool shot_noise, double variance);
     double operator()(double mean) const;
 
 private:
     bool shot_noise_;
     double variance_;
-    std::vector<double> log_gain_;  // ln of I (m + v) over ln m; interpolated between
+    std::vector<double> log_gain_;  // ln of I (m + v) at equidistant ln m, for interpolation
 };
 
 }  // namespace stepdiag

@@ -9,7 +9,7 @@
 namespace stepdiag {
 namespace {
 
-// Twelve numbers of the mirror's frame for each pose, a column each.
+// The twelve numbers of the mirror's frame (columns) for each pose (rows).
 Eigen::Matrix<double, Eigen::Dynamic, 12> mirror_frames(const std::vector<MirrorPose>& mirrors) {
     Eigen::Matrix<double, Eigen::Dynamic, 12> frames(mirrors.size(), 12);
     for (std::size_t i = 0; i < mirrors.size(); ++i) {
@@ -46,7 +46,7 @@ std::vector<Segment> path_segments(const RayTree& tree, int segment) {
 
 namespace {
 
-// How far a segment has moved square to itself: a mirror that goes away along the beam leaves it where it was.
+// Motion of a segment perpendicular to itself. A mirror that moves along the beam does not change the segment's line.
 double sideways(const Segment& from, const Segment& to) {
     const auto across = [&](const Eigen::Vector3d& way) { return way.cross(from.ray.direction).norm(); };
     return std::max(across(to.ray.origin - from.ray.origin), across(to.hit->point - from.hit->point));
@@ -116,7 +116,7 @@ RouteReplay replay_route(const RecordedRoute& route, const std::vector<FaceFrame
         met.index_after = {&recorded.index_after, 0};
     }
 
-    // The way out is the same for all poses.
+    // The path from the source to the mirror is the same for all poses.
     const auto meets_mirror = [mirror](const RecordedEncounter& met) { return met.face == mirror; };
     const auto way_out =
         std::find_if(route.encounters.begin(), route.encounters.end(), meets_mirror) - route.encounters.begin();

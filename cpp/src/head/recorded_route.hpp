@@ -1,4 +1,4 @@
-// The path of a beam as one pose's trace found it, and its replay for the other poses.
+// Path of a beam from the trace of one pose, and its replay for other poses.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +12,16 @@ RecordedRoute record_route(const RayTree& tree, int segment);
 bool same_faces(const RecordedRoute& a, const RecordedRoute& b);
 bool same_faces(const std::vector<RecordedRoute>& a, const std::vector<RecordedRoute>& b);
 
-// A path as its segments, source first.
+// Segments of a path, starting at the source.
 std::vector<Segment> path_segments(const RayTree& tree, int segment);
-// Whether nothing else comes near any of these paths of one beam (all with the same faces, at several poses), which a
-// replay could not see: no face is nearer to a segment than `times` what the segment moves from pose to pose, and a
-// millimetre. `component`: of each face; `source`: the beam's. The components that a segment starts from and ends at do
-// not count: a body is convex, so that light which leaves it does not meet it again.
+// Whether no other face is near the paths of one beam, because a replay cannot detect such a face. `paths`: for several
+// poses, all with the same faces. The distance of every face from a segment must be more than 1 mm plus `times` the
+// motion of the segment between the poses. `component`: of each face; `source`: component of the beam. The components
+// at the ends of a segment are excluded: bodies are convex, so light that leaves a body does not meet it again.
 bool pass_clear(const std::vector<std::vector<Segment>>& paths, const Scene& fixed, const std::vector<int>& component,
                 int source, double times = 2.0);
 
-// A column for each coordinate, a row for each pose.
+// Results of a replay: one column for each coordinate, one row for each pose.
 struct RouteReplay {
     Eigen::Matrix<double, Eigen::Dynamic, 3> points, directions;
     std::vector<double> optical_length, reduced_length;
@@ -31,7 +31,7 @@ struct RouteReplay {
     Eigen::Vector3d direction(std::size_t i) const { return directions.row(Eigen::Index(i)); }
 };
 
-// Frames and outlines of the head's faces; the mirror's face is the last outline, its frames follow from its poses.
+// `frames`, `outlines`: of the head's faces. The mirror has the last outline; its frames follow from its poses.
 RouteReplay replay_route(const RecordedRoute& route, const std::vector<FaceFrame>& frames,
                          const std::vector<Outline>& outlines, const Ray& source,
                          const std::vector<MirrorPose>& mirrors, double gap);

@@ -13,15 +13,15 @@
 namespace stepdiag {
 namespace {
 
-// What one parameter changes, per unit.
+// Changes per unit of one parameter.
 struct Change {
-    int component = -1;  // that moves
+    int component = -1;  // the component that moves
     RigidRate motion;
-    int body = -1;  // whose index changes by 1 per unit
+    int body = -1;  // the body whose index changes by 1 per unit
     double air = 0.0;
 };
 
-// A beam's path at one mirror pose, ready to be derived by any change.
+// Path of a beam at one mirror pose, with its derivative with respect to any change.
 class DerivedPath {
 public:
     DerivedPath(const TracedHead& head, int beam, const MirrorPose& mirror)
@@ -73,7 +73,7 @@ private:
         return component == change.component ? change.motion : RigidRate{};
     }
 
-    // Light in air, or in the glass of the body whose face it is at.
+    // Index of air, or of the glass of the body that the face belongs to.
     Dual index(double value, bool in_glass, int body, const Change& change) const {
         return {value, in_glass ? double(body == change.body) : change.air};
     }
@@ -135,7 +135,7 @@ void add_motions(std::vector<Parameter>& parameters, const std::string& name, in
         }
 }
 
-// Slopes of the air's index at one wavelength; none for air of constant index.
+// Derivatives of the air's index at one wavelength; empty for a constant index.
 std::vector<std::pair<Parameter, double Air::*>> air_parameters(const Environment& environment) {
     if (!std::holds_alternative<Air>(environment.air)) return {};
     return {{{"air", "temperature", "K", {}}, &Air::temperature},
@@ -145,8 +145,7 @@ std::vector<std::pair<Parameter, double Air::*>> air_parameters(const Environmen
 
 double index_slope(const Environment& environment, double Air::* quantity, double wavelength) {
     const double value = std::get<Air>(environment.air).*quantity;
-    const double h =
-        1e-3 * std::max(1.0, std::abs(value));  // the equation is smooth: third orders are below 1e-6 of it
+    const double h = 1e-3 * std::max(1.0, std::abs(value));  // third-order terms are relatively below 1e-6
     const auto at = [&](double changed) {
         Environment other = environment;
         std::get<Air>(other.air).*quantity = changed;
@@ -169,7 +168,7 @@ std::vector<Sensitivity> head_sensitivities(const Head& head, const MirrorPose& 
     std::vector<DerivedPath> paths;
     for (const int beam : order) paths.emplace_back(traced, beam, mirror);
 
-    // The signals themselves, for the reduction's derivatives.
+    // The reduction's derivatives depend on the signals.
     Head linear = head;
     auto plain = std::make_shared<HeadDesign>(design);
     for (HeadBeam& beam : plain->beams)
@@ -187,9 +186,9 @@ std::vector<Sensitivity> head_sensitivities(const Head& head, const MirrorPose& 
                              ? reduce_spot(signals[0], signals.tail<2>(), *nominal.calibration.psd_distance,
                                            nominal.calibration.spot_beam)
                              : reduce_beams(signals, nominal.calibration.beam_offsets);
-    if (!reduced) throw InvalidArgument("mirror: no tilt follows from its readings");
+    if (!reduced) throw InvalidArgument("mirror: its readings do not determine a tilt");
 
-    // By how much each signal changes; `air`: of each beam, because the air's index depends on the wavelength.
+    // Change of each signal. `air`: for each beam, because the air's index depends on the wavelength.
     const auto derive = [&](Change change, const std::vector<double>& air) {
         Eigen::VectorXd rates(signals.size());
         Eigen::Index c = 0;
@@ -236,7 +235,7 @@ std::vector<Sensitivity> head_sensitivities(const Head& head, const MirrorPose& 
     Eigen::VectorXd by_index_error = Eigen::VectorXd::Zero(signals.size());
     for (std::size_t k = 0; k < order.size(); ++k)
         if (const auto& interferometer =
-                design.beams[order[k]].interferometer)  // it divides the whole path, dead path too
+                design.beams[order[k]].interferometer)  // it divides the whole path, including the dead path
             by_index_error[Eigen::Index(k)] =
                 -(signals[Eigen::Index(k)] + nominal.calibration.head_constants[k] + interferometer->dead_path);
     add({"all interferometers", "index error", "1", {}}, by_index_error);

@@ -9,7 +9,7 @@
 namespace stepdiag {
 namespace {
 
-// Sums of 2 x 2 cells; an odd last row or column stands alone.
+// Sums of 2 x 2 cells. An odd last row or column is summed by itself.
 Eigen::MatrixXd halve(const Eigen::MatrixXd& cells) {
     Eigen::MatrixXd sums = Eigen::MatrixXd::Zero((cells.rows() + 1) / 2, (cells.cols() + 1) / 2);
     for (Eigen::Index column = 0; column < cells.cols(); ++column)
@@ -17,7 +17,7 @@ Eigen::MatrixXd halve(const Eigen::MatrixXd& cells) {
     return sums;
 }
 
-// The brightest square of 2 x 2 cells. Neighbouring squares overlap, so that a spot on a corner of cells is met whole.
+// The brightest square of 2 x 2 cells. Squares overlap, so that one of them contains a spot at the corner of cells.
 FoundSpot brightest_square(const Eigen::MatrixXd& cells, double cell) {
     FoundSpot best{0.0, 0.0, 2.0 * cell, -1.0};
     for (Eigen::Index column = 0; column + 1 < cells.cols(); ++column)
@@ -40,8 +40,8 @@ std::optional<FoundSpot> find_spot(const Eigen::MatrixXd& excess, double read_va
         return square.electrons / std::sqrt(variance);  // infinite without noise
     };
 
-    // Scales of 2, 4, 8 ... pixels. The light itself counts as noise here whether it is or not: the best scale then
-    // holds the spot, and not only its brightest pixels.
+    // Scales of 2, 4, 8 ... pixels. The search always includes the shot noise of the light, even if the camera has
+    // none. Otherwise the best scale would contain only the brightest pixels instead of the whole spot.
     std::vector<FoundSpot> squares;
     double best = 0.0;
     Eigen::MatrixXd cells = excess;
@@ -51,7 +51,7 @@ std::optional<FoundSpot> find_spot(const Eigen::MatrixXd& excess, double read_va
         cells = halve(cells);
     }
     for (const FoundSpot& square : squares) {
-        if (significance(square, true) < 0.7 * best) continue;  // the finest that has half the light or more
+        if (significance(square, true) < 0.7 * best) continue;  // take the finest with at least half of the light
         if (square.electrons < least_electrons || significance(square, shot_noise) < least_significance) continue;
         return square;
     }

@@ -1,4 +1,4 @@
-// Finds the brightest spot of an image, so that a fit knows where to begin even where no single pixel stands out.
+// Finds the brightest spot of an image, even if no single pixel is significant. It is the start of a fit.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,13 +7,14 @@
 namespace stepdiag {
 
 struct FoundSpot {
-    double x, y;       // pixels; pixel i reaches from i to i + 1
-    double size;       // edge of the square that holds about half of its light, pixels
+    double x, y;       // pixels; pixel i extends from i to i + 1
+    double size;       // edge of the square that contains about half of the spot's light, pixels
     double electrons;  // inside the square
 };
 
-// `excess`: electrons above the background; `read_variance`: of a pixel without light; `background`: that of the shot
-// noise, 0 without. None where less than least_electrons or least_significance standard deviations stand out.
+// `excess`: electrons above the background; `read_variance`: of a pixel without light; `background`: electrons that add
+// shot noise, 0 without shot noise. Empty if the spot has less than least_electrons or less than least_significance
+// standard deviations.
 std::optional<FoundSpot> find_spot(const Eigen::MatrixXd& excess, double read_variance, double background,
                                    bool shot_noise);
 

@@ -14,7 +14,7 @@
 namespace stepdiag {
 namespace {
 
-// Far above that of a path of metres, far below what another path would do.
+// Limit for rounding: far above the rounding of a path of metres, far below the effect of another face.
 double rounding(double path) { return 1e-9 + 1e-13 * path; }  // mm
 
 void check_errors(const HeadDesign& design, const PoseErrors& errors) {
@@ -30,7 +30,7 @@ void check_errors(const HeadDesign& design, const PoseErrors& errors) {
     }
 }
 
-// Where two answers for the same pose differ by more than rounding.
+// Whether two results for the same pose differ by more than rounding.
 bool differ(const ArrivalTable::Row& a, const Arrivals& b) {
     const auto same = [](const Arrival& x, const Arrival& y) {
         const double limit = rounding(x.beam.optical_length);
@@ -40,7 +40,7 @@ bool differ(const ArrivalTable::Row& a, const Arrivals& b) {
     return !std::equal(a.begin(), a.end(), b.begin(), b.end(), same);
 }
 
-// Of the poses that followed a path: the first and the last, and those whose light ends farthest to each side.
+// Of the poses that followed the paths: the first, the last, and those whose light ends farthest to each side.
 std::set<std::size_t> outermost(const std::vector<RouteReplay>& replayed, const std::vector<std::uint8_t>& followed) {
     std::set<std::size_t> poses;
     std::vector<std::size_t> members;
@@ -57,7 +57,8 @@ std::set<std::size_t> outermost(const std::vector<RouteReplay>& replayed, const 
     return poses;
 }
 
-// The poses to verify: each with the probability `share`, by the gaps between them, so that most cost no random number.
+// Selects the poses to verify, each with the probability `share`. It draws the gaps between them, so that most poses
+// need no random number.
 class Verified {
 public:
     Verified(double share, std::uint64_t seed, std::uint64_t line) : share_(share), seed_(seed), draw_(line << 32) {
@@ -87,7 +88,8 @@ bool meets(const RayTree& tree, int segment, int face) {
     return false;
 }
 
-// The way of the strongest light that an aligned mirror sends to the detector of the design; none where there is none.
+// Path of the strongest light that an aligned mirror sends to the beam's detector in the nominal design; empty if there
+// is none.
 RecordedRoute designed_way(const HeadDesign& design, const HeadBeam& beam, const Scene& nominal, const Medium& air,
                            int detector_face) {
     const int mirror_face = int(nominal.faces().size());
@@ -191,7 +193,7 @@ std::vector<int> TracedHead::wanted_segments(const RayTree& tree, int beam) cons
     return segments;
 }
 
-// The paths of the first pose that is found to have any.
+// The paths of the first pose that has any.
 std::vector<RecordedRoute> TracedHead::record(int beam, const std::vector<MirrorPose>& mirrors) const {
     const std::size_t last = mirrors.size() - 1;
     for (const std::size_t pose : {std::size_t(0), last / 2, last, last / 4, last - last / 4}) {
@@ -203,10 +205,10 @@ std::vector<RecordedRoute> TracedHead::record(int beam, const std::vector<Mirror
     return {};
 }
 
-// Whether the outermost of the replayed poses meet the same faces when they are traced, with no other face near them.
+// Whether the traces of the outermost poses meet the same faces, with no other face near their paths.
 bool TracedHead::is_clear(int beam, const std::vector<MirrorPose>& mirrors, const std::vector<RecordedRoute>& routes,
                           const std::set<std::size_t>& outermost) const {
-    std::vector<std::vector<std::vector<Segment>>> paths(routes.size());  // by route, by pose
+    std::vector<std::vector<std::vector<Segment>>> paths(routes.size());  // [route][pose]
     for (const std::size_t pose : outermost) {
         const RayTree tree = trace(beam, mirrors[pose]);
         std::vector<RecordedRoute> found;
@@ -262,8 +264,8 @@ ArrivalTable TracedHead::replay(int beam, const std::vector<MirrorPose>& mirrors
             std::ostringstream text;
             text << "replay: beam " << design_.beams[beam].name << " at pose " << i << " (mirror at "
                  << mirrors[i].point.transpose()
-                 << " mm in the sensor frame) differs from its trace: another face came "
-                 << "into its way; with a verified share of 1 every pose is traced instead";
+                 << " mm in the sensor frame) differs from its trace: another face is in "
+                 << "the path of the beam; a verified share of 1 traces every pose instead";
             throw ReplayMismatch(text.str());
         }
     }

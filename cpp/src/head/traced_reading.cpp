@@ -5,7 +5,7 @@
 namespace stepdiag {
 namespace {
 
-// The spot of a beam's axis alone: so small that no edge of a sensor clips it.
+// Radius of the spot for a chief ray: so small that the edge of a sensor does not clip it.
 constexpr double point_radius = 1e-9;  // mm
 
 }  // namespace

@@ -14,7 +14,7 @@ namespace {
                           "; expected the links w, X, Y, Z, b, t in a form like \"[w X' b Y Z t]\"");
 }
 
-// "[w X' b Y Z t]", or "wX'bYZt" where blanks cannot be written.
+// Splits "[w X' b Y Z t]" or "wX'bYZt" into links.
 std::vector<std::string> links(std::string_view text) {
     std::vector<std::string> names;
     if (!text.empty() && text.find_first_of("[] \t") == std::string_view::npos) {

@@ -32,7 +32,7 @@ ErrorMap::ErrorMap(ParameterTable table) : table_(std::move(table)) {
         if (table_.functions[i]) check_function(*table_.functions[i], name);
         if (!negative) continue;
         if (!table_.functions[i])
-            throw InvalidArgument(name + ": has a table of the - direction, and none of the + direction");
+            throw InvalidArgument(name + ": has a table of the - direction but none of the + direction");
         check_function(*negative, name + " in - direction");
     }
     for (const Squareness s : all_squarenesses)
@@ -76,7 +76,7 @@ std::vector<FrameDeviation> ErrorMap::frame_deviations(const Eigen::Vector3d& vo
             Eigen::Map<const Eigen::VectorXd>(table_.functions[i]->value.data(), table_.functions[i]->value.size())
                 .cwiseAbs()
                 .maxCoeff();
-        const double tolerance = 1e-9 * peak;  // a table rounded to nine digits still counts as zero there
+        const double tolerance = 1e-9 * peak;  // accepts tables rounded to nine digits
         const auto note = [&](double position) {
             const double value = function(id, position);
             if (std::abs(value) > tolerance) deviations.push_back({id, position, value});

@@ -2,10 +2,12 @@
 
 #include <Eigen/Geometry>
 
+#include "machine/pose-inl.hpp"
 #include "stepdiag/core/error.hpp"
-#include "stepdiag/core/rotation.hpp"
 
 namespace stepdiag {
+
+using namespace STEPDIAG_NAMESPACE;
 
 Eigen::Vector3d angular_lever(const Chain& chain, const Eigen::Vector3d& tool, Axis axis,
                               const Eigen::Vector3d& commanded) {
@@ -22,22 +24,16 @@ Machine::Machine(Chain chain, ErrorMap errors, const Eigen::Vector3d& tool)
 }
 
 Pose Machine::pose(const Eigen::Vector3d& commanded, const Approaches& approach) const {
-    Pose pose;
-    for (const Axis axis : chain_.order()) {
+    const auto motion = [&](int rank) -> AxisMotion<double> {
+        const Axis axis = chain_.order()[rank];
         const double p = commanded[index(axis)];
         const Approach came = approach[index(axis)];
         const Eigen::Vector3d shift = p * Eigen::Vector3d::Unit(index(axis)) + errors_.delta(axis, p, came);
-        const Eigen::Matrix3d turn = rotation_exp(errors_.theta(axis, p, came));
-        if (chain_.carries_workpiece(axis)) {
-            pose.rotation = pose.rotation * turn;
-            pose.position += pose.rotation * shift;
-        } else {
-            pose.position += pose.rotation * shift;
-            pose.rotation = pose.rotation * turn;
-        }
-    }
-    pose.position += pose.rotation * tool_;
-    return pose;
+        return {rotation_exp(broadcast3<double>(errors_.theta(axis, p, came))), broadcast3<double>(shift),
+                chain_.carries_workpiece(axis)};
+    };
+    const ChainPose<double> pose = chain_pose({motion(0), motion(1), motion(2)}, broadcast3<double>(tool_));
+    return {to_eigen(pose.rotation), to_eigen(pose.position)};
 }
 
 Eigen::Vector3d Machine::error(const Eigen::Vector3d& commanded, const Approaches& approach) const {

@@ -9,9 +9,9 @@
 namespace stepdiag {
 namespace {
 
-// Leading lines that a reader looks for first; the others follow by name.
+// Keys written first, because readers look for them first. The other keys follow in alphabetical order.
 const std::vector<std::string> first_keys = {"format", "chain", "volume_mm", "tool_mm"};
-// Of the file, not of the table: how many rows follow the header row.
+// Number of rows after the header row. It belongs to the file and is not kept in the table.
 const std::string rows_key = "rows";
 
 // Power of ten from the unit in the file to the native one.
@@ -54,7 +54,7 @@ private:
         for (const CsvRow& comment : csv_.comments) {
             const std::string_view text = comment.fields.front();
             const auto equals = text.find('=');
-            if (equals == std::string_view::npos) continue;  // a remark, not a key
+            if (equals == std::string_view::npos) continue;  // a remark without a key
             const std::string key = trimmed(text.substr(0, equals)), given = trimmed(text.substr(equals + 1));
             if (key == "format" && given != error_map_format && given != calibration_format)
                 fail(comment.line, "format: expected " + quoted(error_map_format) + " or " +
@@ -70,7 +70,7 @@ private:
         }
     }
 
-    // A file that was cut between two rows looks sound; the number of its rows tells.
+    // A file truncated between two rows is otherwise valid; only the number of rows reveals it.
     void check_rows() const {
         const std::string came = std::to_string(csv_.rows.size());
         if (rows_.line > 0 && rows_.fields.front() != came)
@@ -127,7 +127,7 @@ private:
         else add_squareness(row, *squareness, error, deviation);
     }
 
-    // "", "+" or "-". All rows of a parameter say their direction, or none does.
+    // Returns "", "+" or "-". Either all rows of a parameter have a direction or none has.
     std::string direction_of(const CsvRow& row) {
         const std::string& given = field(row, direction);
         if (!given.empty() && given != "+" && given != "-" && given != "\u2212")
@@ -166,7 +166,7 @@ private:
     CsvFile csv_;
     std::array<std::optional<std::size_t>, column_count> field_;
     std::map<std::string, bool> is_directed_;  // by parameter
-    CsvRow rows_{{}, 0};                       // the leading line that counts them
+    CsvRow rows_{{}, 0};                       // the leading line "# rows="
     ParameterTable table_;
 };
 
@@ -228,7 +228,7 @@ std::string format_parameter_table(const ParameterTable& table) {
         const auto& function = table.functions[i];
         const auto& negative = table.negative_functions[i];
         if (negative && !function)
-            throw InvalidArgument(id.name() + ": has a table of the - direction, and none of the + direction");
+            throw InvalidArgument(id.name() + ": has a table of the - direction but none of the + direction");
         if (function) rows(id, *function, negative ? "+" : "");
         if (negative) rows(id, *negative, "-");
     }

@@ -9,7 +9,7 @@
 namespace stepdiag {
 namespace {
 
-// Random harmonics of one function at its equidistant nodes; `slope` adds a random straight line.
+// Sum of random harmonics of one function at its equidistant nodes. `slope` adds a random straight line.
 std::vector<double> random_shape(std::uint64_t seed, int function, int intervals, bool slope, double amplitude) {
     constexpr int harmonics = 5;
     std::vector<double> value(intervals + 1, 0.0);
@@ -21,7 +21,7 @@ std::vector<double> random_shape(std::uint64_t seed, int function, int intervals
             else if (slope) value[i] += weight * x;
         }
     }
-    if (!slope) value.back() = 0.0;  // sin(pi h) is 1e-16, the frame choice says 0
+    if (!slope) value.back() = 0.0;  // exactly 0 by the choice of frame; sin(pi h) is about 1e-16
     double peak = 0.0;
     for (const double v : value) peak = std::max(peak, std::abs(v));
     if (peak > 0.0)

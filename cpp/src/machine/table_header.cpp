@@ -10,7 +10,7 @@ std::string header_value(const ParameterTable& table, const std::string& key, co
     const auto entry = table.header.find(key);
     if (entry == table.header.end())
         throw InvalidArgument(name + ": the leading line \"# " + key +
-                              "=...\" is missing; a calibration carries its chain, volume_mm and tool_mm");
+                              "=...\" is missing; a calibration needs chain, volume_mm and tool_mm");
     return entry->second;
 }
 

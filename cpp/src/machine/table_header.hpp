@@ -1,5 +1,5 @@
-// What the leading lines "# key=value" of a table say, for all who need more of it than the parameters. Internal: not
-// installed. `name` is what messages call the table; each throws InvalidArgument naming it and the key.
+// Reads values from the leading lines "# key=value" of a table. A missing or invalid line throws InvalidArgument; the
+// message names the key, and the table by `name`. Internal: not installed.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,10 +17,10 @@ std::vector<std::string> split(std::string_view text, std::string_view separator
 
 Chain chain_of(const ParameterTable& table, const std::string& name);
 
-// The three lengths of `key`, such as "volume_mm", mm.
+// Three lengths, mm, such as those of the key "volume_mm".
 Eigen::Vector3d lengths_of(const ParameterTable& table, const std::string& key, const std::string& name);
 
-// The names of error functions that `key` lists, such as "undetermined_slopes"; none where the line is missing.
+// Names of error functions, such as those of the key "undetermined_slopes"; empty if the line is missing.
 std::set<std::string> functions_listed(const ParameterTable& table, const std::string& key, const std::string& name);
 
 }  // namespace stepdiag

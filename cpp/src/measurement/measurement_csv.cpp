@@ -106,7 +106,7 @@ private:
         for (std::size_t i = 0; i < names.size(); ++i)
             if (names[i].substr(0, 2) == "u_" && std::none_of(channel_columns_.begin(), channel_columns_.end(),
                                                               [&](const Column& c) { return c.field == i; }))
-                fail(csv_.header.line, "the column \"" + names[i] + "\" has no column of readings beside it");
+                fail(csv_.header.line, "the column \"" + names[i] + "\" has no corresponding column of readings");
     }
 
     Station station(const CsvRow& row) const {
@@ -166,7 +166,7 @@ private:
                 const Station& station = stations[order[i]];
                 fail(csv_.rows[order[i]].line, "run " + std::to_string(station.run) + ", line " + station.line.name() +
                                                    ", point " + std::to_string(station.point) +
-                                                   " was given already in line " +
+                                                   " is already given in line " +
                                                    std::to_string(csv_.rows[order[i - 1]].line));
             }
     }

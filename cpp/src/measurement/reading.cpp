@@ -3,26 +3,18 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "measurement/reading-inl.hpp"
+
 namespace stepdiag {
 
-std::optional<Reading> read_mirror(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) {
-    if (!(normal.z() > 0.0)) return std::nullopt;
-    Reading reading{0.0, -normal.y() / normal.z(), normal.x() / normal.z()};
-    const double length = point.z() + reading.beta * point.x() - reading.alpha * point.y();
-    if (!(reading.tan2_phi() < 1.0) || !(length > 0.0)) return std::nullopt;
-    reading.distance = length / (1.0 - reading.tan2_phi());
-    return reading;
-}
-
-Eigen::VectorXd beam_distances(const Reading& reading, const std::vector<Eigen::Vector2d>& beam_offsets) {
-    Eigen::VectorXd distances(beam_offsets.size());
-    for (std::size_t i = 0; i < beam_offsets.size(); ++i)
-        distances[i] = reading.distance + (reading.alpha * beam_offsets[i].y() - reading.beta * beam_offsets[i].x()) /
-                                              (1.0 - reading.tan2_phi());
-    return distances;
-}
+using namespace STEPDIAG_NAMESPACE;
 
 namespace {
+
+MirrorReading<double> of_mirror(const Reading& reading) {
+    const double w = 1.0 - reading.tan2_phi();
+    return {reading.distance * w, reading.distance, reading.alpha, reading.beta, w, 1.0 / w};
+}
 
 // The spot's gain g(x), spot = g x with x = (-beta, alpha), and its gradient; its derivative by distance is 2.
 struct SpotGain {
@@ -30,17 +22,33 @@ struct SpotGain {
     Eigen::Vector2d gradient;
 };
 
-SpotGain spot_gain(double distance, const Eigen::Vector2d& x, double psd_distance, const Eigen::Vector2d& spot_beam) {
-    const double w = 1.0 - x.squaredNorm();
-    const double beyond = (psd_distance + x.dot(spot_beam)) / w;
-    return {2.0 * (distance + beyond), 2.0 / w * (spot_beam + 2.0 * beyond * x)};
+SpotGain spot_gain(const Reading& reading, double psd_distance, const Eigen::Vector2d& spot_beam) {
+    const MirrorReading<double> mirror = of_mirror(reading);
+    const double arm = beam_arm(mirror, spot_beam.x(), spot_beam.y());
+    const double beyond = (psd_distance + arm) * mirror.inverse_w;
+    return {spot_lever(mirror, arm, psd_distance),
+            2.0 * mirror.inverse_w * (spot_beam + 2.0 * beyond * Eigen::Vector2d(-reading.beta, reading.alpha))};
 }
 
 }  // namespace
 
+std::optional<Reading> read_mirror(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) {
+    if (!(normal.z() > 0.0)) return std::nullopt;
+    const auto reading = read_plane(broadcast3<double>(point), broadcast3<double>(normal), 1.0 / normal.z());
+    if (!(reading.w > 0.0) || !(reading.length > 0.0)) return std::nullopt;
+    return Reading{reading.distance, reading.alpha, reading.beta};
+}
+
+Eigen::VectorXd beam_distances(const Reading& reading, const std::vector<Eigen::Vector2d>& beam_offsets) {
+    const MirrorReading<double> mirror = of_mirror(reading);
+    Eigen::VectorXd distances(beam_offsets.size());
+    for (std::size_t i = 0; i < beam_offsets.size(); ++i)
+        distances[i] = beam_distance(mirror, beam_arm(mirror, beam_offsets[i].x(), beam_offsets[i].y()));
+    return distances;
+}
+
 Eigen::Vector2d spot_position(const Reading& reading, double psd_distance, const Eigen::Vector2d& spot_beam) {
-    const Eigen::Vector2d x(-reading.beta, reading.alpha);
-    return spot_gain(reading.distance, x, psd_distance, spot_beam).value * x;
+    return spot_gain(reading, psd_distance, spot_beam).value * Eigen::Vector2d(-reading.beta, reading.alpha);
 }
 
 std::optional<ReducedReading> reduce_spot(double distance, const Eigen::Vector2d& spot, double psd_distance,
@@ -51,7 +59,7 @@ std::optional<ReducedReading> reduce_spot(double distance, const Eigen::Vector2d
     Eigen::Matrix2d inverse;  // d x / d spot
     for (int iteration = 0; iteration < 20; ++iteration) {
         if (!(x.squaredNorm() < 1.0)) return std::nullopt;
-        const SpotGain gain = spot_gain(distance, x, psd_distance, spot_beam);
+        const SpotGain gain = spot_gain({distance, x.y(), -x.x()}, psd_distance, spot_beam);
         const Eigen::Matrix2d slopes = gain.value * Eigen::Matrix2d::Identity() + x * gain.gradient.transpose();
         if (!(gain.value > 0.0) || !(slopes.determinant() > 0.0)) return std::nullopt;
         inverse = slopes.inverse();
@@ -62,7 +70,7 @@ std::optional<ReducedReading> reduce_spot(double distance, const Eigen::Vector2d
     if (!(x.squaredNorm() < 1.0)) return std::nullopt;
 
     ReducedReading reduced{{distance, x.y(), -x.x()}, Eigen::Matrix3d::Zero()};
-    Eigen::Matrix<double, 2, 3> by_channel;  // of x, by (distance, spot)
+    Eigen::Matrix<double, 2, 3> by_channel;  // derivative of x with respect to (distance, spot)
     by_channel << -2.0 * inverse * x, inverse;
     reduced.jacobian(0, 0) = 1.0;
     reduced.jacobian.row(1) = by_channel.row(1);

@@ -9,7 +9,7 @@
 namespace stepdiag {
 namespace {
 
-constexpr std::string_view adaptive_kind = "stepdiag adaptive 1\n";  // the number: the version of the format
+constexpr std::string_view adaptive_kind = "stepdiag adaptive 1\n";  // the number is the version of the format
 
 }  // namespace
 
@@ -19,7 +19,7 @@ AdaptiveProcedure::AdaptiveProcedure(const Bins& bins)
       squares_(Eigen::ArrayX4d::Zero(Eigen::Index(bins.outputs().size()), 4)) {}
 
 std::uint64_t AdaptiveProcedure::leaves_per_block(double coverage) {
-    const double rounding = 1e-9;  // 100 / (1 - 0.99) is a little more than 10,000
+    const double rounding = 1e-9;  // because 100 / (1 - 0.99) is slightly more than 10,000
     const double samples = std::max(std::ceil(100.0 / (1.0 - coverage) * (1.0 - rounding)), 1e4);
     return std::uint64_t(std::ceil(samples / double(leaf_samples)));
 }
@@ -50,7 +50,7 @@ Stability AdaptiveProcedure::stability(const PartialStatistics& all) const {
     const double h = double(blocks_);
     const Eigen::VectorXd u = standard_uncertainties(all.state());
     for (Eigen::Index i = 0; i < u.size(); ++i) {
-        // An output that does not vary beyond rounding has no digits to be stable.
+        // Skip an output that varies by rounding only; it has no significant digits.
         const OutputBins& of_output = bins_.content().by_output[std::size_t(i)];
         if (of_output.bins == 1 || !(u[i] > 0.0)) continue;
         const double tolerance = numerical_tolerance(u[i], bins_.options().digits);

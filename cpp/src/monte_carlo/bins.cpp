@@ -11,10 +11,10 @@
 namespace stepdiag {
 namespace {
 
-// Cells of a joint region's grid along each of one, two or three outputs.
+// Number of cells of a joint region's grid along each output, for one, two and three outputs.
 constexpr std::size_t cells_along[] = {0, 1000, 100, 40};
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr std::string_view bins_kind = "stepdiag bins 1\n";  // the number: the version of the format
+constexpr std::string_view bins_kind = "stepdiag bins 1\n";  // the number is the version of the format
 
 void check_equal(const std::string& what, const std::string& expected, const std::string& got) {
     if (expected != got)
@@ -50,7 +50,7 @@ void check_same_options(const StatisticsOptions& a, const StatisticsOptions& b) 
 double numerical_tolerance(double standard_uncertainty, int digits) {
     const auto exponent = [&](double u) { return int(std::floor(std::log10(u))) - digits + 1; };
     const int r = exponent(standard_uncertainty);
-    // 9.97 at two digits is 10, hence not 10^0 but 10^-1 times a number of two digits.
+    // Rounding can increase the exponent: 9.97 is 10 with two digits, so r is 0 instead of -1.
     const bool rounds_up = std::round(standard_uncertainty / std::pow(10.0, r)) >= std::pow(10.0, digits);
     return 0.5 * std::pow(10.0, rounds_up ? r + 1 : r);
 }
@@ -58,18 +58,19 @@ double numerical_tolerance(double standard_uncertainty, int digits) {
 OutputBins bins_of(double mean, double standard_uncertainty, double lowest, double highest, int digits) {
     OutputBins bins{mean, standard_uncertainty, lowest, highest, lowest, 1.0, 1, 0};
     const double magnitude = std::max({std::abs(mean), std::abs(lowest), std::abs(highest)});
-    // Not finer than the numbers themselves are spaced.
+    // Bins must not be finer than the spacing of floating-point numbers.
     const double finest = 8.0 * std::numeric_limits<double>::epsilon() * magnitude;
     if (!(standard_uncertainty > finest)) {
         bins.width = std::max({finest, highest - lowest, std::numeric_limits<double>::min()});
         return bins;
     }
-    // The final u may have one decade less than the pilot's: 5 % below is seven times the scatter of a pilot's u.
+    // The final u may be in a lower decade than the pilot's u. The margin of 5 % is seven times the scatter of a
+    // pilot's u.
     bins.width = std::max(finest, numerical_tolerance(0.95 * standard_uncertainty, digits) / 5.0);
     bins.lower = lowest - 0.5 * standard_uncertainty;
     const double count = std::ceil((highest + 0.5 * standard_uncertainty - bins.lower) / bins.width);
     bins.bins = std::uint32_t(std::min(count, double(largest_bin_count)));
-    if (count > largest_bin_count)  // then those about the mean
+    if (count > largest_bin_count)  // keep the bins about the mean
         bins.lower = std::clamp(mean - 0.5 * largest_bin_count * bins.width, bins.lower,
                                 highest + 0.5 * standard_uncertainty - largest_bin_count * bins.width);
     return bins;
@@ -88,11 +89,11 @@ JointBins joint_bins(const std::vector<std::size_t>& outputs, const Eigen::Matri
     const Eigen::MatrixXd deviations = values.colwise() - bins.centre;
     bins.covariance = deviations * deviations.transpose() / double(std::max<Eigen::Index>(values.cols() - 1, 1));
     const Eigen::VectorXd u = bins.covariance.diagonal().cwiseSqrt();
-    // Conditioned by units no more: outputs may be millimetres and radians.
+    // Scale by u, because outputs may have different units (mm and rad).
     const Eigen::VectorXd unit = u.unaryExpr([](double each) { return each > 0.0 ? 1.0 / each : 1.0; });
     const Eigen::LLT<Eigen::MatrixXd> cholesky(unit.asDiagonal() * bins.covariance * unit.asDiagonal());
     const Eigen::Index size = values.rows();
-    // A correlation of 1 to rounding has no ellipsoid.
+    // There is no ellipsoid if a correlation is 1 within rounding.
     if (cholesky.info() == Eigen::Success && cholesky.matrixLLT().diagonal().minCoeff() > 1e-6) {
         bins.whitening = cholesky.matrixL().solve(Eigen::MatrixXd::Identity(size, size));
         bins.whitening = bins.whitening * unit.asDiagonal();

@@ -42,7 +42,7 @@ void ByteWriter::variable(std::uint64_t value) {
     bytes_.push_back(char(value));
 }
 
-// A zero is followed by how many more of them come.
+// A zero is followed by the number of further zeros.
 void ByteWriter::counts(const std::vector<std::uint32_t>& counts) {
     for (std::size_t i = 0; i < counts.size(); ++i) {
         variable(counts[i]);
@@ -62,7 +62,7 @@ ByteReader::ByteReader(std::string_view bytes, std::string_view kind, std::strin
     : left_(bytes), name_(std::move(name)) {
     if (left_.substr(0, kind.size()) != kind)
         throw InvalidArgument(name_ + ": expected bytes that begin with \"" + std::string(kind) +
-                              "\": they are something else, or of another version");
+                              "\"; these are of another kind or version");
     if (left_.size() < kind.size() + sizeof(std::uint32_t)) damaged();
     std::uint32_t expected;
     std::memcpy(&expected, left_.data() + left_.size() - sizeof expected, sizeof expected);
@@ -71,7 +71,7 @@ ByteReader::ByteReader(std::string_view bytes, std::string_view kind, std::strin
     left_.remove_prefix(kind.size());
 }
 
-void ByteReader::damaged() const { throw InvalidArgument(name_ + ": the bytes are damaged or not all there"); }
+void ByteReader::damaged() const { throw InvalidArgument(name_ + ": the bytes are damaged or incomplete"); }
 
 void ByteReader::take(void* to, std::size_t size) {
     if (size > left_.size()) damaged();

@@ -1,5 +1,5 @@
-// A simple binary format: a word that says what it is and of which version, numbers as they are in memory
-// (little-endian), a CRC-32 at the end. Internal.
+// Simple binary format: a text with kind and version, numbers in little-endian byte order, a CRC-32 at the end.
+// Internal.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,10 +21,10 @@ public:
     }
     void size(std::size_t value) { number(std::uint64_t(value)); }
     void text(const std::string& text);
-    void doubles(const double* values, std::size_t count);  // without their number
+    void doubles(const double* values, std::size_t count);  // does not write `count`
     void indices(const std::vector<std::size_t>& values);
     void matrix(const Eigen::MatrixXd& matrix);
-    void counts(const std::vector<std::uint32_t>& counts);  // most are small or 0: seven bits a byte, runs of zeros
+    void counts(const std::vector<std::uint32_t>& counts);  // compact: seven bits per byte, lengths of runs of zeros
 
     std::string finish() &&;
 
@@ -33,7 +33,7 @@ private:
     std::string bytes_;
 };
 
-// Throws InvalidArgument, beginning with `name`, where the bytes are not of this kind, damaged, or end too soon.
+// Throws InvalidArgument, whose message begins with `name`, if the bytes are of another kind, damaged or incomplete.
 class ByteReader {
 public:
     ByteReader(std::string_view bytes, std::string_view kind, std::string name);
@@ -44,15 +44,15 @@ public:
         take(&value, sizeof value);
         return value;
     }
-    // A number of things of which each takes a byte or more.
+    // A number of items. Each item must take at least one byte, so a damaged size is detected early.
     std::size_t size();
     std::string text();
     void doubles(double* values, std::size_t count) { take(values, count * sizeof(double)); }
     std::vector<std::size_t> indices();
     Eigen::MatrixXd matrix();
-    void counts(std::vector<std::uint32_t>& counts);  // as many as there are
-    void finish() const;                              // nothing may be left
-    void expect(bool condition) const {               // of what was read
+    void counts(std::vector<std::uint32_t>& counts);  // reads counts.size() numbers
+    void finish() const;                              // throws if bytes remain
+    void expect(bool condition) const {               // throws if the content read is inconsistent
         if (!condition) damaged();
     }
 

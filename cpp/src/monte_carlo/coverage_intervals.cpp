@@ -41,7 +41,7 @@ Eigen::RowVector2d CountedValues::symmetric_interval(double coverage) const {
     return {quantile(0.5 * (1.0 - coverage)), quantile(0.5 * (1.0 + coverage))};
 }
 
-// Of all intervals that hold the share `coverage` the shortest one has an end at the edge of a bin.
+// The shortest interval that contains the share `coverage` has an end at the edge of a bin.
 Eigen::RowVector2d CountedValues::shortest_interval(double coverage) const {
     const double total = below_.back(), inside = coverage * total;
     Eigen::RowVector2d shortest(edges_.front(), edges_.back());

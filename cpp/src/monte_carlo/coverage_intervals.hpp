@@ -9,11 +9,11 @@
 
 namespace stepdiag {
 
-// The distribution function of counted values, linear within bins; those beyond the bins spread to the lowest and the
-// highest value.
+// Distribution function of counted values, linear within bins. Values outside the bins are spread evenly up to the
+// lowest and the highest value.
 class CountedValues {
 public:
-    // `counts`: those below the bins, the bins, those above. At least one value.
+    // `counts`: values below the bins, bins, values above the bins. There must be at least one value.
     CountedValues(const OutputBins& bins, const std::uint32_t* counts, double lowest, double highest);
 
     double quantile(double probability) const;
@@ -21,9 +21,10 @@ public:
     Eigen::RowVector2d shortest_interval(double coverage) const;
 
 private:
-    // The value with `rank` values below it; `above`: the end of its bin, from where a greater rank is looked for.
+    // The value with `rank` values below it. `above`: index of the upper edge of its bin; a search for a larger rank
+    // starts there.
     double at_rank(double rank, std::size_t& above) const;
-    std::vector<double> edges_, below_;  // edges of bins, from the lowest to the highest value; counts below each
+    std::vector<double> edges_, below_;  // edges of the bins from the lowest to the highest value; counts below each
 };
 
 }  // namespace stepdiag

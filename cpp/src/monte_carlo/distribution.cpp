@@ -78,7 +78,7 @@ double draw(const Distribution& distribution, double normal, double u, double v)
         case DistributionKind::arcsine: return mean + spread * std::sin(2.0 * pi * u);
         case DistributionKind::student_t: {
             const double nu = distribution.degrees_of_freedom;
-            // nu (u^(-2/nu) - 1); of infinitely many degrees of freedom its limit, Box-Muller.
+            // nu (u^(-2/nu) - 1). Its limit for infinite degrees of freedom is the Box-Muller formula.
             const double square = std::isinf(nu) ? -2.0 * std::log(u) : nu * std::expm1(-2.0 / nu * std::log(u));
             return mean + spread * std::sqrt(square) * std::cos(2.0 * pi * v);
         }
@@ -101,7 +101,7 @@ double t_quantile(double probability, double degrees_of_freedom) {
 }
 
 Eigen::MatrixXd correlation_factor(const Eigen::MatrixXd& correlation, const std::string& name) {
-    // Entries are given with a few digits; what rounding of doubles makes of them is far below.
+    // Accepts rounding of doubles, which is far below the digits of the entries.
     constexpr double rounding = 1e-9;
     if (correlation.rows() != correlation.cols() || correlation.rows() == 0)
         throw InvalidArgument(name + ": expected a square matrix, got " + std::to_string(correlation.rows()) + " x " +
@@ -117,7 +117,7 @@ Eigen::MatrixXd correlation_factor(const Eigen::MatrixXd& correlation, const std
     Eigen::MatrixXd factor = Eigen::MatrixXd(ldlt.matrixL()) * roots.asDiagonal();
     factor = ldlt.transpositionsP().transpose() * factor;
     if (!((factor * factor.transpose() - correlation).array().abs() < rounding).all())
-        throw InvalidArgument(name + ": expected a positive semidefinite matrix: no numbers are correlated like that");
+        throw InvalidArgument(name + ": expected a positive semidefinite matrix, as every correlation matrix is");
     return factor;
 }
 

@@ -40,7 +40,7 @@ FunctionModel::FunctionModel(Function function, std::vector<Distribution> distri
         for (const int member : correlated.members) {
             const std::string input = "correlation: input " + std::to_string(member);
             if (member < 0 || member >= int(distributions_.size()))
-                throw InvalidArgument(input + " is not there: expected 0 to " +
+                throw InvalidArgument(input + " does not exist: expected 0 to " +
                                       std::to_string(int(distributions_.size()) - 1));
             if (distributions_[std::size_t(member)].kind != DistributionKind::normal)
                 throw InvalidArgument(input + " is not normal but " + name(distributions_[std::size_t(member)].kind));

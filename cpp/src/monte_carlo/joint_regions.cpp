@@ -15,7 +15,7 @@ double total_of(const std::vector<std::uint32_t>& counts) {
     return double(std::accumulate(counts.begin(), counts.end(), std::uint64_t(0)));
 }
 
-// The distance that the share `coverage` of the counted ones is below; those beyond the bins spread to the farthest.
+// Quantile `coverage` of the counted distances. Distances beyond the bins are spread evenly up to the farthest one.
 double distance_quantile(const std::vector<std::uint32_t>& counts, double farthest, double coverage) {
     const double rank = coverage * total_of(counts);
     double below = 0.0;
@@ -29,7 +29,7 @@ double distance_quantile(const std::vector<std::uint32_t>& counts, double farthe
 
 double unit_ball(Eigen::Index dimensions) { return dimensions == 1 ? 2.0 : dimensions == 2 ? pi : 4.0 / 3.0 * pi; }
 
-// The fullest cells until they hold the coverage; of equally full ones the first.
+// Chooses the fullest cells until they contain the coverage. For equal counts, the first cell is chosen.
 void choose_cells(const JointCounts& counts, double coverage, JointRegion& region) {
     const std::size_t cells = counts.cells.size() - 1;
     std::vector<std::uint32_t> order(cells);

@@ -10,7 +10,7 @@
 namespace stepdiag {
 namespace {
 
-constexpr std::size_t block_bytes = 600'000;  // of the 1 to 2 MB that a core's second cache has
+constexpr std::size_t block_bytes = 600'000;  // fits the second-level cache of 1 to 2 MB per core
 
 std::vector<std::size_t> gathered_outputs(const Bins::Content& bins) {
     std::vector<std::size_t> outputs = bins.options.kept;
@@ -26,15 +26,15 @@ std::size_t distance_bin(double distance) {
     return std::size_t(std::min(distance / distance_width, double(distance_bins)));
 }
 
-// Lower triangle of the sum over samples of (y - mean)(y - mean)^T; rows of values are outputs, `stride` apart.
-// m^2 / 2 multiplications a sample for m outputs.
+// Lower triangle of the sum over samples of (y - mean)(y - mean)^T. Rows of `values` are outputs, `stride` apart. Takes
+// m^2 / 2 multiplications per sample for m outputs.
 Eigen::MatrixXd outer_products(const double* values, std::size_t stride, std::size_t samples,
                                const Eigen::VectorXd& mean) {
-    constexpr Eigen::Index panel = 48;           // columns at once, a multiple of 6
-    constexpr std::size_t samples_at_once = 96;  // deviations of 900 outputs stay in a core's second cache
+    constexpr Eigen::Index panel = 48;           // columns processed together, a multiple of 6
+    constexpr std::size_t samples_at_once = 96;  // deviations of 900 outputs fit the second-level cache
     const Eigen::Index outputs = mean.size();
     const Eigen::Index columns = (outputs + panel - 1) / panel * panel;
-    const Eigen::Index rows = columns + widest_vector;  // vectors reach beyond the last output: zeros
+    const Eigen::Index rows = columns + widest_vector;  // zeros for vectors that extend beyond the last output
     Eigen::MatrixXd deviations = Eigen::MatrixXd::Zero(rows, Eigen::Index(samples_at_once));
     Eigen::MatrixXd products = Eigen::MatrixXd::Zero(rows, columns);
     for (std::size_t done = 0; done < samples; done += samples_at_once) {
@@ -121,7 +121,7 @@ void LeafWorker::add_block(std::uint64_t first_sample, std::size_t samples) {
     samples_ += good;
 }
 
-// Moves the samples that have a result to the front of each row; how many there are.
+// Moves the samples with a result to the front of each row. Returns their number.
 std::size_t LeafWorker::leave_out_lost(std::uint64_t first_sample, std::size_t samples) {
     std::vector<bool> finite(samples, true);
     for (std::size_t i = 0; i < sums_.size(); ++i)
@@ -140,14 +140,14 @@ std::size_t LeafWorker::leave_out_lost(std::uint64_t first_sample, std::size_t s
     return good;
 }
 
-// An output at a time: its bins then stay in the first cache.
+// Counts one output at a time, so that its bins stay in the first-level cache.
 void LeafWorker::count(std::uint64_t leaf, Counts& counts) const {
     std::vector<std::uint16_t>& recent = counts.begin_leaf();
     for (std::size_t i = 0; i < sums_.size(); ++i) {
         std::uint16_t* bins = recent.data() + bins_.by_output[i].offset;
         const std::uint16_t* indices = indices_.data() + i * leaf_samples;
         for (std::size_t s = 0; s < samples_; ++s) ++bins[indices[s]];
-        // + 0.0: one zero, whichever sign comes first
+        // + 0.0 changes -0.0 to 0.0, so that the bits do not depend on the order
         double& lowest = counts.lowest[Eigen::Index(i)];
         double& highest = counts.highest[Eigen::Index(i)];
         lowest = std::min(lowest, sums_[i].lowest + 0.0);
@@ -188,7 +188,7 @@ void LeafWorker::count_joint(const JointBins& joint, JointCounts& counts) const 
     }
 }
 
-// By sample of the leaf, NaN for a lost one.
+// Values of the kept outputs for each sample of the leaf; NaN for a lost sample.
 std::vector<double> LeafWorker::kept() const {
     std::vector<double> values;
     for (const std::size_t output : bins_.options.kept) {

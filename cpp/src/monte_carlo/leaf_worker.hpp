@@ -1,5 +1,5 @@
-// One leaf of samples: evaluated in blocks that stay in a core's cache, summed, and put into bins when it is whole.
-// Internal.
+// Evaluates one leaf of samples in blocks that fit a core's cache, sums their outputs, and counts them in bins when the
+// leaf is complete. Internal.
 #pragma once
 
 #include <atomic>
@@ -13,16 +13,16 @@
 
 namespace stepdiag {
 
-// Samples of a block: a multiple of lane_group.
+// Number of samples in a block, a multiple of lane_group.
 std::size_t block_samples(std::size_t outputs);
 
-// What one thread holds. Beside the block: 2 bytes for each output and sample of a leaf, and 8 for each output whose
-// values are needed again (all of them for a covariance).
+// Working memory of one thread. In addition to the block it takes, for each sample of a leaf, 2 bytes for each output
+// and 8 bytes for each output whose values are needed again (all outputs for a covariance).
 class LeafWorker {
 public:
     LeafWorker(const SampleModel& model, const Bins::Content& bins);
 
-    // Counts into `counts`, unless stopped before the leaf's end: then nothing.
+    // Evaluates a leaf and adds to `counts`. If stopped before the end of the leaf, returns nothing and adds nothing.
     std::optional<Moments> run(std::uint64_t leaf, Counts& counts, const std::atomic<bool>& stop);
 
 private:
@@ -38,12 +38,12 @@ private:
     std::vector<BinScale> scales_;
     std::vector<RowSums> block_sums_, sums_;
     std::vector<double> block_;
-    std::vector<std::uint16_t> indices_;  // outputs x leaf_samples; the first `samples_` of each count
-    std::vector<std::size_t> gather_;     // outputs whose values are needed
-    std::vector<std::size_t> place_;      // by output: its row in gathered_
+    std::vector<std::uint16_t> indices_;  // bins: outputs x leaf_samples; only the first `samples_` of a row are valid
+    std::vector<std::size_t> gather_;     // outputs whose values are needed again
+    std::vector<std::size_t> place_;      // for each output: its row in gathered_
     std::vector<double> gathered_;        // gather_ x leaf_samples
-    std::vector<std::uint64_t> lost_;     // within the leaf
-    std::size_t samples_ = 0;             // with a result, so far
+    std::vector<std::uint64_t> lost_;     // samples of the leaf without a result
+    std::size_t samples_ = 0;             // samples with a result so far
     std::uint64_t first_sample_ = 0;
 };
 

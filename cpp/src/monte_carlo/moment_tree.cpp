@@ -29,7 +29,7 @@ void MomentTree::add(std::uint64_t first_leaf, Node node) {
     for (;;) {
         const auto sibling = nodes_.find(first_leaf ^ node.leaves());
         if (sibling == nodes_.end() || sibling->second.level != node.level) break;
-        node.moments += sibling->second.moments;  // in either order: a sum of two
+        node.moments += sibling->second.moments;  // the order of two summands does not affect the bits
         first_leaf = std::min(first_leaf, sibling->first);
         ++node.level;
         nodes_.erase(sibling);

@@ -1,6 +1,6 @@
-// Sums over leaves of samples, merged pairwise in a binary tree over the leaves' numbers: node (level, k) is the sum of
-// the leaves k 2^level, ..., (k + 1) 2^level - 1 and exists once all of them are there. So the bits of a sum depend on
-// the set of leaves alone, and a run of n leaves holds about log2 n nodes. Internal.
+// Sums over leaves of samples, merged pairwise in a binary tree over the leaf numbers. Node (level, k) is the sum of
+// the leaves k 2^level, ..., (k + 1) 2^level - 1. It exists as soon as all of them are present. The bits of a sum
+// therefore depend only on the set of leaves, and a run of n leaves has about log2 n nodes. Internal.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +12,7 @@
 
 namespace stepdiag {
 
-// Sums about the pilot's mean: of deviations, of their squares, and on request of their products (lower triangle).
+// Sums of the deviations from the pilot's mean, of their squares, and on request of their products (lower triangle).
 struct Moments {
     std::uint64_t samples = 0;
     std::uint64_t lost = 0;
@@ -33,10 +33,10 @@ public:
         std::uint64_t leaves() const { return std::uint64_t(1) << level; }
     };
 
-    // All throw InvalidArgument for a leaf that is there.
+    // All three throw InvalidArgument if a leaf is already present.
     void check_free(std::uint64_t first_leaf, std::uint64_t leaves) const;
     void add(std::uint64_t first_leaf, Node node);
-    void add(const MomentTree& other);  // all or nothing
+    void add(const MomentTree& other);  // adds all leaves or none
 
     const std::map<std::uint64_t, Node>& nodes() const { return nodes_; }  // by first leaf
     Moments total(Eigen::Index outputs) const;

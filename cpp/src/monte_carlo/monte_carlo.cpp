@@ -45,7 +45,8 @@ void add_leaves(PartialStatistics& all, const SampleModel& model, std::uint64_t 
     if (leaves == 0) return;
     all.state().tree.check_free(first_leaf, leaves);
     std::mutex mutex;
-    // Counts by thread, since adding them is exact in any order; moments at once, so that few of them wait.
+    // Each thread has its own counts, because their addition is exact in any order. Moments are added to the tree
+    // immediately, so that few nodes wait for merging.
     std::vector<Counts> counts(std::size_t(thread_count(control, leaves)), Counts(bins.content()));
     const auto add_counts = [&] {
         for (Counts& each : counts) {
@@ -112,7 +113,7 @@ MonteCarloResult monte_carlo(const SampleModel& model, const StatisticsOptions& 
     return run_leaves(model, bins, 0, (samples + leaf_samples - 1) / leaf_samples, control).result();
 }
 
-// --- the pilot run: where sums and bins of each output are to lie ---
+// --- pilot run: reference mean and bins of each output ---
 
 namespace {
 
@@ -141,7 +142,7 @@ void check_options(const StatisticsOptions& options, std::size_t outputs) {
     }
 }
 
-// Outputs of the first sample that has a result: near enough to the mean for sums about it.
+// Outputs of the first sample with a result. They are near enough to the mean to serve as reference for the sums.
 Eigen::VectorXd first_result(const SampleModel& model) {
     const std::size_t outputs = model.outputs().size();
     std::vector<double> values(outputs * lane_group);
@@ -155,10 +156,10 @@ Eigen::VectorXd first_result(const SampleModel& model) {
         }
     }
     throw InvalidArgument("none of the first " + std::to_string(pilot_samples) +
-                          " samples has a result: no statistics can be made of them");
+                          " samples has a result, so there are no statistics");
 }
 
-// Without bins to speak of, about `centre`; values of the joint outputs are kept.
+// Provisional bins for the pilot run: minimal bins about `centre`. The values of the joint outputs are kept.
 Bins provisional_bins(const SampleModel& model, const StatisticsOptions& options, const Eigen::VectorXd& centre) {
     auto content = std::make_shared<Bins::Content>();
     content->outputs = model.outputs();

@@ -9,9 +9,9 @@
 namespace stepdiag {
 namespace {
 
-constexpr std::string_view statistics_kind = "stepdiag statistics 1\n";  // the number: the version of the format
+constexpr std::string_view statistics_kind = "stepdiag statistics 1\n";  // the number is the version of the format
 
-// Every sample in the order of its index, those of leaves that are not there left out.
+// Values of all samples in the order of their indices. Samples of missing leaves are omitted.
 std::map<std::size_t, std::vector<double>> kept_values(const StatisticsOptions& options, const Counts& counts) {
     std::map<std::size_t, std::vector<double>> kept;
     for (std::size_t i = 0; i < options.kept.size(); ++i) {

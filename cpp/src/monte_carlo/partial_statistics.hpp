@@ -1,4 +1,4 @@
-// What PartialStatistics hold. Internal.
+// Content of PartialStatistics. Internal.
 #pragma once
 
 #include "monte_carlo/bins.hpp"

@@ -3,28 +3,17 @@
 #include <algorithm>
 #include <limits>
 
-// Not those instruction sets that differ from another one only in what is not used here.
-#include <hwy/detect_targets.h>
-#undef HWY_DISABLED_TARGETS
-#ifdef HWY_AVX3_ZEN4  // since Highway 1.1
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4 | HWY_AVX3_SPR)
-#else
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
-#endif
-#undef HWY_TARGET_INCLUDE
+#include "core/simd_targets.hpp"
 #define HWY_TARGET_INCLUDE "monte_carlo/sum_and_bin.cpp"
 #include <hwy/foreach_target.h>  // compiles this file once for every instruction set
 //
-#include <hwy/highway.h>
+#include "core/simd-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace stepdiag {
 namespace HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using Tag = hn::CappedTag<double, 16>;  // lane_group
-
-HWY_INLINE RowSums row(const double* values, std::size_t samples, const BinScale& scale, std::uint16_t* bins) {
+STEPDIAG_INLINE RowSums row(const double* values, std::size_t samples, const BinScale& scale, std::uint16_t* bins) {
     const Tag tag;
     const hn::Rebind<std::int32_t, Tag> integers;
     const hn::Rebind<std::uint16_t, Tag> indices;

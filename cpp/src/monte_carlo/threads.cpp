@@ -21,7 +21,7 @@ int thread_count(const RunControl& control, std::uint64_t items) {
 }
 
 void work_through(std::uint64_t items, const RunControl& control, const std::function<Work(int thread)>& make_work) {
-    constexpr auto pause = std::chrono::milliseconds(100);  // between questions whether to go on
+    constexpr auto pause = std::chrono::milliseconds(100);  // between calls of go_on
     Progress progress;
     std::atomic<std::uint64_t> next{0};
     std::mutex mutex;

@@ -1,4 +1,4 @@
-// Items of work taken one after the other by several threads. Internal.
+// Distributes items of work over several threads. Internal.
 #pragma once
 
 #include <atomic>
@@ -11,16 +11,16 @@ namespace stepdiag {
 
 int thread_count(const RunControl& control, std::uint64_t items);
 
-// What threads and the one that waits for them tell each other.
+// Communication between the working threads and the waiting thread.
 struct Progress {
-    std::atomic<bool> stop{false};     // take no further item
-    std::atomic<bool> abandon{false};  // leave the one in hand
+    std::atomic<bool> stop{false};     // start no further item
+    std::atomic<bool> abandon{false};  // abandon the item in progress
     std::atomic<std::uint64_t> done{0};
 };
-// Does one item; counts the leaves that are done.
+// Processes one item, and counts completed leaves in progress.done.
 using Work = std::function<void(std::uint64_t item, Progress& progress)>;
 
-// `make_work(thread)` is called once by each thread. Exceptions of any of them, and of go_on, come through.
+// Each thread calls `make_work(thread)` once. Exceptions from any thread and from go_on are passed to the caller.
 void work_through(std::uint64_t items, const RunControl& control, const std::function<Work(int thread)>& make_work);
 
 }  // namespace stepdiag

@@ -31,7 +31,7 @@ void require_closed(const std::vector<std::vector<int>>& faces) {
                                   " face(s), expected 2");
 }
 
-// The face through these corners of a convex body, its normal outward.
+// The face of a convex body through these corners, with its normal outward.
 Face make_outer_face(const Corners& corners, const std::vector<int>& face, const std::string& name, double tolerance) {
     Face made{corners[face[0]], Eigen::Vector3d::Zero(), {}, Surface::refracting, {}};
     for (const int corner : face) made.outline.push_back(corners[corner]);
@@ -82,8 +82,8 @@ std::vector<Face> make_body(const Corners& corners, const std::vector<std::vecto
         const double share = double(faces.size()) / most_faces_of_a_body;
         throw InvalidArgument("body: expected at most " + std::to_string(most_faces_of_a_body) + " faces, got " +
                               std::to_string(faces.size()) +
-                              ": each is held against every corner, which would take about " +
-                              std::to_string(std::lround(0.6 * share * share)) + " s; make several bodies of them");
+                              "; the check of each face against every corner would take about " +
+                              std::to_string(std::lround(0.6 * share * share)) + " s; divide it into several bodies");
     }
     if (!(std::isfinite(glass.index) && glass.index >= 1.0))
         throw InvalidArgument("body: expected an index of at least 1");
@@ -148,7 +148,7 @@ std::vector<Face> make_prism(double side, double height, double apex, Medium gla
 
 std::vector<Face> make_corner_cube(double depth, Medium glass, const Placement& placement) {
     require_positive(depth, "depth");
-    // The cube's edges, each inclined by acos(1/sqrt 3) to z, reach the depth at a distance of sqrt 2 from the axis.
+    // The edges of the cube are inclined by acos(1/sqrt 3) to z. At z = depth they are sqrt(2) depth from the axis.
     const double radius = std::sqrt(2.0) * depth;
     Corners corners{Eigen::Vector3d::Zero()};
     for (int k = 0; k < 3; ++k) {
@@ -165,7 +165,7 @@ std::vector<Face> make_cube_splitter(double edge, Medium glass, double reflectan
         throw InvalidArgument("splitter: expected reflectance and absorptance of 0 to 1, together at most 1");
     std::vector<Face> cube = make_plate(edge, edge, edge, glass);
     const double root = std::sqrt(0.5), length = (1.0 - 2e-4) * edge;
-    Eigen::Matrix3d diagonal;  // local y along the cube's, normal between +x and -z
+    Eigen::Matrix3d diagonal;  // local y is the cube's y; the normal is between +x and -z
     diagonal << -root, 0.0, root, 0.0, 1.0, 0.0, -root, 0.0, -root;
     Face face = make_rectangle(Eigen::Vector3d::Zero(), diagonal, {length / root, length}, Surface::splitting);
     face.before = face.behind = glass;

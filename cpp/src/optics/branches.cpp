@@ -3,7 +3,7 @@
 namespace stepdiag {
 namespace {
 
-// Snell's law decides whether light gets through at all; where it does not, the surface has nothing to split.
+// Snell's law first: in the case of total internal reflection there is no transmitted branch to split off.
 Branches at_boundary(const Face& face, const Medium& ambient, const Eigen::Vector3d& direction, double index,
                      double reflectance, double absorptance) {
     const bool enters = direction.dot(face.normal) < 0.0;

@@ -1,4 +1,4 @@
-// Where light goes from a face that it meets.
+// The branches into which a face divides incident light.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,7 +10,7 @@
 
 namespace stepdiag {
 
-// Light that goes on: what happened to it, where to, in which medium, and its share of the power that came.
+// Outgoing light: event, direction, medium, and share of the incident power.
 struct Branch {
     Event event;
     Eigen::Vector3d direction;
@@ -18,11 +18,11 @@ struct Branch {
     double share;
 };
 
-// Transmitted light stands before reflected light; two ways only from a splitting face. `index`: of the medium that the
-// light comes in, which it keeps where it is reflected.
+// Transmitted light precedes reflected light. Only a splitting face has two branches. `index`: refractive index of the
+// medium of the incident light; reflected light stays in it.
 struct Branches {
     std::array<std::optional<Branch>, 2> onward;
-    double absorbed;  // share of the power
+    double absorbed;  // share of the incident power
 };
 
 Branches branches(const Face& face, const Medium& ambient, const Eigen::Vector3d& direction, double index);

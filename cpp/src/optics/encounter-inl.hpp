@@ -1,5 +1,5 @@
 // What a face does to light on a known way: one text for vectors of lanes (replay.cpp) and for numbers that carry their
-// derivative (replay_derivative.cpp). Highway compiles it anew for every instruction set, hence the guard.
+// derivative (replay_derivative.cpp).
 #if defined(STEPDIAG_ENCOUNTER_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef STEPDIAG_ENCOUNTER_INL
 #undef STEPDIAG_ENCOUNTER_INL
@@ -7,15 +7,13 @@
 #define STEPDIAG_ENCOUNTER_INL
 #endif
 
-#include <hwy/highway.h>
-
-#include "optics/number.hpp"
+#include "core/number.hpp"
 #include "stepdiag/optics/path.hpp"
 #include "stepdiag/optics/replay.hpp"
 
-HWY_BEFORE_NAMESPACE();
+STEPDIAG_BEFORE_NAMESPACE();
 namespace stepdiag {
-namespace HWY_NAMESPACE {
+namespace STEPDIAG_NAMESPACE {
 
 template <class N>
 struct Light {
@@ -35,7 +33,7 @@ STEPDIAG_INLINE Truth<N> within(const std::array<double, 3>& edge, N x, N y) {
     return mul_add(broadcast(n, edge[0]), x, broadcast(n, edge[1]) * y) <= broadcast(n, edge[2]);
 }
 
-// Whether a point of the face's plane, in the scene, is inside the outline.
+// Whether a point of the face's plane, in scene coordinates, is inside the outline.
 template <class N, class Face>
 STEPDIAG_INLINE Truth<N> inside(const Outline& outline, const Face& face, const N (&point)[3]) {
     const N row_x[3] = {face.rotation(0), face.rotation(1), face.rotation(2)};
@@ -51,15 +49,15 @@ STEPDIAG_INLINE Truth<N> inside(const Outline& outline, const Face& face, const 
     return all;
 }
 
-// Takes light to the face's plane and on from there. `Met` tells event, deflects and outline; `Face` gives the numbers
-// as N: rotation(0..8),
-// translation(0..2), index() before, inverse_index() of it, index_ratio() mu = before / after, and 1 - mu^2.
+// Propagates light to the face's plane and applies the event. `Met` has event, deflects and outline. `Face` gives the
+// numbers as N: rotation(0..8), translation(0..2), index() before the face, its inverse inverse_index(), index_ratio()
+// mu = before / after, and 1 - mu^2.
 template <class N, class Met, class Face>
 STEPDIAG_INLINE void meet(const Met& met, const Face& face, N gap, Light<N>& light) {
     const N normal[3] = {face.rotation(6), face.rotation(7), face.rotation(8)};
     N(&d)[3] = light.direction;
-    const N along = mul_add(normal[0], d[0], mul_add(normal[1], d[1], normal[2] * d[2]));  // cosine, signed
-    const N beyond = dot_add(normal, light.point, face.translation(2));  // the plane, along its normal
+    const N along = mul_add(normal[0], d[0], mul_add(normal[1], d[1], normal[2] * d[2]));  // signed cosine
+    const N beyond = dot_add(normal, light.point, face.translation(2));  // distance from the plane along its normal
     const N distance = negative(beyond) / along;
     light.followed = both(light.followed, distance > gap);
     for (int k = 0; k < 3; ++k) light.point[k] = mul_add(distance, d[k], light.point[k]);
@@ -68,8 +66,8 @@ STEPDIAG_INLINE void meet(const Met& met, const Face& face, N gap, Light<N>& lig
     light.followed = both(light.followed, inside(*met.outline, face, light.point));
 
     if (met.event == Event::absorbed || (met.event == Event::refracted && !met.deflects)) return;
-    // Snell: with mu = n1/n2, the squared cosine behind the face is (1 - mu^2) + mu^2 along^2; below 0 no light gets
-    // there.
+    // Snell's law: with mu = n1/n2, the squared cosine behind the face is (1 - mu^2) + mu^2 along^2. A negative value
+    // means total internal reflection.
     if (met.event == Event::refracted) {
         const N mu = face.index_ratio();
         const N cosine = mu * along;
@@ -88,7 +86,7 @@ STEPDIAG_INLINE void meet(const Met& met, const Face& face, N gap, Light<N>& lig
     for (int k = 0; k < 3; ++k) d[k] = sub_mul(twice, normal[k], d[k]);
 }
 
-// Infinite and NaN differ from themselves less themselves.
+// x - x is 0 for finite x, and NaN for infinite x and NaN.
 template <class N>
 STEPDIAG_INLINE Truth<N> is_finite(N a) {
     return magnitude(a - a) <= broadcast(Type<N>(), 0.0);
@@ -103,8 +101,8 @@ STEPDIAG_INLINE void check_end(Light<N>& light) {
     }
 }
 
-}  // namespace HWY_NAMESPACE
+}  // namespace STEPDIAG_NAMESPACE
 }  // namespace stepdiag
-HWY_AFTER_NAMESPACE();
+STEPDIAG_AFTER_NAMESPACE();
 
 #endif

@@ -7,7 +7,7 @@
 namespace stepdiag {
 namespace {
 
-// The corners in the plane of two axes, from an origin.
+// Coordinates of the corners along two axes, relative to an origin.
 std::vector<Eigen::Vector2d> project(const Face& face, const Eigen::Vector3d& origin, const Eigen::Vector3d& x,
                                      const Eigen::Vector3d& y) {
     std::vector<Eigen::Vector2d> projected;
@@ -26,7 +26,7 @@ FaceFrame frame_of(const Face& face) {
     for (const auto& corner : corners) lowest = lowest.cwiseMin(corner), highest = highest.cwiseMax(corner);
     const Eigen::Vector2d middle = 0.5 * (lowest + highest);
     const Eigen::Vector3d origin = face.outline[0] + middle.x() * x + middle.y() * y;
-    const Eigen::Vector3d& z = face.normal;  // with the plane's own point: corners are rounded
+    const Eigen::Vector3d& z = face.normal;  // use the plane's own point below, because corners are rounded
     return {{x.x(), x.y(), x.z(), y.x(), y.y(), y.z(), z.x(), z.y(), z.z()},
             {-x.dot(origin), -y.dot(origin), -z.dot(face.point)}};
 }
@@ -38,13 +38,13 @@ Outline outline_of(const Face& face, const FaceFrame& frame) {
     for (const auto& corner : face.outline) outline.corners.push_back((rotation * corner + translation).head<2>());
 
     const std::size_t n = outline.corners.size();
-    double area = 0.0;  // twice, with the sign of the way round
+    double area = 0.0;  // twice the area; the sign gives the orientation of the outline
     for (const auto& corner : outline.corners) outline.half_size = outline.half_size.cwiseMax(corner.cwiseAbs());
     for (std::size_t k = 0; k < n; ++k) {
         const Eigen::Vector2d &a = outline.corners[k], &b = outline.corners[(k + 1) % n];
         area += a.x() * b.y() - a.y() * b.x();
     }
-    // Round-off moves the corners of a rectangle by some 1e-13 mm in a scene of metres.
+    // Rounding moves the corners of a rectangle by about 1e-13 mm in a scene of several metres.
     const double tolerance = 1e-12 * (outline.half_size.norm() + translation.norm());
     const auto is_corner = [&](const Eigen::Vector2d& corner) {
         return (corner.cwiseAbs() - outline.half_size).cwiseAbs().maxCoeff() <= tolerance;

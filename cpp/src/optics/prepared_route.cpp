@@ -8,7 +8,7 @@
 namespace stepdiag {
 namespace {
 
-// Whether one of them varies.
+// Whether at least one value varies from lane to lane.
 template <std::size_t size>
 bool vary(const std::array<LaneValue, size>& values) {
     bool any = false;
@@ -59,7 +59,7 @@ void PreparedRoute::prepare(const Encounter& encounter, PreparedEncounter& made)
         made.index_ratio = made.index_before / made.index_after;
     }
 
-    // One way for lanes is enough: where the indices vary, the plane is taken by lane too.
+    // Two kinds of varying faces suffice: if the indices vary, the plane is read per lane as well.
     const bool rotation_varies = vary(encounter.rotation), translation_varies = vary(encounter.translation);
     made.plane_by_lane = rotation_varies || translation_varies || made.indices_by_lane;
     if (made.plane_by_lane) {

@@ -1,4 +1,4 @@
-// A route as replay.cpp walks it: what is common to all lanes copied side by side, the rest as pointers.
+// A route prepared for replay.cpp: values common to all lanes are copied next to each other, the others are pointers.
 #pragma once
 
 #include <cstddef>
@@ -9,8 +9,8 @@
 
 namespace stepdiag {
 
-// Values of successive lanes start at from + (lane & mask): the mask is all ones, or 0 for a row of copies of one
-// value.
+// Values of successive lanes start at from + (lane & mask). The mask is all ones, or 0 for an array of copies of one
+// common value.
 struct LaneSource {
     const double* from;
     std::size_t mask;
@@ -21,17 +21,17 @@ struct PreparedEncounter {
     bool deflects;
     bool plane_by_lane, indices_by_lane;
     const Outline* outline;
-    double plane[12];                                   // where common: rotation and translation,
-    double index_before, index_after, one_less_ratio2;  // and of the indices n1, n2, 1 - (n1/n2)^2
+    double plane[12];                                   // if common to all lanes: rotation and translation,
+    double index_before, index_after, one_less_ratio2;  // n1, n2, 1 - (n1/n2)^2,
     double inverse_index, index_ratio;                  // 1/n1, n1/n2
-    LaneSource plane_from[12];                          // where by lane
+    LaneSource plane_from[12];                          // if different for each lane
     LaneSource index_before_from, index_after_from;
 };
 
 class PreparedRoute {
 public:
-    // To be read `width` lanes at a time. Where there are fewer lanes, they are copied, and the last of them goes on.
-    // Throws InvalidArgument for strides other than 0 and 1.
+    // Prepares reading of `width` lanes at a time. Fewer lanes than `width` are copied and padded with the last one.
+    // Throws InvalidArgument for a stride other than 0 and 1.
     PreparedRoute(const std::vector<Encounter>& route, const LaneRays& rays, std::size_t lanes, std::size_t width);
 
     LaneSource start[8];  // origin, direction, optical and reduced length
@@ -43,13 +43,13 @@ private:
     LaneSource source(const LaneValue& value);
 
     std::size_t lanes_, width_, size_;
-    // Both without initial values: a call for one lane should not cost that of hundreds.
+    // Both are left uninitialised, so that a call for one lane does not pay for hundreds.
     std::unique_ptr<PreparedEncounter[]> encounters_;
     std::unique_ptr<double[]> rows_;
     double* next_row_;
 };
 
-// Results of up to 64 lanes, to be copied where they belong.
+// Temporary results of up to 64 lanes.
 struct ResultsAside {
     double number[8][64];
     std::uint8_t followed[64];

@@ -18,12 +18,12 @@ void check(const TreeLimits& limits) {
     if (limits.most_segments < 1) throw InvalidArgument("most_segments: expected at least 1");
 }
 
-// A tree while it grows.
+// Builds a ray tree.
 class Growth {
 public:
     Growth(const Scene& scene, const Medium& ambient, const TreeLimits& limits)
         : scene_(scene), ambient_(ambient), limits_(limits) {
-        tree_.segments.reserve(32);  // more than most heads need: growing costs as much as tracing
+        tree_.segments.reserve(32);  // enough for most heads; reallocation would cost as much as the trace
         hits_before_.reserve(32);
     }
 
@@ -62,7 +62,7 @@ private:
             if (branch && !(branch->share > 0.0)) branch.reset();
         const int children = int(next.onward[0].has_value()) + int(next.onward[1].has_value());
         if (children > limits_.most_segments - int(tree_.segments.size())) {
-            tree_.cut += segment.power;  // its end is `cut` already
+            tree_.cut += segment.power;  // its end is already `cut`
             return;
         }
         tree_.segments[index].hit = hit;
@@ -84,8 +84,8 @@ private:
     const Medium& ambient_;
     const TreeLimits& limits_;
     RayTree tree_;
-    std::vector<int> hits_before_;                      // by segment
-    std::priority_queue<std::pair<double, int>> open_;  // power, -segment: of two of the same power the earlier one
+    std::vector<int> hits_before_;                      // for each segment
+    std::priority_queue<std::pair<double, int>> open_;  // power, -segment: for equal powers the earlier one comes first
 };
 
 PathEnd end_of_path(SegmentEnd end) {
@@ -114,7 +114,7 @@ Path RayTree::path_to(int segment) const {
                               std::to_string(segment));
     const Segment& last = segments[segment];
     if (last.end == SegmentEnd::goes_on)
-        throw InvalidArgument("segment: " + std::to_string(segment) + " goes on: its path ends with another one");
+        throw InvalidArgument("segment: " + std::to_string(segment) + " goes on; its path ends with another segment");
     std::vector<int> way;
     for (int i = segment; i >= 0; i = segments[i].parent) way.push_back(i);
     std::reverse(way.begin(), way.end());

@@ -2,19 +2,11 @@
 
 #include <algorithm>
 
-// Not those instruction sets that differ from another one only in what is not used here.
-#include <hwy/detect_targets.h>
-#undef HWY_DISABLED_TARGETS
-#ifdef HWY_AVX3_ZEN4  // since Highway 1.1
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4 | HWY_AVX3_SPR)
-#else
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
-#endif
-#undef HWY_TARGET_INCLUDE
+#include "core/simd_targets.hpp"
 #define HWY_TARGET_INCLUDE "optics/replay.cpp"
 #include <hwy/foreach_target.h>  // compiles this file once for every instruction set
 
-// Vectors before the physics that is calculated with them:
+// The vector type must precede the code that uses it:
 #include "core/simd-inl.hpp"
 //
 #include "optics/encounter-inl.hpp"
@@ -25,36 +17,35 @@ HWY_BEFORE_NAMESPACE();
 namespace stepdiag {
 namespace HWY_NAMESPACE {
 
-// The numbers of an encounter as `meet` takes them, where they are the same for all lanes ...
+// Numbers of an encounter for `meet`, for the case that they are common to all lanes.
 struct CommonFace {
     const PreparedEncounter& encounter;
     std::size_t lane;
 
-    STEPDIAG_INLINE Pair common(double value) const { return broadcast(Type<Pair>(), value); }
     STEPDIAG_INLINE Pair by_lane(const LaneSource& source) const { return load(source.from + (lane & source.mask)); }
-    STEPDIAG_INLINE Pair rotation(int k) const { return common(encounter.plane[k]); }
-    STEPDIAG_INLINE Pair translation(int k) const { return common(encounter.plane[9 + k]); }
-    STEPDIAG_INLINE Pair index() const { return common(encounter.index_before); }
-    STEPDIAG_INLINE Pair inverse_index() const { return common(encounter.inverse_index); }
-    STEPDIAG_INLINE Pair index_ratio() const { return common(encounter.index_ratio); }
-    STEPDIAG_INLINE Pair one_less_ratio2() const { return common(encounter.one_less_ratio2); }
+    STEPDIAG_INLINE Pair rotation(int k) const { return all(encounter.plane[k]); }
+    STEPDIAG_INLINE Pair translation(int k) const { return all(encounter.plane[9 + k]); }
+    STEPDIAG_INLINE Pair index() const { return all(encounter.index_before); }
+    STEPDIAG_INLINE Pair inverse_index() const { return all(encounter.inverse_index); }
+    STEPDIAG_INLINE Pair index_ratio() const { return all(encounter.index_ratio); }
+    STEPDIAG_INLINE Pair one_less_ratio2() const { return all(encounter.one_less_ratio2); }
 };
 
-// ... where the plane is that of each lane ...
+// The same if each lane has its own plane.
 struct PlaneByLane : CommonFace {
     STEPDIAG_INLINE Pair rotation(int k) const { return by_lane(encounter.plane_from[k]); }
     STEPDIAG_INLINE Pair translation(int k) const { return by_lane(encounter.plane_from[9 + k]); }
 };
 
-// ... and where the indices are as well.
+// The same if each lane has its own plane and indices.
 struct FaceByLane : PlaneByLane {
     STEPDIAG_INLINE Pair index() const { return by_lane(encounter.index_before_from); }
-    STEPDIAG_INLINE Pair inverse_index() const { return common(1.0) / index(); }
+    STEPDIAG_INLINE Pair inverse_index() const { return all(1.0) / index(); }
     STEPDIAG_INLINE Pair index_ratio() const { return index() / by_lane(encounter.index_after_from); }
-    STEPDIAG_INLINE Pair one_less_ratio2() const { return sub_mul(index_ratio(), index_ratio(), common(1.0)); }
+    STEPDIAG_INLINE Pair one_less_ratio2() const { return sub_mul(index_ratio(), index_ratio(), all(1.0)); }
 };
 
-// By the operation that FaceByLane takes, so that the bits are the same.
+// Uses the same operations as FaceByLane to get the same bits.
 void prepare_indices(const PreparedRoute& route) {
     for (PreparedEncounter& encounter : route) {
         const Vector ratio = hn::Set(Tag(), encounter.index_ratio);
@@ -63,11 +54,11 @@ void prepare_indices(const PreparedRoute& route) {
     }
 }
 
-// The lanes from `lane` on that a pair of vectors holds; results go to to.point[0][at] and on.
+// Processes one pair of vectors, starting with `lane`. Writes results to to.point[0][at] and the following elements.
 void follow(const PreparedRoute& route, std::size_t lane, double gap, const LaneResults& to, std::size_t at) {
     const auto start = [&](int k) HWY_ATTR { return load(route.start[k].from + (lane & route.start[k].mask)); };
-    const Pair zero = broadcast(Type<Pair>(), 0.0), nearest = broadcast(Type<Pair>(), gap);
-    Light<Pair> light{{start(0), start(1), start(2)}, {start(3), start(4), start(5)}, start(6), start(7), zero <= zero};
+    const Pair nearest = all(gap);
+    Light<Pair> light{{start(0), start(1), start(2)}, {start(3), start(4), start(5)}, start(6), start(7), all_true()};
     for (const PreparedEncounter& encounter : route) {
         const CommonFace face{encounter, lane};
         if (encounter.indices_by_lane) meet(encounter, FaceByLane{{face}}, nearest, light);
@@ -87,8 +78,8 @@ void replay_lanes(const std::vector<Encounter>& route, const LaneRays& rays, std
     const std::size_t width = 2 * hn::Lanes(Tag());
     PreparedRoute prepared(route, rays, lanes, width);
     prepare_indices(prepared);
-    // Lanes that do not fill a pair of vectors: of a pair that ends with the last lane. First, because results may be
-    // written over what the rays came from.
+    // If the lanes do not fill the last pair of vectors, process a pair that ends with the last lane. Do this first,
+    // because results may overwrite the input rays.
     const std::size_t left = lanes % width;
     ResultsAside aside;
     if (left > 0) follow(prepared, std::max(lanes, width) - width, gap, aside.results, 0);

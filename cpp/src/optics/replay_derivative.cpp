@@ -2,9 +2,6 @@
 
 #include <Eigen/Geometry>
 
-// Numbers before the physics that is calculated with them:
-#include "optics/number.hpp"
-//
 #include "optics/encounter-inl.hpp"
 
 namespace stepdiag {
@@ -29,7 +26,7 @@ DualFrame moving(const FaceFrame& frame, const RigidRate& rate) {
     DualFrame moved;
     for (int row = 0; row < 3; ++row) {
         const Eigen::Vector3d axis = rotation.row(row).transpose();
-        const Eigen::Vector3d axis_rate = rate.rotation.cross(axis);  // -R [w]x, row by row
+        const Eigen::Vector3d axis_rate = rate.rotation.cross(axis);  // row of -R [w]x
         for (int k = 0; k < 3; ++k) moved.rotation[3 * row + k] = {axis[k], axis_rate[k]};
         moved.translation[row] = {frame.translation[row], translation_rate[row]};
     }
@@ -48,7 +45,7 @@ DualRay moving(const Ray& ray, const RigidRate& rate) {
 }
 
 std::optional<DualRay> replay(const std::vector<DualEncounter>& route, const DualRay& ray, double gap) {
-    using namespace HWY_NAMESPACE;
+    using namespace STEPDIAG_NAMESPACE;
     Light<Dual> light{{ray.point[0], ray.point[1], ray.point[2]},
                       {ray.direction[0], ray.direction[1], ray.direction[2]},
                       ray.optical_length,

@@ -23,19 +23,19 @@
 namespace stepdiag {
 namespace {
 
-// One device for the process: making one takes milliseconds and starts a thread pool.
+// One device for the whole process, because creating a device takes milliseconds and starts a thread pool.
 RTCDevice device() {
     static const RTCDevice device = [] {
         const RTCDevice made = rtcNewDevice("threads=1,verbose=0");
         if (!made)
-            throw std::runtime_error("Embree gave no device (error " + std::to_string(rtcGetDeviceError(nullptr)) +
-                                     ")");
+            throw std::runtime_error("Embree did not create a device (error " +
+                                     std::to_string(rtcGetDeviceError(nullptr)) + ")");
         return made;
     }();
     return device;
 }
 
-// What Embree made; it makes nothing where memory runs out.
+// Checks an object created by Embree, which returns null if memory is insufficient.
 template <class Made>
 Made* not_null(Made* object) {
     if (!object) throw std::bad_alloc();
@@ -62,7 +62,7 @@ void intersect(RTCScene scene, RTCRayHit& query) {
 void check_power(const Face& face, const std::string& name) {
     if (!(face.reflectance >= 0.0 && face.reflectance <= 1.0 && face.absorptance >= 0.0 && face.absorptance <= 1.0))
         throw InvalidArgument(name + ": expected a reflectance and an absorptance of 0 to 1");
-    // Thirds and tenths need not add up to 1 to the last bit.
+    // The tolerance accepts shares whose sum exceeds 1 by rounding only.
     if (face.surface == Surface::splitting && face.reflectance + face.absorptance > 1.0 + 1e-12)
         throw InvalidArgument(name + ": reflectance and absorptance are together more than 1");
     for (const double index : {face.behind.index, face.before ? face.before->index : 1.0})
@@ -72,7 +72,7 @@ void check_power(const Face& face, const std::string& name) {
 void check_outline(const Face& face, const std::string& name) {
     const std::size_t n = face.outline.size();
     if (n < 3) throw InvalidArgument(name + ": expected three corners or more, got " + std::to_string(n));
-    double turned = 0.0;  // +1 or -1: which way the corners run around the normal
+    double turned = 0.0;  // +1 or -1: orientation of the corners about the normal
     for (std::size_t k = 0; k < n; ++k) {
         const Eigen::Vector3d edge = face.outline[(k + 1) % n] - face.outline[k];
         const Eigen::Vector3d next = face.outline[(k + 2) % n] - face.outline[(k + 1) % n];
@@ -121,7 +121,7 @@ Hit hit_on_plane(const Face& face, int index, const Ray& ray) {
     return {index, distance, ray.origin + distance * ray.direction};
 }
 
-// A hair's breadth beyond an edge is inside, so that no ray slips between two faces that share it.
+// A small margin outside the edges counts as inside, so that no ray passes between two faces with a common edge.
 bool is_inside(const Face& face, const Eigen::Vector3d& point) {
     const std::size_t n = face.outline.size();
     bool left = false, right = false;
@@ -129,7 +129,7 @@ bool is_inside(const Face& face, const Eigen::Vector3d& point) {
         const Eigen::Vector3d edge = face.outline[(k + 1) % n] - face.outline[k];
         const double side = edge.cross(point - face.outline[k]).dot(face.normal);
         const double breadth = 1e-12 * edge.squaredNorm();
-        left |= !(side <= breadth);  // and what is not a number is outside
+        left |= !(side <= breadth);  // a NaN is outside
         right |= !(side >= -breadth);
     }
     return !(left && right);
@@ -137,10 +137,10 @@ bool is_inside(const Face& face, const Eigen::Vector3d& point) {
 
 }  // namespace
 
-// What scenes share: the faces and Embree's tree of their triangles, which a face of n corners gives n - 2 of.
+// Shared by copies of a scene: the faces, and Embree's tree of their triangles (n - 2 for a face of n corners).
 struct Scene::Tree {
     std::vector<Face> faces;
-    Eigen::Vector3d centre;  // Embree's origin: its coordinates stay small, so that single precision goes a long way
+    Eigen::Vector3d centre;  // Embree's origin; small coordinates lose less in single precision
     double gap;
     std::vector<int> face_of_triangle;
     EmbreeScene embree;
@@ -148,10 +148,10 @@ struct Scene::Tree {
     explicit Tree(std::vector<Face> all)
         : faces(std::move(all)),
           centre(mean_corner(faces)),
-          gap(1e-6 * largest_coordinate(faces, centre)),  // some ten units of single precision's last place
+          gap(1e-6 * largest_coordinate(faces, centre)),  // about ten units in the last place of single precision
           embree(not_null(rtcNewScene(device()))) {
         rtcSetSceneFlags(embree.get(), RTC_SCENE_FLAG_ROBUST);
-        rtcSetSceneBuildQuality(embree.get(), RTC_BUILD_QUALITY_LOW);  // a handful of faces needs no better tree
+        rtcSetSceneBuildQuality(embree.get(), RTC_BUILD_QUALITY_LOW);  // sufficient for few faces
         if (!faces.empty()) add_triangles();
         rtcCommitScene(embree.get());
         if (rtcGetDeviceError(device()) != RTC_ERROR_NONE) throw std::bad_alloc();
@@ -207,7 +207,7 @@ Scene::Scene(std::vector<Face> faces) {
         const double need = 150.0 * double(triangles) / 1e6;  // measured with 1e5, 1e6 and 4e6 faces of four corners
         throw InvalidArgument("scene: " + std::to_string(count) + " faces need about " +
                               std::to_string(std::lround(need) + 1) +
-                              " MB of memory beside their own, more than there is");
+                              " MB of memory in addition to their own, more than is available");
     }
     gap_ = tree_->gap;
 }
@@ -215,7 +215,7 @@ Scene::Scene(std::vector<Face> faces) {
 Scene Scene::with(std::vector<Face> more) const {
     check(more, std::size_t(face_count()));
     Scene scene = *this;
-    // The faces added are met in double, where rounding is all that there is to pass over.
+    // Added faces are tested in double precision, so the gap only has to cover rounding.
     scene.gap_ = std::max(gap_, 1e-10 * largest_coordinate(more, tree_->centre));
     scene.added_.insert(scene.added_.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
     return scene;

@@ -24,7 +24,7 @@ Corners corners_of(const std::vector<Face>& body) {
     return corners;
 }
 
-// The difference a - b that goes least far along x.
+// The difference a - b with the smallest component along x.
 Vector3d least_along(const Vector3d& x, const Corners& a, const Corners& b) {
     Eigen::Index i, k;
     (x.transpose() * a).minCoeff(&i);
@@ -32,13 +32,13 @@ Vector3d least_along(const Vector3d& x, const Corners& a, const Corners& b) {
     return a.col(i) - b.col(k);
 }
 
-// One to four affinely independent differences, and the nearest point to 0 of their simplex as weights that are
-// positive and add up to 1.
+// A simplex of one to four affinely independent differences. Its nearest point to 0 is given by positive weights that
+// add up to 1.
 class Simplex {
 public:
     explicit Simplex(const Vector3d& point) : points_(point), weights_(Eigen::VectorXd::Ones(1)) {}
 
-    // Made square to the simplex twice again: of a point near 0 rounding has left neither length nor direction.
+    // Orthogonalise to the simplex twice more: near 0, rounding spoils both length and direction of the point.
     Vector3d nearest() const {
         Vector3d nearest = points_ * weights_;
         if (points_.cols() == 1) return nearest;
@@ -56,8 +56,8 @@ public:
         points_.rightCols<1>() = point;
         weights_.conservativeResize(weights_.size() + 1);
         weights_.tail<1>().setZero();
-        // Towards the nearest point of the plane through all points; where that is outside, up to the first face met,
-        // and on without the corner opposite.
+        // Move towards the nearest point of the plane through all points. If it is outside the simplex, stop at the
+        // first face and remove the opposite corner.
         for (;;) {
             const Weights aim = nearest_of_plane();
             if ((aim.array() > 0.0).all() || points_.cols() == 1) {
@@ -114,12 +114,12 @@ double separation(const std::vector<Face>& body_a, const std::vector<Face>& body
         (a.colwise() - b.col(0)).colwise().norm().maxCoeff() + (b.colwise() - b.col(0)).colwise().norm().maxCoeff();
     Simplex simplex(a.col(0) - b.col(0));
     double bound = 0.0;
-    for (int i = 0; i < 200; ++i) {  // some ten suffice; the bound holds whenever it stops
+    for (int i = 0; i < 200; ++i) {  // about ten suffice; the bound is valid after any number
         const Vector3d nearest = simplex.nearest();
         const double distance = nearest.norm();
         if (distance <= 1e-14 * scale) return bound;
         const Vector3d extreme = least_along(nearest, a, b);
-        bound = std::max(bound, extreme.dot(nearest) / distance);  // the plane that separates them
+        bound = std::max(bound, extreme.dot(nearest) / distance);  // distance from the separating plane
         if (distance - bound <= 1e-13 * scale || simplex.has(extreme)) return bound;
         simplex.add(extreme);
     }

@@ -63,7 +63,7 @@ std::vector<double> Plan::nodes(Axis axis) const {
 
 const StepOrder& Plan::order(int run) const {
     const int count = int(orders_.size());
-    return orders_[((run % count) + count) % count];  // run numbers may be negative
+    return orders_[((run % count) + count) % count];  // a run number may be negative
 }
 
 std::vector<PlanPoint> Plan::points(const Line& line, int run) const {
@@ -90,7 +90,7 @@ std::vector<PlanPoint> Plan::points(const Line& line, int run) const {
 }
 
 LateralExcursion Plan::lateral_excursion(const Line& line) const {
-    // The travel repeats itself step by step, so the first step shows all of it.
+    // Every step repeats the same lateral motion, so one step gives the full range.
     const Plan one_step(volume_, {line}, 1, orders_);
     const Eigen::Matrix<double, 3, 2> lateral = frame(line).leftCols<2>();
     LateralExcursion excursion{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};

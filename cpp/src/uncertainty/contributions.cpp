@@ -55,7 +55,7 @@ void Contributions::add_inputs(const std::vector<PropagatedInput>& inputs, const
     sum_.second_order = second_order;
     const bool correlated = correlation.size() > 0;
     const Index count = Index(inputs.size());
-    std::map<int, std::vector<Index>> pooled;  // by estimate; negative: its own
+    std::map<int, std::vector<Index>> pooled;  // by estimate; a negative key means a separate estimate
     for (Index i = 0; i < count; ++i) {
         const int estimate = inputs[std::size_t(i)].estimate;
         pooled[estimate < 0 ? -1 - int(i) : estimate].push_back(i);
@@ -68,8 +68,8 @@ void Contributions::add_inputs(const std::vector<PropagatedInput>& inputs, const
             const bool together = inputs[std::size_t(i)].group == inputs[std::size_t(j)].group;
             (together ? group : sum_.between_groups) += covariance;
             variance_ += covariance;
-            // Welch and Satterthwaite suppose independent estimates; a correlation of known uncertainties does not
-            // matter.
+            // The Welch-Satterthwaite formula requires independent estimates. Correlations of inputs with exactly known
+            // uncertainties are irrelevant.
             if (std::isfinite(inputs[std::size_t(i)].degrees_of_freedom))
                 satterthwaite_ = (covariance.array() != 0.0)
                                      .select(VectorXd::Constant(variance_.size(), std::nan("")), satterthwaite_);
@@ -88,7 +88,7 @@ void Contributions::add_inputs(const std::vector<PropagatedInput>& inputs, const
 
 Propagation Contributions::result() const {
     Propagation result = sum_;
-    // Rounding of what cancels between correlated inputs may leave a variance below 0.
+    // Contributions of correlated inputs may cancel; rounding can then make a variance negative.
     result.standard_uncertainty = variance_.cwiseMax(0.0).cwiseSqrt();
     result.degrees_of_freedom =
         (satterthwaite_.array() == 0.0)
@@ -106,7 +106,7 @@ void check_correlation(const MatrixXd& correlation, Index size, const std::strin
     if (correlation.rows() != size || correlation.cols() != size)
         throw InvalidArgument(what + ": expected " + shape + " x " + shape + " numbers, got " +
                               std::to_string(correlation.rows()) + " x " + std::to_string(correlation.cols()));
-    // Rounded coefficients are welcome: what was printed to nine digits is one.
+    // Accepts coefficients rounded to nine digits.
     constexpr double rounding = 1e-9;
     if (!correlation.allFinite() || (correlation - correlation.transpose()).cwiseAbs().maxCoeff() > rounding ||
         (correlation.diagonal().array() - 1.0).abs().maxCoeff() > rounding)

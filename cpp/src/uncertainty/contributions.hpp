@@ -1,5 +1,5 @@
-// Sums up what inputs contribute to the outputs' uncertainty: variances, budget, covariance, Welch-Satterthwaite.
-// Internal.
+// Sums the contributions of inputs to the uncertainty of the outputs: variances, budget, covariance, and effective
+// degrees of freedom (Welch-Satterthwaite). Internal.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,12 +15,12 @@ class Contributions {
 public:
     Contributions(std::vector<SampleModel::Output> outputs, Eigen::VectorXd value, bool full_covariance);
 
-    // Independent standard normal numbers act through the columns of `effect` (a row each output). Their standard
-    // uncertainties come from one estimate, with these degrees of freedom.
+    // Adds independent standard normal quantities that act through the columns of `effect` (rows are outputs). Their
+    // standard uncertainties come from one estimate with these degrees of freedom.
     void add(const std::string& group, const Eigen::MatrixXd& effect, double degrees_of_freedom);
-    // A covariance of the outputs themselves.
+    // Adds a covariance of the outputs.
     void add_covariance(const std::string& group, const Eigen::MatrixXd& covariance);
-    // Inputs with their c_i u_i as columns, correlated where `correlation` is not empty.
+    // Adds inputs. `first_order`: columns c_i u_i; `correlation`: of the inputs, empty for independent inputs.
     void add_inputs(const std::vector<PropagatedInput>& inputs, const Eigen::MatrixXd& first_order,
                     const Eigen::MatrixXd& second_order, const Eigen::MatrixXd& correlation);
 
@@ -38,7 +38,8 @@ private:
     std::vector<Eigen::VectorXd> group_variances_;
 };
 
-// Throws InvalidArgument beginning with `what`: size, symmetry, 1 on the diagonal, positive semidefinite.
+// Checks size, symmetry, 1 on the diagonal, and that the matrix is positive semidefinite. Throws InvalidArgument, whose
+// message begins with `what`.
 void check_correlation(const Eigen::MatrixXd& correlation, Eigen::Index size, const std::string& what);
 
 }  // namespace stepdiag

@@ -18,7 +18,7 @@ using Eigen::VectorXd;
 
 constexpr double undetermined = std::numeric_limits<double>::quiet_NaN();
 
-// Linear functionals of a calibration with their joint covariance; NaN where `missing` says so.
+// Joint covariance of linear functionals of a calibration. Rows and columns with a missing parameter are NaN.
 MatrixXd covariance_of(const Calibration& calibration, const MatrixXd& rows, const std::vector<bool>& missing) {
     MatrixXd covariance = MatrixXd::Constant(rows.rows(), rows.rows(), undetermined);
     if (calibration.covariance.size() > 0) covariance = rows * calibration.covariance * rows.transpose();
@@ -30,7 +30,7 @@ MatrixXd covariance_of(const Calibration& calibration, const MatrixXd& rows, con
     return covariance;
 }
 
-// Rounding may leave a variance below 0.
+// Rounding can make a variance negative.
 VectorXd roots(const VectorXd& variances) {
     return variances.unaryExpr([](double v) { return v < 0.0 ? 0.0 : std::sqrt(v); });
 }
@@ -113,7 +113,7 @@ std::vector<DiagonalRows> diagonal_rows(const Calibration& calibration, const Ei
         diagonal.rows.resize(Index(nodes), layout.size());
         for (Index k = 0; k < Index(nodes); ++k) {
             for (const Axis axis : all_axes) {
-                // Counted from home, as a plan's nodes are, so that a node is met to the last bit.
+                // Same formula as for the nodes of a plan, so that positions agree with nodes to the last bit.
                 const Index node = diagonal.line.sign(axis) > 0 ? k : Index(nodes) - 1 - k;
                 diagonal.point(k, index(axis)) = double(node) * calibration.volume[index(axis)] / double(nodes - 1);
             }
@@ -126,7 +126,7 @@ std::vector<DiagonalRows> diagonal_rows(const Calibration& calibration, const Ei
                         term.coefficient *= at == k ? direction[c] : -direction[c];
                         along.push_back(term);
                     }
-                if (k == 0) along.clear();  // the first point against itself
+                if (k == 0) along.clear();  // the first point is its own reference
             }
             diagonal.rows.row(k) = layout.row(along).transpose();
             const auto missing = layout.missing(along);

@@ -16,7 +16,7 @@ std::uint32_t item_of(std::size_t sequence, std::size_t number) {
     return std::uint32_t(sequence) * Draws::items_of_a_sequence + std::uint32_t(number);
 }
 
-// A number of a sequence, scaled to its distribution.
+// One number of a sequence, transformed to its distribution.
 double number_of(const Distribution& distribution, std::uint64_t seed, std::uint64_t sample, std::size_t sequence,
                  std::size_t number) {
     const double normal = normal_pair(seed, stream, {sample, item_of(sequence, number / 2)})[number % 2];
@@ -25,7 +25,7 @@ double number_of(const Distribution& distribution, std::uint64_t seed, std::uint
     return draw(distribution, normal, uniform[0], uniform[1]);
 }
 
-// Cholesky's factor; of a semidefinite matrix, which has none, the root by eigenvectors.
+// Cholesky factor. A semidefinite matrix may have none; its root is computed from eigenvectors.
 Eigen::MatrixXd root_of(const Eigen::MatrixXd& correlation) {
     const Eigen::LLT<Eigen::MatrixXd> factor(correlation);
     if (factor.info() == Eigen::Success) return factor.matrixL();
@@ -76,7 +76,7 @@ std::uint64_t Draws::sensor_seed(std::uint64_t sample) const {
 
 namespace {
 
-// Turns the standard normal numbers of one input or row into its distribution's.
+// Transforms the standard normal numbers of one input or row to its distribution.
 void scale(const Distribution& distribution, std::uint64_t seed, std::uint64_t first_sample, std::size_t lanes,
            std::uint32_t item, double* values, std::vector<double>& uniform) {
     if (distribution.kind == DistributionKind::normal) {

@@ -1,10 +1,10 @@
-// The random numbers of virtual calibrations, and the one home of which number is which. All are of the stream
-// `virtual_calibration`, with the sample's index as the block's counter, so that a number does not depend on what else
-// is drawn. Sequence 0 has the inputs, number i being the input i of UncertainInputs; sequence 1 + e the reading noise
-// e, its number r being that of row r (of a walk: of the step from row r - 1). Number m of a sequence s:
+// Random numbers of virtual calibrations. This file defines their addresses. All numbers are from the stream
+// `virtual_calibration`, with the sample's index as the counter of the block, so that a number does not depend on other
+// draws. Sequence 0 contains the inputs: number i is input i of UncertainInputs. Sequence 1 + e contains the reading
+// noise e: number r belongs to row r (for a walk: to the step from row r - 1). Number m of sequence s uses
 //   normal   normal_pair of the block {sample, item = s 2^20 + m / 2, draw 0}, its half m % 2
-//   u, v     uniform_pair of the block {sample, item = s 2^20 + m, draw 1}, for distributions that take them
-// and what the sensors of a design draw from is the seed 2^53 u of the block {sample, item 0, draw 2}.
+//   u, v     uniform_pair of the block {sample, item = s 2^20 + m, draw 1}, for distributions that need them
+// The sensors of a design use the seed 2^53 u of the block {sample, item 0, draw 2}.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,32 +22,32 @@ public:
     static constexpr std::size_t most_rows = 2 * std::size_t(items_of_a_sequence);
     static constexpr std::size_t most_sequences = (std::size_t(1) << 32) / items_of_a_sequence;
 
-    // Throws InvalidArgument as check(inputs), and for more kinds of noise than there are sequences.
+    // Throws InvalidArgument as check(inputs), and for too many inputs or kinds of noise.
     Draws(UncertainInputs inputs, std::uint64_t seed);
 
     const UncertainInputs& what() const { return inputs_; }
     std::uint64_t seed() const { return seed_; }
     Eigen::VectorXd expectations() const;  // of the inputs
 
-    // One sample, one number after the other.
+    // Numbers of one sample.
     Eigen::VectorXd inputs(std::uint64_t sample) const;
     double noise(std::size_t entry, std::uint64_t sample, std::size_t row) const;
     std::uint64_t sensor_seed(std::uint64_t sample) const;
 
-    // The same, to a few units in the last place, of `lanes` (a multiple of lane_group) samples in lanes:
-    // out[input * lanes + lane], out[(row - first_row) * lanes + lane]; first_row is even, and room for an even number
-    // of rows.
+    // The same for many samples with SIMD, equal to a few units in the last place. `lanes` is the number of samples, a
+    // multiple of lane_group. Writes out[input * lanes + lane] and out[(row - first_row) * lanes + lane]. first_row
+    // must be even; `out` has room for an even number of rows.
     void inputs(std::uint64_t first_sample, std::size_t lanes, double* out) const;
     void noise(std::size_t entry, std::uint64_t first_sample, std::size_t lanes, std::size_t first_row,
                std::size_t rows, double* out) const;
-    // The standard normal numbers that noise is made of.
+    // Standard normal numbers before the transformation to the noise's distribution.
     void standard_noise(std::size_t entry, std::uint64_t first_sample, std::size_t lanes, std::size_t first_row,
                         std::size_t rows, double* out) const;
 
 private:
     UncertainInputs inputs_;
     std::uint64_t seed_;
-    std::vector<Eigen::MatrixXd> roots_;  // of the correlations: root root^T = correlation
+    std::vector<Eigen::MatrixXd> roots_;  // for each correlation: root root^T = correlation
 };
 
 }  // namespace stepdiag

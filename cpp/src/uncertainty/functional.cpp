@@ -87,14 +87,14 @@ std::vector<std::string> EntryLayout::missing(const Functional& functional) cons
     for (const auto& [where, coefficient] : coefficients) {
         const auto& [parameter, position] = where;
         const bool is_function = parameter < function_count;
-        // Functions are 0 at home whatever the readings say, and levers that cancel do so to rounding.
+        // Functions are 0 at home by definition, and cancelled levers leave only rounding.
         if ((is_function && position == 0.0) || std::abs(coefficient) <= 1e-12 * largest) continue;
         std::string what = parameter_name(parameter);
         if (has(parameter)) {
             if (!is_function || has_slope_[parameter]) continue;
             what = "slope of " + what;
         }
-        if (names.empty() || names.back() != what) names.push_back(what);  // the map has parameters one after the other
+        if (names.empty() || names.back() != what) names.push_back(what);  // the map is sorted by parameter
     }
     return names;
 }

@@ -1,4 +1,4 @@
-// Linear functionals of the 21 parameters: sums of coefficient x parameter at a position. Internal.
+// Linear functionals of the 21 parameters: sums of coefficient times parameter at a position. Internal.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,10 +10,10 @@
 
 namespace stepdiag {
 
-// The value of an error function at a position, or of a squareness (its coefficient then has the position in it).
+// One term: an error function at a position, or a squareness. The coefficient of a squareness includes the position.
 struct Term {
     int parameter;    // FunctionId::index(), or function_count + Squareness
-    double position;  // mm; of a squareness 0
+    double position;  // mm; 0 for a squareness
     double coefficient;
 };
 using Functional = std::vector<Term>;
@@ -21,15 +21,15 @@ using Functional = std::vector<Term>;
 // Deviations X, Y, Z (functional point, mm), A, B, C (tool, rad) at a commanded point, to first order.
 std::array<Functional, 6> deviations_at(const Chain& chain, const Eigen::Vector3d& tool, const Eigen::Vector3d& point);
 
-// Where each parameter's entries begin among a calibration's values.
+// Position of each parameter's entries in the values of a calibration.
 class EntryLayout {
 public:
     explicit EntryLayout(const Calibration& calibration);
 
     Eigen::Index size() const { return size_; }
-    // Coefficients by entry; a parameter that is absent has none.
+    // Coefficients for all entries. Absent parameters are omitted.
     Eigen::VectorXd row(const Functional& functional) const;
-    // Parameters that act in the functional and are not there: "EAX", "slope of EXX", "C0Y".
+    // Parameters of the functional that the calibration does not have: "EAX", "slope of EXX", "C0Y".
     std::vector<std::string> missing(const Functional& functional) const;
     // The value of a function at a position is the sum of weight x entry.
     struct Weighted {
@@ -41,7 +41,7 @@ public:
     Eigen::Index first(int parameter) const { return first_[std::size_t(parameter)]; }
 
 private:
-    std::array<Eigen::Index, function_count + squareness_count> first_;  // -1: absent
+    std::array<Eigen::Index, function_count + squareness_count> first_;  // -1 for an absent parameter
     std::array<bool, function_count> has_slope_;
     std::array<std::vector<double>, function_count> positions_;
     Eigen::Index size_ = 0;

@@ -39,7 +39,8 @@ void check_model(const LinearModel& model) {
         if (input.estimate < 0) continue;
         const auto [entry, is_new] = estimates.emplace(input.estimate, input.degrees_of_freedom);
         if (!is_new && entry->second != input.degrees_of_freedom)
-            throw InvalidArgument(input.name + ": expected the degrees of freedom of the others of its estimate");
+            throw InvalidArgument(input.name +
+                                  ": expected the same degrees of freedom as for the other inputs of its estimate");
     }
     if (model.correlation.size() > 0) check_correlation(model.correlation, n, "correlation");
 }
@@ -63,7 +64,7 @@ VectorXd Propagation::expanded(double coverage) const {
     VectorXd expanded(value.size());
     for (Index i = 0; i < value.size(); ++i) {
         const double nu = degrees_of_freedom[i];
-        // Rounding must not take 9 for 8.
+        // The tolerance keeps rounding from truncating 9 to 8.
         const double whole = std::isfinite(nu) ? std::max(std::floor(nu * (1.0 + 1e-12)), std::min(nu, 1.0)) : nu;
         expanded[i] = std::isnan(nu) ? nu : t_quantile((1.0 + coverage) / 2.0, whole) * standard_uncertainty[i];
     }
@@ -81,18 +82,18 @@ VectorXd Propagation::second_order_uncertainty() const {
     return variance.cwiseSqrt();
 }
 
-// --- through virtual calibrations ---
+// --- propagation with virtual calibrations ---
 
 namespace {
 
 constexpr Index largest_gain = 400'000'000;  // numbers: 3.2 GB
 
-// GUM 4.2.3: s/sqrt(n) of n repeated readings, with n - 1 degrees of freedom, where JCGM 101 has a t distribution.
+// GUM 4.2.3: s/sqrt(n) of n repeated readings with n - 1 degrees of freedom. JCGM 101 uses a t distribution instead.
 double gum_uncertainty(const Distribution& d) {
     return d.kind == DistributionKind::student_t ? d.spread : d.standard_uncertainty();
 }
 
-// Derived outputs below the entries.
+// Appends rows for the derived outputs to the rows of the entries.
 MatrixXd with_derived(const MatrixXd& of_entries, const std::vector<DerivedOutput>& derived) {
     MatrixXd all(of_entries.rows() + Index(derived.size()), of_entries.cols());
     all.topRows(of_entries.rows()) = of_entries;
@@ -112,7 +113,7 @@ MatrixXd correlation_of(const UncertainInputs& inputs) {
     return correlation;
 }
 
-// Each input at its expectation and a standard uncertainty to both sides.
+// Results for each input at its expectation, and at its expectation plus and minus its standard uncertainty.
 struct InputEffects {
     std::vector<PropagatedInput> inputs;
     VectorXd value;  // at the expectations
@@ -138,19 +139,19 @@ InputEffects input_effects(const VirtualCalibrations& calibrations) {
     effects.first_order.resize(outputs.rows(), count);
     effects.second_order.resize(outputs.rows(), count);
     if (!effects.value.allFinite())
-        throw InvalidArgument("virtual calibrations: without deviations there is no result");
+        throw InvalidArgument("virtual calibrations: the evaluation has no result without deviations");
     for (Index i = 0; i < count; ++i) {
         const auto up = outputs.col(1 + 2 * i), down = outputs.col(2 + 2 * i);
         if (!up.allFinite() || !down.allFinite())
             throw InvalidArgument(effects.inputs[std::size_t(i)].name +
-                                  ": with a deviation of its standard uncertainty there is no result");
+                                  ": the evaluation has no result for a deviation by its standard uncertainty");
         effects.first_order.col(i) = (up - down) / 2.0;
         effects.second_order.col(i) = (up - effects.value + (down - effects.value)) / 2.0;
     }
     return effects;
 }
 
-// d_ij = (f(+i, +j) + f(-i, -j) - 2 f)/2 - s_i - s_j, s the second order of one input: odd orders cancel.
+// d_ij = (f(+i, +j) + f(-i, -j) - 2 f)/2 - s_i - s_j, where s_i is the second order of input i. Odd orders cancel.
 void add_products(const VirtualCalibrations& calibrations, const InputEffects& effects, const MatrixXd& correlation,
                   Propagation& result) {
     const auto& uncertain = calibrations.run().inputs.inputs;
@@ -183,7 +184,7 @@ void add_products(const VirtualCalibrations& calibrations, const InputEffects& e
                     strongest = {i, j, product[o]};
         }
     }
-    // A pair that leaves the evaluation without a result leaves nothing to be said.
+    // The products are unknown if the evaluation has no result for a pair.
     result.knows_products = result.product_variance.allFinite();
 }
 
@@ -192,8 +193,8 @@ MatrixXd gain_of(const VirtualCalibrations& calibrations) {
     const Index channels = Index(signal_channels(calibrations.nominal()).size());
     if (entries * channels > largest_gain / std::max<Index>(Index(calibrations.nominal().size()), 1))
         throw InvalidArgument("propagation: expected at most " + std::to_string(largest_gain) +
-                              " sensitivities to readings, got more by far too many steps; the Monte Carlo method "
-                              "does without them");
+                              " sensitivities to readings, got more: the plan has too many steps; the Monte Carlo "
+                              "method does not need them");
     return with_derived(calibrations.evaluator().gain(), calibrations.derived());
 }
 

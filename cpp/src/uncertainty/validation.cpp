@@ -15,7 +15,7 @@ using Eigen::VectorXd;
 
 double rounding_of(const std::string& unit) { return unit == "rad" ? 1e-13 : 1e-10; }
 
-// One output of both, and the words for it.
+// Reasons why one output is not validated, as text.
 class Reasons {
 public:
     Reasons(const Propagation& propagation, const MonteCarloResult& found, const Validation& validation, Index output)
@@ -68,7 +68,7 @@ private:
                number(gum_.second_order(i_, input)) + ", u is " + number(u());
     }
 
-    // A mean that is not the value at the inputs' expectations.
+    // The mean differs from the value at the inputs' expectations.
     void say_shift() {
         const double shift = found_.mean[i_] - gum_.value[i_];
         if (std::abs(shift) <= std::max(delta() / 4.0, 4.0 * drawn_u() / std::sqrt(double(found_.samples)))) return;
@@ -80,12 +80,12 @@ private:
             if (gum_.second_order.cols() > 1) text += "; all squares together by " + number(by_squares);
         } else {
             text += ", of which the squares of single inputs explain " + number(by_squares) +
-                    ": products of two inputs, or higher orders, do the rest";
+                    ": products of two inputs, or higher orders, explain the rest";
         }
         say(text);
     }
 
-    // A standard uncertainty that is another one.
+    // The standard uncertainties differ.
     void say_width() {
         const double excess = drawn_u() * drawn_u() - u() * u();
         if (std::abs(drawn_u() - u()) <= std::max(delta() / 4.0, 3.0 * drawn_u() / std::sqrt(2.0 * found_.samples)))
@@ -102,7 +102,7 @@ private:
         else if (excess > 0.0)
             text += gum_.knows_products ? ": orders above the second spread it"
                                         : ": products of two inputs, or higher orders, spread it";
-        else text += ": higher orders of the inputs take some away";
+        else text += ": higher orders of the inputs reduce it";
         say(text);
     }
     std::string strongest_product() const {
@@ -120,7 +120,7 @@ private:
         return sum;
     }
 
-    // A distribution that is not normal.
+    // The distribution is not normal.
     void say_shape() {
         const double below = found_.mean[i_] - found_.symmetric(i_, 0),
                      above = found_.symmetric(i_, 1) - found_.mean[i_];

@@ -1,8 +1,9 @@
-// Ranges over a volume. To first order a deviation is a sum of terms of one position and of products of two,
-//   e = F1(p1) + F2(p2) + F3(p3) + G12(p1) p2 + G13(p1) p3 + G23(p2) p3,   axes 1, 2, 3 from workpiece to tool,
-// so that for given p1 and p2 the extreme over p3 is that of F3 + slope p3: a corner of the convex hull of F3. Along an
-// axis that carries the workpiece F is quadratic between nodes. That of axis 1 is searched exactly, cell by cell where
-// it can matter; axes 2 and 3 on a finer grid, where they carry it too.
+// Ranges over a volume. To first order, a deviation is a sum of functions of one position and products of two
+// positions. With axes 1, 2, 3 from workpiece to tool:
+//   e = F1(p1) + F2(p2) + F3(p3) + G12(p1) p2 + G13(p1) p3 + G23(p2) p3
+// For given p1 and p2, the extreme over p3 is the extreme of F3 + slope p3, which is at a corner of the convex hull of
+// F3. F is quadratic between nodes along an axis that carries the workpiece. For axis 1 the search is exact, in those
+// cells that can contain the extreme. For axes 2 and 3 it uses a finer grid if they carry the workpiece, too.
 #include "stepdiag/uncertainty/volume_ranges.hpp"
 
 #include <Eigen/Geometry>
@@ -20,9 +21,9 @@ using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr int finer = 16;  // parts of an interval that is searched on a grid
+constexpr int finer = 16;  // divisions of an interval for a search on a grid
 
-// One axis at its grid points: position, translation and rotation.
+// Position, translation and rotation of one axis at its grid points.
 struct AxisTable {
     std::vector<double> position;
     Matrix3Xd delta;
@@ -42,9 +43,9 @@ AxisState between(const AxisTable& table, Index interval, double t) {
             mix(table.theta.col(interval), table.theta.col(interval + 1))};
 }
 
-// --- largest values of functions that are linear, or parabolas, between points ---
+// --- largest values of piecewise linear and piecewise quadratic functions ---
 
-// The corners of the upper convex hull of the points (x_k, y_k), x ascending.
+// Upper convex hull of the points (x_k, y_k), x ascending.
 class UpperHull {
 public:
     UpperHull(const std::vector<double>& x, const Eigen::VectorXd& y) {
@@ -58,7 +59,8 @@ public:
             y_.push_back(y[Eigen::Index(k)]);
         }
     }
-    // The largest y + slope x. `corner`: where it was last time, a good start for a slope that is much the same.
+    // Largest y + slope x. `corner`: start of the search, and its result; the last result is a good start for a similar
+    // slope.
     double support(double slope, std::size_t& corner) const {
         const auto rises = [&](std::size_t k) { return y_[k + 1] - y_[k] + slope * (x_[k + 1] - x_[k]) > 0.0; };
         while (corner + 1 < x_.size() && rises(corner)) ++corner;
@@ -71,7 +73,7 @@ private:
     std::vector<double> y_;
 };
 
-// The largest value of a parabola between its ends that rises by `sag` above the middle of their chord.
+// Largest value of a parabola between its end points. In the middle it is higher than the chord by `sag`.
 double top_of_arc(double begin, double end, double sag) {
     const double slope = (end - begin) / (4.0 * sag);
     if (!(sag > 0.0 && std::abs(slope) < 1.0)) return std::max(begin, end);
@@ -84,16 +86,16 @@ struct VolumeRanges::Grid {
     Chain chain;
     Vector3d tool;
     EntryLayout layout;
-    std::array<std::vector<double>, 3> position;  // by axis
-    // [6 axis + component][grid point]: the entries that its value is the sum of; empty where it is absent
+    std::array<std::vector<double>, 3> position;  // of each axis
+    // [6 axis + component][grid point]: weighted entries whose sum is the value; empty for an absent function
     std::array<std::vector<std::array<EntryLayout::Weighted, 2>>, function_count> nodes;
     std::array<std::vector<std::string>, range_count> missing;
     std::vector<DiagonalRows> diagonals;
 
     AxisTable table(Axis axis, const VectorXd& values) const;
-    // How far deviations X, Y, Z rise above the chord in the middle of an interval of an axis; 0 where it is linear.
+    // Deviations X, Y, Z minus their chord in the middle of an interval of an axis; 0 for linear deviations.
     Vector3d sag(const AxisTable& table, Axis axis, Index interval) const;
-    Vector3d deviation(const std::array<AxisState, 3>& states) const;  // by rank in the chain
+    Vector3d deviation(const std::array<AxisState, 3>& states) const;  // states in the order of the chain
     struct Terms;
     Terms terms(const std::array<AxisTable, 3>& tables, int component, double sign) const;
     double largest(const std::array<AxisTable, 3>& tables, int component, double sign) const;
@@ -126,7 +128,7 @@ AxisTable VolumeRanges::Grid::table(Axis axis, const VectorXd& values) const {
 Vector3d VolumeRanges::Grid::sag(const AxisTable& table, Axis axis, Index interval) const {
     if (!chain.carries_workpiece(axis)) return Vector3d::Zero();
     const double length = table.position[std::size_t(interval) + 1] - table.position[std::size_t(interval)];
-    // theta x p e_a with theta = theta_0 + (turn/length) (p - p_0): second derivative 2 turn/length.
+    // theta x p e_a with theta = theta_0 + (turn/length) (p - p_0) has the second derivative 2 turn/length x e_a.
     const Vector3d turn = table.theta.col(interval + 1) - table.theta.col(interval);
     return -turn.cross(Vector3d::Unit(index(axis))) * length / 4.0;
 }
@@ -142,11 +144,11 @@ Vector3d VolumeRanges::Grid::deviation(const std::array<AxisState, 3>& states) c
     return error;
 }
 
-// The terms of sign x one deviation at the grid points of three axes by rank in the chain.
+// Terms of one deviation, multiplied by sign, at the grid points of the three axes in the order of the chain.
 struct VolumeRanges::Grid::Terms {
     std::array<VectorXd, 3> own;  // F1, F2, F3
     VectorXd g12, g13, g23;
-    std::array<VectorXd, 3> sag;  // by interval
+    std::array<VectorXd, 3> sag;  // of each interval
 };
 
 VolumeRanges::Grid::Terms VolumeRanges::Grid::terms(const std::array<AxisTable, 3>& tables, int component,
@@ -176,7 +178,7 @@ VolumeRanges::Grid::Terms VolumeRanges::Grid::terms(const std::array<AxisTable, 
     return terms;
 }
 
-// The largest sign x deviation.
+// Largest value of sign times deviation.
 double VolumeRanges::Grid::largest(const std::array<AxisTable, 3>& tables, int component, double sign) const {
     const Terms at = terms(tables, component, sign);
     const auto& p2 = tables[1].position;
@@ -206,7 +208,7 @@ double VolumeRanges::Grid::largest(const std::array<AxisTable, 3>& tables, int c
     return best;
 }
 
-// The same where the second axis is quadratic between nodes, too.
+// The same if the second axis is also quadratic between nodes.
 double VolumeRanges::Grid::search_cells(const std::array<AxisTable, 3>& tables, int component, double sign,
                                         const Terms& at, const Eigen::MatrixXd& top) const {
     const int parts = chain.carries_workpiece(chain.order()[2]) ? finer : 1;
@@ -256,7 +258,7 @@ VolumeRanges::VolumeRanges(const Calibration& calibration, const Vector3d& tool)
                 for (const double p : f->position)
                     if (p > 0.0 && p < travel) all.push_back(p);
         std::sort(all.begin(), all.end());
-        // The same node may differ in its last digits from function to function.
+        // The positions of a node may differ in the last digits between functions.
         for (const double p : all)
             if (positions.empty() || p - positions.back() > 1e-9 * travel) positions.push_back(p);
         for (int c = 0; c < 6; ++c) {
@@ -266,7 +268,7 @@ VolumeRanges::VolumeRanges(const Calibration& calibration, const Vector3d& tool)
                 grid->nodes[std::size_t(function)].push_back(grid->layout.interpolation(function, p));
         }
     }
-    // What is missing at a point where no lever is 0 by chance.
+    // Missing parameters at a point where no lever is 0.
     const Vector3d somewhere = calibration.volume.cwiseProduct(Vector3d(0.37, 0.61, 0.83));
     const auto deviations = deviations_at(calibration.chain, tool, somewhere);
     for (std::size_t c = 0; c < deviation_count; ++c) grid->missing[c] = grid->layout.missing(deviations[c]);
@@ -285,7 +287,7 @@ Ranges VolumeRanges::evaluate(const VectorXd& values) const {
         ranges[c] = grid_->missing[std::size_t(c)].empty()
                         ? grid_->largest(tables, c, 1.0) + grid_->largest(tables, c, -1.0)
                         : 0.0;
-        ranges[c + 3] = 0.0;  // of a sum of terms of one position each
+        ranges[c + 3] = 0.0;  // rotations are sums of functions of one position
         for (const AxisTable& table : tables)
             ranges[c + 3] += table.theta.row(c).maxCoeff() - table.theta.row(c).minCoeff();
     }

@@ -17,9 +17,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// L with L L^T = covariance, which may be singular: what is certain (0 at home) has none.
+// L with L L^T = covariance. The covariance may be singular, because exactly known values (0 at home) have no variance.
 MatrixXd root_of(const MatrixXd& covariance) {
-    // In units of the standard uncertainties: mm beside rad would make the pivots' order one of units.
+    // Scale by the standard uncertainties, so that the order of the pivots does not depend on the units mm and rad.
     const VectorXd u = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
     const VectorXd scale = (u.array() > 0.0).select(u.array().inverse(), 0.0);
     const Eigen::LDLT<MatrixXd> factor(scale.asDiagonal() * covariance * scale.asDiagonal());
@@ -34,7 +34,7 @@ void check_covariance(const Calibration& calibration) {
         throw InvalidArgument("calibration: expected one evaluated with full covariance");
 }
 
-// Columns: the standard normal numbers of samples.
+// Standard normal numbers; each column is one sample.
 MatrixXd normal_numbers(std::uint64_t seed, std::uint64_t first_sample, Index count, Index samples) {
     MatrixXd numbers(count, samples);
     for (Index s = 0; s < samples; ++s)
@@ -55,7 +55,7 @@ struct RangeModel::State {
     MatrixXd root;
     std::uint64_t seed;
     std::vector<Output> outputs;
-    std::vector<int> indices;  // of the outputs among the ranges
+    std::vector<int> indices;  // index of each output in the ranges
 };
 
 RangeModel::RangeModel(const Calibration& calibration, const std::optional<Eigen::Vector3d>& tool, std::uint64_t seed) {
@@ -84,7 +84,7 @@ std::unique_ptr<SampleModel::Worker> RangeModel::worker() const {
     struct RangeWorker : Worker {
         explicit RangeWorker(const State& state) : state(state) {}
         void evaluate(const SampleBlock& block) override {
-            constexpr std::size_t together = 16;  // columns of a product; a block's size is a multiple of it
+            constexpr std::size_t together = 16;  // columns of a product; the size of a block is a multiple of it
             for (std::size_t begin = 0; begin < block.samples; begin += together) {
                 const MatrixXd values =
                     (state.root * normal_numbers(state.seed, block.first_sample + begin, state.root.cols(), together))
@@ -116,7 +116,7 @@ VolumetricAccuracy volumetric_accuracy(const Calibration& calibration, const std
     const Index count = Index(options.samples), together = 16;
     MatrixXd drawn(count, range_count), of_noise(count, range_count);
     std::atomic<Index> next{0};
-    // A sample's numbers depend on its index alone, so that threads make no difference.
+    // The numbers of a sample depend on its index only, so the result does not depend on the threads.
     const auto draw_blocks = [&] {
         for (Index begin; (begin = together * next++) < count;) {
             const Index here = std::min(together, count - begin);

@@ -1,4 +1,4 @@
-// Runs that batches of linear evaluations are tested with.
+// Runs for tests of batches of linear evaluations.
 #pragma once
 
 #include <limits>
@@ -30,7 +30,7 @@ struct TestRun {
     const char* chain = "[w X' b Y Z t]";
     Vector3d tool = Vector3d::Zero();
 
-    // Noise by seed; 0: none.
+    // The seed determines the noise; 0 means no noise.
     Measurement measure(std::uint64_t seed) const {
         SimulationOptions options;
         options.repeats = repeats, options.backward = backward;
@@ -101,7 +101,7 @@ std::vector<TestRun> runs() {
 
 std::size_t signal_count(const Measurement& run) { return run.channels().size(); }
 
-// One set a lane.
+// Arranges the sets of readings in SIMD lanes.
 std::vector<double> in_lanes(const std::vector<Measurement>& sets) {
     const std::size_t channels = signal_count(sets[0]);
     std::vector<double> readings(sets[0].size() * channels * sets.size());

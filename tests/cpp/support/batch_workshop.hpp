@@ -128,6 +128,7 @@ inline Workshop with_psd() {
     Workshop shop;
     shop.head.layout = stepdiag::HeadLayout::psd;
     shop.head.psd_distance = 40.0;
+    shop.head.aperture = 1000.0, shop.head.mirror = {1000.0, 1000.0};  // set-ups far off lose no beam
     return shop;
 }
 

@@ -1,4 +1,5 @@
-// Two small heads for tests: three interferometers behind a window, and a beam beside a laser with splitter and PSD.
+// Two small heads for tests: three interferometers behind a window, and one interferometer next to a laser with
+// splitter and PSD.
 #pragma once
 
 #include "stepdiag/core/rotation.hpp"

@@ -1,4 +1,4 @@
-// Machines whose tables a compensator is made of.
+// Random machines for tests of the compensator.
 #pragma once
 
 #include <Eigen/Core>
@@ -33,7 +33,7 @@ inline ParameterTable random_table(int intervals = 50, const std::string& chain 
     return with_header(make_random_error_map(test_volume, options).table(), chain);
 }
 
-// Positions from -outside to volume + outside.
+// Random positions from -outside to volume + outside, mm.
 inline std::vector<Position> random_positions(int count, double outside = 0.0, unsigned seed = 1) {
     std::mt19937_64 engine(seed);
     std::uniform_real_distribution<double> unit(0.0, 1.0);

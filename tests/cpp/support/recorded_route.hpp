@@ -1,4 +1,4 @@
-// A bench of glass and mirrors, its traced path as a route to replay, and lanes of rays.
+// Optical bench of glass and mirrors for tests of the replay: its traced path as a route, and SIMD lanes of rays.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -12,16 +12,16 @@
 #include "stepdiag/optics/path.hpp"
 #include "stepdiag/optics/replay.hpp"
 
-// Faces, indices and events of a path, the same for all lanes until a test puts arrays in their place.
+// Faces, indices and events of a path. They are common to all lanes unless a test replaces them by arrays.
 struct RecordedRoute {
-    std::deque<stepdiag::FaceFrame> frames;  // a deque: its elements stay where they are
+    std::deque<stepdiag::FaceFrame> frames;  // a deque, because its elements do not move
     std::deque<stepdiag::Outline> outlines;
     std::deque<double> indices;
     std::vector<stepdiag::Encounter> route;
-    std::vector<int> faces;  // of the scene
+    std::vector<int> faces;  // indices in the scene
 
     RecordedRoute() = default;
-    RecordedRoute(const RecordedRoute&) = delete;  // the route points into this one
+    RecordedRoute(const RecordedRoute&) = delete;  // the route has pointers into this object
     RecordedRoute(const stepdiag::Scene& scene, const stepdiag::Medium& ambient, const stepdiag::Ray& ray,
                   const stepdiag::Path& path) {
         Eigen::Vector3d from = ray.origin;
@@ -54,7 +54,7 @@ struct RecordedRoute {
     }
 };
 
-// Rays by lane, with places for their results.
+// Rays for each lane, with memory for their results.
 struct RayLanes {
     std::vector<double> start[8];  // origin, direction, optical and reduced length
     std::vector<double> end[8];
@@ -88,9 +88,10 @@ struct RayLanes {
     Eigen::Vector3d direction(std::size_t lane) const { return {end[3][lane], end[4][lane], end[5][lane]}; }
 };
 
-// Through a plate and a wedge, by a right-angle prism to a mirror and back the same way; all a little out of place.
+// The beam goes through a plate and a wedge, over a right-angle prism to a mirror, and back along the same path. All
+// components are slightly misaligned.
 struct Bench {
-    static constexpr int plate = 0, wedge = 6, prism = 12, mirror = 17, screen = 18, faces = 19;  // where theirs start
+    static constexpr int plate = 0, wedge = 6, prism = 12, mirror = 17, screen = 18, faces = 19;  // index of first face
     stepdiag::Medium air{1.00027}, glass{1.5009};
     stepdiag::Ray ray{{0, 0, 0}, {0, 0, 1}};
     stepdiag::Scene scene;
@@ -115,7 +116,7 @@ private:
         constexpr double pi = stepdiag::pi;
         add(stepdiag::make_plate(40, 40, 6, glass, {{0, 0, 60}, rotation(0)}));
         add(stepdiag::make_wedge(40, 40, 8, 0.01, glass, {{0, 0, 120}, rotation(0)}));
-        // Legs square to z and x, the hypotenuse turns z into x.
+        // The legs are perpendicular to z and x; the hypotenuse reflects z to x.
         add(stepdiag::make_prism(60, 60, 0.5 * pi, glass, {{-1, 0, 201}, rotation(0.75 * pi)}));
         faces.push_back(make_rectangle({700, 0, 200}, rotation(0.5 * pi), {200, 200}, stepdiag::Surface::reflecting));
         faces.push_back(make_rectangle({0, 0, -50}, rotation(0), {500, 500}, stepdiag::Surface::absorbing));
@@ -123,7 +124,7 @@ private:
     }
 };
 
-// All numbers of an encounter that its event uses.
+// All numbers that the event of an encounter uses.
 inline std::vector<stepdiag::LaneValue*> numbers(stepdiag::Encounter& encounter) {
     std::vector<stepdiag::LaneValue*> all{&encounter.index_before};
     for (auto& value : encounter.rotation) all.push_back(&value);
@@ -134,7 +135,7 @@ inline std::vector<stepdiag::LaneValue*> numbers(stepdiag::Encounter& encounter)
     return all;
 }
 
-// Every number of a route as an array of lanes.
+// Replaces every number of a route by an array of lanes.
 struct ByLane {
     std::deque<std::vector<double>> arrays;
 
@@ -147,7 +148,7 @@ struct ByLane {
     }
 };
 
-// Lanes that start a little beside each other.
+// Rays with slightly different starts.
 inline RayLanes fan(const Bench& bench, std::size_t lanes) {
     RayLanes fan(lanes, bench.ray);
     for (std::size_t i = 0; i < lanes; ++i) {

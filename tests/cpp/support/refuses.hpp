@@ -1,4 +1,4 @@
-// How tests say that bad input is refused: an InvalidArgument whose message names the culprit.
+// Expectation that bad input throws an InvalidArgument whose message names the culprit.
 #pragma once
 
 #include <gtest/gtest.h>

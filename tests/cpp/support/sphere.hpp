@@ -7,7 +7,7 @@
 #include "stepdiag/core/units.hpp"
 #include "stepdiag/optics/body.hpp"
 
-// A polyhedron whose corners lie on a sphere: `rings` bands of `sectors` faces each.
+// A polyhedron with its corners on a sphere: `rings` bands of `sectors` faces each.
 inline std::vector<stepdiag::Face> make_sphere(double radius, int rings, int sectors,
                                                const stepdiag::Placement& placement = {}) {
     std::vector<Eigen::Vector3d> corners{{0.0, 0.0, radius}};

@@ -1,4 +1,4 @@
-// Spoils a good text, reproducibly: bytes replaced, removed, doubled, or the end cut off.
+// Damages a valid text reproducibly: replaces, removes or repeats bytes, or cuts off the end.
 #pragma once
 
 #include <random>

@@ -1,5 +1,6 @@
-// What a head without a design reads, by ray tracing (Embree): the truth for the closed definition of its readings and
-// for the rules by which beams are lost. It shares nothing with them: a mirror and a square that takes the beam back.
+// Readings of a head without a design by ray tracing (Embree). They are the truth for the closed definition of the
+// readings and for the rules for lost beams. The code is independent of them: it traces a mirror, and a square that
+// receives the beam.
 #pragma once
 
 #include <optional>
@@ -9,18 +10,18 @@
 
 namespace stepdiag::test {
 
-// What comes back of one beam, in the sensor frame.
+// Result for one beam, in the sensor frame.
 struct TracedBeam {
-    double half_path;  // of the round trip between reference plane and mirror, mm
+    double half_path;  // half of the round trip between reference plane and mirror, mm
     Eigen::Vector3d point, direction;
 
-    // The normal bisects the two directions: n ~ z - r, so that beta = n_x/n_z and alpha = -n_y/n_z.
+    // The normal bisects outgoing and returned beam: n ~ z - r. Hence beta = n_x/n_z and alpha = -n_y/n_z.
     Reading reading() const {
         return {half_path, direction.y() / (1.0 - direction.z()), -direction.x() / (1.0 - direction.z())};
     }
 };
 
-// `start`: where the beam leaves the reference plane. None where it misses the mirror or does not come back.
+// `start`: origin of the beam in the reference plane, mm. Empty if the beam misses the mirror or does not return.
 inline std::optional<TracedBeam> trace_beam(const Head& head, const HeadSetup& setup, const Eigen::Vector2d& start,
                                             const Eigen::Vector3d& functional_point,
                                             const Eigen::Matrix3d& machine_R_tool, const Medium& air = {}) {

@@ -50,7 +50,7 @@ inline UncertainInput normal(InputQuantity quantity, double spread, const std::s
     return {quantity, {DistributionKind::normal, 0.0, spread}, line, part, component};
 }
 
-// All quantities of a set-up that a head has, on one line or another.
+// All quantities of a set-up for this kind of head, on different lines.
 inline std::vector<UncertainInput> setup_inputs(Kind kind) {
     std::vector<UncertainInput> inputs;
     const auto pair = [&](InputQuantity quantity, double spread, const char* line) {
@@ -73,7 +73,7 @@ inline std::vector<UncertainInput> setup_inputs(Kind kind) {
     return inputs;
 }
 
-// Every quantity that this kind of head has, in an air that may be uncertain.
+// All uncertain quantities for this kind of head, including those of the air.
 inline UncertainInputs everything(Kind kind) {
     UncertainInputs all{setup_inputs(kind)};
     const auto add_all = [&](InputQuantity quantity, double spread, int components, const std::string& part = "") {

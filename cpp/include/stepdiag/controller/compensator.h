@@ -1,6 +1,6 @@
-/* Volumetric compensation for a controller, for C: see compensator.hpp, which says what the functions do.
- * Lengths in mm, angles in rad. Only load allocates; after it no function allocates, locks, throws or makes a system
- * call, and all but free may be called from many threads at once. */
+/* Volumetric compensation for a controller: the C interface of compensator.hpp, which describes the functions. Lengths
+ * in mm, angles in rad. Only load allocates. The other functions do not allocate, lock, throw or make system calls; all
+ * except free may be called from several threads concurrently. */
 #ifndef STEPDIAG_COMPENSATOR_H
 #define STEPDIAG_COMPENSATOR_H
 
@@ -16,10 +16,10 @@ typedef struct stepdiag_compensator stepdiag_compensator;
 enum stepdiag_outside { STEPDIAG_HOLD = 0, STEPDIAG_LINEAR = 1, STEPDIAG_REFUSE = 2 };
 enum stepdiag_approach { STEPDIAG_MEAN = 0, STEPDIAG_POSITIVE = 1, STEPDIAG_NEGATIVE = 2 };
 
-/* Flags of a status; 0 is an answer inside the volume. */
+/* Flags of a status (see CompensationStatus). 0: the position is inside the volume. */
 enum stepdiag_status { STEPDIAG_OUTSIDE = 1, STEPDIAG_CAPPED = 2, STEPDIAG_REFUSED = 4 };
 
-/* See CompensatorOptions. Start from stepdiag_default_options(), so that new ones find their defaults. */
+/* See CompensatorOptions. Initialise with stepdiag_default_options(), so that future options have their defaults. */
 typedef struct {
     double origin[3];
     int outside; /* enum stepdiag_outside */
@@ -27,19 +27,20 @@ typedef struct {
     double largest_correction;
     int approach; /* enum stepdiag_approach */
     double largest_tool;
-    int accept_rejected; /* 1: takes a table whose fit was rejected */
+    int accept_rejected; /* 1: accept a table whose fit was rejected */
 } stepdiag_options;
 
 stepdiag_options stepdiag_default_options(void);
 
-/* `options` may be NULL. NULL on failure: `message` then holds the reason, cut to `message_size` bytes with its 0. */
+/* `options` may be NULL for the defaults. Returns NULL on failure; `message` then contains the reason, truncated to
+ * `message_size` bytes including the terminating 0. */
 stepdiag_compensator* stepdiag_compensator_load(const char* path, const char* chain, const stepdiag_options* options,
                                                 char* message, size_t message_size);
 void stepdiag_compensator_free(stepdiag_compensator* compensator);
 
-/* Each returns the status; without a compensator or a position that is STEPDIAG_REFUSED. `tool` may be NULL: the tool of
- * the calibration. Where an answer goes may be NULL, too, or where the position is; without `orientation` an error takes a
- * third less time. */
+/* Each function returns the status, which is STEPDIAG_REFUSED if compensator or position is NULL. A NULL `tool` means
+ * the tool of the calibration. Output pointers may be NULL or equal to the input pointer. Without `orientation`, an
+ * error takes a third less time. */
 unsigned stepdiag_error(const stepdiag_compensator* compensator, const double position[3], const double tool[3],
                         double error[3], double orientation[3]);
 unsigned stepdiag_command(const stepdiag_compensator* compensator, const double target[3], const double tool[3],
@@ -50,9 +51,9 @@ unsigned stepdiag_forward(const stepdiag_compensator* compensator, const double 
 uint64_t stepdiag_fingerprint(const stepdiag_compensator* compensator);
 double stepdiag_inverse_bound(const stepdiag_compensator* compensator);
 void stepdiag_calibration_tool(const stepdiag_compensator* compensator, double tool[3]);
-/* Verdict of the table's fit: "accepted", "doubtful", "rejected" or "unchecked"; "" where the table has none. */
+/* Verdict of the table's fit: "accepted", "doubtful", "rejected" or "unchecked"; "" if the table has none. */
 const char* stepdiag_fit(const stepdiag_compensator* compensator);
-/* What the table does not tell, counted from 0: "EXX", "EYX (slope)", "C0Y". NULL after the last. */
+/* Parameters that the table does not determine, by index from 0: "EXX", "EYX (slope)", "C0Y". NULL after the last. */
 const char* stepdiag_uncompensated(const stepdiag_compensator* compensator, size_t index);
 
 #ifdef __cplusplus

@@ -1,13 +1,14 @@
-// Volumetric compensation for a controller: a calibration file, loaded once, tells the error of the machine wherever it
-// is sent, and where to send it instead.
-//   forward(c) = c + e(c)                  where the tool is when the axes stand at c
-//   command(t) = c with c + e(c) = t       where the axes must stand for the tool to be at t; c <- t - e(c), bounded
-// e(c): error of the functional point, the exact pose of CONVENTIONS (machine.hpp) minus its nominal position, with the
-// tool offset of the call, interpolated linearly between the nodes of the table. Positions are axis positions in the
-// controller's machine coordinates, mm; `origin` is where these have home, the corner of the calibrated volume.
+// Volumetric compensation for a controller. A compensator is made from a calibration file. For any position it gives
+// the error of the machine and the compensated command.
+//   forward(c) = c + e(c)                  position of the tool if the axes are at c
+//   command(t) = c with c + e(c) = t       axis positions that bring the tool to t; bounded iteration c <- t - e(c)
+// e(c) is the error of the functional point: its exact pose (CONVENTIONS, machine.hpp) minus its nominal position, for
+// the tool offset of the call. Functions are interpolated linearly between the nodes of the table. Positions are axis
+// positions in the controller's machine coordinates, mm; `origin` gives these coordinates of home, the corner of the
+// calibrated volume. Angles in rad.
 //
-// Loading allocates and throws. After that every function is noexcept, allocates nothing, locks nothing, makes no
-// system call, takes a bounded time, and may be called from many threads at once. compensator.h is the same in C.
+// Loading allocates memory and may throw. All other functions are noexcept, take a bounded time, do not allocate, lock
+// or make system calls, and may be called from several threads concurrently. compensator.h is the interface for C.
 #pragma once
 
 #include <array>
@@ -21,38 +22,39 @@ namespace stepdiag {
 struct CompensatorTables;
 struct ParameterTable;
 
-// What holds outside the calibrated volume. An error is judged by its position, a command by its target, a forward by
-// its result, so that the three agree although command and target differ; 1e-6 mm beyond the edge still is inside.
+// Behaviour outside the calibrated volume. The test uses the position for an error, the target for a command, and the
+// result for a forward. The three therefore agree although command and target differ. A position up to 1e-6 mm beyond
+// the edge counts as inside.
 enum class Outside {
-    hold,    // the error of the nearest point of the volume
-    linear,  // functions and squareness terms go on as in the last interval, up to `margin`; further out as `refuse`
-    refuse   // no answer: CompensationStatus::refused
+    hold,    // use the error of the nearest point of the volume
+    linear,  // extrapolate functions and squareness terms from the last interval up to `margin`; refuse beyond it
+    refuse   // refuse the request (compensation_refused)
 };
 
-// Of a table with two directions of approach (reversal), which the compensator corrects: it knows no motion.
+// The direction of approach to compensate, for a table with reversal. The compensator does not know the motion.
 enum class CompensatedApproach { mean, positive, negative };
 
 struct CompensatorOptions {
-    std::array<double, 3> origin = {0.0, 0.0, 0.0};  // controller's coordinates of home, mm
+    std::array<double, 3> origin = {0.0, 0.0, 0.0};  // home in the controller's coordinates, mm
     Outside outside = Outside::hold;
-    double margin = 0.0;              // mm, with Outside::linear; at most the volume's shortest edge
-    double largest_correction = 1.0;  // mm: command and forward shorten a longer error vector to this length
+    double margin = 0.0;              // for Outside::linear, mm; at most the volume's shortest edge
+    double largest_correction = 1.0;  // mm; command and forward shorten longer error vectors to this length
     CompensatedApproach approach = CompensatedApproach::mean;
-    double largest_tool = 1000.0;  // mm: longer tools are refused; the bound of the inverse holds for all others
-    bool accept_rejected = false;  // takes a table whose fit was rejected
+    double largest_tool = 1000.0;  // mm; longer tools are refused; inverse_bound() is valid for all shorter tools
+    bool accept_rejected = false;  // accept a table whose fit was rejected
 };
 
-// Flags: 0 is an answer inside the volume.
+// Flags. 0: the position is inside the volume.
 enum CompensationStatus : unsigned {
-    compensation_outside = 1,  // outside the volume: held, linear or refused
-    compensation_capped = 2,   // the error is longer than largest_correction, the correction is not
-    compensation_refused = 4   // no answer: outside with Outside::refuse, beyond the margin, a position that is not
-                              // finite or farther than 100 m, a tool longer than largest_tool; the position returned is
-                              // the one asked for, an error is 0, and the machine must not move
+    compensation_outside = 1,  // outside the volume: held, extrapolated or refused
+    compensation_capped = 2,   // the error exceeds largest_correction; corrections are shortened
+    compensation_refused = 4   // refused: outside with Outside::refuse, beyond the margin, a position that is not
+                               // finite or farther than 100 m, or a tool longer than largest_tool. The function returns
+                               // the given position or an error of 0. The machine must not move.
 };
 
 struct MachineError {
-    std::array<double, 3> position;     // e, mm: the whole of it, also where the correction is capped
+    std::array<double, 3> position;     // e, mm; not shortened to largest_correction
     std::array<double, 3> orientation;  // rotation vector of the tool, rad
     unsigned status;
 };
@@ -64,12 +66,16 @@ struct CompensatedPosition {
 
 class Compensator {
 public:
-    // Reads a calibration or error map. Throws InvalidArgument naming the file, line and key: what the table's reader
-    // refuses; a table whose fit was rejected, unless accept_rejected; one without chain, volume_mm or tool_mm, or with
-    // another chain than `chain`, the controller's; one without parameters, or with nodes that cannot be those of its
-    // volume; errors so steep that the inverse has no bound; options that make no sense.
+    // Reads a calibration or error map. `chain` is the kinematic chain of the controller's machine. Throws
+    // InvalidArgument, which names file, line and key, for:
+    //   - a file that read_parameter_table() rejects
+    //   - a table whose fit was rejected, unless accept_rejected is set
+    //   - a table without chain, volume_mm or tool_mm, or with a chain other than `chain`
+    //   - a table without parameters, or with nodes that do not match its volume
+    //   - errors with slopes so large that the inverse has no bound
+    //   - options out of range
     static Compensator load(const std::string& path, const std::string& chain, const CompensatorOptions& options = {});
-    // The same of a table in memory; `name` is what messages call it.
+    // The same for a table in memory. Messages call it `name`.
     Compensator(const ParameterTable& table, const std::string& name, const std::string& chain,
                 const CompensatorOptions& options = {});
     ~Compensator();
@@ -81,24 +87,25 @@ public:
     CompensatedPosition command(const std::array<double, 3>& target, const std::array<double, 3>& tool) const noexcept;
     CompensatedPosition forward(const std::array<double, 3>& command, const std::array<double, 3>& tool) const noexcept;
 
-    // The same on three numbers each, as in C; the answer, of which the status is returned, may replace the question.
-    // `tool` may be null: that of the calibration. `orientation` may be null: it takes a third of the time.
+    // The same with arrays of three numbers, as in C. They return the status. Input and output may be the same array. A
+    // null `tool` means the tool of the calibration. A null `orientation` is not computed, which saves a third of the
+    // time.
     unsigned error(const double* position, const double* tool, double* error, double* orientation) const noexcept;
     unsigned command(const double* target, const double* tool, double* command) const noexcept;
     unsigned forward(const double* command, const double* tool, double* actual) const noexcept;
 
-    // The table in force: a hash of chain, volume, tool, nodes and values, whatever the file's spelling and order.
-    // Options, uncertainties, method and date are not in it.
+    // Hash that identifies the corrections of the table: chain, volume, tool, nodes and values. It does not depend on
+    // the spelling and order of the file, on options, uncertainties, method and date.
     std::uint64_t fingerprint() const noexcept;
-    // |forward(command(t)) - t| never exceeds this, mm, whatever the target, the tool and the options.
+    // Upper bound of |forward(command(t)) - t|, mm, for all targets, tools and options.
     double inverse_bound() const noexcept;
     std::array<double, 3> volume() const noexcept;  // mm
     std::array<double, 3> tool() const noexcept;    // of the calibration, mm
-    // Verdict of the table's fit: "accepted", "doubtful", "rejected" or "unchecked"; empty where the table has none.
-    // Whoever loads a doubtful or unchecked table should be told.
+    // Verdict of the table's fit: "accepted", "doubtful", "rejected" or "unchecked"; empty if the table has none. Warn
+    // the user about a doubtful or unchecked table.
     const std::string& fit() const noexcept;
-    // What the table does not tell and is therefore not compensated: "EXX", "EYX (slope)", "EXX (above 784.0 mm)",
-    // "C0Y".
+    // Parameters that the table does not determine. They are not compensated. Examples: "EXX", "EYX (slope)",
+    // "EXX (above 784.0 mm)", "C0Y".
     const std::vector<std::string>& uncompensated() const noexcept;
 
 private:

@@ -1,4 +1,4 @@
-// The instruction set of the processor that everything with several lanes is calculated with.
+// Selects the SIMD instruction set of the processor for all vectorised calculations.
 #pragma once
 
 #include <string>
@@ -6,11 +6,12 @@
 
 namespace stepdiag {
 
-// Name of the instruction set in use, e.g. "AVX3" (AVX-512); results are the same bits for the same one.
+// Name of the instruction set in use, such as "AVX3" (AVX-512). The same instruction set gives the same bits.
 std::string instruction_set();
-// Those that this processor has, fastest first. The fastest is in use until another is chosen, for the whole process,
-// e.g. to get the bits of a lesser processor. Throws InvalidArgument naming those there are.
+// Instruction sets that this processor supports, fastest first. The fastest is the default.
 std::vector<std::string> instruction_sets();
+// Selects an instruction set for the whole process, for example to reproduce the bits of an older processor. Throws
+// InvalidArgument, which lists the supported ones, for any other name.
 void choose_instruction_set(const std::string& name);
 
 }  // namespace stepdiag

@@ -1,4 +1,4 @@
-// The numbers of core/random.hpp for many counters at once: one sample a lane, from vectors of eight and more.
+// The random numbers of core/random.hpp for many counters at once. Each SIMD lane computes one sample.
 #pragma once
 
 #include <cstddef>
@@ -8,9 +8,9 @@
 
 namespace stepdiag {
 
-// Blocks of random bits as RandomBlock{sample, item, draw}: lanes are the samples first_sample, first_sample + 1, ...,
-// items first_item, first_item + 1, ...; `lanes` is a multiple of lane_group. Both numbers of a pair are given:
-// out[(2 * (item - first_item) + k) * lanes + lane], k = 0, 1.
+// Addresses of many blocks RandomBlock{sample, item, draw}. The samples are first_sample, ..., first_sample + lanes -
+// 1, the items first_item, first_item + 1, ... `lanes` must be a multiple of lane_group. Both numbers of a pair are
+// written: out[(2 * (item - first_item) + k) * lanes + lane] with k = 0, 1 and lane = sample - first_sample.
 struct RandomBlocks {
     std::uint64_t seed;
     RandomStream stream;
@@ -21,9 +21,10 @@ struct RandomBlocks {
 };
 inline constexpr std::size_t lane_group = 16;
 
-// The same bits as uniform_pair.
+// Same bits as uniform_pair. `out` has room for 2 * items * lanes numbers.
 void fill_uniform(const RandomBlocks& lanes, std::size_t items, double* out);
-// normal_pair to a few units in the last place: the same bits for one instruction set (instruction_set).
+// Same numbers as normal_pair to a few units in the last place. Bits are reproducible for one instruction set
+// (core/instruction_set.hpp).
 void fill_normal(const RandomBlocks& lanes, std::size_t items, double* out);
 
 }  // namespace stepdiag

@@ -1,5 +1,6 @@
-// The design of a laser head: bodies of glass, beams and detectors, as drawn. Everything stands in the head's frame:
-// origin in the reference plane (z = 0), where the beam of d1 or of the distance starts, the mirror at +z.
+// Design of a laser head: glass bodies, beams and detectors in their nominal places. All placements are in the head's
+// frame. Its origin is in the reference plane (z = 0), where the beam of d1 or of the distance starts; the mirror is at
+// +z. Lengths in mm, angles in rad.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,12 +19,13 @@
 
 namespace stepdiag {
 
-// A catalogue glass, whose index is relative to air of 20 degrees Celsius and 101325 Pa, or a constant absolute index.
+// A catalogue glass, with its index relative to air at 20 degrees Celsius and 101325 Pa, or a constant absolute index.
 using Material = std::variant<double, Glass>;
 double refractive_index(const Material& material, double wavelength);  // absolute
 
-// Faces stand in the component's own frame; refracting and splitting faces get the material's index behind them (a
-// splitting face inside the body on both sides) when a trace at some wavelength is made.
+// A glass body. Its faces are in the component's own frame. The media of the faces are set for a trace at a given
+// wavelength: refracting and splitting faces get the material's index behind them, a splitting face inside the body
+// gets it on both sides.
 struct HeadBody {
     std::string name;
     std::vector<Face> faces;
@@ -31,17 +33,18 @@ struct HeadBody {
     Placement placement;
 };
 
-// Light source and, for an interferometer, the plane that takes the beam back: x-y of its own frame, beam along +z.
+// A light source that emits along +z of its own frame. For an interferometer, the x-y plane of this frame also receives
+// the returned beam.
 struct HeadBeam {
     std::string name;
     Placement placement;
     GaussianMode mode;
-    std::optional<Interferometer> interferometer;  // or
-    std::string sensor;                            // the sensor that the beam comes to
-    double housing = 10.0;  // edge of the square around the source that stops light, mm; spot beams
+    std::optional<Interferometer> interferometer;  // either an interferometer,
+    std::string sensor;                            // or the name of the sensor that the beam meets
+    double housing = 10.0;  // spot beams: edge of the square around the source that absorbs light, mm
 };
 
-// Sensor in the x-y plane of its own frame, light from either side.
+// A sensor in the x-y plane of its own frame. It detects light from both sides.
 struct SpotSensor {
     std::string name;
     Placement placement;
@@ -51,23 +54,23 @@ struct SpotSensor {
 
 struct HeadDesign {
     std::string name;
-    HeadLayout layout;  // psd: one interferometer and one beam to one sensor; multi_beam: three or more interferometers
+    HeadLayout layout;  // psd: one interferometer, one beam to one sensor; multi_beam: at least three interferometers
     std::vector<HeadBody> bodies;
     std::vector<HeadBeam> beams;
     std::vector<SpotSensor> sensors;
     TreeLimits limits;
 };
 
-// How a component stands out of its place: turned about its own origin by a rotation vector, then shifted, both along
-// the head's axes.
+// Deviation of a component from its nominal place: a rotation about its own origin, given as a rotation vector,
+// followed by a shift. Both are along the head's axes.
 struct PoseError {
     Eigen::Vector3d shift = Eigen::Vector3d::Zero();     // mm
     Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  // rad
 };
 using PoseErrors = std::map<std::string, PoseError>;  // by component name
 
-// Throws InvalidArgument for names that are empty or given twice, a layout without its beams or sensor, a beam to an
-// unknown sensor, bodies, sources and sensors that overlap or touch, values out of range.
+// Throws InvalidArgument if a name is empty or given twice, the layout lacks a beam or sensor, a beam refers to an
+// unknown sensor, bodies, sources and sensors overlap or touch, or a value is out of range.
 void check_design(const HeadDesign& design);
 
 }  // namespace stepdiag

@@ -1,7 +1,7 @@
-// Which readings a head gives.
+// Layout of a head: the quantities that it reads (layouts a and b of the paper).
 //   ideal       distance and the mirror's two tilts
-//   psd         layout b: distance and the spot on a position sensing device
-//   multi_beam  layout a: the distances of three or more parallel interferometer beams
+//   psd         layout b: distance, and position of a spot on a position sensing device
+//   multi_beam  layout a: distances of three or more parallel interferometer beams
 #pragma once
 
 #include <string>

@@ -1,11 +1,12 @@
-// What an interferometer makes of the light that comes back to its collimator.
-// Two reading models. The chief ray: half the optical path of the beam's axis to the collimator's plane and back, the
-// conventions' reading. The coupled mode: the phase with which the returned Gaussian couples into the fibre's mode,
-// -L phi^2/2 instead of +L phi^2 for a mirror at L turned by phi (waist at the collimator), and the share of the light
-// that couples.
-// Both models read the same path when the light comes back along the axis: what diffraction adds to the phase of an
-// aligned beam on its way (Gouy's phase and the curvature of its wave fronts, below half a wavelength in the round
-// trip) is taken off, because it is no length. Lengths in mm, angles in rad, wavelengths in nm (vacuum).
+// Reading of an interferometer from the light that returns to its collimator. There are two reading models:
+//   chief ray     half the optical path of the beam's axis to the collimator's plane and back (CONVENTIONS)
+//   coupled mode  phase with which the returned Gaussian beam couples into the fibre's mode, and the share of the light
+//                 that couples
+// For a mirror at distance L tilted by phi, the chief ray reads L + L phi^2; the coupled mode, with the waist at the
+// collimator, reads L - L phi^2/2 (both to second order). Both models read the same path for light that returns along
+// the axis: the phase that diffraction adds to an aligned beam is subtracted, because it is not a length. This phase
+// (Gouy phase and curvature of the wave fronts) is below half a wavelength in the round trip. Lengths in mm, angles in
+// rad, wavelengths in nm (vacuum).
 #pragma once
 
 #include <Eigen/Core>
@@ -21,62 +22,64 @@ std::string name(ReadingModel model);
 ReadingModel parse_reading_model(std::string_view text);  // throws InvalidArgument
 
 struct Interferometer {
-    double aperture = 10.0;           // edge of the square in the collimator's plane that takes the beam back, mm
+    double aperture = 10.0;           // edge of the square in the collimator's plane that receives the beam, mm
     double acceptance = 0.1;          // largest angle between the returned beam and the collimator's axis, rad
-    double least_coupling = 0.0;      // coupled_mode: a smaller share of the light is a lost reading
-    double resolution = 0.0;          // step of the distance, mm; 0: none
-    double periodic_amplitude = 0.0;  // of the non-linearity, mm; its period is half a wavelength in the air
-    double dead_path = 0.0;           // mm in air before the reference plane, whose index is taken as assumed
-    double index_error = 0.0;         // relative error of the index that distances are reduced with, e.g. 0.5e-6
+    double least_coupling = 0.0;      // coupled_mode: least share of the light; the reading is lost below it
+    double resolution = 0.0;          // step of the distance, mm; 0: continuous
+    double periodic_amplitude = 0.0;  // of the non-linearity, mm; its period is half a wavelength in air
+    double dead_path = 0.0;           // path in air before the reference plane, not corrected for the index, mm
+    double index_error = 0.0;         // relative error of the index used to reduce distances, such as 0.5e-6
     ReadingModel model = ReadingModel::chief_ray;
 };
 
-// Throws InvalidArgument naming the value.
+// Throws InvalidArgument, which names the value, for a value out of range.
 void check_interferometer(const Interferometer& interferometer);
 
-// The collimator's mode: waist radius (1/e^2 of power), and the waist's place along the beam from the collimator's
-// plane.
+// Gaussian mode of the collimator: waist radius (1/e^2 of power), and position of the waist along the beam, measured
+// from the collimator's plane.
 struct GaussianMode {
     double wavelength;      // vacuum, nm
     double waist_radius;    // mm
     double waist_position;  // mm, reduced (t/n)
 };
 
-// Throws InvalidArgument naming the value.
+// Throws InvalidArgument, which names the value, for a value out of range.
 void check_gaussian_mode(const GaussianMode& mode);
 
-// zR = pi w0^2 / wavelength, mm: a reduced length, in which the beam's cross section doubles.
+// Rayleigh length zR = pi w0^2 / wavelength, mm: the reduced length over which the beam's cross section doubles.
 double rayleigh_length(const GaussianMode& mode);
 
-// A beam that has come back, in the collimator's frame (beam out along +z, its plane z = 0).
+// A returned beam in the collimator's frame (outgoing beam along +z, collimator's plane at z = 0).
 struct ReturnedBeam {
-    Eigen::Vector2d position;   // where the axis meets the collimator's plane, mm
-    Eigen::Vector3d direction;  // unit, z < 0
+    Eigen::Vector2d position;   // intersection of its axis with the collimator's plane, mm
+    Eigen::Vector3d direction;  // unit vector, z < 0
     double optical_length;      // sum of n t along the axis, out and back, mm
     double reduced_length;      // sum of t / n, mm
 };
 
 struct Coupling {
-    double optical_length;  // round trip as the fibre's phase has it, mm
+    double optical_length;  // round trip that corresponds to the phase in the fibre, mm
     double efficiency;      // share of the light that couples, 0 to 1
 };
 
-// Closed form of the overlap of a displaced, turned Gaussian with the mode, in a medium of index n at the collimator.
-// With the complex beam parameters q0 = -z0 + i zR of the mode and q1 = q0 + (reduced length) of the returned beam,
-// both in the collimator's plane, position d and transverse direction s = n (r_x, r_y), k = 2 pi / wavelength:
-//   overlap = integral of returned times outgoing field (reciprocity: the mode that couples runs backwards)
+// Coupling of a displaced and tilted Gaussian beam into the mode, in closed form, for a medium of index n at the
+// collimator. The complex beam parameters in the collimator's plane are q0 = -z0 + i zR for the mode and
+// q1 = q0 + (reduced length) for the returned beam. With position d, transverse direction s = n (r_x, r_y) and
+// k = 2 pi / wavelength:
+//   overlap = integral of returned times outgoing field (by reciprocity, the coupling mode propagates backwards)
 //           = 2 i zR / (q0 + q1) exp(-i k (optical length + Q/2)),  Q = [d.d - 2 q1 d.s - q0 q1 s.s] / (q0 + q1)
-//   optical length of the fibre's phase = optical length + Re Q / 2        (the phase of the first factor is taken off)
+//   optical length of the fibre's phase = optical length + Re Q / 2        (without the phase of the first factor)
 //   efficiency = |2 zR / (q0 + q1)|^2 exp(k Im Q)
-// Paraxial, for a round beam. A. E. Siegman, Lasers (1986), ch. 17 and 20; W. B. Joyce, B. C. DeLoach, Appl. Opt. 23
-// (1984) 4187.
+// Paraxial approximation, round beam. A. E. Siegman, Lasers (1986), ch. 17 and 20; W. B. Joyce, B. C. DeLoach, Appl.
+// Opt. 23 (1984) 4187.
 Coupling couple(const GaussianMode& mode, const ReturnedBeam& beam, double index);
 
-// The distance that the instrument gives; the noise and the head's constant are the caller's. In this order:
-//   1. none where the beam is outside aperture or acceptance (both models), or below the least coupling (coupled_mode)
-//   2. the round trip by the model, halved and divided by the index used, assumed_index (1 + index_error)
-//   3. the dead path: + dead_path (true_index / (index used) - 1)
-//   4. the non-linearity: + periodic_amplitude sin(2 pi (round trip) / wavelength)
+// Distance reading of the instrument, mm. The caller adds noise and the head's constant. The steps are:
+//   1. lost (empty) if the beam is outside aperture or acceptance (both models), or below the least coupling
+//      (coupled_mode)
+//   2. round trip by the model, divided by 2 and by the index used, assumed_index (1 + index_error)
+//   3. dead path: + dead_path (true_index / (index used) - 1)
+//   4. non-linearity: + periodic_amplitude sin(2 pi (round trip) / wavelength)
 //   5. rounding to a multiple of the resolution
 std::optional<double> read_distance(const Interferometer& interferometer, const GaussianMode& mode,
                                     const ReturnedBeam& beam, double true_index, double assumed_index);

@@ -1,7 +1,8 @@
-// What a head would read if it stood as designed: the constants that its readings are reduced with.
-//   head constant   half the optical path over the index, less the mirror's distance, at zero tilt
-//   (u, v)          from the change of distance with tilt, d = (L - beta u + alpha v)/(1 - t)
+// Calibration of a head from its nominal design: the constants used to reduce its readings.
+//   head constant   half the optical path divided by the index, minus the mirror's distance, at zero tilt
+//   (u, v)          from the change of the distance with tilt, d = (L - beta u + alpha v)/(1 - t)
 //   psd distance D  from the change of the spot with tilt at two distances, spot = 2 (L + D)/(1 - t) (-beta, alpha)
+// Symbols as in measurement/reading.hpp; lengths in mm.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,18 +13,19 @@
 
 namespace stepdiag {
 
-// A mirror nearer than this would stand in the head, mm.
+// Extent of the head beyond its reference plane, mm. The mirror must be farther away.
 double reach(const HeadDesign& design);
 
 struct NominalHead {
     HeadCalibration calibration;
-    // Layout psd: unfolded spot = axes (raw - zero), so that a head's detector may be turned as one likes.
+    // Layout psd: unfolded spot = spot_axes (raw spot - spot_zero). This allows any orientation of the detector.
     Eigen::Matrix2d spot_axes = Eigen::Matrix2d::Identity();
     Eigen::Vector2d spot_zero = Eigen::Vector2d::Zero();
 };
 
-// `distance`: of the mirror, mm. The air is what the readings are reduced with; that of 20 degrees Celsius unless told.
-// Throws InvalidArgument where a beam does not meet the mirror, does not come back, or tells nothing of tilts.
+// `distance`: from the reference plane to the mirror, mm. `environment`: the air used to reduce the readings, by
+// default at 20 degrees Celsius. Throws InvalidArgument if the distance is within the head, a beam misses the mirror or
+// does not return, or the beams do not depend on the tilts.
 NominalHead nominal_head(const HeadDesign& design, double distance, const Environment& environment = {Air{}});
 
 }  // namespace stepdiag

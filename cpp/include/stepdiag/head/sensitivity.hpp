@@ -1,8 +1,8 @@
-// How a traced head's readings answer to what may be wrong with it: first derivatives by the pose error of every
-// component and of the mirror, by the indices of glass and air, by the state of the air. Exact, by forward-mode
-// derivatives through the replay of each beam's path; only the slope of the air's index by temperature, pressure and
-// humidity is a difference of that equation. Of the beams' axes (chief rays), whatever the
-// reading model.
+// Sensitivity of a traced head's readings: first derivatives with respect to the pose error of every component and of
+// the mirror, the indices of glass and air, and the state of the air. The derivatives are exact (forward-mode
+// differentiation of the replay of each beam's path). Only the derivative of the air's index with respect to
+// temperature, pressure and humidity is a finite difference. The derivatives are those of the beams' axes (chief rays)
+// for either reading model.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,16 +15,17 @@
 namespace stepdiag {
 
 struct Sensitivity {
-    std::string component;    // its name; "mirror", "air", "all interferometers"
+    std::string component;    // name of the component; "mirror", "air", "all interferometers"
     std::string quantity;     // "shift x" ..., "rotation x" ..., "index", "temperature", "pressure", "humidity"
     std::string unit;         // of the quantity: "mm", "rad", "1", "K", "Pa"
-    Eigen::VectorXd signals;  // by one unit, in the order of signal_names; mm
-    Eigen::Vector3d reading;  // the same reduced to distance (mm), alpha and beta (rad)
+    Eigen::VectorXd signals;  // change of the signals per unit of the quantity, mm, in the order of signal_names
+    Eigen::Vector3d reading;  // change of the reduced distance (mm), alpha and beta (rad) per unit
 };
 
-// In the order of the design's components (bodies, beams, sensors; six degrees of freedom each, then a body's index),
-// mirror, air, interferometer (relative index error). Rotations are about the component's own origin, all along the
-// head's axes. Throws InvalidArgument for a head without a design, or a mirror pose at which a beam is lost.
+// Order: the design's components (bodies, beams, sensors; for each the six degrees of freedom, then the index of a
+// body), mirror, air, interferometers (relative index error). Rotations are about the component's own origin; all
+// directions are the head's axes. `mirror`: pose in the sensor frame; `size`: width and height of the mirror, mm.
+// Throws InvalidArgument for a head without a design, and for a mirror pose at which a beam is lost.
 std::vector<Sensitivity> head_sensitivities(const Head& head, const MirrorPose& mirror, const Eigen::Vector2d& size,
                                             const Environment& environment = {Air{}});
 

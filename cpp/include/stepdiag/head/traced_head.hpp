@@ -1,7 +1,7 @@
-// A head as its design says, with its components out of their places: which light of its beams comes back from a
-// mirror. Two ways to the same answer: the Embree trace of a pose's whole ray tree, which finds the faces, and the
-// replay of the paths it found, for many poses at once. Everything is in the sensor frame: beam along +z, reference
-// plane z = 0.
+// Ray-traced head: a design with pose errors of its components. It determines the light of each beam that returns from
+// a mirror. There are two methods with the same result: the Embree trace of the whole ray tree of one pose, which finds
+// the faces, and the replay of the recorded paths for many poses at once. All coordinates are in the sensor frame: beam
+// along +z, reference plane z = 0. Lengths in mm, angles in rad.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,26 +18,26 @@
 
 namespace stepdiag {
 
-// The mirror's centre and axes; its normal is the third.
+// Centre (mm) and axes of the mirror. The third axis is its normal.
 struct MirrorPose {
     Eigen::Vector3d point;
     Eigen::Matrix3d rotation;
 };
 
-// The mirror with this centre and the tilts alpha and beta: its normal is along (beta, -alpha, 1).
+// A mirror with this centre and the tilts alpha and beta (rad). Its normal is along (beta, -alpha, 1).
 MirrorPose tilted_mirror(const Eigen::Vector3d& point, double alpha, double beta);
 
-// Light of a beam where it belongs: on its collimator's plane, or on its sensor; in the frame of that component.
+// Light of a beam at its detector (the collimator's plane or the sensor), in the frame of that component.
 struct Arrival {
     ReturnedBeam beam;
-    double power;      // share of the source's
-    bool is_designed;  // came the way that the design's strongest light comes from an aligned mirror: no ghost
+    double power;      // share of the source's power
+    bool is_designed;  // took the designed path, that of the strongest light from an aligned mirror; not a ghost
 };
-// A beam's light at one pose: that of the designed way, then ghosts that saw the mirror, strongest first, then
-// straylight; none where nothing but straylight came. Of an interferometer that of the designed way at most.
+// All light of a beam at one pose: first the designed path, then ghosts that met the mirror, strongest first, then
+// straylight. Empty if there is only straylight. An interferometer has at most the light of the designed path.
 using Arrivals = std::vector<Arrival>;
 
-// The same of many poses, one after the other.
+// Arrivals of many poses, in the order of the poses.
 class ArrivalTable {
 public:
     struct Row {
@@ -49,7 +49,7 @@ public:
         bool empty() const { return first == last; }
         const Arrival& operator[](std::size_t i) const { return first[i]; }
     };
-    std::size_t size() const { return ends_.size(); }  // poses
+    std::size_t size() const { return ends_.size(); }  // number of poses
     Row operator[](std::size_t pose) const {
         return {all_.data() + (pose > 0 ? ends_[pose - 1] : 0), all_.data() + ends_[pose]};
     }
@@ -57,7 +57,7 @@ public:
         ends_.reserve(poses);
         all_.reserve(arrivals);
     }
-    void add(const Arrival& arrival) { all_.push_back(arrival); }  // to the pose that end_pose closes
+    void add(const Arrival& arrival) { all_.push_back(arrival); }  // to the pose that the next end_pose() completes
     void end_pose() { ends_.push_back(all_.size()); }
 
 private:
@@ -65,7 +65,7 @@ private:
     std::vector<std::size_t> ends_;
 };
 
-// The faces that light meets on its way to a detector.
+// One face on the path of light to a detector.
 struct RecordedEncounter {
     int face;
     Event event;
@@ -73,64 +73,63 @@ struct RecordedEncounter {
 };
 struct RecordedRoute {
     std::vector<RecordedEncounter> encounters;
-    double power;  // at the end, share of the source's
+    double power;  // at the end, as a share of the source's power
 };
 
 struct ReplayOptions {
-    // Of the poses that were replayed, traced as well and compared; 1: nothing is replayed, 0: nothing compared.
+    // Share of the replayed poses that are also traced and compared. 1: trace every pose; 0: compare none.
     double verified_share = 1e-3;
-    std::uint64_t seed = 0;  // decides which, together with
-    std::uint64_t line = 0;  // what is replayed: another number, other poses
+    std::uint64_t seed = 0;  // seed and line select the poses to verify
+    std::uint64_t line = 0;
 };
 
 struct ReplayCount {
     long replayed = 0;  // poses of a beam
-    long traced = 0;    // poses that the recorded paths did not fit
+    long traced = 0;    // poses that do not follow the recorded paths
     long verified = 0;
 };
 
-// A replayed pose that differs from its trace: another face came into the beam's way.
+// Thrown if a replayed pose differs from its trace, because another face is in the path of the beam.
 class ReplayMismatch : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
 class TracedHead {
 public:
-    // Throws InvalidArgument for a design that makes no sense, pose errors of components that it does not have or not
-    // finite, an environment out of range.
+    // `mirror`: width and height, mm. Throws InvalidArgument for an invalid design, pose errors that are not finite or
+    // of unknown components, or an environment out of range.
     TracedHead(HeadDesign design, PoseErrors errors, const Environment& environment, const Eigen::Vector2d& mirror);
 
     const HeadDesign& design() const { return design_; }
     double air_index(int beam) const { return optics_[beam].air.index; }
 
-    // One pose by Embree.
+    // Traces one pose with Embree.
     RayTree trace(int beam, const MirrorPose& mirror) const;
     Arrivals arrivals(int beam, const MirrorPose& mirror) const;
-    int mirror_face() const;  // its index in the tree's hits
+    int mirror_face() const;  // index of the mirror's face in the hits of the tree
     int detector_face(int beam) const { return optics_[beam].detector_face; }
 
-    // Many poses by replay of the paths that the first pose has. The outermost of the poses that follow them, whose
-    // light ends farthest to each side, are traced: where these do not meet the same faces, or where another face is
-    // near them, all poses are traced. So is each pose that does not follow the paths. Throws ReplayMismatch naming the
-    // pose where a verification differs by more than rounding (1e-9 mm + 1e-13 of
-    // the path).
+    // Replays many poses along the paths of the first pose. The outermost poses, whose light ends farthest to each
+    // side, are also traced. If they do not meet the same faces, or if another face is near their paths, all poses are
+    // traced. A pose that does not follow the paths is traced, too. Throws ReplayMismatch, which names the pose, if a
+    // verification differs by more than rounding (1e-9 mm + 1e-13 of the path).
     ArrivalTable replay(int beam, const std::vector<MirrorPose>& mirrors, const ReplayOptions& options = {},
                         ReplayCount* count = nullptr) const;
 
-    // A beam's own scene: glass has another index at another wavelength.
+    // The scene of one beam. Each beam has its own, because the index of glass depends on the wavelength.
     struct BeamOptics {
         Medium air;
         Scene fixed;                    // without the mirror
         std::vector<FaceFrame> frames;  // of its faces
-        std::vector<Outline> outlines;  // of its faces, and the mirror
-        std::vector<int> component;     // of its faces: bodies, beams, sensors counted through
+        std::vector<Outline> outlines;  // of its faces and of the mirror
+        std::vector<int> component;     // of its faces: bodies, beams and sensors numbered in this order
         Ray source;
         int detector_face;
-        Placement detector;           // where the light is wanted
-        RecordedRoute designed = {};  // none where the design gets no light there
+        Placement detector;           // of the beam's collimator or sensor
+        RecordedRoute designed = {};  // empty if the nominal design has no light at the detector
     };
     const BeamOptics& optics(int beam) const { return optics_[beam]; }
-    // Segments that end where the beam's light is wanted, in the order of Arrivals.
+    // Segments that end at the beam's detector, in the order of Arrivals.
     std::vector<int> wanted_segments(const RayTree& tree, int beam) const;
 
 private:

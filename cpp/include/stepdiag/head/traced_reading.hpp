@@ -1,4 +1,4 @@
-// The signals of a traced head: from the light that comes back (traced_head) through its detectors to what it says.
+// Signals of a traced head: its detectors' readings of the light that returns (traced_head.hpp).
 #pragma once
 
 #include <cstdint>
@@ -12,21 +12,22 @@
 namespace stepdiag {
 
 struct ReadingConditions {
-    Environment environment;             // what the light runs in
-    std::optional<Environment> assumed;  // what readings are reduced with; none: the same
+    Environment environment;             // the true air
+    std::optional<Environment> assumed;  // the air used to reduce the readings; empty: the true air
     ReplayOptions replay;
     std::uint64_t noise_seed = 0;  // of the sensors' own noise
 };
 
 class TracedReader {
 public:
-    // `head.design` must be there.
+    // `head` must have a design. `mirror`: width and height, mm.
     TracedReader(const Head& head, const Eigen::Vector2d& mirror, const ReadingConditions& conditions);
 
-    // One row a pose, without the constants and the noise of a line. `first_row` counts the sensors' noise on.
+    // One row for each pose, without the constants and the noise of a line. `first_row`: number of the first row, on
+    // which the sensors' noise depends.
     std::vector<SignalRow> read(const std::vector<MirrorPose>& mirrors, std::uint64_t first_row = 0,
                                 ReplayCount* count = nullptr) const;
-    // The same by the Embree trace of every pose.
+    // The same for one pose, by the Embree trace.
     SignalRow trace(const MirrorPose& mirror) const;
 
     const TracedHead& head() const { return traced_; }

@@ -1,5 +1,5 @@
-// Names of the 21 geometric error parameters (ISO 230-1): error functions E<component><axis> with components X Y Z
-// (translations, mm) and A B C (rotations about X Y Z, rad), and the squarenesses C0Y, B0Z, A0Z (rad).
+// Names of the 21 geometric error parameters (ISO 230-1). There are 18 error functions E<component><axis> with the
+// components X Y Z (translations, mm) and A B C (rotations about X Y Z, rad), and the squarenesses C0Y, B0Z, A0Z (rad).
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ inline constexpr int function_count = 18;
 inline constexpr int squareness_count = 3;
 inline constexpr std::array<Squareness, 3> all_squarenesses = {Squareness::C0Y, Squareness::B0Z, Squareness::A0Z};
 
-// The error function of one component of one axis: its place in tables of eighteen, axis by axis.
+// Error function of one component of one axis. index() is its place in tables of 18 functions, ordered by axis.
 struct FunctionId {
     Axis axis;
     Component component;
@@ -36,7 +36,8 @@ struct FunctionId {
 std::string name(Squareness squareness);
 std::optional<Squareness> parse_squareness(std::string_view text);
 
-// The axis whose translation a squareness belongs to, the component it acts on, and its sign:
+// How a squareness enters the translations: the axis, the component of its translation (0 to 2 for x, y, z), and the
+// sign.
 // delta_Y.x = EXY - C0Y y, delta_Z.x = EXZ + B0Z z, delta_Z.y = EYZ - A0Z z.
 struct SquarenessTerm {
     Axis axis;

@@ -1,6 +1,7 @@
-// The CSV format that error maps and calibrations share: "parameter,position_mm,value,unit,standard_uncertainty" behind
-// leading "# key=value" lines; optional column "direction" (+ or -, for reversal). Values are kept in native units (mm,
-// rad), and a number written is read back to the same bits.
+// Table of the 21 parameters, and its CSV format, which error maps and calibrations share. The file has leading lines
+// "# key=value" and the columns "parameter,position_mm,value,unit,standard_uncertainty". An optional column "direction"
+// (+ or -) gives the direction of approach. Values in memory are in native units (mm, rad). Writing and reading a
+// number preserves its bits.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,14 +16,14 @@
 
 namespace stepdiag {
 
-// One error function at its nodes; an uncertainty that is not known is absent.
+// Values of one error function at its nodes. An unknown uncertainty is empty. All vectors have the same length.
 struct FunctionTable {
     std::vector<double> position;  // mm, ascending
     std::vector<double> value;     // mm or rad
     std::vector<std::optional<double>> standard_uncertainty;
 };
 
-// Linear between nodes; outside them the end value.
+// Interpolates linearly between nodes and keeps the end value outside them. `position` in mm.
 double interpolate(const FunctionTable& table, double position);
 
 struct SquarenessValue {
@@ -34,29 +35,34 @@ struct ParameterTable {
     std::map<std::string, std::string> header;  // format, chain, volume_mm, tool_mm, ...
     std::array<std::optional<FunctionTable>, function_count> functions;
     std::array<std::optional<SquarenessValue>, squareness_count> squarenesses;
-    // Of nodes approached in - direction, where these have a table of their own; `functions` then has that of the +
-    // direction.
+    // Values at nodes approached in - direction, if the function distinguishes the directions. In that case `functions`
+    // has the values for the + direction.
     std::array<std::optional<FunctionTable>, function_count> negative_functions = {};
 };
 
-// What the leading line "# format=..." of a table may say.
+// Valid values of the leading line "# format=...".
 inline constexpr const char* error_map_format = "stepdiag error map 1";
 inline constexpr const char* calibration_format = "stepdiag calibration 1";
 
-// Columns may stand in any order. Throws InvalidArgument naming file and line: unreadable or binary file, another
-// format; format, chain, volume_mm or tool_mm given twice; rows that the leading line "# rows=" does not count, as of a
-// file that was cut; a column missing, unknown or doubled, unknown parameter or unit, a number that is none or not
-// finite, positions that do not ascend, a squareness with a position or given twice, a parameter of which some rows
-// have a direction and some have none. What is given for one direction alone is taken for both.
+// Columns may be in any order. Values given for one direction only apply to both directions. Throws InvalidArgument,
+// which names file and line, for:
+//   - a file that is unreadable, binary or of another format
+//   - format, chain, volume_mm or tool_mm given twice
+//   - a number of rows other than that of the leading line "# rows=" (a truncated file)
+//   - a missing, unknown or repeated column
+//   - an unknown parameter or unit, a text that is not a finite number
+//   - positions that do not ascend, a squareness with a position or given twice
+//   - a parameter with a direction in some rows only
 ParameterTable read_parameter_table(const std::string& path);
 ParameterTable parse_parameter_table(std::string_view text, const std::string& file_name);
 
-// Writes to a temporary file beside `path`, then renames it. Throws InvalidArgument for what could not be read back: a
-// header key with "=", a line break in the header, a value that is not finite, a - direction without the other.
+// Writes to a temporary file beside `path`, then renames it. Throws InvalidArgument for content that could not be read
+// back: a header key with "=", a line break in the header, a value that is not finite, a - direction without a +
+// direction.
 void write_parameter_table(const ParameterTable& table, const std::string& path);
 std::string format_parameter_table(const ParameterTable& table);
 
-// Three lengths of the leading lines, "800.0 600.0 500.0".
+// Formats three lengths for the leading lines: "800.0 600.0 500.0".
 std::string format_lengths(const Eigen::Vector3d& lengths);
 
 }  // namespace stepdiag

@@ -1,4 +1,5 @@
-// What evaluators know of a head: the constants that its readings are reduced with, and nothing of its errors.
+// Calibration of a head: the constants with which evaluations reduce its readings. The errors of the head are not known
+// to evaluations. Lengths in mm, sensor frame.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,23 +12,24 @@
 namespace stepdiag {
 
 struct HeadCalibration {
-    // Layout psd: the unfolded plane of the position sensing device behind the reference plane, mm; reduced, that is,
-    // glass of thickness t counts as t n_air/n.
+    // Layout psd: distance of the position sensing device's unfolded plane behind the reference plane, mm. It is a
+    // reduced length: glass of thickness t counts as t n_air/n.
     std::optional<double> psd_distance = {};
-    // Layout multi_beam: (u, v) of the beams d1 ... dn in the sensor frame, mm.
+    // Layout multi_beam: offsets (u, v) of the beams d1 ... dn in the reference plane, mm.
     std::vector<Eigen::Vector2d> beam_offsets = {};
-    // Layout psd: (u, v) of the beam that makes the spot, mm.
+    // Layout psd: offset (u, v) of the beam that makes the spot, mm.
     Eigen::Vector2d spot_beam = Eigen::Vector2d::Zero();
-    // What windows and splitters add to each distance of a nominal head, mm; the head has taken it off its readings.
+    // Contribution of windows and splitters to each distance of a nominal head, mm. Readings are already corrected for
+    // it.
     std::vector<double> head_constants = {};
-    // From the beam's origin to the line's first commanded functional point, mm.
+    // Distance from the beam's origin to the line's first commanded functional point, mm.
     double standoff = 100.0;
 };
 
-// Of all lines' heads.
+// Calibrations of the heads on all lines.
 struct HeadCalibrations {
     HeadCalibration head;
-    std::map<std::string, HeadCalibration> by_line;  // of the lines that have another one, by name
+    std::map<std::string, HeadCalibration> by_line;  // exceptions, by the name of the line
 
     HeadCalibrations(HeadCalibration head = {}, std::map<std::string, HeadCalibration> by_line = {})
         : head(std::move(head)), by_line(std::move(by_line)) {}

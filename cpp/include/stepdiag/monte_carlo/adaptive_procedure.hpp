@@ -1,4 +1,4 @@
-// As many samples as the figures need: the adaptive procedure of JCGM 101 (7.9.4).
+// Adaptive Monte Carlo procedure (JCGM 101:2008, 7.9.4), which chooses the number of samples.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,9 +10,10 @@
 
 namespace stepdiag {
 
-// The adaptive procedure (JCGM 101, 7.9.4): blocks of M = max(J, 10^4) samples, J the smallest whole number that is
-// 100/(1 - p) or more, rounded up to whole leaves, until twice the standard deviation of the average over blocks is no
-// more than delta for mean, u, and both ends of the symmetric interval of every output.
+// Computes blocks of M = max(J, 10^4) samples, rounded up to whole leaves. J is the smallest integer of at least
+// 100/(1 - p) for the coverage probability p. The procedure ends if twice the standard deviation of the average over
+// the blocks is at most delta (numerical_tolerance) for the mean, u, and both ends of the symmetric coverage interval
+// of every output.
 class AdaptiveProcedure {
 public:
     explicit AdaptiveProcedure(const Bins& bins);
@@ -21,12 +22,13 @@ public:
     LeafRange next_block() const;
     std::uint64_t blocks() const { return blocks_; }
 
-    // The next block, which is also merged into `all`. Throws InvalidArgument for leaves other than next_block().
+    // Adds the next block, and merges it into `all`. Throws InvalidArgument for leaves other than next_block(), and for
+    // a block without any result.
     void add(const PartialStatistics& block, PartialStatistics& all);
 
-    // delta is that of u over `all` blocks so far.
+    // `all`: all blocks so far. delta follows from their u.
     Stability stability(const PartialStatistics& all) const;
-    MonteCarloResult result(const PartialStatistics& all) const;  // with it
+    MonteCarloResult result(const PartialStatistics& all) const;  // includes the stability
 
     std::string to_bytes() const;
     static AdaptiveProcedure from_bytes(std::string_view bytes);
@@ -34,7 +36,7 @@ public:
 private:
     Bins bins_;
     std::uint64_t blocks_ = 0;
-    Eigen::ArrayX4d average_, squares_;  // of the figures: average, sum of squared deviations from it (Welford)
+    Eigen::ArrayX4d average_, squares_;  // average and sum of squared deviations over the blocks (Welford)
 };
 
 }  // namespace stepdiag

@@ -1,4 +1,4 @@
-// A measurement model given as a function: y = f(x), with distributions of the inputs x (JCGM 101, 5.9).
+// Measurement model given as a function y = f(x), with distributions of the inputs x (JCGM 101:2008, 5.9).
 #pragma once
 
 #include <Eigen/Core>
@@ -13,10 +13,11 @@ namespace stepdiag {
 class FunctionModel : public SampleModel {
 public:
     using Values = Eigen::Array<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    // Values of the outputs (a row each) for those of the inputs, a column a sample. Called by several threads at once.
+    // Computes output values from input values. Rows are inputs or outputs, columns are samples. Several threads call
+    // it concurrently.
     using Function = std::function<void(Eigen::Ref<const Values> inputs, Eigen::Ref<Values> outputs)>;
 
-    // Throws InvalidArgument for distributions and correlations that make no sense, and where there is no output.
+    // Throws InvalidArgument for an invalid distribution (check), an invalid correlation, or an empty list of outputs.
     FunctionModel(Function function, std::vector<Distribution> distributions, std::vector<Output> outputs,
                   std::uint64_t seed = 0, std::vector<CorrelatedInputs> correlations = {});
 
@@ -25,8 +26,9 @@ public:
     std::string target() const override;
     std::unique_ptr<Worker> worker() const override;
 
-    // Inputs of the samples from first_sample on (a multiple of lane_group), as many as columns (a multiple, too):
-    // normal ones by RandomBlock{sample, input / 2, 0}, half input % 2, others from both numbers of {sample, input, 1}.
+    // Draws the inputs of the samples first_sample, first_sample + 1, ..., one for each column. first_sample and the
+    // number of columns are multiples of lane_group. Normal inputs use number input % 2 of
+    // RandomBlock{sample, input / 2, 0}; the others use both numbers of RandomBlock{sample, input, 1}.
     void draw(std::uint64_t first_sample, Eigen::Ref<Values> inputs) const;
 
 private:
@@ -35,7 +37,7 @@ private:
     std::vector<Distribution> distributions_;
     std::vector<Output> outputs_;
     std::uint64_t seed_;
-    std::vector<CorrelatedInputs> correlations_;  // with correlation_factor in place of the correlation
+    std::vector<CorrelatedInputs> correlations_;  // with correlation_factor() instead of the correlation
 };
 
 }  // namespace stepdiag

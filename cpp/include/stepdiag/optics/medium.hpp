@@ -1,5 +1,5 @@
-// What light travels through: a constant index, optical glass (air: core/air.hpp). Wavelengths are vacuum wavelengths
-// in nm.
+// Optical media: a constant refractive index, and optical glass by its Sellmeier equation. Air is in core/air.hpp.
+// Wavelengths are vacuum wavelengths in nm.
 #pragma once
 
 #include <string>
@@ -8,24 +8,26 @@
 
 namespace stepdiag {
 
-// A medium of constant refractive index, as a trace at one wavelength sees it.
+// A medium of constant refractive index, for a trace at one wavelength.
 struct Medium {
     double index = 1.0;
 };
 
-// Optical glass by its Sellmeier equation, n^2 - 1 = sum B_i L / (L - C_i) with L = (wavelength/um)^2.
+// Optical glass with the Sellmeier equation n^2 - 1 = sum B_i L / (L - C_i), L = (wavelength/um)^2.
 struct Glass {
     std::string name;
     double B[3];
     double C[3];  // um^2
 };
 
-// SCHOTT's N-BK7, K7, N-SK4, F2 and N-SF11 (catalogue constants, relative to air of 20 degrees Celsius and 101325 Pa,
-// as catalogues are) and fused silica (I. H. Malitson, J. Opt. Soc. Am. 55 (1965) 1205).
+// SCHOTT's N-BK7, K7, N-SK4, F2 and N-SF11 with the constants of the catalogue, and fused silica (I. H. Malitson, J.
+// Opt. Soc. Am. 55 (1965) 1205). Catalogue indices are relative to air at 20 degrees Celsius and 101325 Pa.
 const std::vector<Glass>& glasses();
-const Glass& find_glass(std::string_view name);  // throws InvalidArgument naming those there are
+// Throws InvalidArgument, which lists the known glasses, for an unknown name.
+const Glass& find_glass(std::string_view name);
 
-// At 334 to 2325 nm, where all these constants hold. Throws InvalidArgument outside.
+// Throws InvalidArgument for a wavelength outside 334 to 2325 nm, the range in which the constants of all glasses are
+// valid.
 double refractive_index(const Glass& glass, double wavelength);
 
 }  // namespace stepdiag

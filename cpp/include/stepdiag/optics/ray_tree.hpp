@@ -1,5 +1,6 @@
-// Non-sequential tracing: a splitting face sends a ray both ways, so that one beam becomes a tree of segments.
-// Powers are shares of the source's. What is absorbed, what leaves the scene and what the limits cut add up to it.
+// Non-sequential tracing. A splitting face transmits and reflects each ray, so one beam becomes a tree of segments.
+// Powers are shares of the source's power. The absorbed power, the power that leaves the scene and the power cut by the
+// limits add up to 1.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,43 +14,43 @@
 namespace stepdiag {
 
 struct TreeLimits {
-    int most_hits = 64;          // of any path from the source
-    double least_power = 1e-6;   // of the source's power; weaker light is cut
-    int most_segments = 100000;  // of the whole tree
+    int most_hits = 64;          // on any path from the source
+    double least_power = 1e-6;   // share of the source's power; weaker light is cut
+    int most_segments = 100000;  // in the whole tree
 };
 
 enum class SegmentEnd {
-    goes_on,   // other segments start where it ends
-    absorbed,  // by the face it meets
-    left,      // the scene, without meeting a face
-    cut,       // by a limit, before it was followed
+    goes_on,   // other segments start at its end
+    absorbed,  // absorbed by the face that it meets
+    left,      // left the scene without meeting a face
+    cut,       // cut by a limit before it was traced
 };
 
 struct Segment {
-    int parent;                  // index of the segment that it comes from; -1: the source
-    Ray ray;                     // where it starts
-    double index;                // of the medium it runs in
-    double power;                // share of the source's power, at its start
-    std::optional<Hit> hit;      // where it meets a face
-    std::optional<Event> event;  // how it came out of its parent's hit; none for the source
+    int parent;                  // index of the preceding segment; -1 for the first segment
+    Ray ray;                     // origin and direction of the segment
+    double index;                // refractive index of its medium
+    double power;                // share of the source's power at its start
+    std::optional<Hit> hit;      // the face at its end; empty if it leaves the scene
+    std::optional<Event> event;  // event at the hit of its parent; empty for the first segment
     SegmentEnd end;
 };
 
 struct RayTree {
-    std::vector<Segment> segments;  // a parent stands before its children
-    double absorbed = 0.0;          // power lost in faces: absorbing ones, and shares of reflecting and splitting ones
+    std::vector<Segment> segments;  // a parent precedes its children
+    double absorbed = 0.0;          // power absorbed by absorbing, reflecting and splitting faces
     double left = 0.0;
     double cut = 0.0;
 
-    // Segments absorbed at this face, strongest first.
+    // Indices of the segments absorbed at this face, strongest first.
     std::vector<int> arrivals(int face) const;
-    // The way from the source to the end of a segment. Throws InvalidArgument for one that goes on: its way ends with
-    // another one.
+    // The path from the source to the end of a segment. Throws InvalidArgument for an index out of range, and for a
+    // segment that goes on, because its path ends with another segment.
     Path path_to(int segment) const;
 };
 
-// A source of power 1 in the ambient medium. The strongest branches are followed first, so that a limit on the number
-// of segments cuts the weakest. Throws InvalidArgument for limits that make no sense.
+// Traces a source of power 1 in the ambient medium. The strongest branches come first, so that the limit on segments
+// cuts the weakest ones. Throws InvalidArgument for a limit below 1 or a least power outside 0 to 1.
 RayTree trace_tree(const Scene& scene, const Medium& ambient, const Ray& ray, const TreeLimits& limits = {});
 
 }  // namespace stepdiag

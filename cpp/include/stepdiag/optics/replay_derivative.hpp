@@ -1,8 +1,7 @@
-// First derivatives of where a route ends, by one parameter at a time: exact, because the replay itself is calculated
-// with numbers that carry their slope (dual.hpp). A parameter may move faces rigidly, change indices, and move the
-// source:
-//   local = R x + t of a face that is turned by `rotation` about `about` and shifted: R' = -R [rotation]x,
-//   t' = R (rotation x about - shift)
+// Exact first derivatives of the end of a route with respect to one parameter. The replay is calculated with dual
+// numbers (dual.hpp). A parameter may move faces rigidly, change refractive indices, and move the source. For a face
+// with local = R x + t that rotates by `rotation` about `about` and moves by `shift`:
+//   R' = -R [rotation]x,   t' = R (rotation x about - shift)
 #pragma once
 
 #include <Eigen/Core>
@@ -10,17 +9,17 @@
 #include <optional>
 #include <vector>
 
-#include "stepdiag/optics/dual.hpp"
+#include "stepdiag/core/dual.hpp"
 #include "stepdiag/optics/path.hpp"
 #include "stepdiag/optics/replay.hpp"
 #include "stepdiag/optics/scene.hpp"
 
 namespace stepdiag {
 
-// First-order rigid motion for each unit of a parameter; none unless given.
+// Rigid motion to first order per unit of a parameter. The default is no motion.
 struct RigidRate {
     Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  // rotation vector, rad per unit
-    Eigen::Vector3d about = Eigen::Vector3d::Zero();     // what the rotation leaves in place, mm
+    Eigen::Vector3d about = Eigen::Vector3d::Zero();     // fixed point of the rotation, mm
     Eigen::Vector3d shift = Eigen::Vector3d::Zero();     // mm per unit
 };
 
@@ -30,7 +29,7 @@ struct DualFrame {
 };
 DualFrame moving(const FaceFrame& frame, const RigidRate& rate = {});
 
-// As Encounter, of one lane.
+// An Encounter of a single ray.
 struct DualEncounter {
     Event event;
     bool deflects = true;
@@ -39,7 +38,7 @@ struct DualEncounter {
     Dual index_before, index_after;
 };
 
-// A ray at its start, or where it ends.
+// A ray at the start or at the end of a route.
 struct DualRay {
     std::array<Dual, 3> point, direction;
     Dual optical_length = {};  // sum of n t, mm
@@ -47,7 +46,8 @@ struct DualRay {
 };
 DualRay moving(const Ray& ray, const RigidRate& rate = {});
 
-// None where one of replay's checks fails. The checks are those of the values: a slope says nothing of an edge nearby.
+// Empty if one of the checks of the replay fails. The checks use the values only; a derivative does not show that an
+// edge is near.
 std::optional<DualRay> replay(const std::vector<DualEncounter>& route, const DualRay& ray, double gap);
 
 }  // namespace stepdiag

@@ -1,4 +1,4 @@
-// How far bodies stand apart.
+// Distance between bodies.
 #pragma once
 
 #include <vector>
@@ -7,13 +7,14 @@
 
 namespace stepdiag {
 
-// Distance of two convex bodies or flat pieces (mirror, screen), mm: of the convex hulls of all their faces' corners,
-// so that a face inside a body, as a cube's splitting one, changes nothing. 0 where they touch or overlap. Never more
-// than the true distance, and less by at most 1e-12 of their size and distance. Costs as much as looking at every
-// corner some ten times. Throws InvalidArgument for a body without a corner, or one that is not finite.
+// Distance between two convex bodies or flat pieces (mirror, screen), mm; 0 if they touch or overlap. It is the
+// distance between the convex hulls of all corners, so a face inside a body (the splitting face of a cube) has no
+// influence. The result never exceeds the true distance and is smaller by at most 1e-12 of size and distance. The cost
+// is about ten passes over all corners. Throws InvalidArgument for a body without corners, or with a corner that is not
+// finite.
 //
-// P. Wolfe, "Finding the nearest point in a polytope", Mathematical Programming 11 (1976) 128: the point of the set of
-// all differences a - b that is nearest to 0.
+// Method: nearest point to 0 in the set of all differences a - b (P. Wolfe, "Finding the nearest point in a polytope",
+// Mathematical Programming 11 (1976) 128).
 double separation(const std::vector<Face>& a, const std::vector<Face>& b);
 
 }  // namespace stepdiag

@@ -1,4 +1,4 @@
-// What a face does to light.
+// Optical surfaces: reflection and refraction at a face.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,20 +10,21 @@ namespace stepdiag {
 enum class Surface {
     reflecting,  // reflects the share `reflectance`, absorbs the rest
     absorbing,
-    refracting,  // all light goes on, refracted or else totally reflected
-    splitting,   // light goes both ways: `reflectance` back, `absorptance` lost, the rest on by Snell's law; where that
-                 // has no solution, all that is not lost is totally reflected
+    refracting,  // refracts or totally reflects all light
+    splitting,   // reflects the share `reflectance`, absorbs `absorptance`, refracts the rest; in the case of total
+                 // internal reflection, reflects all light that it does not absorb
 };
 
-// Law of reflection, r = d - 2(n.d)n, for a unit normal of either side.
+// Law of reflection, r = d - 2(n.d)n. The unit normal may point to either side.
 inline Eigen::Vector3d reflect(const Eigen::Vector3d& direction, const Eigen::Vector3d& normal) {
     return direction - 2.0 * normal.dot(direction) * normal;
 }
 
-// Snell's law in vector form. With the normal turned against the light, c = -n.d and mu = n1/n2 (index before /
-// behind):
+// Snell's law in vector form. With the normal n directed against the light, c = -n.d, and mu = n1/n2 (index before over
+// index behind the face):
 //   r = mu d + (mu c - sqrt(1 - mu^2 (1 - c^2))) n
-// None where the root is imaginary: total internal reflection.
+// `direction` and `normal` are unit vectors; the normal may point to either side. Empty in the case of total internal
+// reflection, where the root is imaginary.
 inline std::optional<Eigen::Vector3d> refract(const Eigen::Vector3d& direction, const Eigen::Vector3d& normal,
                                               double index_ratio) {
     const double along = normal.dot(direction);

@@ -1,4 +1,5 @@
-// What the machine is told to do: the lines measured through a volume, in single-axis steps.
+// Measurement plan: the lines through the measured volume, and the single-axis steps along them. Lengths in mm, machine
+// frame with its origin at home, the corner of the volume where all axis positions are 0.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,16 +12,17 @@
 
 namespace stepdiag {
 
-// One point of a line. Axis nodes are counted from home: node k of an axis stands at k * travel / steps.
+// One point of a line. Nodes of an axis are numbered from home: node k is at k * travel / steps.
 struct PlanPoint {
     int number;                 // on its line, from 0
     Eigen::Vector3d commanded;  // mm, machine frame
     std::array<int, 3> node;    // per axis
-    std::optional<Axis> moved;  // the axis that moved to get here; none for a line's first point
+    std::optional<Axis> moved;  // the axis that moved from the previous point; empty for the first point
 };
 
-// The mirror must hold the beam wherever a step takes it: the mirror rides on the tool, the beam stays, so that the
-// beam wanders over the mirror by the lateral part of the travel, in local x and y of the line, mm.
+// Range of the beam's position on the mirror, in local x and y of the line, mm. The mirror moves with the tool and the
+// beam is fixed, so the beam moves over the mirror by the lateral part of the travel. The mirror must be at least this
+// large.
 struct LateralExcursion {
     Eigen::Vector2d lowest;
     Eigen::Vector2d highest;
@@ -31,15 +33,16 @@ using StepOrder = std::array<Axis, 3>;
 
 class Plan {
 public:
-    // A thousand steps an axis are far beyond any run; the covariance of an evaluation costs their square.
+    // Limits the cost of an evaluation's covariance, which grows with the square of the steps. A thousand steps per
+    // axis already exceed any practical run.
     static constexpr int largest_step_count = 2'000;
 
-    // `volume`: edges X, Y, Z, mm. Scale lines are single-axis lines of two points. Throws InvalidArgument for an empty
-    // or doubled line, a volume without extent, steps outside 1 .. largest_step_count, a scale line that moves more
-    // than one axis, no order.
+    // `volume`: edges X, Y, Z, mm. Scale lines are single-axis lines of two points. Throws InvalidArgument if there is
+    // no line, a line is given twice, an edge is outside 0.001 to 1e6 mm, `steps` is outside 1 to largest_step_count,
+    // a scale line moves more than one axis, or there is no order.
     Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, StepOrder order = all_axes,
          std::vector<Line> scale_lines = {});
-    // Run r goes in the order r modulo their number.
+    // Run r uses orders[r modulo the number of orders].
     Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::vector<StepOrder> orders,
          std::vector<Line> scale_lines = {});
 
@@ -56,13 +59,13 @@ public:
     std::vector<double> nodes(Axis axis) const;
     Eigen::Matrix3d frame(const Line& line) const { return line_frame(line, volume_); }
 
-    // The points of a line of this plan, from 0; 3N+1 on a body diagonal, 2N+1 on a face diagonal, N+1 on a single
-    // axis, 2 on a scale line.
+    // The points of a line in the order of travel. For N steps: 3N+1 on a body diagonal, 2N+1 on a face diagonal, N+1
+    // on a single-axis line, 2 on a scale line. Throws InvalidArgument for a line that is not in the plan.
     std::vector<PlanPoint> points(const Line& line, int run = 0) const;
 
-    LateralExcursion lateral_excursion(const Line& line) const;  // in any of the orders
-    // Width (local x) and height (local y) of the smallest mirror, centred on the functional point, for all lines, mm.
-    // A beam of finite diameter needs that much more.
+    LateralExcursion lateral_excursion(const Line& line) const;  // over all orders
+    // Width (local x) and height (local y) of the smallest mirror for all lines, mm, centred on the functional point.
+    // Add the diameter of the beam.
     Eigen::Vector2d smallest_mirror() const;
 
 private:
@@ -73,6 +76,7 @@ private:
     std::vector<Line> scale_lines_;
 };
 
-StepOrder parse_order(std::string_view text);  // "XYZ", "YZX", ...: a permutation
+// Accepts a permutation of "XYZ"; throws InvalidArgument for any other text.
+StepOrder parse_order(std::string_view text);
 
 }  // namespace stepdiag

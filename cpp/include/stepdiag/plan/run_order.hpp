@@ -1,4 +1,4 @@
-// The order in which a run is measured: the passes along its lines, forward and backward.
+// The order in which the passes of a measurement are made, forward and backward along each line.
 #pragma once
 
 #include <cstdint>
@@ -8,27 +8,27 @@
 
 namespace stepdiag {
 
-// A backward run passes a line's points in reverse order, with head and mirror as they are.
+// A backward run visits the points of a line in reverse order. Head and mirror stay as they are.
 enum class Direction { forward, backward };
-const char* name(Direction direction);  // as files write it
+const char* name(Direction direction);  // as in files
 
-// How the axes come to each point of a pass, its first included: in the direction of the pass's own travel, because a
-// measuring program overruns the start and comes back, so that backlash is taken up. An axis that the line does not
-// move stands at home, approached in + direction.
+// Direction from which each axis approaches the points of a pass, including the first point. It is the direction of
+// travel of the pass, because a measuring program overruns the start and returns to take up backlash. An axis that the
+// line does not move is at home, approached in + direction.
 Approaches approaches(const Line& line, Direction direction);
 
 // One pass along a line.
 struct PlannedPass {
-    std::size_t line_index;  // among the plan's lines, then its scale lines
+    std::size_t line_index;  // in the plan's lines followed by its scale lines
     Line line;
     int run;
     Direction direction;
-    std::uint64_t first_row;        // of the run, where this pass begins
-    std::uint64_t setup_row;        // where head and mirror were set up: the first row of the forward pass
-    std::vector<PlanPoint> points;  // in the order in which they are read: descending on a backward pass
+    std::uint64_t first_row;  // number of the first row of this pass in the measurement
+    std::uint64_t setup_row;  // number of the row where head and mirror were set up: first row of the forward pass
+    std::vector<PlanPoint> points;  // in the order of reading, which is reversed for a backward pass
 };
-// The plan's lines in their order, then its scale lines; of each line runs 0, 1, 2, ..., `repeats` of them; with
-// `backward` runs 0, 2, ... and after each its backward run 1, 3, ...
+// The passes of all lines in the order of the plan, then those of the scale lines. Each line has the runs 0, 1, ...,
+// repeats - 1. With `backward` the forward runs are 0, 2, ..., and each is followed by its backward run 1, 3, ...
 std::vector<PlannedPass> planned_passes(const Plan& plan, int repeats, bool backward);
 
 }  // namespace stepdiag

@@ -1,7 +1,7 @@
-// What is uncertain about a virtual calibration (JCGM 101: its input quantities). Two kinds:
-//  - an input is drawn once for each virtual calibration, as a deviation that is added to what is nominal;
+// Uncertain input quantities of a virtual calibration (JCGM 101). There are two kinds:
+//  - an input is drawn once for each virtual calibration, as a deviation that is added to the nominal value;
 //  - reading noise is drawn for every reading (or pose).
-// Signs and frames as those of the nominal quantity: Misalignment, PoseError, Environment (CONVENTIONS).
+// Signs and frames are those of the nominal quantities: Misalignment, PoseError, Environment (CONVENTIONS).
 #pragma once
 
 #include <string>
@@ -27,16 +27,16 @@ enum class InputQuantity {
     // of the head (`part`: a component of its design, by name; of all lines that have it)
     part_shift,     // mm, component x, y, z
     part_rotation,  // rad, component about x, y, z
-    psd_distance,   // mm, closed layout psd: the true one beside the nominal one
-    beam_offset,    // mm, closed layout multi_beam: component 2 i: u of beam i, 2 i + 1: v
-    reading_model,  // 1: distances read this times L phi^2 too much (0: chief ray; -1.5: a single-mode interferometer)
-    // of the air (true air beside the assumed one)
+    psd_distance,   // mm, layout psd without design: true minus nominal distance
+    beam_offset,    // mm, layout multi_beam without design: component 2 i is u of beam i, 2 i + 1 is v
+    reading_model,  // 1: this times L phi^2 is added to distances (0: chief ray; -1.5: single-mode interferometer)
+    // Air: true minus assumed state.
     temperature,       // degrees Celsius
     pressure,          // Pa
     humidity,          // 1
-    refractive_index,  // 1, relative: n is 1 + this times itself
-    wavelength,        // 1, relative: of the light, known to the counter as nominal
-    // of the machine
+    refractive_index,  // 1, relative: factor 1 + this on n
+    wavelength,        // 1, relative: true wavelength; the counter uses the nominal one
+    // Machine.
     machine_drift,  // mm/s, component x, y, z, of the functional point since the first reading of the run
 };
 
@@ -46,18 +46,18 @@ InputQuantity parse_input_quantity(const std::string& name);
 struct UncertainInput {
     InputQuantity quantity;
     Distribution distribution;
-    std::string line = {};  // of a set-up
-    std::string part = {};  // of a head
+    std::string line = {};  // for quantities of a set-up
+    std::string part = {};  // for quantities of a head
     int component = 0;
 };
-// "reflector a of ppp", "beam constant d1 of ppp", "shift x of splitter", "temperature", ...: what reports call it.
+// Name in reports: "reflector a of ppp", "beam constant d1 of ppp", "shift x of splitter", "temperature", ...
 std::string name(const UncertainInput& input);
 
 enum class NoiseQuantity {
-    channel,       // of the channel `channel`, each reading by itself
-    common,        // mm: one draw a reading, of all its distances
-    head_walk,     // mm/sqrt(s): random walk of the distances from a line's first reading
-    machine_walk,  // mm/sqrt(s): random walk of the functional point from the run's first reading; component x, y, z
+    channel,       // mm or rad: independent noise of each reading of the channel `channel`
+    common,        // mm: one draw for each row, added to all its distances
+    head_walk,     // mm/sqrt(s): random walk of the distances since a line's first reading
+    machine_walk,  // mm/sqrt(s): random walk of the functional point since the run's first reading; component x, y, z
     position,      // mm: repeatability of the functional point at every pose; component x, y, z
     orientation,   // rad: repeatability of the tool's orientation; component about x, y, z
 };
@@ -67,11 +67,11 @@ NoiseQuantity parse_noise_quantity(const std::string& name);
 
 struct ReadingNoise {
     NoiseQuantity quantity;
-    Distribution distribution;  // walks: normal
+    Distribution distribution;  // must be normal for walks
     std::string channel = {};   // "distance", "alpha", "d1", ...
     int component = 0;
 };
-// "noise of distance", "common noise", "head walk", "machine walk x", "position x", "orientation x".
+// Name in reports: "noise of distance", "common noise", "head walk", "machine walk x", "position x", "orientation x".
 std::string name(const ReadingNoise& noise);
 
 struct UncertainInputs {
@@ -80,9 +80,11 @@ struct UncertainInputs {
     std::vector<CorrelatedInputs> correlations = {};
 };
 
-// Throws InvalidArgument for an input given twice, a component, line or part that its quantity does not have, a
-// distribution that makes no sense, members that are out of range, not normal or in two correlations, a matrix that is
-// no correlation (size, symmetry, 1 on the diagonal, not positive semidefinite).
+// Throws InvalidArgument for:
+//   - an input given twice, or with a component, line or part that its quantity does not have
+//   - an invalid distribution (check(Distribution))
+//   - members of a correlation that are out of range, not normal, or in two correlations
+//   - a matrix that is not a correlation matrix (size, symmetry, 1 on the diagonal, positive semidefinite)
 void check(const UncertainInputs& inputs);
 
 }  // namespace stepdiag

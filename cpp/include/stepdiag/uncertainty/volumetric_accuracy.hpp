@@ -1,4 +1,5 @@
-// The uncertainty of the ranges over a volume, by draws from the joint normal distribution of a calibration's values.
+// Uncertainty of the ranges over a volume (volume_ranges.hpp), by the Monte Carlo method with draws from the joint
+// normal distribution of a calibration's values.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,8 +15,7 @@
 
 namespace stepdiag {
 
-// A model of the ranges for the Monte Carlo method: draws from the joint normal distribution of a calibration's values.
-// Outputs: those of range_names that nothing is missing for.
+// Model of the ranges for the Monte Carlo method. Outputs are the ranges of range_names without a missing parameter.
 class RangeModel : public SampleModel {
 public:
     // Throws InvalidArgument for a calibration without covariance.
@@ -24,7 +24,7 @@ public:
 
     const std::vector<Output>& outputs() const override;
     std::uint64_t seed() const override;
-    std::string target() const override;  // "scalar": one after the other
+    std::string target() const override;  // "scalar": no SIMD
     std::unique_ptr<Worker> worker() const override;
 
 private:
@@ -32,20 +32,21 @@ private:
     std::shared_ptr<const State> state_;
 };
 
-// A range is not linear in the values, and noise makes it larger: draws about the values found show by how much.
+// Ranges with their uncertainty. A range is not linear in the values, and noise increases it. The draws about the
+// values of the calibration show by how much.
 struct VolumetricAccuracy {
     Ranges value;                 // of the calibration's values
     Ranges mean;                  // of the draws
     Ranges standard_uncertainty;  // standard deviation of the draws
-    // Of the draws, probabilistically symmetric: a column with the lower and one with the upper ends. They are as much
-    // too large as the values are.
+    // Probabilistically symmetric coverage interval of the draws: lower and upper ends as columns. It has the same bias
+    // as the values.
     Eigen::Matrix<double, range_count, 2> drawn_interval;
-    // Mirrored about the value, 2 value - drawn_interval, which takes the bias off to first order; not below 0.
+    // Interval reflected about the value, 2 value - drawn_interval, which removes the bias to first order; not below 0.
     Eigen::Matrix<double, range_count, 2> interval;
-    // |V(found) - V(true)| <= V(found - true): with at least the coverage probability the true range is within
-    // value -+ this, the quantile of the range of noise alone.
+    // Quantile of the range of noise only. Because |V(found) - V(true)| <= V(found - true), the true range is within
+    // value +- bound with at least the coverage probability.
     Ranges bound;
-    double resolution;  // mm: see VolumeRanges
+    double resolution;  // mm; see VolumeRanges
     std::array<std::vector<std::string>, range_count> missing;
     std::size_t samples;
 
@@ -56,7 +57,7 @@ struct RangeOptions {
     std::size_t samples = 10'000;
     std::uint64_t seed = 0;
 };
-// Throws InvalidArgument for a calibration without covariance, a coverage probability outside 0 .. 1, fewer samples
+// Throws InvalidArgument for a calibration without covariance, a coverage probability outside (0, 1), or fewer samples
 // than 100/(1 - coverage).
 VolumetricAccuracy volumetric_accuracy(const Calibration& calibration, const std::optional<Eigen::Vector3d>& tool = {},
                                        const RangeOptions& options = {});

@@ -1,5 +1,6 @@
-// A number with its derivative by one parameter: (a + a' e)(b + b' e) = ab + (a'b + ab') e with e^2 = 0. Calculating
-// with such numbers gives exact derivatives (forward mode). Comparisons are those of the values.
+// Dual number: a value and its derivative with respect to one parameter, with
+// (a + a' e)(b + b' e) = ab + (a'b + ab') e and e^2 = 0. Calculations with dual numbers give exact derivatives
+// (forward-mode automatic differentiation). Comparisons use the values only.
 #pragma once
 
 #include <cmath>
@@ -23,6 +24,8 @@ inline Dual sqrt(Dual a) {
     const double root = std::sqrt(a.value);
     return {root, 0.5 * a.slope / root};
 }
+inline Dual sin(Dual a) { return {std::sin(a.value), std::cos(a.value) * a.slope}; }
+inline Dual cos(Dual a) { return {std::cos(a.value), -std::sin(a.value) * a.slope}; }
 inline Dual abs(Dual a) { return std::signbit(a.value) ? -a : a; }
 inline bool operator>(Dual a, Dual b) { return a.value > b.value; }
 inline bool operator<=(Dual a, Dual b) { return a.value <= b.value; }
