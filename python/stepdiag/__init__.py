@@ -7,8 +7,8 @@
     run = sd.simulate(machine, plan, sd.Head())
     calibration = sd.evaluate(run, plan, sd.Head(), machine.chain)
 
-Units are native throughout: length mm, angle rad, wavelength nm.
-Bad input raises InvalidArgument, a ValueError.
+Lengths are in mm, angles in rad, wavelengths in nm. Invalid arguments and files raise
+InvalidArgument, a ValueError.
 """
 
 from importlib import import_module
@@ -274,7 +274,7 @@ __all__ = [
     "write_measurement",
 ]
 
-# Imported on first use, since pydantic, xarray and others take their time: by module, as above for type checkers.
+# Imported on first use, because pydantic, xarray and others are slow. By module, as above.
 _LATER = {
     "acquisition.acquire": ("acquire",),
     "acquisition.options": ("AcquireOptions",),

@@ -271,7 +271,7 @@ class Measurement:
         ...
     def to_xarray(self) -> xarray.Dataset:
         """
-        The run as a labelled table.
+        The measurement as a labelled table (xarray.Dataset).
         """
     def write(self, path: str | os.PathLike[str]) -> None:
         """
@@ -951,7 +951,7 @@ class Calibration:
         """
     def to_xarray(self) -> xarray.Dataset:
         """
-        The calibration as a labelled table.
+        The calibration as a labelled table (xarray.Dataset).
         """
     def write(self, path: str | os.PathLike[str]) -> None:
         """

@@ -30,5 +30,5 @@ def units_of(parameter: str) -> str:
 
 
 def in_report_units(kind: Kind, value: float) -> float:
-    """mm to µm, rad to µrad."""
+    """Convert a value from native units (mm, rad) to those of reports (µm, µrad)."""
     return report_value(NATIVE_UNIT[kind], value)[0]

@@ -1,4 +1,4 @@
-"""What all figures have in common: their style, and files that have the same bytes run after run."""
+"""Common style of all figures, and files with the same bytes in every run."""
 
 import io
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ STYLE: Any = {
     "grid.color": "#e4e4e4",
     "grid.linewidth": 0.6,
     "legend.frameon": False,
-    "svg.hashsalt": "stepdiag",  # the same names inside the file, run after run
+    "svg.hashsalt": "stepdiag",  # same names inside the file in every run
 }
 
 # Metadata that would differ from run to run.
@@ -33,7 +33,7 @@ UNWANTED: Final = {"png": "Software", "svg": "Date"}
 
 @contextmanager
 def own_style() -> Iterator[None]:
-    """Our style, not the user's own, for what is drawn inside."""
+    """Use stepdiag's style instead of the user's for what is drawn inside the block."""
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(STYLE)
@@ -41,7 +41,7 @@ def own_style() -> Iterator[None]:
 
 
 def save(figure: Figure, suffix: str) -> bytes:
-    """The figure as the content of a file, "png" or "svg"."""
+    """The content of a file of this figure; `suffix` is "png" or "svg"."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format=suffix, dpi=160, metadata={UNWANTED[suffix]: None})
     return buffer.getvalue()

@@ -1,4 +1,4 @@
-"""Units: of keys and files in native ones (mm, rad, s, Pa, 1), and those of reports."""
+"""Units: native ones in keys and files (mm, rad, s, Pa, 1), and those of reports."""
 
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
@@ -49,11 +49,11 @@ def native(key: str, value: Any) -> Any:
     return value * unit_of(key).native if isinstance(value, int | float) else value
 
 
-# Native unit -> what reports show it in, and how many of these it is.
+# Native unit -> unit in reports, and the factor to it.
 REPORT_UNITS: Final[Mapping[str, tuple[str, float]]] = {"mm": ("µm", 1e3), "rad": ("µrad", MICRO), "1": ("", 1.0)}
 
 
 def report_value(unit: str, value: float) -> tuple[float, str]:
-    """A value in native units as reports show it, and its unit there: mm as µm, rad as µrad."""
+    """Convert from native units to those of reports (mm to µm, rad to µrad): value and unit."""
     name, factor = REPORT_UNITS.get(unit, (unit, 1.0))
     return value * factor, name

@@ -1,4 +1,4 @@
-// Touches what a static archive must bring along: Embree (optics) and libcsv (tables).
+// Uses the dependencies that a static archive must link: Embree (optics) and libcsv (tables).
 #include <cstdio>
 #include <cstring>
 #include <stepdiag/core/error.hpp>

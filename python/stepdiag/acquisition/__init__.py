@@ -1,1 +1,1 @@
-"""Readings from an instrument: when to read, what was read, and the simulated instrument."""
+"""Readings from an instrument: triggers, settling, raw files, and the simulated instrument."""

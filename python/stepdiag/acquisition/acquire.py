@@ -1,4 +1,4 @@
-"""Acquisition: a run's readings from the instrument to the disk, and from there to a measurement file."""
+"""Acquisition of a run: from the instrument to a raw file, then to a measurement file."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,12 +23,12 @@ from stepdiag.scenario.known import Known
 
 @dataclass(frozen=True)
 class Acquired:
-    """What there is when an acquisition ends."""
+    """The files and counts of a finished or interrupted acquisition."""
 
     raw: Path
     output: Path
     readings: int
-    lost: int  # of them, with a beam missing at least
+    lost: int  # readings with at least one missing beam
     planned: int
 
     @property
@@ -37,7 +37,7 @@ class Acquired:
 
 
 def raw_path(output: Path) -> Path:
-    """Where the raw file of an output stands, if nobody says otherwise: beside it, run.csv as run.raw.jsonl."""
+    """Default path of the raw file: beside the output, run.raw.jsonl for run.csv."""
     return output.with_suffix(".raw.jsonl")
 
 
@@ -52,12 +52,28 @@ def acquire(
     raw: Path | None = None,
     operator: Operator | None = None,
 ) -> Acquired:
-    """Takes the readings of a scenario's plan, when `trigger` wants them, from an instrument ("ids3010://HOST[:PORT]").
+    """Acquire the readings of a scenario's plan from an instrument and write the measurement.
 
-    Every value goes to the raw file first; `output` is made from it after every visit and at the end, whatever ends
-    it. `resume` goes on with a raw file: at the point where it stopped, or with its line or set-up once more. Raises
-    InvalidArgument, and InstrumentError where the instrument fails: what is read is kept, and can be resumed. Closes
-    the trigger."""
+    Every value goes to the raw file first. `output` is rewritten from it after every visit and at
+    the end, also when an error or an interruption ends the acquisition. Then the readings so far
+    are kept and the acquisition can be resumed. The trigger is closed in any case.
+
+    Args:
+        scenario: its `known` half is used; the head must have one channel for each axis read
+            (docs/acquisition.md).
+        source: address of the instrument, "ids3010://HOST[:PORT]".
+        output: measurement to write, CSV or netCDF (.nc).
+        trigger: decides when to read: KeyTrigger, SettleTrigger or TcpTrigger.
+        resume: continue a raw file: "point", where it stopped; "line" or "set-up", reading its last
+            line or set-up again. None: begin a new one.
+        raw: the raw file; None: `raw_path(output)`.
+        operator: receives messages and confirms; None: messages are dropped.
+
+    Raises:
+        InvalidArgument: an option, the head or a file does not suit, or a file exists that would be
+            lost.
+        InstrumentError: the instrument cannot be reached or fails.
+    """
     known, options = scenario.known, options or AcquireOptions()
     try:
         channels = channels_of(known)
@@ -87,7 +103,7 @@ def acquire(
                 work.go_on(content, resume or "point")
 
             def write() -> None:
-                # What the raw file holds, without reading it again after every visit.
+                # Same content as the raw file, without reading it again after every visit.
                 known = RawContent(path, header, tuple(work.done.values()), sound_bytes=0, torn_bytes=0)
                 run = measurement_of(known, zero=options.zero, uncertainties=options.uncertainties)
                 write_measurement(run, output)
@@ -110,10 +126,10 @@ def acquire(
 def _opened(
     path: Path, header: Header, resume: Resume | None, instrument: Ids3010
 ) -> Iterator[tuple[RawFile, RawContent | None]]:
-    """The raw file, begun or to go on with."""
+    """Open the raw file: a new one, or one to continue together with its content."""
     if resume is None:
         check_new(path)
-        instrument.describe()  # one that cannot be reached leaves no file behind
+        instrument.describe()  # before the file is made: an unreachable instrument leaves none
         with RawFile.create(path, header) as file:
             yield file, None
         return
@@ -121,5 +137,5 @@ def _opened(
     with file:
         for key, what in (("digest", "plan, head or channels"), ("axes", "axes"), ("sign", "sign")):
             if getattr(content.header, key) != getattr(header, key):
-                raise InvalidArgument(f"{path}: was begun with another {what}: a run is resumed as it was begun")
+                raise InvalidArgument(f"{path}: was begun with another {what}; resume it with the same")
         yield file, content

@@ -1,6 +1,6 @@
-"""A client of the attocube IDS3010, a displacement measuring interferometer of three axes: JSON-RPC 2.0 over TCP.
+"""Client of the attocube IDS3010, a three-axis displacement interferometer: JSON-RPC 2.0 over TCP.
 
-docs/acquisition.md says where the protocol was read, and what of it was not tried on an instrument.
+docs/acquisition.md names the sources of the protocol and what was not tried on an instrument.
 """
 
 import socket
@@ -20,31 +20,30 @@ AXES: Final = 3
 RUNNING: Final = "measurement running"
 IDLE: Final = "system idle"
 STARTING: Final = ("measurement starting", "measurement restarting")
-TWIN: Final = "stepdiag twin"  # what a twin calls itself, in its device type
-# Firmware up to 1.8 names its functions by the first, that of 1.9.1 by the second.
+TWIN: Final = "stepdiag twin"  # device type that a twin reports
+# Prefix of the functions' names: the first up to firmware 1.8, the second in 1.9.1.
 INTERFACES: Final = ("com.attocube.ids", "com.attocube.sen")
 LARGEST_POSITION: Final = 2**63  # pm
 
 
 class InstrumentError(OSError):
-    """The instrument cannot be reached, does not answer, answers nonsense, or reports an error."""
+    """The instrument cannot be reached, gives no valid answer, or reports an error."""
 
 
 class _Refused(InstrumentError):
-    """The instrument understood the request, and reports an error."""
+    """The instrument understood the request and reports an error."""
 
 
 @dataclass(frozen=True)
 class Sample:
-    """Positions read at one time, of the axes asked for: picometres, None where the beam is lost, and the warning
-    numbers of those."""
+    """Simultaneous positions of the requested axes, pm (None: beam lost), and warning numbers."""
 
     pm: tuple[int | None, ...]
     warnings: tuple[int, ...]
 
 
 def parse_source(source: str) -> tuple[str, int]:
-    """Host and port of "ids3010://HOST[:PORT]". Raises InvalidArgument."""
+    """Return host and port of "ids3010://HOST[:PORT]". Raises InvalidArgument."""
     expected = InvalidArgument(f"source: expected ids3010://HOST or ids3010://HOST:PORT, got {source!r}")
     try:
         parts = urlsplit(source)
@@ -59,8 +58,10 @@ def parse_source(source: str) -> tuple[str, int]:
 
 
 class Ids3010:
-    """One connection, made anew where it breaks. Every request ends within `timeout` seconds; what only asks is asked
-    up to `attempts` times. Raises InstrumentError."""
+    """A connection to an IDS3010. It reconnects after a failure.
+
+    Every request ends within `timeout` seconds. A request that changes nothing is tried up to
+    `attempts` times. Raises InstrumentError."""
 
     def __init__(self, host: str, port: int = PORT, *, timeout: float = 2.0, attempts: int = 3) -> None:
         self.name = f"ids3010://{host}:{port}"
@@ -82,17 +83,19 @@ class Ids3010:
         self.close()
 
     def close(self) -> None:
-        """Closes the connection; the next request makes another one."""
+        """Close the connection. The next request opens another one."""
         if self._socket is not None:
             self._socket.close()
         self._socket = None
         self._stream = JsonStream()
 
-    # --- what it measures ---
+    # --- measured values ---
 
     def read(self, axes: Sequence[int]) -> Sample:
-        """The absolute positions of these axes (from 0). A warning of all three together is looked into axis by axis:
-        a position with a warning of its own is lost."""
+        """Read the absolute positions of these axes (numbered from 0).
+
+        If the common request returns a warning, every axis is read by itself. A position with a
+        warning of its own is lost."""
         if len(axes) > 1:
             warning, *positions = self._positions("getAbsolutePositions", (), AXES)
             if warning == 0:
@@ -110,14 +113,14 @@ class Ids3010:
             )
         return [number for number in numbers if number is not None]
 
-    # --- its state ---
+    # --- state ---
 
     def mode(self) -> str:
-        """What it is doing: "system idle", "measurement starting", "measurement running", ..."""
+        """Return the mode: "system idle", "measurement starting", "measurement running", ..."""
         return self._word("system.getCurrentMode")
 
     def describe(self) -> dict[str, str]:
-        """Type, firmware and serial number, as far as it tells."""
+        """Return type, firmware and serial number, as far as the instrument reports them."""
         found = {}
         for key, method in (
             ("type", "system.getDeviceType"),
@@ -131,7 +134,9 @@ class Ids3010:
         return found | {"interface": self._interface or ""}
 
     def start(self, timeout: float) -> None:
-        """Starts its measurement, stopping one that runs: so its manual clears errors after a beam was interrupted."""
+        """Start the measurement, stopping a running one first.
+
+        According to the manual this clears the errors of an interrupted beam."""
         if self.mode() != IDLE:
             self.ask("system.stopMeasurement", attempts=1)
             self.wait_for(IDLE, timeout)
@@ -139,11 +144,11 @@ class Ids3010:
         self.wait_for(RUNNING, timeout)
 
     def error_text(self, number: int) -> str:
-        """What the instrument says that an error or warning number means."""
+        """Return the instrument's own text for an error or warning number."""
         if number not in self._texts:
             method = "com.attocube.system.errorNumberToString"
             try:
-                result = self._request(method, (0, number), self._attempts)  # ask() would come back here
+                result = self._request(method, (0, number), self._attempts)  # ask() calls this
             except InstrumentError:
                 return f"number {number}"
             words = [value for value in result if isinstance(value, str)]
@@ -153,13 +158,15 @@ class Ids3010:
         return f"number {number}: {self._texts[number]}"
 
     def wait_for(self, mode: str, timeout: float) -> None:
-        """Until it says that it does this."""
+        """Wait until the instrument reports this mode.
+
+        Raises InstrumentError after `timeout` seconds."""
         deadline = time.monotonic() + timeout
         while (now := self.mode()) != mode:
             if time.monotonic() > deadline:
                 error = _whole(self._request(self._full("system.getSystemError"), (), self._attempts)[0])
                 told = f"; it reports {self.error_text(error)}" if error else ""
-                raise InstrumentError(f"{self.name}: expected it to come to {mode!r}, it stays in {now!r}{told}")
+                raise InstrumentError(f"{self.name}: expected the mode {mode!r}, but it stays in {now!r}{told}")
             time.sleep(0.05)
 
     def _word(self, method: str, params: Sequence[int] = ()) -> str:
@@ -172,8 +179,10 @@ class Ids3010:
     # --- requests ---
 
     def ask(self, method: str, params: Sequence[Any] = (), *, attempts: int | None = None) -> list[Any]:
-        """The result of a function, named in full or without its interface. Positions come with a warning number in
-        front, which is left to the caller; of all others a number that is not 0 is an error."""
+        """Call a function, named in full or without its interface, and return its result.
+
+        A result begins with a number. For positions it is a warning, which the caller has to check.
+        For all other functions a number other than 0 is an error."""
         result = self._request(self._full(method), params, attempts or self._attempts)
         number = _whole(result[0])
         if number and not method.startswith("displacement."):
@@ -203,7 +212,7 @@ class Ids3010:
             except _Refused:
                 raise
             except (OSError, ValueError) as error:
-                self.close()  # what still comes belongs to the old request
+                self.close()  # a late answer would belong to the old request
                 if attempt + 1 == attempts:
                     if isinstance(error, InstrumentError):
                         raise
@@ -263,7 +272,7 @@ class Ids3010:
 
 
 def _whole(value: Any) -> int | None:
-    """A whole number: JSON may write it with a point."""
+    """The value as an integer if it is whole (JSON may write 3.0), else None."""
     if isinstance(value, float) and value.is_integer() and abs(value) <= 2.0**53:
         value = int(value)
     if isinstance(value, bool) or not isinstance(value, int) or abs(value) >= LARGEST_POSITION:

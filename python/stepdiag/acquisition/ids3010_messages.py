@@ -1,28 +1,31 @@
 """JSON objects on a stream, as the attocube IDS3010 and its clients send them.
 
-The instrument ends its replies with a line end; the manufacturer's Python client sends requests without one, his MATLAB
-client with one. An object ends itself, so that both are understood here.
+The instrument ends a reply with a newline. The manufacturer's Python client sends requests without
+one, the MATLAB client with one. JsonStream accepts both: an object is complete at its closing
+brace.
 """
 
 import json
 from typing import Any, Final
 
-LARGEST: Final = 2**16  # bytes of an object; those of the instrument have a few hundred
+LARGEST: Final = 2**16  # bytes of one object; the instrument's have a few hundred
 
 
 class JsonStream:
-    """Takes a stream apart into its objects."""
+    """Splits a stream of bytes into JSON objects."""
 
     def __init__(self) -> None:
         self._rest = b""
 
     def feed(self, data: bytes) -> list[dict[str, Any]]:
-        """The objects that are complete now. Raises ValueError, which shows the beginning, for what is none."""
+        """Return the objects that are now complete.
+
+        Raises ValueError with the beginning of invalid input."""
         self._rest = (self._rest + data).lstrip()
         objects = []
         while self._rest:
             line, end, rest = self._rest.partition(b"\n")
-            if not end and not line.rstrip().endswith(b"}"):  # it may go on
+            if not end and not line.rstrip().endswith(b"}"):  # the object may be incomplete
                 if not line.startswith(b"{") or len(line) > LARGEST:
                     raise ValueError(shown(line))
                 break
@@ -31,19 +34,19 @@ class JsonStream:
             except ValueError:
                 if end or len(line) > LARGEST or not line.startswith(b"{"):
                     raise ValueError(shown(line)) from None
-                break  # an inner object ends here, not the whole one
+                break  # this brace ends an inner object
             objects.append(content)
             self._rest = (line[used:] + end + rest).lstrip()
         return objects
 
 
 def encoded(content: dict[str, Any]) -> bytes:
-    """An object as one line of text, without a line end."""
+    """Encode an object as one line of text without its newline."""
     return json.dumps(content).encode()
 
 
 def shown(data: bytes) -> str:
-    """The beginning of what came, fit for a message."""
+    """The beginning of received bytes, shortened and escaped for a message."""
     return ascii(data[:60].decode("utf-8", errors="replace")) + ("..." if len(data) > 60 else "")
 
 

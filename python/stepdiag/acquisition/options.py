@@ -1,4 +1,4 @@
-"""How an acquisition reads: axes, settling, time limits."""
+"""Options of an acquisition: axes, settling, time limits."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -10,18 +10,18 @@ from stepdiag.acquisition.settling import Settling
 
 @dataclass(frozen=True)
 class AcquireOptions:
-    """How an acquisition reads. Times in seconds."""
+    """Options of an acquisition. Times are in seconds. Raises InvalidArgument naming the option."""
 
-    axes: tuple[int, ...] | None = None  # of the instrument, from 1, one for each channel; none: 1, 2, ...
-    sign: Literal[1, -1] = 1  # -1: its positions fall where the distance grows
+    axes: tuple[int, ...] | None = None  # instrument axis (from 1) of each channel; None: 1, 2, ...
+    sign: Literal[1, -1] = 1  # -1: positions decrease as the distance increases
     settling: Settling = field(default_factory=Settling)
     zero: Zero = "none"
     uncertainties: bool = False
-    start: Literal["auto", "never"] = "auto"  # the instrument's measurement, at every set-up
+    start: Literal["auto", "never"] = "auto"  # whether to restart its measurement at a set-up
     start_timeout: float = 90.0
-    timeout: float = 2.0  # of one request
-    attempts: int = 3  # of a request that only asks
-    wait_timeout: float = 3600.0  # for a reading to be wanted
+    timeout: float = 2.0  # answer to one request
+    attempts: int = 3  # tries of a request that changes nothing
+    wait_timeout: float = 3600.0  # until the trigger wants the next reading
 
     def __post_init__(self) -> None:
         if self.sign not in (1, -1):

@@ -1,7 +1,7 @@
-"""The raw file of an acquisition: JSON lines, only ever appended to, on the disk before the next reading begins.
+"""The raw file of an acquisition: JSON lines, append-only, synced to disk before the next reading.
 
-The first line is the header; then every value that the instrument gave, after those of a point what became of them, and
-where an acquisition began or was taken up again (raw_records.py).
+The first line is the header. Then follow all values of the instrument, after the values of a point
+its reading, and the places where an acquisition began or was resumed (raw_records.py).
 """
 
 import fcntl
@@ -19,7 +19,7 @@ from stepdiag.io.whole_files import check_output, read_bytes, reason, sync_folde
 
 @dataclass(frozen=True)
 class RawContent:
-    """What a raw file holds. `sound_bytes`: its length without a last line that was torn, of `torn_bytes`."""
+    """Content of a raw file. `sound_bytes`: length without a torn last line of `torn_bytes`."""
 
     path: Path
     header: Header
@@ -28,7 +28,7 @@ class RawContent:
     torn_bytes: int
 
     def readings(self) -> dict[tuple[int, int], RawReading]:
-        """The readings by (visit, point), in the order in which they were taken, without those that were repeated."""
+        """The last reading by (visit, point), in the order of acquisition."""
         found: dict[tuple[int, int], RawReading] = {}
         for record in self.records:
             if isinstance(record, Again):
@@ -40,19 +40,19 @@ class RawContent:
 
     @property
     def planned(self) -> int:
-        """How many readings the plan has."""
+        """Number of readings in the plan."""
         return sum(len(visit.points) for visit in self.header.plan)
 
     @property
     def torn(self) -> str | None:
-        """What there is to say of its end."""
+        """A message about the torn last line; None if there is none."""
         if not self.torn_bytes:
             return None
         return f"{self.path}: the last line was torn ({self.torn_bytes} bytes without an end) and is left out"
 
 
 class RawFile:
-    """A raw file that is being written. Nobody else writes it at the same time."""
+    """A raw file open for writing, locked against other processes."""
 
     def __init__(self, path: Path, handle: int) -> None:
         self.path = path
@@ -60,7 +60,7 @@ class RawFile:
 
     @classmethod
     def create(cls, path: Path, header: Header) -> Self:
-        """A new file. Raises InvalidArgument for one that exists."""
+        """Create a file. Raises InvalidArgument if it exists."""
         check_new(path)
         try:
             handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | os.O_CLOEXEC, 0o666)
@@ -74,11 +74,13 @@ class RawFile:
 
     @classmethod
     def resume(cls, path: Path) -> tuple[Self, RawContent]:
-        """The file to go on with, and what it holds; a torn last line is cut off."""
+        """Open a file to continue it, cutting off a torn last line.
+
+        Returns the file and its content."""
         try:
             handle = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CLOEXEC)
         except OSError as error:
-            raise InvalidArgument(f"{path}: cannot go on with it: {reason(error)}") from None
+            raise InvalidArgument(f"{path}: cannot be continued: {reason(error)}") from None
         file = cls(path, handle)
         file._lock()
         try:
@@ -92,7 +94,7 @@ class RawFile:
         return file, content
 
     def append(self, records: Iterable[Record]) -> None:
-        """Writes records, and returns when they are on the disk."""
+        """Write records. When this returns they are on the disk."""
         data = b"".join(record.model_dump_json().encode() + b"\n" for record in records)
         before = os.fstat(self._handle).st_size
         try:
@@ -100,7 +102,7 @@ class RawFile:
                 data = data[os.write(self._handle, data) :]
             os.fsync(self._handle)
         except OSError as error:
-            os.ftruncate(self._handle, before)  # a disk that is full leaves no half of a line
+            os.ftruncate(self._handle, before)  # a full disk must not leave half a line
             raise InvalidArgument(f"{self.path}: cannot be written: {reason(error)}") from None
 
     def close(self) -> None:
@@ -123,17 +125,20 @@ class RawFile:
 
 
 def check_new(path: Path) -> None:
-    """Raises InvalidArgument where `path` cannot become a raw file: nothing is ever written over one."""
+    """Raise InvalidArgument if a raw file cannot be created at `path`.
+
+    Existing files are never replaced."""
     check_output(path)
     if path.exists() or path.is_symlink():
         raise InvalidArgument(
-            f"{path}: exists already: `resume` goes on with it, another `output` (or `raw`) begins a new one"
+            f"{path}: exists already: `resume` continues it, another `output` (or `raw`) begins a new one"
         )
 
 
 def read_raw(path: Path) -> RawContent:
-    """Reads a raw file. A last line without its end is left out: so a power cut leaves it. Raises InvalidArgument for
-    any other line that is not sound."""
+    """Read a raw file, ignoring a last line that a power cut has torn.
+
+    Raises InvalidArgument naming the file and line for any other invalid line."""
     data = read_bytes(path)
     sound = data.rfind(b"\n") + 1
     lines = data[:sound].split(b"\n")[:-1]

@@ -1,4 +1,4 @@
-"""The records of a raw file, one a line: what was acquired, as it came."""
+"""The records of a raw file, one per line."""
 
 from typing import Annotated, Literal, Self
 
@@ -14,7 +14,7 @@ Direction = Literal["forward", "backward"]
 
 
 class Visited(Section):
-    """A visit of the plan. `nominal_mm`: what an ideal head would read there with a machine without errors."""
+    """A visit of the plan. `nominal_mm`: readings of an ideal head on a machine without errors."""
 
     visit: Count
     set_up: Count
@@ -34,22 +34,22 @@ class Visited(Section):
 
 
 class Header(Section):
-    """The first record: all that a measurement file is made with."""
+    """The first record: everything that is needed to make a measurement file."""
 
     record: Literal["header"] = "header"
     format: Literal["stepdiag raw readings"] = "stepdiag raw readings"
     version: Literal[1] = 1
     created: AwareDatetime
     scenario: str
-    digest: str  # of channels and plan
+    digest: str  # of channels and plan, see digest_of
     channels: Annotated[list[str], Field(min_length=1)]
-    axes: list[Count]  # of the instrument, from 1, one for each channel
-    sign: Literal[1, -1]  # -1: its positions fall where the distance grows
+    axes: list[Count]  # instrument axis (from 1) of each channel
+    sign: Literal[1, -1]  # -1: positions decrease as the distance increases
     plan: list[Visited]
 
 
 class Session(Section):
-    """Where an acquisition began or was taken up again, with what."""
+    """The beginning of an acquisition, or of its continuation."""
 
     record: Literal["session"] = "session"
     time: AwareDatetime
@@ -62,7 +62,7 @@ class Session(Section):
 
 
 class Again(Section):
-    """What was read of this visit and of later ones is read once more."""
+    """Marks that this visit and all later ones are read again."""
 
     record: Literal["again"] = "again"
     time: AwareDatetime
@@ -70,7 +70,7 @@ class Again(Section):
 
 
 class Point(Section):
-    """At which point of the plan."""
+    """A point of the plan."""
 
     visit: Count
     line: str
@@ -81,7 +81,7 @@ class Point(Section):
 
 
 class Value(Point):
-    """One value of every axis as the instrument gave it; null where the beam was missing."""
+    """One value of every axis; null where the beam was missing."""
 
     record: Literal["value"] = "value"
     time: AwareDatetime
@@ -90,8 +90,10 @@ class Value(Point):
 
 
 class RawReading(Point):
-    """What became of the values of a point: means, standard deviations of one value, how many were averaged, and why
-    channels were lost."""
+    """The reading of a point.
+
+    Means, standard deviations of a single value, number of averaged values, and reasons for lost
+    channels."""
 
     record: Literal["reading"] = "reading"
     time: AwareDatetime
@@ -102,7 +104,7 @@ class RawReading(Point):
 
     @property
     def is_lost(self) -> bool:
-        """Whether a beam is missing at least."""
+        """Whether at least one beam is missing."""
         return any(pm is None for pm in self.pm)
 
 
@@ -111,7 +113,7 @@ _RECORD: TypeAdapter[Record] = TypeAdapter(Record)
 
 
 def parse_record(line: bytes, place: str) -> Record:
-    """The record of a line. Raises InvalidArgument, with `place` in front."""
+    """Parse a line. Raises InvalidArgument beginning with `place`."""
     try:
         return _RECORD.validate_json(line)
     except ValidationError as error:

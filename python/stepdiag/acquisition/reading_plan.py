@@ -1,4 +1,4 @@
-"""What an acquisition is to read: the channels of the scenario's head, its visits, and where head and mirror stand."""
+"""What an acquisition reads: channels of the head, visits, and positions of head and mirror."""
 
 import hashlib
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from stepdiag.scenario.order_of_run import Visit, visits_of
 
 
 def channels_of(known: Known) -> list[str]:
-    """The channels that the instrument's axes fill. Raises InvalidArgument for a head that it cannot be."""
+    """Channels filled by the instrument's axes. Raises InvalidArgument for an unsuitable head."""
     head = known.head
     if head.layout == "multi_beam":
         if len(head.signals) != AXES:
@@ -23,7 +23,7 @@ def channels_of(known: Known) -> list[str]:
             )
         return list(head.signals)
     if head.layout == "ideal":
-        return ["distance"]  # which conventional evaluation takes alone
+        return ["distance"]  # the conventional evaluation needs no other channel
     raise InvalidArgument(
         f'{known.path}: head: the layout "{head.layout}" cannot be read: the IDS3010 gives distances and no spot; '
         f'expected "multi_beam" with {AXES} beams, or "ideal" of which one axis reads the distance'
@@ -31,7 +31,7 @@ def channels_of(known: Known) -> list[str]:
 
 
 def check_axes(axes: Sequence[int], channels: Sequence[str]) -> None:
-    """Raises InvalidArgument where the instrument's axes (from 1) are not one for each channel."""
+    """Raise InvalidArgument unless there is one instrument axis (from 1) for each channel."""
     good = len(set(axes)) == len(axes) == len(channels) and all(1 <= axis <= AXES for axis in axes)
     if not good:
         raise InvalidArgument(
@@ -41,14 +41,14 @@ def check_axes(axes: Sequence[int], channels: Sequence[str]) -> None:
 
 
 def nominal_distances(known: Known, visit: Visit) -> list[float]:
-    """What an ideal head would read along a visit with a machine without errors, mm."""
+    """Readings in mm of an ideal head along a visit, on a machine without errors."""
     start = known.plan.points(visit.line, visit.run)[0]
     along = known.plan.frame(visit.line)[:, 2]
     return [float(d) for d in known.heads[visit.line].standoff + (visit.positions - start) @ along]
 
 
 def described_plan(known: Known) -> list[Visited]:
-    """The visits as a raw file keeps them."""
+    """The visits as records of a raw file."""
     return [
         Visited(
             visit=visit.number,
@@ -66,13 +66,13 @@ def described_plan(known: Known) -> list[Visited]:
 
 
 def digest_of(channels: Sequence[str], plan: Sequence[Visited]) -> str:
-    """Of all that must be the same for an acquisition to be taken up again."""
+    """Digest of everything that must be unchanged for an acquisition to be resumed."""
     text = ",".join(channels) + "".join(visit.model_dump_json() for visit in plan)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def placement(known: Known, visit: Visit) -> str:
-    """Where head and mirror go for a visit's line, in words, in the machine frame."""
+    """Text with the positions of head and mirror for a visit's line, in the machine frame."""
     first = known.plan.points(visit.line, visit.run)[0] + np.array(known.tool)
     along = known.plan.frame(visit.line)[:, 2]
     origin = first - known.heads[visit.line].standoff * along

@@ -1,4 +1,4 @@
-"""From a raw file to the measurement that is evaluated. Nothing but the raw file is needed."""
+"""From a raw file to a measurement. The raw file contains all that is needed."""
 
 import math
 from pathlib import Path
@@ -12,23 +12,29 @@ from stepdiag.acquisition.raw_records import RawReading, Visited
 from stepdiag.config.toml_text import located
 from stepdiag.io.data_files import write_measurement
 
-PICOMETRES = 10**9  # in a millimetre
+PICOMETRES = 10**9  # per mm
 
 Zero = Literal["none", "first"]
-Row = tuple[Visited, int, RawReading]  # a visit of the plan, the place of the point in it, the reading
+Row = tuple[Visited, int, RawReading]  # visit, index of the point in it, reading
 
 
 def write_run(raw: Path, output: Path, *, zero: Zero = "none", uncertainties: bool = False) -> None:
-    """The measurement file of a raw file, whole or not at all."""
+    """Write the measurement of a raw file, complete or not at all."""
     write_measurement(measurement_of(read_raw(raw), zero=zero, uncertainties=uncertainties), output)
 
 
 def measurement_of(content: RawContent, *, zero: Zero = "none", uncertainties: bool = False) -> Measurement:
-    """The readings in the plan's order. A lost one is NaN, a point that was not read has no row.
+    """The readings in the plan's order. A lost reading is NaN; a point not yet read has no row.
 
-    zero "first": of every set-up and beam a constant is taken off, so that its first reading is the nominal distance
-    there. `uncertainties`: standard deviations of the means, beside the readings. Raises InvalidArgument where there
-    is no reading, or one that is not in the plan of the header."""
+    Args:
+        zero: "first": subtract a constant for each set-up and beam, such that its first reading is
+            the nominal distance there.
+        uncertainties: add the standard deviations of the means.
+
+    Raises:
+        InvalidArgument: there is no reading, or a reading does not belong to the plan of the
+            header.
+    """
     header, readings = content.header, content.readings()
     rows = _rows(content, readings)
     constants = _constants(rows, header.sign, len(header.channels)) if zero == "first" else {}
@@ -38,7 +44,7 @@ def measurement_of(content: RawContent, *, zero: Zero = "none", uncertainties: b
         for i, name in enumerate(header.channels):
             pm, deviation = reading.pm[i], reading.sd_pm[i]
             if pm is not None:
-                # One division, which rounds once: the number nearest to the picometres.
+                # A single division rounds once: the double nearest to the picometres.
                 values[name][row] = (header.sign * pm - constants.get((visit.set_up, i), 0)) / PICOMETRES
             if deviation is not None and deviation > 0.0 and reading.values > 0:
                 deviations[name][row] = deviation / math.sqrt(reading.values) / PICOMETRES
@@ -74,7 +80,7 @@ def _rows(content: RawContent, readings: dict[tuple[int, int], RawReading]) -> l
 
 
 def _constants(rows: list[Row], sign: int, channels: int) -> dict[tuple[int, int], int]:
-    """By set-up and channel, pm: what its first reading is too long."""
+    """By set-up and channel: first reading minus nominal distance, pm."""
     constants: dict[tuple[int, int], int] = {}
     for visit, index, reading in rows:
         for i in range(channels):

@@ -1,4 +1,4 @@
-"""Reading when the mirror has come to rest at the next point: for programs that only wait at each point."""
+"""A trigger for programs that only dwell: reads when the mirror comes to rest at the next point."""
 
 import time
 from collections import deque
@@ -10,30 +10,34 @@ from stepdiag.acquisition.settling import Reading, Settling
 from stepdiag.acquisition.triggers import Context, Stopped, of_start, point_text
 from stepdiag.scenario.order_of_run import Visit
 
-# mm. A rest counts as the next point within this share of the plan's shortest step, as the last one within BACK after
-# the mirror was more than AWAY from it. A shorter step than SMALLEST is none that a distance could tell.
+# mm. A rest is the next point if it is within this share of the plan's shortest step of it. It is
+# the last point if it is within BACK of it and the mirror was more than AWAY from it meanwhile. The
+# distance cannot resolve steps below SMALLEST.
 STEP_SHARE: Final = 0.25
 AWAY: Final = 0.1
 BACK: Final = 0.05
 SMALLEST: Final = 0.01
 PICOMETRE: Final = 1e-9  # mm
 
-Row = tuple[int | None, ...]  # pm of every axis
+Row = tuple[int | None, ...]  # position of every axis, pm
 
 
 class SettleTrigger:
-    """The first reading of every set-up is the operator's. Then a mirror that comes to rest a step further is at the
-    next point; one that leaves the last point and comes back to it, as programs do to take up backlash, is read there
-    once more. A visit that begins where the one before it ended begins at once."""
+    """Reads when the mirror comes to rest at the next point, judged by the change of the distance.
+
+    The operator starts the first reading of every set-up. After that a mirror at rest one step
+    further is at the next point. A mirror that left the last point and is at rest there again
+    (programs do so to take up backlash) is read there once more. A visit that begins at the last
+    point of the visit before is read there at once."""
 
     def __init__(self) -> None:
         self._context: Context | None = None
         self._set_up = 0
-        self._last: Row | None = None  # of the last point that was read, in this set-up
+        self._last: Row | None = None  # the last point read in this set-up
         self._is_asked = False  # the operator has just asked for a reading
         self._last_nominal = 0.0
-        self._nominal = 0.0  # of the point that is being read
-        self._rest: Row | None = None  # where the mirror was found at rest; an operator may ask before
+        self._nominal = 0.0  # distance at the point being read
+        self._rest: Row | None = None  # rest position; None if the operator asked before the rest
         self._told = float("-inf")
 
     def start(self, context: Context) -> None:
@@ -49,7 +53,7 @@ class SettleTrigger:
 
     def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
         self._rest = None
-        if self._last is None and not self._is_asked:  # nothing tells the next rest from the point before
+        if self._last is None and not self._is_asked:  # no reading to start from
             of_start(self._context).operator.confirm(f"the last reading was lost: read {point_text(visit, index)}")
         self._is_asked = False
         is_next = self._last is None or self._await(self._last, visit, index, nominal)
@@ -61,7 +65,7 @@ class SettleTrigger:
         if abs(step) < SMALLEST:
             if index > 0:
                 operator = of_start(self._context).operator
-                operator.confirm(f"the distance does not change to it: read {point_text(visit, index)}")
+                operator.confirm(f"the distance does not change in this step: read {point_text(visit, index)}")
             else:
                 self._rest = last
             return True
@@ -76,7 +80,7 @@ class SettleTrigger:
             window.append(context.read().pm)
             moved = _change(window[-1], last, context.sign)
             if moved is None:
-                self._complain("no beam: where the mirror rests cannot be told")
+                self._complain("no beam: cannot tell where the mirror rests")
                 window.clear()
             elif at_rest(window, context.settling):
                 self._rest = window[-1]
@@ -91,23 +95,23 @@ class SettleTrigger:
                     )
             was_away = was_away or (moved is not None and abs(moved) > AWAY)
             time.sleep(max(context.settling.interval, 0.001))
-        raise Stopped(f"{point_text(visit, index)}: the mirror did not come there in {context.wait_timeout:g} s")
+        raise Stopped(f"{point_text(visit, index)}: the mirror did not arrive within {context.wait_timeout:g} s")
 
     def _complain(self, text: str) -> None:
-        """Not more often than every five seconds: it is asked many times a second."""
+        """Tell the operator, at most every five seconds: the caller polls many times per second."""
         if time.monotonic() - self._told > 5.0:
             self._told = time.monotonic()
             of_start(self._context).operator.tell(text)
 
     def doubt(self, reading: Reading) -> str | None:
-        """A program that does not wait long enough is at the next point before this one is read."""
+        """Report a mirror that moved on before its reading was complete (dwell too short)."""
         moved = None if self._rest is None else _change(tuple(reading.mean_pm), self._rest, 1)
         if moved is None or abs(moved) <= BACK:
             return None
         return f"the mirror moved on by {abs(moved):.4f} mm while it was read"
 
     def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
-        if any(value is not None for value in pm):  # else the next rest is told from the point before
+        if any(value is not None for value in pm):  # else the step starts earlier
             self._last, self._last_nominal = tuple(pm), self._nominal
 
     def failed(self, why: str) -> None:
@@ -118,7 +122,7 @@ class SettleTrigger:
 
 
 def at_rest(window: Sequence[Row], settling: Settling) -> bool:
-    """Whether these values agree, on every axis that has a beam in all of them."""
+    """Whether the values agree on every axis that has a beam in all of them."""
     if len(window) < settling.count:
         return False
     columns = [[pm for pm in column if pm is not None] for column in zip(*window, strict=True)]
@@ -127,12 +131,12 @@ def at_rest(window: Sequence[Row], settling: Settling) -> bool:
 
 
 def _change(row: Row, last: Row, sign: int) -> float | None:
-    """By how much the distance is longer than at the last reading, mm: the mean of the beams that both have."""
+    """Change of the distance since the last reading, mm: mean over the beams present in both."""
     changes = [now - then for now, then in zip(row, last, strict=True) if now is not None and then is not None]
     return sign * sum(changes) / len(changes) * PICOMETRE if changes else None
 
 
 def _shortest(nominal: Sequence[float], step: float) -> float:
-    """The shortest step of a visit that a distance can tell, or this one."""
+    """The shortest step of a visit that the distance can resolve, or `step` if there is none."""
     steps = [abs(b - a) for a, b in pairwise(nominal)]
     return min([abs(step), *(length for length in steps if length >= SMALLEST)])

@@ -17,15 +17,18 @@ PICOMETRES_PER_MICROMETRE = 1_000_000
 
 @dataclass(frozen=True)
 class Settling:
-    """When values count as settled, and what is averaged then."""
+    """When values count as settled, and how many are averaged.
 
-    count: int = 5  # values in a row that agree
-    limit_um: float = 0.5  # largest minus smallest of them, on every axis; of the averaged ones to their mean
-    timeout: float = 20.0  # s, after which the reading is lost
-    average: int = 10  # values
+    Raises InvalidArgument naming the field."""
+
+    count: int = 5  # consecutive values that must agree
+    # Largest range of these on every axis, and largest distance of averaged values from their mean.
+    limit_um: float = 0.5
+    timeout: float = 20.0  # s; after that the reading is lost
+    average: int = 10  # number of values
     interval: float = 0.01  # s between two values
-    retries: int = 5  # values without a beam in a row, after which that beam is lost
-    retry_wait: float = 0.1  # s between those
+    retries: int = 5  # consecutive values without a beam before the beam counts as lost
+    retry_wait: float = 0.1  # s between these
 
     def __post_init__(self) -> None:
         for name, value, lowest in (
@@ -55,7 +58,7 @@ ValueKind = Literal["settling", "average", "lost"]
 
 @dataclass(frozen=True)
 class TakenValue:
-    """One value of every axis, as the instrument gave it."""
+    """One value of every axis."""
 
     time: datetime
     kind: ValueKind
@@ -64,11 +67,13 @@ class TakenValue:
 
 @dataclass
 class Reading:
-    """What was read at a point: every value, their mean and standard deviation (None where lost), and why it was."""
+    """All values taken at a point, and why axes are lost.
+
+    Mean and standard deviation are None there."""
 
     axes: int
     values: list[TakenValue] = field(default_factory=list)
-    lost: dict[int, str] = field(default_factory=dict)  # by place of the axis
+    lost: dict[int, str] = field(default_factory=dict)  # reason by index of the axis
 
     @property
     def averaged(self) -> list[tuple[int | None, ...]]:
@@ -76,13 +81,13 @@ class Reading:
 
     @property
     def mean_pm(self) -> list[int | None]:
-        """The means, rounded to the picometre."""
+        """The means, rounded to 1 pm."""
         averaged = self.averaged
         return [None if i in self.lost else _mean(_column(averaged, i)) for i in range(self.axes)]
 
     @property
     def deviation_pm(self) -> list[float | None]:
-        """Standard deviations of one value; None where there are fewer than two."""
+        """Standard deviations of a single value; None for fewer than two values."""
         averaged = self.averaged
         if len(averaged) < 2:
             return [None] * self.axes
@@ -90,9 +95,10 @@ class Reading:
 
 
 def take_reading(read: Callable[[], Sample], axes: int, options: Settling, told: Callable[[int], str] = str) -> Reading:
-    """Reads until the values of every axis settle, then averages. An axis without a beam is given up after
-    `retries` values in a row, the others are read on; values that never settle are lost. `told` says in words what
-    a warning number means."""
+    """Read until the values of every axis settle, then average.
+
+    An axis without a beam is given up after `retries` values in a row; the others are read on.
+    Values that do not settle in time are lost. `told` returns the text of a warning number."""
     return _Taking(axes, options, told).take(read)
 
 
@@ -104,7 +110,7 @@ class _Taking:
         self._live = set(range(axes))
         self._misses = [0] * axes
         self._window: deque[tuple[int | None, ...]] = deque(maxlen=options.count)
-        self._centre: dict[int, float] | None = None  # of the settled window, while averaging
+        self._centre: dict[int, float] | None = None  # mean of the settled window, while averaging
         self._averaged = 0
 
     def take(self, read: Callable[[], Sample]) -> Reading:
@@ -121,7 +127,7 @@ class _Taking:
         return self._reading
 
     def _add(self, sample: Sample) -> bool:
-        """Takes a value; False where a beam is missing."""
+        """Add a value. Returns False if a beam is missing."""
         missing = [i for i in self._live if sample.pm[i] is None]
         for i in self._live:
             self._misses[i] = self._misses[i] + 1 if i in missing else 0
@@ -149,7 +155,7 @@ class _Taking:
         self._reading.values.append(TakenValue(datetime.now(UTC), kind, sample.pm))
 
     def _start_again(self) -> None:
-        """What was averaged so far was not at rest."""
+        """Discard the average: the mirror was not at rest."""
         values = self._reading.values
         values[:] = [TakenValue(v.time, "settling" if v.kind == "average" else v.kind, v.pm) for v in values]
         self._window.clear()

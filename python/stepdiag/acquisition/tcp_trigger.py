@@ -1,4 +1,4 @@
-"""Reading when a controller asks, over a socket."""
+"""A trigger for controllers that request a reading over a socket."""
 
 import selectors
 import socket
@@ -14,11 +14,14 @@ from stepdiag.scenario.order_of_run import Visit
 
 
 class TcpTrigger:
-    """A controller asks, by lines of text: READ <visit> <point> is answered by DONE <visit> <point> when the reading is
-    on the disk, or by FAIL <reason>. The last point may be asked for once more, by a controller that had no answer: it
-    stands there, and is read again."""
+    """A socket on which a controller requests readings by lines of text.
 
-    LONGEST: Final = 256  # bytes of a line
+    READ <visit> <point> is answered by DONE <visit> <point> when the reading is on the disk, or by
+    FAIL <reason>. A controller that received no answer may request the last point once more; it is
+    still there, so the point is read again. Raises InvalidArgument if it cannot listen; port 0 is
+    any free port, see `address`."""
+
+    LONGEST: Final = 256  # bytes per line
 
     def __init__(self, host: str = "127.0.0.1", port: int = 0) -> None:
         try:
@@ -55,9 +58,9 @@ class TcpTrigger:
                 self._asking, self._wanted = client, wanted
                 return wanted == expected
             wrong = _expectation(expected, line)
-            context.operator.tell(f"the controller asked in vain: {wrong}")
+            context.operator.tell(f"refused a request of the controller: {wrong}")
             self._answer(client, f"FAIL {wrong}")
-        raise Stopped(f"{point_text(visit, index)}: nobody asked for it in {context.wait_timeout:g} s")
+        raise Stopped(f"{point_text(visit, index)}: no request within {context.wait_timeout:g} s")
 
     def doubt(self, reading: Reading) -> str | None:
         return None  # a controller waits for its answer
@@ -79,7 +82,7 @@ class TcpTrigger:
         self._server.close()
 
     def _next_line(self, timeout: float) -> tuple[socket.socket, bytes] | None:
-        """A whole line and who sent it, waiting for one if there is none. Clients take turns."""
+        """Return a complete line and its sender, waiting up to `timeout` s. Clients take turns."""
         ready = any(b"\n" in rest for rest in self._clients.values())
         for key, _ in self._selector.select(0.0 if ready else timeout):
             if key.fileobj is self._server:
@@ -90,7 +93,7 @@ class TcpTrigger:
             line, end, rest = text.partition(b"\n")
             if end:
                 del self._clients[client]
-                self._clients[client] = rest  # at the end of the row
+                self._clients[client] = rest  # moves the client to the end of the queue
                 return client, line
         return None
 
@@ -99,7 +102,7 @@ class TcpTrigger:
             client, _ = self._server.accept()
         except OSError:
             return
-        client.settimeout(1.0)  # for answers; who does not take them is dropped
+        client.settimeout(1.0)  # a client that does not read its answers is dropped
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._clients[client] = b""
         self._selector.register(client, selectors.EVENT_READ)
@@ -137,7 +140,7 @@ def _wanted(line: bytes) -> tuple[int, int] | None:
 
 
 def _expectation(expected: tuple[int, int], line: bytes) -> str:
-    """What is wrong with a line, if it does not ask for this visit and point."""
+    """Explain why a line is not a request for this visit and point."""
     wanted = _wanted(line)
     if wanted is None:
         words = line.decode("ascii", errors="replace").split()

@@ -1,6 +1,6 @@
-"""When to read: what a trigger is, and the one that is the operator's key.
+"""When to read: the interface of a trigger, and the one that waits for the operator's key.
 
-settle_trigger.py: when the mirror has come to rest a step further; tcp_trigger.py: when a controller asks.
+Others: settle_trigger.py (the mirror has come to rest), tcp_trigger.py (a controller requests).
 """
 
 from collections.abc import Callable, Sequence
@@ -13,20 +13,20 @@ from stepdiag.scenario.order_of_run import Visit
 
 
 class Stopped(InstrumentError):
-    """Nobody asked for a reading in time: the acquisition stops, and can be resumed."""
+    """No reading was requested in time. The acquisition stops and can be resumed."""
 
 
 class Operator(Protocol):
-    """Who stands at the machine."""
+    """The person at the machine."""
 
     def tell(self, text: str) -> None: ...
 
     def confirm(self, text: str) -> None:
-        """Returns when the operator says so."""
+        """Show the text; return when the operator confirms."""
 
 
 class Silent:
-    """An operator who is told nothing, and always ready."""
+    """No operator: ignores messages and confirms everything."""
 
     def tell(self, text: str) -> None:
         pass
@@ -37,40 +37,40 @@ class Silent:
 
 @dataclass(frozen=True)
 class Context:
-    """What a trigger may ask of the acquisition."""
+    """What an acquisition offers to its trigger."""
 
     read: Callable[[], Sample]
     settling: Settling
     wait_timeout: float  # s
     sign: int
     operator: Operator
-    last: tuple[int, int] | None = None  # visit and point of the reading that was taken last
+    last: tuple[int, int] | None = None  # visit and point of the last reading
 
 
 class Trigger(Protocol):
     def start(self, context: Context) -> None: ...
 
     def begin(self, visit: Visit, index: int, text: str) -> None:
-        """Before a visit's first reading; `text` says where head and mirror stand."""
+        """Called before the first reading of a visit. `text` says where head and mirror stand."""
 
     def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
-        """Returns when the reading at this place of the visit is wanted; False where it is the last one once more."""
+        """Wait until a reading is wanted. True: of this point. False: of the last one once more."""
 
     def doubt(self, reading: Reading) -> str | None:
-        """Why a reading is not of the point, if there is reason to think so."""
+        """Reason to doubt that the reading was taken at its point, or None."""
 
     def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
-        """The reading is on the disk."""
+        """Called when the reading is on the disk."""
 
     def failed(self, why: str) -> None:
-        """The reading could not be taken; the acquisition stops."""
+        """Called when the reading failed and the acquisition stops."""
 
     def close(self) -> None: ...
 
 
 @dataclass
 class KeyTrigger:
-    """The operator asks for every reading."""
+    """The operator confirms every reading."""
 
     context: Context | None = None
 
@@ -98,7 +98,7 @@ class KeyTrigger:
 
 
 def point_text(visit: Visit, index: int) -> str:
-    """A point in words: visit, line, run, direction, number and commanded position."""
+    """Text for a point: visit, line, run, direction, number and commanded position."""
     x, y, z = (float(p) for p in visit.positions[index])
     return (
         f"visit {visit.number} (line {visit.line}, run {visit.run}, {visit.direction}), "
@@ -107,6 +107,6 @@ def point_text(visit: Visit, index: int) -> str:
 
 
 def of_start(context: Context | None) -> Context:
-    """What start() gave."""
+    """The context that start() received."""
     assert context is not None, "start() comes first"
     return context

@@ -19,7 +19,7 @@ Resume = Literal["point", "line", "set-up"]
 
 
 class Acquisition:
-    """What is done, and what is still to be read. `done`: the readings by (visit, point), as they were taken."""
+    """State of an acquisition. `done`: readings by (visit, point), in order of acquisition."""
 
     def __init__(
         self,
@@ -37,12 +37,12 @@ class Acquisition:
         self._visits = list(visits_of(known))
         self._axes = [axis - 1 for axis in header.axes]
         self._is_twin = False
-        self._set_up = 0  # for which the instrument was found ready
-        self._visit = 0  # of the last reading
+        self._set_up = 0  # the last set-up for which the instrument was ready
+        self._visit = 0  # visit of the last reading
         self.done: dict[tuple[int, int], RawReading] = {}
 
     def go_on(self, content: RawContent, resume: Resume) -> None:
-        """Takes what a raw file holds for done, but for its last line or set-up if those are to be read again."""
+        """Continue a raw file, except its last line or set-up if that is read again."""
         if content.torn is not None:
             self._operator.tell(content.torn)
         self.done = content.readings()
@@ -55,17 +55,17 @@ class Acquisition:
         self.done = {key: reading for key, reading in self.done.items() if key[0] < first}
 
     def run(self, source: str, write: Callable[[], None]) -> None:
-        """Reads what is not done; calls `write` after every visit."""
+        """Read the remaining points. Calls `write` after every visit."""
         remaining = list(self._remaining())
         if not remaining:
-            self._operator.tell("every point of the plan is read already")
+            self._operator.tell("all points of the plan have been read")
             return
         known = self._instrument.describe()
         self._is_twin = TWIN in known.get("type", "")
         visit, index = remaining[0]
         self._file.append([self._session(source, known, visit, index)])
         if self.done:
-            self._operator.tell(f"going on with {point_text(visit, index)}: bring the machine there")
+            self._operator.tell(f"continuing with {point_text(visit, index)}: move the machine there")
         options = self._options
         last = next(reversed(self.done), None)
         self._trigger.start(
@@ -115,7 +115,7 @@ class Acquisition:
         self._tell_lost(visit, index, stored)
         key = (stored.visit, stored.point)
         if once_more and stored.is_lost and not self.done[key].is_lost:
-            self._file.append(values)  # the reading that there is was better
+            self._file.append(values)  # the earlier reading is better
         else:
             self._file.append([*values, stored])
             self.done.pop(key, None)
@@ -127,14 +127,16 @@ class Acquisition:
             self._operator.tell(f"{point_text(visit, index)}: {channel} is lost: {why}")
         if any("no beam" in why for why in reading.lost.values()):
             self._operator.tell(
-                "after an interrupted beam this set-up may carry another constant: stop, and `restart_set_up`"
+                "an interrupted beam may change the constant of this set-up: stop, and use `restart_set_up`"
             )
 
     def _read(self) -> Sample:
         return self._instrument.read(self._axes)
 
     def _make_ready(self, visit: Visit) -> None:
-        """The instrument measures, and reports no beam missing: whoever moves the head interrupts them all."""
+        """Make sure that the instrument measures and reports no missing beam.
+
+        Moving the head interrupts all beams, so this is called at every set-up."""
         mode = self._instrument.mode()
         if mode in STARTING:
             self._instrument.wait_for(RUNNING, self._options.start_timeout)
@@ -146,11 +148,11 @@ class Acquisition:
         state = f"{self._instrument.name}: {', '.join(sorted(texts))}"
         if any(self._visits[number - 1].set_up == visit.set_up for number, _ in self.done):
             raise InstrumentError(
-                f"{state}; a measurement started anew would give this set-up another constant: use `restart_set_up`"
+                f"{state}; restarting the measurement would change the constant of this set-up: use `restart_set_up`"
             )
         if self._options.start == "never":
             raise InstrumentError(f"{state}; expected a running measurement without warnings")
-        self._operator.tell(f"{state}; its measurement is started anew")
+        self._operator.tell(f"{state}; restarting its measurement")
         self._instrument.start(self._options.start_timeout)
 
     def _session(self, source: str, instrument: dict[str, str], visit: Visit, index: int) -> Session:
@@ -174,7 +176,7 @@ class Acquisition:
 
 
 def _records(visit: Visit, index: int, reading: Reading, channels: list[str]) -> Iterator[Record]:
-    """The values of a reading, and at last the reading itself."""
+    """Yield the records of the values, then the record of the reading."""
     x, y, z = (float(p) for p in visit.positions[index])
     number, line, run, direction = visit.number, visit.line, visit.run, visit.direction
     point, position = int(visit.points[index]), (x, y, z)

@@ -1,4 +1,7 @@
-"""The command line, one module a group of commands. Flags, output and exit codes are here and nowhere else."""
+"""The command line, one module per group of commands.
+
+Only here are flags, output and exit codes.
+"""
 
 from stepdiag.cli.command_line import main
 

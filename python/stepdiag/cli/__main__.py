@@ -1,4 +1,4 @@
-"""`python -m stepdiag.cli` is the command stepdiag."""
+"""Runs the command line by `python -m stepdiag.cli`."""
 
 import sys
 

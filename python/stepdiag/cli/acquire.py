@@ -1,4 +1,4 @@
-"""The commands that take a run's readings from an instrument, and that simulate the instrument."""
+"""Commands that read an instrument, and that simulate it."""
 
 import sys
 from collections.abc import Callable
@@ -20,7 +20,7 @@ SECONDS = click.FloatRange(min=0.0, min_open=True)
 
 
 class _Terminal:
-    """The operator, at the terminal."""
+    """The operator at the terminal."""
 
     def tell(self, text: str) -> None:
         click.echo(in_flags(text))
@@ -29,7 +29,7 @@ class _Terminal:
         click.echo(f"{text}: Enter", nl=False)
         sys.stdout.flush()
         if not sys.stdin.readline():
-            raise InvalidArgument("standard input ended: nobody is there to press Enter; --resume goes on")
+            raise InvalidArgument("standard input ended before Enter was pressed; --resume continues")
 
 
 @click.command(epilog="\b\nExample: stepdiag acquire scenario.toml --source ids3010://192.168.1.1 -o run.csv")
@@ -40,7 +40,7 @@ class _Terminal:
     default="key",
     show_default=True,
     metavar="WHAT",
-    help="When to read: key (Enter), settle (at rest one step on), or tcp://HOST:PORT (a controller asks there).",
+    help="When to read: key (at Enter), settle (at rest one step on), or tcp://HOST:PORT (at a controller's request).",
 )
 @click.option(
     "--axes", metavar="N,N,N", help="Axes of the instrument that give d1, d2, d3 (or distance).  [default: 1,2,3]"
@@ -50,29 +50,31 @@ class _Terminal:
     type=click.Choice(["+", "-"]),
     default="+",
     show_default=True,
-    help="Use - if the instrument's positions fall as the distance grows.",
+    help="Use - if the instrument's positions decrease as the distance increases.",
 )
 @click.option(
     "--zero",
     type=click.Choice(["none", "first"]),
     default="none",
     show_default=True,
-    help="first: each set-up's first reading becomes the nominal distance, by a constant of each beam.",
+    help="first: subtract a constant for each set-up and beam; its first reading becomes the nominal distance.",
 )
-@click.option("--settle-count", type=click.IntRange(2), default=5, show_default=True, help="Values that must agree.")
+@click.option(
+    "--settle-count", type=click.IntRange(2), default=5, show_default=True, help="Values in a row that must agree."
+)
 @click.option(
     "--settle-limit-um",
     type=SECONDS,
     default=0.5,
     show_default=True,
-    help="Largest difference between them, on every axis.",
+    help="Largest range of these values on every axis.",
 )
 @click.option(
     "--settle-timeout",
     type=SECONDS,
     default=20.0,
     show_default=True,
-    help="Seconds to wait for rest; after that the reading is lost.",
+    help="Seconds to wait for settled values; after that the reading is lost.",
 )
 @click.option(
     "--average", type=click.IntRange(1), default=10, show_default=True, help="Values to average after settling."
@@ -85,7 +87,7 @@ class _Terminal:
     type=click.IntRange(0),
     default=5,
     show_default=True,
-    help="Values without a beam before a reading counts as lost.",
+    help="Consecutive values without a beam before the beam counts as lost.",
 )
 @click.option(
     "--timeout", type=SECONDS, default=2.0, show_default=True, help="Seconds to wait for an answer of the instrument."
@@ -98,7 +100,7 @@ class _Terminal:
     type=click.Choice(["auto", "never"]),
     default="auto",
     show_default=True,
-    help="auto: restart the instrument's measurement at a set-up if it has stopped or warns.",
+    help="auto: restart the instrument's measurement at a set-up if it is stopped or reports a warning.",
 )
 @click.option("--uncertainties", is_flag=True, help="Also write the standard deviation of each mean (u_d1_um ...).")
 @click.option(
@@ -106,15 +108,16 @@ class _Terminal:
 )
 @click.option("--resume", is_flag=True, help="Continue the raw file at the point where it stopped.")
 @click.option("--restart-line", is_flag=True, help="Continue the raw file, but read its last line again.")
-@click.option("--restart-set-up", is_flag=True, help="Continue the raw file, but read all of its last set-up again.")
+@click.option("--restart-set-up", is_flag=True, help="Continue the raw file, but read its last set-up again.")
 @click.option("--from-raw", type=PATH, metavar="FILE", help="Do not measure; make the output from this raw file.")
 @out_file("Measurement to write, CSV or netCDF (.nc).", MEASUREMENT)
 def acquire(scenario: Path | None, output: OutputFile, from_raw: Path | None, **given: Any) -> None:
-    """Take the readings of SCENARIO's plan from an attocube IDS3010.
+    """Record the readings of SCENARIO's plan from an attocube IDS3010.
 
-    At every point waits until the distances have settled, and averages. Says before every set-up where head and
-    mirror go. Each value is on the disk, in the raw file, before the next point; the output is made from it after
-    every visit and at the end. A beam that is missing is a lost reading, an empty field.
+    Before every set-up the command states where head and mirror belong. At every point it waits
+    until the distances have settled, then averages. Each value is written to the raw file on disk
+    before the next point is read. The output is made from the raw file after every visit and at the
+    end. A missing beam is a lost reading: an empty field.
     """
     if from_raw is not None:
         if scenario is not None or given["source"] is not None:
@@ -132,7 +135,7 @@ def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
 
     described = read_scenario(scenario)
     raw: OutputFile = given["raw"] or OutputFile(raw_path(output.path), (RAW,))
-    # An output that was not made from the raw file, and a raw file that nobody goes on with, are refused by acquire.
+    # acquire() refuses outputs made from other raw files, and raw files that are not resumed.
     path = output.claim(scenario, raw.path, error_map=described.truth.error_map, overwrite=True)
     raw.claim(scenario, error_map=described.truth.error_map, overwrite=True)
     options, resume = _options(given), _resume(given)
@@ -157,7 +160,7 @@ def _convert(raw: Path, output: OutputFile, options: "AcquireOptions") -> None:
 
     path = output.claim(raw, overwrite=True)
     if path.exists() and raw_path(path).resolve() != raw.resolve():
-        raise InvalidArgument(f"{path}: exists, and does not stand beside {raw}: move it away, or name another -o")
+        raise InvalidArgument(f"{path}: exists, and is not beside {raw}: move it away, or name another -o")
     content = read_raw(raw)
     if content.torn is not None:
         tell("warning", content.torn)
@@ -262,7 +265,7 @@ def _point(context: click.Context, option: click.Parameter, texts: tuple[str, ..
     type=click.FloatRange(min=0.0),
     default=0.0,
     show_default=True,
-    help="Time in which a move rings out.",
+    help="Time that a move takes to settle.",
 )
 @click.option(
     "--sampling-noise-um", type=click.FloatRange(min=0.0), default=0.0, show_default=True, help="Noise of every value."
@@ -287,8 +290,8 @@ def twin(
 ) -> None:
     """Simulate the instrument: an IDS3010 that reads SCENARIO's virtual machine.
 
-    Whoever moves the machine tells it so by stepdiag.twin.moveTo; with --play it moves by itself, one visit after the
-    other as a client begins them. Ends with Ctrl-C.
+    The program that moves the machine reports its moves by stepdiag.twin.moveTo. With --play the
+    machine moves by itself, through each visit that a client begins. Ctrl-C ends the command.
     """
     import threading
 

@@ -1,4 +1,4 @@
-"""The commands that read calibrations: report one, compare two."""
+"""Commands that read calibrations: report one, compare two."""
 
 from pathlib import Path
 
@@ -16,15 +16,15 @@ from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, OutputFile
     "output",
     type=Writes(FUNCTIONAL_POINT),
     metavar="FILE",
-    help="Also write the straightness of the functional point beside the table's (CSV).",
+    help="Also write the straightness of the functional point and that of the table (CSV).",
 )
 @click.pass_context
 def report(context: click.Context, calibration: Path, output: OutputFile | None) -> None:
     """Summarise a CALIBRATION (CSV or netCDF).
 
-    Largest values and uncertainties, and the point to which straightness refers: the tables hold that of the axes' own
-    frames. For an axis that carries the workpiece, or with a tool offset, the functional point's differs; a netCDF file
-    has it too.
+    Reports the largest values and uncertainties, and the point to which straightness refers. The
+    tables refer to the axes' own frames. For an axis that carries the workpiece, or with a tool
+    offset, the straightness of the functional point differs; netCDF files contain it as well.
     """
     from stepdiag.io.data_files import read_calibration
     from stepdiag.io.whole_files import check_input, write_whole
@@ -52,16 +52,16 @@ def report(context: click.Context, calibration: Path, output: OutputFile | None)
     default=0.05,
     show_default=True,
     metavar="P",
-    help="A difference is significant if chance explains it with less than this probability (for all values together).",
+    help="A difference is significant if its probability by chance is smaller than this (for all values together).",
 )
 @click.pass_context
 def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None, limit: float) -> None:
-    """Set two calibrations A and B (CSV or netCDF) side by side.
+    """Compare two calibrations A and B (CSV or netCDF).
 
-    For every parameter the largest difference B - A, where it is, its standard uncertainty sqrt(u_A^2 + u_B^2), and
-    whether any difference is more than chance explains: the probability of one is multiplied by the number of values
-    compared (Bonferroni). Where nodes differ, the longer table is interpolated. Of functions whose slope is not
-    determined in both, the shapes are compared.
+    Reports for every parameter the largest difference B - A, its position, its standard uncertainty
+    sqrt(u_A^2 + u_B^2), and whether a difference is significant. The probability of each difference
+    is multiplied by the number of values compared (Bonferroni). If nodes differ, the longer table
+    is interpolated. Functions whose slope is not determined in both are compared by shape.
     """
     from stepdiag.calibration.comparison import compare_calibrations
     from stepdiag.io.data_files import read_calibration

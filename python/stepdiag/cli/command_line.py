@@ -1,6 +1,6 @@
-"""The command line: the commands of the other modules of cli, and exit codes.
+"""The command line: all commands, and the exit codes.
 
-What is imported inside a command keeps the others fast.
+Imports inside the commands keep the other commands fast.
 """
 
 import io
@@ -33,7 +33,7 @@ For your own measurement fill in machine/measurement.csv and evaluate it instead
 To see what a plan can determine before you measure: stepdiag observe machine/scenario.toml
 """
 
-# In the order in which somebody new needs them.
+# In the order in which a new user needs them.
 COMMANDS = {
     demo: "Simulate and evaluate the machine of the method's paper.",
     init: "Start with your own machine: a scenario and a sheet of points.",
@@ -72,11 +72,13 @@ def _complain(message: str) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs the command line and returns the exit code: 0 done, 1 our mistake, 2 a caller's, 3 done but not to be
-    trusted, 130 interrupted."""
+    """Run the command line and return the exit code.
+
+    0: done. 1: internal error. 2: error of the user or in a file. 3: done, but the result must not
+    be used. 130: interrupted."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal without µ still gets the rest of the line
+            stream.reconfigure(errors="replace")  # a terminal without µ shows the rest of the line
     try:
         result = cli.main(arguments, prog_name="stepdiag", standalone_mode=False)
         return result if isinstance(result, int) else 0

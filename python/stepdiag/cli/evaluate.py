@@ -1,4 +1,4 @@
-"""The commands that calibrate a machine from a run, and that say beforehand what a run would determine."""
+"""Commands that calibrate a machine from a run, or report beforehand what a run would determine."""
 
 from pathlib import Path
 from typing import Literal
@@ -22,7 +22,7 @@ from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
     help="Method of evaluation; see above.",
 )
 @click.option("--covariance", is_flag=True, help="Also write the covariance of all values (netCDF only).")
-@out_file("Calibration to write, CSV or netCDF (.nc, which keeps the set-up and the residuals as well).", CALIBRATION)
+@out_file("Calibration to write, CSV or netCDF (.nc, with set-ups and residuals).", CALIBRATION)
 @click.pass_context
 def evaluate(
     context: click.Context,
@@ -32,15 +32,16 @@ def evaluate(
     covariance: bool,
     output: OutputFile,
 ) -> None:
-    """Evaluate the measurement RUN (CSV or netCDF), made by SCENARIO's plan and head.
+    """Evaluate the measurement RUN (CSV or netCDF) that was made with SCENARIO's plan and head.
 
-    Finds the machine's 21 error parameters with their standard uncertainties, and says what the readings do
-    not determine. Of the scenario only chain, tool, plan, head, uncertainties and the unknowns of the
-    adjustment are used.
+    Determines the machine's 21 error parameters with their standard uncertainties, and reports what
+    the readings do not determine. Only chain, tool, plan, head, uncertainties and the unknowns of
+    the adjustment are taken from the scenario.
 
-    The first line of the report is the verdict of the fit, which the calibration carries as well. A rejected fit ends
-    with a warning and exit code 3: the calibration is written, but not to be used. A result that no machine can have
-    ([plausible] in the scenario) is an error, and nothing is written.
+    The first line of the report is the verdict of the fit, which is also stored in the calibration.
+    If the fit is rejected, the command ends with a warning and exit code 3; the calibration is
+    written, but must not be used. A result that no machine can have ([plausible] in the scenario)
+    is an error, and nothing is written.
 
     \b
     adjustment    all readings at once and exactly: the machine's errors, and how head and mirror were set up
@@ -55,7 +56,7 @@ def evaluate(
 
     check_input(run)
     if covariance and not is_netcdf(output.path):
-        raise InvalidArgument(f"--covariance: expected an output named .nc, for CSV keeps none; got {output.path}")
+        raise InvalidArgument(f"--covariance: expected an output named .nc (CSV has no covariance), got {output.path}")
     described = read_scenario(scenario)
     path = output.claim(scenario, run, error_map=described.truth.error_map)
     known = described.known
@@ -99,9 +100,9 @@ def _step_counts(context: click.Context, option: click.Parameter, text: str | No
 def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | None) -> None:
     """Report what SCENARIO's plan and head can determine, and how well, before you measure.
 
-    Adjusts an error-free run with the scenario's uncertainties and unknowns. Says which of the 21 parameters
-    and of the set-up's unknowns the readings determine, with which standard uncertainty, what is missing for the
-    others, and how the largest uncertainties grow with the number of steps.
+    Adjusts an error-free run with the scenario's uncertainties and unknowns. Reports which of the
+    21 parameters and of the set-up's unknowns the readings determine, their standard uncertainties,
+    what is missing for the others, and how the largest uncertainties grow with the number of steps.
     """
     from stepdiag.io.whole_files import write_whole
     from stepdiag.planning.observation import USUAL_STEPS, observe, prospects

@@ -8,10 +8,10 @@ import click
 from stepdiag.cli.options import PATH, Writes, tell, tell_fit
 from stepdiag.io.outputs import COMP_FILE, COMP_LINES, GRID, ISG_TABLE, KINEMATICS_TABLE, OutputFile, claim_folder
 
-# Those of stepdiag.export.FORMATS, which needs not be imported to show a help text; a test compares.
+# Those of stepdiag.export.write.FORMATS, which is slow to import; a test compares them.
 FORMATS = ("linuxcnc-comp", "linuxcnc-kins", "isg", "csv-grid")
 KINDS = {"linuxcnc-kins": KINEMATICS_TABLE, "isg": ISG_TABLE, "csv-grid": GRID}
-FOLDER = {"compensation.ini": COMP_LINES} | {f"joint{n}.comp": COMP_FILE for n in range(3)}  # of linuxcnc-comp
+FOLDER = {"compensation.ini": COMP_LINES} | {f"joint{n}.comp": COMP_FILE for n in range(3)}  # linuxcnc-comp
 MM = "<X Y Z>"
 
 
@@ -35,7 +35,7 @@ MM = "<X Y Z>"
 @click.option(
     "--origin", type=float, nargs=3, metavar=MM, help="Controller's coordinates of home, mm.  [default: 0 0 0]"
 )
-@click.option("--incomplete", is_flag=True, help="Export what is not determined as 0.")
+@click.option("--incomplete", is_flag=True, help="Export undetermined values as 0.")
 @click.option(
     "--approach",
     type=click.Choice(("mean", "positive", "negative")),
@@ -63,7 +63,7 @@ MM = "<X Y Z>"
     "--nodes", type=int, nargs=3, metavar="<NX NY NZ>", help="Points of the grid (csv-grid).  [default: 11 11 11]"
 )
 @click.option("--step", type=float, metavar="MM", help="Largest spacing of the grid, instead of --nodes (csv-grid).")
-@click.option("--accept-rejected", is_flag=True, help="Export a calibration although its fit was rejected.")
+@click.option("--accept-rejected", is_flag=True, help="Export a calibration even if its fit was rejected.")
 @click.option("--orientation", is_flag=True, default=None, help="Also write the rotations of the tool (csv-grid).")
 @click.pass_context
 def export(context: click.Context, /, calibration: Path, to: str, output: OutputFile, **options: Any) -> None:
@@ -75,8 +75,9 @@ def export(context: click.Context, /, calibration: Path, to: str, output: Output
     isg            volumetric compensation of ISG-CNC and TwinCAT CNC; written from the manual, not tried
     csv-grid       error vectors on a grid
 
-    Tells the sign convention, the reference point, what resampling loses and what is not compensated. What the
-    calibration does not determine is refused unless --incomplete. An error map is taken too: what it lacks is 0.
+    Reports the sign convention, the reference point, the loss by resampling and what is not
+    compensated. Refuses a calibration that does not determine all that the format needs, unless
+    --incomplete is given. An error map is accepted as well; parameters that it lacks are 0.
     """
     from stepdiag.export.common import ExportOptions
     from stepdiag.export.write import check_fit, export_calibration, read_what_is_exported

@@ -1,4 +1,4 @@
-"""The commands that begin with files of one's own, and that tell what a file is."""
+"""Commands that create a user's first files, and that check files."""
 
 from pathlib import Path
 
@@ -13,14 +13,14 @@ from stepdiag.io.outputs import OutputFile
 @click.argument("files", nargs=-1, required=True, type=PATH, metavar="FILE...")
 @click.pass_context
 def check(context: click.Context, files: tuple[Path, ...]) -> None:
-    """Check each FILE: of what kind it is, and whether it is sound.
+    """Check each FILE: report its kind and whether it is valid.
 
-    Knows scenarios, heads and studies (TOML), measurements and calibrations (CSV or netCDF), error maps (CSV)
-    and raw readings (JSON lines). A
-    scenario is checked together with the error map that it names. With one scenario among the files, each measurement
-    is adjusted with it: do its lines, points and distances belong to that plan, and what is the verdict of the fit?
+    Accepts scenarios, heads and studies (TOML), measurements and calibrations (CSV or netCDF),
+    error maps (CSV) and raw readings (JSON lines). A scenario is checked together with its error
+    map. If there is one scenario among the files, each measurement is adjusted with it. The command
+    reports whether lines, points and distances belong to that plan, and the verdict of the fit.
 
-    Exit code 2 if any file is not sound or two do not belong together, 3 if a fit is rejected.
+    Exit code 2 if a file is invalid or two do not belong together, 3 if a fit is rejected.
     """
     from stepdiag.report.file_check import examine
 
@@ -55,7 +55,7 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
     if not sound:
         context.exit(2)
     if untrusted:
-        tell("warning", "a fit is rejected: do not use what comes of it")
+        tell("warning", "a fit is rejected: do not use results from it")
         context.exit(NOT_TO_BE_TRUSTED)
 
 
@@ -70,12 +70,12 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
 )
 @click.option("--head", "head_name", metavar="NAME", help="Start from a copy of this shipped head (see head list).")
 def init(output: OutputFile, scenario: Path | None, head_name: str | None) -> None:
-    """Begin with your own machine: a scenario to edit and a sheet to fill in.
+    """Start with your own machine: a scenario to edit and a sheet to fill in.
 
-    Writes scenario.toml, with a comment on every key, and measurement.csv with all commanded points and empty
-    fields for the readings of your instrument. Existing files are never overwritten. After changing the plan
-    in the scenario, make a new sheet with --sheet-for. With --head the scenario's head is head.toml, a copy of a
-    shipped description, in place of a layout.
+    Writes scenario.toml, with a comment on every key, and measurement.csv with all commanded points
+    and empty fields for the readings of your instrument. Existing files are never overwritten.
+    After changing the plan in the scenario, make a new sheet with --sheet-for. With --head, the
+    scenario uses head.toml, a copy of a shipped description, instead of a layout.
     """
     from stepdiag.config.scenario_template import template
     from stepdiag.head.description import find_shipped_head
@@ -94,7 +94,7 @@ def init(output: OutputFile, scenario: Path | None, head_name: str | None) -> No
         shipped = find_shipped_head(head_name) if head_name else None
         if shipped is not None:
             texts["head.toml"] = read_text(shipped)
-        # As it is read in its new folder, where the head's copy is not yet.
+        # Checked as in its new folder, which does not contain the head's copy yet.
         known = parse_scenario(template(head_name)).known
     folder = output.path
     written = [folder / name for name in (*texts, "measurement.csv")]

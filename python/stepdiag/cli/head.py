@@ -1,4 +1,4 @@
-"""The commands `stepdiag head ...`: list, show, check and sensitivity of head descriptions."""
+"""The commands `stepdiag head ...`: list, show, check and sensitivity."""
 
 import math
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ Look at a shipped head, then make your own from it:
   stepdiag init -o machine --head beam_and_psd
   stepdiag head check machine/head.toml
 """
-MARGIN = 100.0  # mm that the mirror is wider and higher than the beams' places
+MARGIN = 100.0  # mm by which the mirror exceeds the extent of the beams
 DISTANCES = (100.0, 300.0, 600.0, 1200.0)  # mm
 
 HEAD = click.argument("name", metavar="HEAD")
@@ -35,15 +35,15 @@ MIRROR = click.option(
 
 @click.group(cls=InOrder, epilog=EPILOG)
 def head() -> None:
-    """Look at descriptions of laser heads.
+    """Draw and check descriptions of laser heads.
 
     HEAD is the path of a description (TOML), or the name of a shipped one.
     """
 
 
-@head.command("list", short_help="The shipped heads.", epilog="\b\nExample: stepdiag head list")
+@head.command("list", short_help="List the shipped heads.", epilog="\b\nExample: stepdiag head list")
 def list_heads() -> None:
-    """List the heads that come with stepdiag, with the files to copy."""
+    """List the heads that come with stepdiag, and the paths of their files."""
     from stepdiag.head.description import find_head, read_head_design, shipped_heads
 
     for name in shipped_heads():
@@ -55,12 +55,13 @@ def list_heads() -> None:
 @head.command(short_help="Draw a head.", epilog="\b\nExample: stepdiag head show beam_and_psd -o head.png")
 @HEAD
 @out_file("Figure to write, .png or .svg.", PNG, SVG)
-@click.option("--distance", type=float, metavar="MM", help=f"Of the mirror.  [default: {DISTANCES[1]:g}]")
+@click.option("--distance", type=float, metavar="MM", help=f"Distance of the mirror.  [default: {DISTANCES[1]:g}]")
 @MIRROR
 def show(name: str, output: OutputFile, distance: float | None, mirror: tuple[float, float] | None) -> None:
     """Draw bodies, beams and detectors of HEAD from two sides.
 
-    Light that comes to its detector is a full line; what goes elsewhere is dashed, the paler the weaker.
+    Light that arrives at its detector is a solid line. Other light is dashed; weaker light is
+    paler.
     """
     from stepdiag.io.whole_files import write_whole
 
@@ -81,14 +82,14 @@ def show(name: str, output: OutputFile, distance: float | None, mirror: tuple[fl
     multiple=True,
     type=float,
     metavar="MM",
-    help=f"Of the mirror from the head; may be given again.  [default: {', '.join(f'{d:g}' for d in DISTANCES)}]",
+    help=f"Distance of the mirror; may be repeated.  [default: {', '.join(f'{d:g}' for d in DISTANCES)}]",
 )
 @MIRROR
 def check(name: str, distances: tuple[float, ...], mirror: tuple[float, float] | None) -> None:
-    """Report what HEAD does in front of an aligned mirror.
+    """Report what HEAD reads in front of an aligned mirror.
 
-    Its nominal calibration; spot, path and power at every detector; how far the mirror may tilt and travel before
-    a reading is lost; the smallest mirror.
+    The report has the nominal calibration; spot, path and power at every detector; how far the
+    mirror may tilt and move before a reading is lost; and the smallest mirror.
     """
     from stepdiag.head.check import check_report
 
@@ -101,19 +102,21 @@ def check(name: str, distances: tuple[float, ...], mirror: tuple[float, float] |
     epilog="\b\nExample: stepdiag head sensitivity three_beams --distance 600",
 )
 @HEAD
-@click.option("--distance", type=float, metavar="MM", help=f"Of the mirror.  [default: {DISTANCES[2]:g}]")
+@click.option("--distance", type=float, metavar="MM", help=f"Distance of the mirror.  [default: {DISTANCES[2]:g}]")
 @click.option(
     "--tilt",
     nargs=2,
     default=(300.0, 300.0),
     show_default=True,
     metavar="A B",
-    help="Of the mirror, alpha and beta, µrad.",
+    help="Tilts alpha and beta of the mirror, µrad.",
 )
 def sensitivity(name: str, distance: float | None, tilt: tuple[float, float]) -> None:
-    """List what every pose error, index error and change of the air in HEAD changes, the strongest first.
+    """List the effect of every imperfection of HEAD, strongest first.
 
-    Exact derivatives along the traced rays, for distance and tilts after reduction with the nominal calibration.
+    Imperfections are pose errors, index errors and changes of the air. The effects are exact
+    derivatives along the traced rays, for distance and tilts after reduction with the nominal
+    calibration.
     """
     from stepdiag.head.sensitivity import sensitivity_report
     from stepdiag.units import MICRORADIAN
@@ -128,7 +131,7 @@ def sensitivity(name: str, distance: float | None, tilt: tuple[float, float]) ->
 def _prepare(
     name: str, mirror: tuple[float, float] | None, distances: Sequence[float], standard: Sequence[float]
 ) -> tuple["_core.Head", Sequence[float]]:
-    """A head with a mirror that no beam misses, unless one is given; the distances given, else the standard ones."""
+    """The head with the given mirror, or one that no beam misses; and the distances to use."""
     from stepdiag.head.description import ROOM, before_the_head, find_head, reach, read_head_design
 
     if mirror is not None and not all(math.isfinite(edge) and edge > 0.0 for edge in mirror):

@@ -32,7 +32,7 @@ _AXES = ("X", "Y", "Z")
     nargs=6,
     type=float,
     metavar="X X Y Y Z Z",
-    help="First and last position of X, Y, Z, mm; no move goes beyond.  [default: unlimited]",
+    help="Limits of travel of X, Y, Z, mm; no move exceeds them.  [default: unlimited]",
 )
 @click.option("--overrun", type=float, metavar="MM", help="Overrun before the first point of a line.  [default: 1]")
 @click.option(
@@ -50,9 +50,9 @@ _AXES = ("X", "Y", "Z")
 @click.option(
     "--trigger",
     type=click.Choice(["handshake", "pulse", "dwell"]),
-    help="How the program asks for a reading (docs/measuring.md).  [default: handshake for linuxcnc, dwell for iso]",
+    help="How the program requests a reading (docs/measuring.md).  [default: handshake for linuxcnc, dwell for iso]",
 )
-@click.option("--trigger-code", metavar="M80", help="Your own M-code that asks for a reading.")
+@click.option("--trigger-code", metavar="M80", help="Your own M-code that requests a reading.")
 @click.option(
     "--timeout", type=float, metavar="S", help="Seconds that a handshake waits for a reading.  [default: 300]"
 )
@@ -71,11 +71,13 @@ _AXES = ("X", "Y", "Z")
 def nc(scenario: Path, output: OutputFile, **given: Any) -> None:
     """Write the measuring program of SCENARIO: G-code for the machine's controller.
 
-    The axes go through the plan's points in its order, with feed and times of [plan_by_time], wait at each, and ask
-    for a reading; acquire takes the readings. Between lines the program stops for head and mirror.
+    The axes move through the plan's points in its order, with feed and times of [plan_by_time]. At
+    each point the program waits and requests a reading, which `acquire` records. Between lines the
+    program stops to set up head and mirror.
 
-    Positions are those of the axes, counted from home, without tool length. Every visit of a line begins with an
-    overrun, so that all axes come to all points from the side that the plan says.
+    Positions are those of the axes, counted from home, without tool length. Every visit of a line
+    begins with an overrun, so that all axes approach all points from the side that the plan
+    specifies.
     """
     from stepdiag.io.whole_files import write_whole
     from stepdiag.program.measuring_program import measuring_program

@@ -1,4 +1,4 @@
-"""The command that chooses a plan by the time that there is."""
+"""The command that chooses a plan for the available time."""
 
 import math
 import sys
@@ -14,7 +14,7 @@ Family = Literal["length", "angle", "squareness"]
 
 
 class _Positive(click.FloatRange):
-    """Click's range lets NaN pass."""
+    """FloatRange accepts NaN; this type does not."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         number = float(super().convert(value, param, ctx))
@@ -46,7 +46,7 @@ _POSITIVE = _Positive(min=0.0, min_open=True, max=1e9)
     type=click.Choice(["length", "angle", "squareness"]),
     default="length",
     show_default=True,
-    help="Minimise the largest standard uncertainty of these; length: positioning errors and straightnesses.",
+    help="Minimise the largest standard uncertainty of this family; length: positioning and straightness.",
 )
 @click.option(
     "-o",
@@ -58,14 +58,16 @@ _POSITIVE = _Positive(min=0.0, min_open=True, max=1e9)
 def plan(
     scenario: Path, minutes: float | None, spacing: float | None, family: Family, output: OutputFile | None
 ) -> None:
-    """Tell which plan to measure in the time that there is.
+    """Choose the plan to measure in the available time.
 
-    Takes head, uncertainties and unknowns of SCENARIO, and the times of its section [plan_by_time]. For numbers
-    of steps, sets of lines and repeats it finds the time to measure, set-ups included, and the largest standard
-    uncertainties that an adjustment then has, for a machine with the errors of [machine.random].
+    Uses head, uncertainties and unknowns of SCENARIO, and the times in its section [plan_by_time].
+    For numbers of steps, sets of lines and repeats it calculates the measuring time, set-ups
+    included, and the largest standard uncertainties of an adjustment, for a machine with the errors
+    of [machine.random].
 
-    The table has the plans that no other beats in time, in distance between nodes, and in uncertainty (see --for).
-    More steps resolve more, take longer, and make each value less certain: it is a sum over more steps.
+    The table contains the plans that no other plan beats in time, in distance between nodes and in
+    uncertainty (see --for). More steps resolve more, but take longer and make each value less
+    certain, because it is a sum over more steps.
     """
     from stepdiag.io.whole_files import write_whole
     from stepdiag.planning.plan_by_time import choose, outcomes, own_spacing

@@ -1,4 +1,4 @@
-"""The commands that simulate: a run of a scenario, and the demonstrations."""
+"""Commands that simulate: the run of a scenario, and the demonstrations."""
 
 from pathlib import Path
 
@@ -15,9 +15,9 @@ from stepdiag.io.outputs import MEASUREMENT, OutputFile
 def simulate(scenario: Path, output: OutputFile, overwrite: bool) -> None:
     """Simulate the run that SCENARIO (TOML) describes.
 
-    The virtual machine moves through the plan with its errors, and the head reads the mirror at every point.
-    Lost readings are empty fields, in netCDF missing values. A measurement that is there already is kept, unless told
-    to overwrite it.
+    The virtual machine moves through the plan with its errors, and the head reads the mirror at
+    every point. Lost readings are empty fields, in netCDF missing values. An existing measurement
+    is kept unless --overwrite is given.
     """
     from stepdiag.io.data_files import write_measurement
     from stepdiag.scenario.description import read_scenario, simulate_scenario
@@ -41,16 +41,18 @@ def simulate(scenario: Path, output: OutputFile, overwrite: bool) -> None:
 @click.option(
     "--controller",
     type=click.Choice(["linuxcnc", "calculated"]),
-    help="Close the loop in LinuxCNC, or calculate the same without it.",
+    help="Run the closed loop in LinuxCNC, or calculate it without a controller.",
 )
 def demo(output: OutputFile | None, controller: str | None) -> None:
     """Simulate and evaluate the machine of the method's paper, and draw its Figure 5.
 
-    Writes scenarios, truth, runs, calibrations, a table and the figure; go on from them with simulate and
-    evaluate. Written again, they are replaced, unless a scenario was changed.
+    Writes scenarios, truth, runs, calibrations, a table and the figure, from which you can continue
+    with `simulate` and `evaluate`. Another demo replaces these files, unless a scenario was
+    changed.
 
-    With --controller linuxcnc the loop is closed: LinuxCNC runs the measuring program on a virtual machine, the run
-    is evaluated, LinuxCNC compensates with the calibration, and is measured again (docs/loop.md).
+    With --controller linuxcnc the loop is closed: LinuxCNC runs the measuring program on a virtual
+    machine, stepdiag evaluates the run, LinuxCNC compensates with the calibration, and the machine
+    is measured again (docs/loop.md).
     """
     from stepdiag.demo.paper import claim_demo, run_demo
 

@@ -1,4 +1,4 @@
-"""The command that goes through a grid of scenarios."""
+"""The command that computes a grid of scenarios."""
 
 import sys
 from pathlib import Path
@@ -16,13 +16,14 @@ from stepdiag.io.outputs import STUDY, OutputFile
 @click.option("--resume", is_flag=True, help="Continue an interrupted study.")
 @worker_options
 def study(file: Path, output: OutputFile, resume: bool, scheduler: str | None, workers: int | None) -> None:
-    """Vary keys of a scenario over a grid, each cell with its virtual calibrations.
+    """Vary keys of a scenario over a grid, with virtual calibrations for each cell.
 
-    STUDY (TOML) names the scenario, the keys and their values, methods and the number of samples; see docs/study.md.
-    The result has a dimension for each key, and of each parameter and family the largest and the median mean,
-    standard uncertainty and coverage interval over its nodes. A cell that cannot be computed says why.
+    STUDY (TOML) names the scenario, the keys and their values, methods and the number of samples;
+    see docs/study.md. The result has a dimension for each key. For each parameter and family it
+    contains the largest and the median mean, standard uncertainty and coverage interval over the
+    nodes. For a cell that cannot be computed it states the reason.
 
-    Finished cells are kept in a file beside the result until it is written.
+    Finished cells are kept in a file beside the result until that is written.
     """
     from stepdiag.uncertainty.study import FinishedCells, run_study
     from stepdiag.uncertainty.study_keys import read_study
@@ -49,7 +50,7 @@ def study(file: Path, output: OutputFile, resume: bool, scheduler: str | None, w
         if finished.path.stat().st_size == 0:
             finished.remove()
         else:
-            tell("interrupted", f"{finished.path} keeps what is done; the same command with --resume goes on")
+            tell("interrupted", f"{finished.path} has the finished cells: repeat the command with --resume")
         raise
     finished.remove()
     failures = [result.failure for result in results.values() if result.failure]

@@ -1,4 +1,4 @@
-"""The command that tells how uncertain a calibration would be: propagation, and virtual calibrations by the million."""
+"""The command that reports how uncertain a calibration would be."""
 
 import math
 import re
@@ -26,7 +26,7 @@ Point = tuple[tuple[float, float, float], tuple[float, float, float] | None]
 
 
 def _sample_count(context: click.Context, option: click.Parameter, text: str | None) -> int | None:
-    """A whole number, also as 1e6."""
+    """A whole number; 1e6 is accepted as well."""
     if text is None:
         return None
     try:
@@ -39,7 +39,7 @@ def _sample_count(context: click.Context, option: click.Parameter, text: str | N
 
 
 def _points(context: click.Context, option: click.Parameter, texts: tuple[str, ...]) -> list[Point]:
-    """Three numbers, or six: the tool's offset behind them."""
+    """Three numbers, or six: a position and a tool offset."""
     result: list[Point] = []
     for text in texts:
         try:
@@ -47,7 +47,7 @@ def _points(context: click.Context, option: click.Parameter, texts: tuple[str, .
         except ValueError:
             numbers = []
         if len(numbers) not in (3, 6) or not all(map(math.isfinite, numbers)):
-            expected = "X,Y,Z in mm, or X,Y,Z and the offset of a tool behind them"
+            expected = "X,Y,Z in mm, or X,Y,Z followed by a tool offset"
             raise click.BadParameter(f"expected {expected}, such as 400,300,250, got {text!r}")
         x, y, z, *offset = numbers
         result.append(((x, y, z), (offset[0], offset[1], offset[2]) if offset else None))
@@ -71,7 +71,7 @@ def _points(context: click.Context, option: click.Parameter, texts: tuple[str, .
     show_default=True,
     help="Method of evaluation of each calibration; see above.",
 )
-@click.option("--adaptive", is_flag=True, help="Draw as many samples as the digits need (JCGM 101, 7.9).")
+@click.option("--adaptive", is_flag=True, help="Draw as many samples as the digits require (JCGM 101, 7.9).")
 @click.option(
     "--digits",
     type=click.IntRange(1, 3),
@@ -120,8 +120,8 @@ def _points(context: click.Context, option: click.Parameter, texts: tuple[str, .
     "--checkpoint",
     type=Writes(CHECKPOINT),
     metavar="FILE",
-    help="What is done (.checkpoint), every ten seconds and at the end; by default only of a run that was interrupted, "
-    "beside -o. One that is there already is never overwritten: --resume, or remove it.",
+    help="File for the state of the run (.checkpoint), written every ten seconds and at the end. An existing one is "
+    "never overwritten: use --resume, or remove it.  [default: beside -o, kept after an interruption only]",
 )
 @click.option("--resume", is_flag=True, help="Continue from the checkpoint; the result has the same bits.")
 @click.option("--inputs", "list_inputs", is_flag=True, help="List the names of the uncertain inputs and end.")
@@ -151,11 +151,13 @@ def uncertainty(
     scheduler: str | None,
     workers: int | None,
 ) -> None:
-    """Report how uncertain a calibration of SCENARIO's machine would be, from the inputs in its [uncertainty].
+    """Report how uncertain a calibration of SCENARIO's machine would be.
 
-    Without -n the command uses the law of propagation alone (GUM): it prints tables by family of parameters, and
-    where the largest uncertainties come from. With -n it also uses the Monte Carlo method (JCGM 101): it makes
-    virtual calibrations, each with inputs drawn from their distributions, every pose traced, and noise added.
+    The uncertain inputs are those of the scenario's [uncertainty]. Without -n the command uses only
+    the law of propagation (GUM). It prints tables by family of parameters, and the sources of the
+    largest uncertainties. With -n it also uses the Monte Carlo method (JCGM 101): it makes virtual
+    calibrations, for which it draws inputs from their distributions, traces every pose, and adds
+    noise.
 
     \b
     adjustment    all readings at once and exactly: what evaluate does
@@ -180,7 +182,7 @@ def uncertainty(
         threads=threads,
         covariance=covariance,
         keep=keep,
-        joint=tuple(tuple(re.split(r",(?![^(]*\))", names)) for names in joint),  # not within X at (1, 2, 3)
+        joint=tuple(tuple(re.split(r",(?![^(]*\))", names)) for names in joint),  # no comma inside "X at (1, 2, 3)"
         compare=compare,
         points=tuple(points),
         volume=volume,
@@ -214,27 +216,27 @@ def uncertainty(
             write_uncertainty(result, path)
         for line in (*opening_rows(result), *result_rows(result)):
             click.echo(line)
-    if wanted.draws and checkpoint is None:  # one that was named can go on to more samples
+    if wanted.draws and checkpoint is None:  # a checkpoint named by the user is kept: it can continue to more samples
         kept.path.unlink(missing_ok=True)
 
 
 @contextmanager
 def _kept(wanted: "UncertaintyRequest", errors: type[BaseException]) -> Iterator[None]:
-    """Says how to go on where one of these errors ends the block."""
+    """State how to continue if one of these errors ends the block."""
     try:
         yield
     except errors as error:
         if wanted.draws and wanted.checkpoint is not None and wanted.checkpoint.exists():
-            tell("interrupted", f"{wanted.checkpoint} keeps what is done; the same command with --resume goes on")
+            tell("interrupted", f"{wanted.checkpoint} has the finished samples: repeat the command with --resume")
         elif isinstance(error, KeyboardInterrupt):
-            tell("interrupted", "nothing was kept")
+            tell("interrupted", "no samples were kept")
         if isinstance(error, KeyboardInterrupt):
             raise click.Abort from None
         raise
 
 
 def _evaluate(scenario: "Scenario", wanted: "UncertaintyRequest", workers: "Workers | None") -> "UncertaintyResult":
-    """With a progress bar."""
+    """Evaluate with a progress bar."""
     from stepdiag.uncertainty.packed_calibrations import pack_calibrations
     from stepdiag.uncertainty.run import evaluate_uncertainty
 
@@ -244,7 +246,7 @@ def _evaluate(scenario: "Scenario", wanted: "UncertaintyRequest", workers: "Work
 
 
 class Bar:
-    """Samples done, their rate and the time left, on standard error where that is a terminal."""
+    """A progress bar on standard error if that is a terminal: samples done, rate and time left."""
 
     def __init__(self) -> None:
         self._bar: Any = None
@@ -260,7 +262,7 @@ class Bar:
             self._bar.render_finish()
 
     def show(self, done: int, total: int) -> None:
-        """Called several times a second."""
+        """Update the bar. Called several times per second."""
         now = time.monotonic()
         if self._bar is None:
             if not sys.stderr.isatty():

@@ -1,4 +1,4 @@
-"""The options of commands that may compute on Dask's workers."""
+"""Options of commands that can compute on Dask workers."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,7 +16,7 @@ MOST_WORKERS: Final = 1024
 
 
 def worker_options(command: Command) -> Command:
-    """--scheduler and --workers; see `chosen_workers`."""
+    """Add --scheduler and --workers; see `chosen_workers`."""
     scheduler = click.option(
         "--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler, such as tls://HOST:8786."
     )
@@ -31,12 +31,14 @@ def worker_options(command: Command) -> Command:
 
 @contextmanager
 def chosen_workers(scheduler: str | None, count: int | None) -> Iterator["Workers | None"]:
-    """None where neither option is given. Raises InvalidArgument where both are, or Dask is missing."""
+    """The chosen workers; None if neither option is given.
+
+    Raises InvalidArgument if both are given or Dask is missing."""
     if scheduler is None and count is None:
         yield None
         return
     if scheduler is not None and count is not None:
-        raise InvalidArgument("--workers: goes without --scheduler, which has its own")
+        raise InvalidArgument("--workers: cannot be combined with --scheduler, which has its own workers")
     from stepdiag.uncertainty.dask_workers import workers_of
 
     with workers_of(scheduler, count, lambda message: tell("warning", message)) as workers:

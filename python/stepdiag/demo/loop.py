@@ -1,7 +1,8 @@
-"""The closed loop: a controller measures a machine by a program, compensates with the calibration, and measures again.
+"""The closed loop: a controller measures a machine, compensates with the calibration, and repeats.
 
-Everything goes the way of the commands (nc, twin, acquire, evaluate) and through their files. What the loop is judged
-by is the virtual machine itself: the exact pose of its tool where the controller makes its axes stand.
+All steps use the commands' functions (nc, twin, acquire, evaluate) and their files. The loop is
+judged by the virtual machine itself: the exact pose of its tool at the axis positions that the
+controller commands.
 """
 
 from collections.abc import Sequence
@@ -23,7 +24,7 @@ SEEDS: Final = 40  # repetitions of the noisy case, by calculation
 
 
 def claim_loop(folder: Path, steps: int = STEPS) -> Path:
-    """The folder, if nothing would be lost in it but what an earlier loop wrote. Raises InvalidArgument."""
+    """Return the folder if only files of an earlier loop would be lost. Raises InvalidArgument."""
     scenarios = {}
     files: dict[str, outputs.FileKind | str] = {
         **{"report.txt": outputs.REPORT, "points.csv": outputs.POINTS},
@@ -52,7 +53,7 @@ def run_loop(
     seeds: int = SEEDS,
     progress: Progress = lambda text: None,
 ) -> list[str]:
-    """Writes all files of the loop into `folder`, and returns the lines of its report."""
+    """Write all files of the loop into `folder`. Returns the lines of its report."""
     make_folder(folder)
     outcomes: list[LoopOutcome] = []
     standing = None  # where the axes stand for the points without compensation: once for all machines
@@ -78,5 +79,5 @@ def run_loop(
 
 
 def controller_of(name: str) -> Controller:
-    """By the name that the command line knows it by."""
+    """The controller by its name on the command line."""
     return Calculated() if name == "calculated" else Linuxcnc()

@@ -1,8 +1,8 @@
-"""The machines of the closed loop: their truths, and the scenarios that they are measured with.
+"""The machines of the closed loop: their true errors, and the scenarios of their measurement.
 
-The head is three beams in a triangle, one for each axis of one IDS3010. Of a triangle of radius r with a noise s of
-each distance, their mean is known to s/sqrt(3) and the mirror's tilts to s/(r sqrt(3/2)): 0.1 µm and 1 µrad make
-r = 81.65 mm.
+The head has three beams in a triangle, one for each axis of an IDS3010. With a noise s of each
+distance and a triangle of radius r, the mean distance is known to s/sqrt(3) and the mirror's tilts
+to s/(r sqrt(3/2)). Noise of 0.1 µm and 1 µrad gives r = 81.65 mm.
 """
 
 import math
@@ -29,7 +29,7 @@ RADIUS: Final = DISTANCE_NOISE / TILT_NOISE / math.sqrt(1.5)
 
 @dataclass(frozen=True)
 class LoopCase:
-    """A machine and how it is measured; folders and tables call it by its name."""
+    """A machine and how it is measured. Its name is used for folders and in tables."""
 
     name: str
     title: str
@@ -38,7 +38,7 @@ class LoopCase:
 
     @property
     def truth(self) -> str:
-        """The file of its errors."""
+        """The file with its errors."""
         return "truth_screw.csv" if self.screw else "truth.csv"
 
 
@@ -49,19 +49,21 @@ CASES: Final = (CLEAN, SCREW, NOISE)
 
 
 def finer(steps: int) -> int:
-    """How many nodes of the truth there are to a step: as many as resolve the screw, with few steps too."""
+    """Number of the truth's nodes per step: enough to resolve the screw, also with few steps."""
     return -(-FINER * STEPS // steps)
 
 
 def write_truth(case: LoopCase, folder: Path, steps: int = STEPS) -> None:
-    """The errors of a case's machine, with nodes at those of the plan and at least FINER times as many."""
+    """Write a machine's errors, with the plan's nodes and at least FINER times as many."""
     screw = {"screw_pitch": SCREW_PITCH, "screw_amplitude": SCREW_AMPLITUDE} if case.screw else {}
     truth = _core.random_error_map(VOLUME, seed=SEED, intervals=steps * finer(steps), **screw)
     truth.write(folder / case.truth, chain=_core.Chain(CHAIN), volume=VOLUME, tool=TOOL)
 
 
 def write_scenario(case: LoopCase, folder: Path, steps: int = STEPS, seed: int = 1) -> Path:
-    """The scenario of a case; `seed` is that of its noise. The truth lies in the folder above."""
+    """Write the scenario of a case; `seed` is that of its noise.
+
+    The truth is in the parent folder."""
     make_folder(folder)
     path = folder / "scenario.toml"
     write_whole(path, scenario_text(case, steps, seed))
@@ -69,7 +71,7 @@ def write_scenario(case: LoopCase, folder: Path, steps: int = STEPS, seed: int =
 
 
 def scenario_text(case: LoopCase, steps: int = STEPS, seed: int = 1) -> str:
-    """What there is to know of a case, as a scenario file."""
+    """The scenario of a case as text."""
     beams = [
         [round(RADIUS * math.cos(angle), 4), round(RADIUS * math.sin(angle), 4)]
         for angle in (math.radians(90), math.radians(210), math.radians(330))

@@ -1,4 +1,4 @@
-"""The picture of the closed loop: errors before and after, what a screw leaves, and noise against its statement."""
+"""Figure of the closed loop: errors before and after, a screw error, and noise."""
 
 import math
 from typing import Final
@@ -17,7 +17,7 @@ DASHES: Final = {"nodes": "-", "random": "--"}
 
 
 def draw_loop(outcomes: list[LoopOutcome], repeated: dict[str, Agreement] | None) -> dict[str, bytes]:
-    """The figure as the content of files, by name."""
+    """The figure as contents of files, by name."""
     with own_style():
         figure = Figure(figsize=(12.0, 3.9), layout="constrained")
         left, middle, right = figure.subplots(1, 3)
@@ -31,7 +31,7 @@ def draw_loop(outcomes: list[LoopOutcome], repeated: dict[str, Agreement] | None
 
 
 def draw_errors(axes: Axes, outcomes: list[LoopOutcome]) -> None:
-    """Of all points the share whose error is smaller."""
+    """Draw the share of points with a smaller error."""
     for number, outcome in enumerate(outcomes):
         for kind, points in outcome.points.items():
             label = f"{outcome.case.name}, {WORDS[kind]}"
@@ -47,7 +47,7 @@ def draw_errors(axes: Axes, outcomes: list[LoopOutcome]) -> None:
 
 
 def lengths(errors: FloatArray) -> FloatArray:
-    """In µm."""
+    """Lengths of error vectors, µm."""
     return np.asarray(np.linalg.norm(errors, axis=1) * UM)
 
 
@@ -57,7 +57,7 @@ def draw_shares(axes: Axes, values: FloatArray, *, color: str, linestyle: str, l
 
 
 def draw_screw(axes: Axes, outcome: LoopOutcome) -> None:
-    """Along the first part of X, what is left in X."""
+    """Draw the remaining error in X along the first part of X."""
     fine, nodes = np.linspace(0.0, SHOWN, 1001), outcome.scenario.known.plan.nodes("X")
     nodes = nodes[nodes <= SHOWN]
     targets = np.zeros((len(fine), 3))
@@ -72,7 +72,7 @@ def draw_screw(axes: Axes, outcome: LoopOutcome) -> None:
 
 
 def draw_noise(axes: Axes, outcome: LoopOutcome, repeated: dict[str, Agreement] | None) -> None:
-    """Errors by the uncertainty that the calibration states, and the chi-square distribution that they should have."""
+    """Draw errors relative to the stated uncertainty, and the expected chi-square distribution."""
     for kind, found in outcome.agreement.items():
         draw_shares(axes, found.chi_square, color="C2", linestyle=DASHES[kind], label=f"this run, {WORDS[kind]}")
     for kind, found in (repeated or {}).items():

@@ -1,4 +1,4 @@
-"""What a controller is asked to do in the loop, whichever it is: a measuring program, then points to go to."""
+"""Jobs for a controller in the loop: run a measuring program, then go to points."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class Job:
 
 
 class Controller(Protocol):
-    """Does a job: writes the run, and returns where the axes stood for the points, (n, 3), mm."""
+    """Executes a job: writes the run, and returns the axis positions at the points, (n, 3), mm."""
 
     name: str
 
@@ -40,7 +40,7 @@ class Controller(Protocol):
 
 
 class Calculated:
-    """No controller, but the same compensator and the same instrument, without program, sockets and clock."""
+    """The same compensator and instrument without a controller, program, sockets or clock."""
 
     name = "no controller (calculated)"
 

@@ -1,10 +1,11 @@
-"""LinuxCNC in the loop: it runs the measuring program on a virtual machine, which its joints move.
+"""LinuxCNC in the loop: it runs the measuring program, and its joints move a virtual machine.
 
     program --handshake--> bridge --moveTo--> twin (virtual machine, head and instrument)
                              |                  ^ JSON-RPC
                              +------READ-----> acquire --> run.csv
 
-The points come after the run in the same way, as one more visit: what is stored of it is where the joints stood.
+After the run the points follow in the same way as one more visit, for which the joints' positions
+are stored.
 """
 
 import shutil
@@ -42,11 +43,11 @@ TASK_CYCLE: Final = 0.0002  # s: most of a reading's time is the program's waiti
 
 
 class LoopError(LinuxcncError):
-    """The loop broke: a reading was not stored, or the program stopped."""
+    """The loop failed: a reading was not stored, or the program stopped."""
 
 
 class Linuxcnc:
-    """One start of LinuxCNC for every job."""
+    """Starts LinuxCNC once for each job."""
 
     name = "LinuxCNC"
 
@@ -93,7 +94,9 @@ class Linuxcnc:
         }
 
     def _points_program(self, job: Job) -> Path:
-        """Goes to the points, and has every one of them read as that of a visit after the last."""
+        """Write the program for the points.
+
+        It requests a reading at each point, as those of one more visit."""
         path = job.run.with_name("points.ngc")
         writer = Writer("linuxcnc", 12, "G53")
         number = _points_visit(job).number
@@ -107,7 +110,7 @@ class Linuxcnc:
 
 
 class _Listening(TcpTrigger):
-    """A trigger that outlives the acquisition, for what comes after it."""
+    """A trigger that remains open after the acquisition."""
 
     def close(self) -> None:
         pass
@@ -117,7 +120,7 @@ class _Listening(TcpTrigger):
 
 
 class _Recorder(threading.Thread):
-    """Takes the readings of the run, then keeps where the joints stood for the points."""
+    """Records the readings of the run, then the joints' positions at the points."""
 
     def __init__(self, job: Job, twin: Twin, trigger: _Listening) -> None:
         super().__init__(name="stepdiag-loop", daemon=True)
@@ -151,7 +154,7 @@ class _Recorder(threading.Thread):
         raise AssertionError("points are not read")
 
     def result(self) -> FloatArray:
-        """Joints, (n, 3), mm."""
+        """Joint positions, (n, 3), mm."""
         if self.error is not None:
             raise LoopError(f"acquisition: {self.error}") from self.error
         if len(self._joints) != len(self._job.points):
@@ -175,7 +178,7 @@ def _points_visit(job: Job) -> Visit:
 
 
 def _go_on(recorder: _Recorder, say: Say) -> Any:
-    """At a stop: nobody has to mount anything, but a reading that did not come ends the loop."""
+    """Continue after a stop: nothing has to be mounted. A missing reading ends the loop."""
 
     def stopped(session: LinuxcncSession, line: int, messages: list[str]) -> None:
         if recorder.error is not None:

@@ -1,4 +1,4 @@
-"""A case of the closed loop: the machine is measured, calibrated, compensated and measured again."""
+"""One case of the closed loop: measure, calibrate, compensate, measure again."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class PointSet:
 
 @dataclass(frozen=True)
 class LoopOutcome:
-    """What the loop made of a case."""
+    """The result of a case."""
 
     case: LoopCase
     scenario: Scenario
@@ -55,7 +55,9 @@ def run_case(
     counts: tuple[int, int],
     progress: Progress,
 ) -> tuple[LoopOutcome, FloatArray]:
-    """Measures, calibrates, compensates and measures again; also returns where the axes stood for the points before."""
+    """Measure, calibrate, compensate and measure again.
+
+    Also returns the axis positions at the points without compensation."""
     here, later = folder / case.name, folder / f"{case.name}-again"
     write_truth(case, folder, steps)
     scenario = read_scenario(write_scenario(case, here, steps))
@@ -105,7 +107,9 @@ def run_case(
 
 
 def repetitions(outcome: LoopOutcome, seeds: int) -> dict[str, Agreement]:
-    """The noisy case with other noise, calculated: what is left, and the uncertainty that each calibration states."""
+    """Repeat the noisy case with other noise, calculated.
+
+    Returns remaining errors and their stated uncertainty by kind of points."""
     errors: dict[str, list[FloatArray]] = {}
     variances: dict[str, list[FloatArray]] = {}
     steps = outcome.scenario.known.plan.steps
@@ -121,7 +125,7 @@ def repetitions(outcome: LoopOutcome, seeds: int) -> dict[str, Agreement]:
 
 
 def whole_grid(outcome: LoopOutcome) -> tuple[float, float]:
-    """The largest errors at any node of the plan's grid, before and after compensation, by calculation, mm."""
+    """Largest errors at all nodes of the grid before and after compensation, calculated, mm."""
     nodes = [outcome.scenario.known.plan.nodes(axis) for axis in "XYZ"]
     compensator = _core.Compensator(outcome.table, CHAIN)
     before = after = 0.0

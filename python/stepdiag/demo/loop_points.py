@@ -1,4 +1,4 @@
-"""What the loop is judged by: errors at nodes of the plan and at random points, before and after compensation."""
+"""Criteria of the loop: errors at nodes and random points, before and after compensation."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -15,7 +15,7 @@ QUANTILE_95: Final = 7.8147279
 
 
 def grid_nodes(plan: Plan, count: int, seed: int) -> FloatArray:
-    """So many nodes of the plan's grid, drawn without repetition, (n, 3), mm; the eight corners are among them."""
+    """A random choice of `count` nodes of the plan's grid, (n, 3), mm, with all eight corners."""
     sides = plan.steps + 1
     corners = np.array([[x, y, z] for x in (0, plan.steps) for y in (0, plan.steps) for z in (0, plan.steps)])
     drawn = np.random.default_rng(seed).permutation(sides**3)[:count]
@@ -26,18 +26,18 @@ def grid_nodes(plan: Plan, count: int, seed: int) -> FloatArray:
 
 
 def random_points(plan: Plan, count: int, seed: int) -> FloatArray:
-    """Points anywhere in the volume, (n, 3), mm."""
+    """Random points in the volume, (n, 3), mm."""
     return np.random.default_rng(seed).uniform(0.0, plan.volume, (count, 3))
 
 
 def errors_at(machine: Machine, joints: FloatArray, targets: FloatArray) -> FloatArray:
-    """By how much the functional point is beside its target, where the axes stand at `joints`, (n, 3), mm."""
+    """Deviation of the functional point from its target for axes at `joints`, (n, 3), mm."""
     return joints + machine.error(joints) - targets
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """Of error vectors, mm."""
+    """Sizes of error vectors, mm."""
 
     largest: float
     rms: float
@@ -50,7 +50,7 @@ class Sizes:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Errors that are left against what the calibration says of its own uncertainty."""
+    """Remaining errors compared with the calibration's stated uncertainty."""
 
     chi_square: FloatArray  # (n,): of each error vector, by the covariance of the calibration there
     stated_rms: float  # of the vectors' standard uncertainty, mm
@@ -58,22 +58,24 @@ class Agreement:
 
     @property
     def covered(self) -> float:
-        """The share of points whose error lies in the region of 95 %."""
+        """Share of points whose error lies in the region of 95 %."""
         return float(np.mean(self.chi_square <= QUANTILE_95))
 
     @property
     def mean_chi_square(self) -> float:
-        """1 is expected, a degree of freedom."""
+        """Mean chi-square per degree of freedom; 1 is expected."""
         return float(np.mean(self.chi_square) / 3.0)
 
 
 def covariances(calibration: Calibration, points: FloatArray) -> FloatArray:
-    """Of the calibration's error vectors at points, (n, 3, 3), mm^2."""
+    """Covariances of the calibration's error vectors at points, (n, 3, 3), mm^2."""
     return np.array([error_at_point(calibration, point).covariance[:3, :3] for point in points])
 
 
 def agreement(errors: FloatArray, covariance: FloatArray) -> Agreement:
-    """At home the covariance is 0 and there is nothing to agree with: such points are left out."""
+    """Compare errors with their covariance.
+
+    Points at home, where the covariance is 0, are left out."""
     known = np.linalg.eigvalsh(covariance)[:, 0] > 0.0
     errors, covariance = errors[known], covariance[known]
     chi_square = np.einsum("ni,ni->n", errors, np.linalg.solve(covariance, errors[:, :, None])[:, :, 0])

@@ -1,8 +1,9 @@
-"""The second calibration: what a run says of a machine whose controller compensates.
+"""The second calibration: evaluates the run of a compensated machine.
 
-Such a machine still tilts as it did, since three axes cannot undo a tilt, but its tilts no longer move the functional
-point. So it is not a chain of axes with tilts any more, and no calibration with free angles fits its readings. The
-tilts are taken from the readings instead, and what is asked for are translations: how far the point is from its place.
+Three axes cannot compensate tilts. The compensated machine still tilts, but its tilts no longer
+move the functional point. Therefore it is no longer a chain of axes with tilts, and no calibration
+with free angles fits its readings. The tilts are taken from the readings instead, and only
+translations are evaluated: the distance of the functional point from its commanded position.
 """
 
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ ITERATIONS = 5  # of t = alpha^2 + beta^2, each of which gains a factor of t, ab
 
 @dataclass(frozen=True)
 class Translations:
-    """A calibration of translations alone, and its largest values."""
+    """A calibration of translations, and its largest values."""
 
     calibration: Calibration
     length: float  # mm, of positioning errors and straightnesses
@@ -27,7 +28,7 @@ class Translations:
 
 
 def translations(known: Known, run: Measurement) -> Translations:
-    """Of a run with three beams or more."""
+    """Evaluate the translations of a run with three or more beams."""
     place = along_beam(known, run)
     sound = np.isfinite(place)
     reduced = Measurement(
@@ -47,10 +48,11 @@ def translations(known: Known, run: Measurement) -> Translations:
 
 
 def along_beam(known: Known, run: Measurement) -> npt.NDArray[np.float64]:
-    """How far along the beam the functional point is, (n,), mm: from the distances and the tilts in them.
+    """Position of the functional point along the beam, (n,), mm, from distances and their tilts.
 
-    Beam i reads (L - beta u_i + alpha v_i)/(1 - t), t = alpha^2 + beta^2, and L = z + beta x - alpha y of the
-    functional point (x, y, z) in the sensor frame (docs/method.md), of which x and y are the commanded ones."""
+    Beam i reads (L - beta u_i + alpha v_i)/(1 - t), t = alpha^2 + beta^2, and L = z + beta x -
+    alpha y of the functional point (x, y, z) in the sensor frame (docs/method.md), of which x and y
+    are the commanded ones."""
     offsets = known.head.beam_offsets
     distances = np.stack([run.channels[name] for name in known.signals], axis=1)
     design = np.column_stack([np.ones(len(offsets)), -offsets[:, 0], offsets[:, 1]])

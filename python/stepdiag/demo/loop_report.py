@@ -1,4 +1,4 @@
-"""What the closed loop says: a table of errors before and after, and what explains what is left."""
+"""Report of the closed loop: a table of errors before and after, and explanations."""
 
 import math
 from collections.abc import Iterator
@@ -63,7 +63,7 @@ def node_note(outcomes: list[LoopOutcome]) -> Iterator[str]:
 
 
 def screw_note(outcome: LoopOutcome) -> Iterator[str]:
-    """A screw error has its period between the nodes, or nearly so: the plan cannot know it."""
+    """Remaining screw error: its pitch is not resolved by the nodes."""
     yield f"A screw error of {SCREW_PITCH:g} mm pitch and {SCREW_AMPLITUDE * UM:g} µm on all axes stays between nodes:"
     yield f"{'':<6}{'step':>10}{'seen as':>22}{'left at nodes':>16}{'left between':>16}"
     for axis, name in enumerate("XYZ"):
@@ -79,7 +79,7 @@ def screw_note(outcome: LoopOutcome) -> Iterator[str]:
 
 
 def left_along(outcome: LoopOutcome, axis: int, positions: FloatArray) -> FloatArray:
-    """What compensation leaves along an axis, the others at home, calculated, (n, 3), mm."""
+    """Error remaining along an axis with the others at home, calculated, (n, 3), mm."""
     targets = np.zeros((len(positions), 3))
     targets[:, axis] = positions
     return errors_at(outcome.machine, _core.Compensator(outcome.table, CHAIN).command(targets), targets)
@@ -115,7 +115,7 @@ def recheck_table(outcomes: list[LoopOutcome]) -> Iterator[str]:
 
 
 def point_table(outcomes: list[LoopOutcome]) -> str:
-    """Every point as a row of CSV, errors in µm."""
+    """All points as CSV, errors in µm."""
     parts = [f"{when}_{axis}_um" for when in ("before", "after") for axis in "xyz"]
     rows = []
     for outcome in outcomes:

@@ -1,4 +1,4 @@
-"""The demonstration: the paper's virtual machine, simulated, evaluated by all methods and compared with its truth."""
+"""The demonstration: the paper's virtual machine, simulated and evaluated by all methods."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +11,9 @@ from stepdiag.io.whole_files import make_folder, write_whole
 
 
 def claim_demo(folder: Path) -> Path:
-    """The folder, if nothing would be lost in it but what an earlier demonstration wrote. Raises InvalidArgument."""
+    """Return the folder if only files of an earlier demonstration would be lost.
+
+    Raises InvalidArgument otherwise."""
     scenarios = {f"{case.name}/scenario.toml": scenario_of(case) for case in CASES}
     files: dict[str, outputs.FileKind | str] = {
         **scenarios,
@@ -24,7 +26,7 @@ def claim_demo(folder: Path) -> Path:
 
 
 def run_demo(folder: Path, progress: Callable[[str], None] = lambda text: None) -> list[str]:
-    """Writes all files of the demonstration into `folder`, and returns the lines of its report."""
+    """Write all files of the demonstration into `folder`. Returns the lines of its report."""
     make_folder(folder)
     write_truths(folder)
     results = []

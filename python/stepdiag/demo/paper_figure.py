@@ -1,4 +1,4 @@
-"""The picture of the demonstration, after Figure 5 of the paper."""
+"""Figure of the demonstration, after Figure 5 of the paper."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -58,7 +58,7 @@ YLABEL = {
 
 
 def draw_figure(results: Sequence[Result]) -> dict[str, bytes]:
-    """The figure as files: figure.png and figure.svg. Same results, same bytes."""
+    """The figure as files, figure.png and figure.svg. Same results give the same bytes."""
     by_name = {result.case.name: result for result in results}
     with own_style():
         figure = Figure(figsize=(10.0, 8.0), layout="constrained")
@@ -88,7 +88,7 @@ def legend_handles() -> list[Any]:
 
 
 def draw_functions(axes: Axes, result: Result, names: Sequence[str], methods: Sequence[str]) -> None:
-    """Error functions over position: truth broad and pale, the methods on top of it."""
+    """Draw error functions over position: truth as a broad pale line, the methods above it."""
     for name in names:
         scale = 1e6 if name[1] in "ABC" else 1e3
         position, value = result.truth.functions[name]
@@ -101,7 +101,7 @@ def draw_functions(axes: Axes, result: Result, names: Sequence[str], methods: Se
 
 
 def draw_definition(axes: Axes, result: Result, names: Sequence[str]) -> None:
-    """Dots on every tenth node of the enhanced evaluation."""
+    """Draw dots on every tenth node of the enhanced evaluation."""
     for name in names:
         position, value, _ = result.calibrations["enhanced"].functions[name]
         scale = 1e6 if name[1] in "ABC" else 1e3
@@ -109,7 +109,7 @@ def draw_definition(axes: Axes, result: Result, names: Sequence[str]) -> None:
 
 
 def name_functions(axes: Axes, names: Sequence[str]) -> None:
-    """Names the functions in their colours, in an empty band above the curves."""
+    """Write the functions' names in their colours into an empty band above the curves."""
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.14 * (high - low))
     for k, name in enumerate(names):
@@ -125,7 +125,7 @@ def name_functions(axes: Axes, names: Sequence[str]) -> None:
 
 
 def draw_screw(axes: Axes, result: Result, end: float = 160.0) -> None:
-    """The beginning of travel, magnified: fine truth, nodes of the enhanced calibration, straight lines between."""
+    """Draw the beginning of travel, enlarged: truth, calibrated nodes, lines between them."""
     calibration = result.calibrations["enhanced"].to_error_map()
     floor = 0.0  # each function stands below the one before; only the ripple matters here
     for name in POSITIONING:

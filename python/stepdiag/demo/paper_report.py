@@ -1,4 +1,4 @@
-"""What the demonstration of the paper says: errors by case and method, and what explains them."""
+"""Report of the demonstration: errors by case and method, and explanations."""
 
 import math
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ from stepdiag.units import MICRO
 
 
 def error_table(results: list[Result]) -> Iterator[str]:
-    """Largest differences to the truth at the nodes, by case and method."""
+    """Table of the largest differences from the truth at the nodes."""
     yield "Largest remaining errors at the nodes (calibration - truth)"
     yield f"{'':<52}" + "".join(f"{kind:>14}" for kind in KINDS)
     yield f"{'':<52}" + "".join(f"{REPORT_UNIT[kind]:>14}" for kind in KINDS)
@@ -39,13 +39,13 @@ def error_table(results: list[Result]) -> Iterator[str]:
 
 
 def conventional_trend(result: Result, reference: Result) -> float:
-    """How far a set-up moves the conventional positioning errors from those of the reference case, mm."""
+    """How far a set-up moves the conventional positioning errors from the reference case's, mm."""
     mine, base = (r.calibrations["conventional"].functions for r in (result, reference))
     return max(float(np.max(np.abs(mine[name][1] - base[name][1]))) for name in POSITIONING)
 
 
 def trend_note(results: list[Result]) -> list[str]:
-    """Which of 1c and 1d shows the trend that the paper's Figure 5 shows, by the numbers."""
+    """Which of 1c and 1d shows the trend of the paper's Figure 5."""
     by_name = {result.case.name: result for result in results}
     alone, following = (conventional_trend(by_name[name], by_name["1a"]) * 1e3 for name in ("1c", "1d"))
     second_order = 0.5 * (700e-6**2 + 1000e-6**2) * math.dist(VOLUME, (0, 0, 0)) * 1e3
@@ -60,10 +60,11 @@ def trend_note(results: list[Result]) -> list[str]:
 
 
 def traced_differences(traced: Result, defined: Result) -> dict[str, tuple[float, float]]:
-    """By how much the readings of case 3 differ from those of 3d, and what of it second order does not explain, mm.
+    """Differences between the readings of case 3 and 3d, and their part beyond second order, mm.
 
-    The laser starts at (u, 0) beside the interferometer, so its way to the mirror is L - u beta: the spot moves by
-    2 u beta (beta, -alpha). The window's glass shortens L for the angle, so the distance loses that times tan^2 phi."""
+    The laser starts at (u, 0) beside the interferometer, so its path to the mirror is L - u beta:
+    the spot moves by 2 u beta (beta, -alpha). The window's glass shortens L for the angle, so the
+    distance loses that times tan^2 phi."""
     mine, theirs = traced.measurement.channels, defined.measurement.channels
     zero = defined.scenario.truth.keys.misalignment.psd_zero_mm
     arm = 2.0 * (theirs["distance"] + PSD_DISTANCE)
@@ -81,7 +82,7 @@ def traced_differences(traced: Result, defined: Result) -> dict[str, tuple[float
 
 
 def traced_note(results: list[Result]) -> list[str]:
-    """Case 3 has a sensor out of its place in a traced head, 3d a number that is added to its readings."""
+    """Compare case 3 (displaced sensor in a traced head) with 3d (offset added to its readings)."""
     by_name = {result.case.name: result for result in results}
     traced, defined = by_name["3"], by_name["3d"]
     nanometres = {name: (a * 1e6, b * 1e6) for name, (a, b) in traced_differences(traced, defined).items()}
@@ -106,13 +107,13 @@ def traced_note(results: list[Result]) -> list[str]:
 
 
 def _left(result: Result, kind: Kind) -> str:
-    """What the adjustment leaves of a case's truth."""
+    """Error of the adjustment, as text."""
     value = largest_deviations(result.calibrations["adjustment"], result.truth)[kind].value
     return f"{abs(in_report_units(kind, value)):.1g} {REPORT_UNIT[kind]}"
 
 
 def between_nodes(result: Result, name: str) -> tuple[float, float]:
-    """Largest differences to the truth at the nodes of the calibration and at those of the finer truth, mm."""
+    """Largest differences from the truth at the calibration's nodes and at the truth's, mm."""
     calibration = result.calibrations["enhanced"].to_error_map()
     coarse, _ = calibration.functions[name]
     fine, _ = result.truth.functions[name]
@@ -123,7 +124,7 @@ def between_nodes(result: Result, name: str) -> tuple[float, float]:
 
 
 def screw_note(result: Result) -> Iterator[str]:
-    """Errors at nodes and between them, apart: what the steps do not sample, no evaluation can find."""
+    """Errors at nodes and between them. No evaluation can find what the steps do not sample."""
     yield f"Case 4: a screw error of {SCREW_PITCH:g} mm pitch and {SCREW_AMPLITUDE * 1e3:g} µm amplitude, enhanced:"
     yield f"{'':<6}{'step':>10}{'seen as':>22}{'at nodes':>14}{'between nodes':>16}"
     for name, edge in zip(POSITIONING, VOLUME, strict=True):

@@ -1,4 +1,4 @@
-"""What the formats have in common: options, what is refused or said of every export, nodes and error maps."""
+"""What the export formats share: options, checks and notes, nodes and error maps."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,38 +17,40 @@ Approach = Literal["mean", "positive", "negative"]
 APPROACHES: Final[tuple[Approach, ...]] = ("mean", "positive", "negative")
 
 
-SAME_NODE: Final = 1e-6  # mm: nearer ones are the same position, and one row of a table with nine digits
+SAME_NODE: Final = 1e-6  # mm: closer nodes count as one; tables have nine digits after the point
 
 
 @dataclass(frozen=True)
 class ExportOptions:
-    """What a user chooses; None: the format's default, documented with the command."""
+    """Options of an export. None: the default of the format, see `stepdiag export --help`.
 
-    tool: Triple | None = None  # mm; None: the calibration's
-    origin: Triple | None = None  # mm, controller's coordinates of home; None: 0 0 0
-    incomplete: bool = False  # what is not determined is exported as 0
-    approach: Approach | None = None  # of tables with two directions; None: mean
-    at: Triple | None = None  # mm from home, linuxcnc-comp: the lines that are corrected; None: centre of the volume
-    rows: int | None = None  # linuxcnc-comp, isg: at most so many rows a table
-    nodes: tuple[int, int, int] | None = None  # csv-grid
-    step: float | None = None  # mm, csv-grid: largest spacing
-    orientation: bool | None = None  # csv-grid: rotations too
-    squareness: Literal["straightness", "parameters"] | None = None  # isg: where squareness is written
-    accept_rejected: bool = False  # takes a calibration whose fit was rejected
+    `export_calibration` refuses options that its format does not use."""
+
+    tool: Triple | None = None  # tool offset, mm; None: the calibration's
+    origin: Triple | None = None  # home in the controller's coordinates, mm; None: 0 0 0
+    incomplete: bool = False  # export undetermined values as 0
+    approach: Approach | None = None  # direction to export if there are two; None: mean
+    at: Triple | None = None  # linuxcnc-comp: point on corrected lines, mm from home; None: centre
+    rows: int | None = None  # linuxcnc-comp, isg: largest number of rows in a table
+    nodes: tuple[int, int, int] | None = None  # csv-grid: points along X, Y, Z
+    step: float | None = None  # csv-grid: largest spacing, mm
+    orientation: bool | None = None  # csv-grid: export rotations as well
+    squareness: Literal["straightness", "parameters"] | None = None  # isg: where to put it
+    accept_rejected: bool = False  # export a calibration with a rejected fit
 
 
 @dataclass(frozen=True)
 class Export:
-    """Texts of files by their paths, and what is to say about them."""
+    """Contents of files by path, and notes for the user."""
 
     files: Mapping[Path, str]
     report: Sequence[str]
 
 
 def require(calibration: Calibration, names: Sequence[str], options: ExportOptions) -> list[str]:
-    """Sentences on what of `names` is not determined, or not up to the end of the volume.
+    """Notes on which of `names` are undetermined, or not determined over the whole volume.
 
-    Raises InvalidArgument where something is not determined, unless allowed."""
+    Raises InvalidArgument if one is undetermined, unless `options.incomplete`."""
     missing = list(undetermined_of(calibration, names))
     if missing and not options.incomplete:
         raise InvalidArgument(
@@ -71,7 +73,7 @@ def _held(calibration: Calibration, names: Sequence[str]) -> Iterator[str]:
 
 
 def undetermined_of(calibration: Calibration, names: Sequence[str]) -> Iterator[str]:
-    """What a table of these parameters would hold as 0 although nobody knows it."""
+    """The values that tables of these parameters would contain as 0 although they are unknown."""
     for name in names:
         if name not in calibration.functions and name not in calibration.squareness:
             yield name
@@ -82,17 +84,17 @@ def undetermined_of(calibration: Calibration, names: Sequence[str]) -> Iterator[
 
 
 def tool_of(calibration: Calibration, options: ExportOptions) -> FloatArray:
-    """The tool offset that the export is for, mm."""
+    """Tool offset of the export, mm."""
     return np.array(calibration.tool if options.tool is None else options.tool, dtype=float)
 
 
 def origin_of(options: ExportOptions) -> FloatArray:
-    """Controller's coordinates of home, mm."""
+    """Home in the controller's coordinates, mm."""
     return np.array(options.origin or (0.0, 0.0, 0.0), dtype=float)
 
 
 def compensated_map(calibration: Calibration, approach: Approach) -> ErrorMap:
-    """The error map of one direction of approach, or of the mean of both: it has no reversal error."""
+    """The error map for one direction of approach, or the mean of both; without reversal errors."""
     positive = {name: table[:2] for name, table in calibration.functions.items()}
     squareness = {name: angle for name, (angle, _) in calibration.squareness.items()}
     if approach == "positive":
@@ -111,20 +113,20 @@ def compensated_map(calibration: Calibration, approach: Approach) -> ErrorMap:
 
 
 def common_nodes(errors: ErrorMap, axis: str) -> FloatArray:
-    """Every position at which a function of this axis has a node, mm, ascending."""
+    """Union of the nodes of all functions of an axis, mm, ascending."""
     tables = [*errors.functions.items(), *errors.negative_functions.items()]
     return np.unique(np.concatenate([[0.0], *(position for name, (position, _) in tables if name[2] == axis)]))
 
 
 def inside(nodes: FloatArray, edge: float) -> FloatArray:
-    """The nodes within the volume, and both its ends; of nodes that are one but for rounding, one."""
+    """The nodes within the volume and both its ends; nodes that differ by rounding are merged."""
     between = nodes[(nodes > SAME_NODE) & (nodes < edge - SAME_NODE)]
     apart = np.diff(between, prepend=-np.inf) > SAME_NODE
     return np.concatenate([[0.0], between[apart], [edge]])
 
 
 def spread(values: FloatArray, most: int) -> FloatArray:
-    """At most so many of the values, the first and the last among them."""
+    """At most `most` of the values, among them the first and the last."""
     rows = np.linspace(0, len(values) - 1, min(most, len(values))).round().astype(int)
     return np.asarray(values[np.unique(rows)])
 

@@ -1,8 +1,8 @@
-"""A plain grid of error vectors over the volume, as CSV with leading `# key=value` lines.
+"""A grid of error vectors over the volume: CSV with leading `# key=value` lines.
 
-At every grid point the error of the functional point, actual minus commanded, by the exact pose of docs/conventions.md.
-Whoever interpolates between the points makes an error that is found on a finer sampling, and stated: that of trilinear
-interpolation, which is what most controllers and programs do.
+Every grid point has the error of the functional point, actual minus commanded, by the exact pose of
+docs/conventions.md. Interpolation between the points adds an error. For trilinear interpolation,
+which most controllers and programs use, its largest value is searched on a finer grid and stated.
 """
 
 from collections.abc import Iterator
@@ -33,11 +33,11 @@ from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 GRID_FORMAT: Final = "stepdiag error grid 1"
 DEFAULT_NODES: Final = (11, 11, 11)
 MOST_POINTS: Final = 2_000_000  # a file of 200 MB
-MOST_SAMPLES: Final = 1_000_000  # of the search for the largest loss: seconds
+MOST_SAMPLES: Final = 1_000_000  # for the search of the largest loss; takes seconds
 
 
 def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> Export:
-    """The file, and what interpolation in it loses."""
+    """The file, and the largest error of interpolation in it."""
     axes = _axes(calibration.volume, options)
     tool, origin = tool_of(calibration, options), origin_of(options)
     missing = require(calibration, [*FUNCTIONS, *SQUARENESSES], options)
@@ -71,7 +71,7 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
 
 
 def _axes(volume: FloatArray, options: ExportOptions) -> list[FloatArray]:
-    """Positions of the grid from home, both ends of every edge among them."""
+    """Positions of the grid from home, mm; both ends of every edge are included."""
     if options.nodes is not None and options.step is not None:
         raise InvalidArgument("`step`: the grid is given by `nodes` already")
     counts = options.nodes or DEFAULT_NODES
@@ -80,7 +80,7 @@ def _axes(volume: FloatArray, options: ExportOptions) -> list[FloatArray]:
     if options.step is not None:
         if not options.step > 0.0 or not np.isfinite(options.step):
             raise InvalidArgument(f"`step`: expected a length in mm, got {options.step:g}")
-        # Whole steps that rounding has made a little more are still whole.
+        # Tolerates quotients that rounding has made slightly larger than an integer.
         intervals = np.ceil(volume / options.step * (1.0 - 1e-12))
         x, y, z = (int(min(n, MOST_POINTS)) + 1 for n in np.maximum(intervals, 1.0))
         counts = (x, y, z)
@@ -96,7 +96,7 @@ def _axes(volume: FloatArray, options: ExportOptions) -> list[FloatArray]:
 def _rotation(machine: Machine, grid: FloatArray) -> FloatArray:
     """Rotation vectors of the tool, rad."""
     turn = machine.pose(grid)[0]
-    # sin(angle)·axis: of angles below a milliradian it is the rotation vector to 1e-9 rad.
+    # sin(angle)·axis equals the rotation vector to 1e-9 rad for angles below 1 mrad.
     return 0.5 * np.stack(
         [turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]], axis=1
     )
@@ -108,7 +108,7 @@ def _header(orientation: bool) -> list[str]:
 
 
 def _rows(axes: list[FloatArray], origin: FloatArray, values: list[FloatArray]) -> Iterator[str]:
-    """Positions that are read back to the same bits; nine digits of a µm or µrad, which nobody interpolates to."""
+    """Lines of the file: positions with all digits, values with nine decimal places."""
     words = [[repr(float(p)) for p in axis + o] for axis, o in zip(axes, origin, strict=True)]
     number = ",".join(["%.9f"] * sum(value.shape[1] for value in values)) + "\n"
     rows = np.concatenate(values, axis=1)
@@ -120,10 +120,11 @@ def _rows(axes: list[FloatArray], origin: FloatArray, values: list[FloatArray]) 
 
 
 def interpolation_loss(machine: Machine, axes: list[FloatArray], volume: FloatArray) -> tuple[float, FloatArray]:
-    """Largest distance of the trilinearly interpolated error from the exact one, mm, and the position of it.
+    """Largest error of trilinear interpolation, mm, and where it is.
 
-    Looked for where it can be: at all combinations of the tables' nodes and the middles between nodes; where these are
-    too many, at a share of them, and from the worst one found along each axis through all of them."""
+    The search visits all combinations of the tables' nodes and the midpoints between nodes. If
+    these are too many, it visits a subset, and from the worst point found all of them along each
+    axis."""
     samples = [_samples(machine, axis, grid, float(edge)) for axis, grid, edge in zip(AXES, axes, volume, strict=True)]
     most = int(MOST_SAMPLES ** (1.0 / 3.0))
     few = [spread(s, most) for s in samples]
@@ -133,7 +134,7 @@ def interpolation_loss(machine: Machine, axes: list[FloatArray], volume: FloatAr
     def loss(points: list[FloatArray]) -> tuple[float, FloatArray]:
         grid = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1).reshape(-1, 3)
         interpolated = values
-        for k in sorted(range(3), key=lambda k: len(points[k]) / len(axes[k])):  # the smaller arrays first
+        for k in sorted(range(3), key=lambda k: len(points[k]) / len(axes[k])):
             interpolated = _along(interpolated, axes[k], points[k], k)
         distance = np.linalg.norm(machine.error(grid) - interpolated.reshape(-1, 3), axis=1)
         worst = int(np.argmax(distance))

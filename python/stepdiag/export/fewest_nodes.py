@@ -1,10 +1,11 @@
 """Fewer nodes for functions that are linear between their nodes.
 
-`fewest_nodes` finds which nodes to keep so that linear interpolation between them deviates by at most a tolerance, with
-as few of them as can be: the shortest path from the first node to the last, where an edge is a chord that passes every
-node between at most the tolerance away (Imai and Iri, Computational-geometric methods for polygonal approximations of
-a curve, 1986). `best_subset` searches the least tolerance that a number of nodes permits: of all subsets of that size
-none has a smaller largest deviation, but for the relative RESOLUTION of the search.
+`fewest_nodes` keeps the fewest nodes such that linear interpolation between them deviates by at
+most a tolerance. This is the shortest path from the first node to the last, where an edge is a
+chord that passes every node between its ends within the tolerance (Imai and Iri,
+Computational-geometric methods for polygonal approximations of a curve, 1986). `best_subset`
+searches the smallest tolerance for a given number of nodes: no subset of that size has a smaller
+largest deviation, except for the relative RESOLUTION of the search.
 """
 
 from collections.abc import Iterator
@@ -19,15 +20,20 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int_]
 
 RESOLUTION: Final = 1e-4
-MOST_NODES: Final = 5_000  # the search takes seconds
-ROWS_AT_ONCE: Final = 512  # bounds the memory
+MOST_NODES: Final = 5_000  # so that the search takes seconds
+ROWS_AT_ONCE: Final = 512  # limits the memory
 
 
 def best_subset(x: FloatArray, functions: FloatArray, size: int) -> IntArray:
-    """Which `size` nodes (or fewer) to keep, the first and the last among them.
+    """Indices of at most `size` nodes to keep, among them the first and the last.
 
-    x: (n,) ascending. functions: (m, n), values at the nodes. Their largest deviation, over all positions and all m, is
-    the least that any such subset has. Raises InvalidArgument for fewer than 2 or for more than MOST_NODES nodes."""
+    Their largest deviation, over all positions and functions, is the smallest of all such subsets.
+    Raises InvalidArgument for fewer than 2 or more than MOST_NODES nodes.
+
+    Args:
+        x: positions of the nodes, (n,), ascending.
+        functions: values at the nodes, (m, n).
+        size: largest number of nodes to keep."""
     if size < 2:
         raise InvalidArgument(f"rows: expected at least 2, got {size}")
     if len(x) > MOST_NODES:
@@ -39,7 +45,7 @@ def best_subset(x: FloatArray, functions: FloatArray, size: int) -> IntArray:
     best = fewest_nodes(x, functions, 0.0, window)
     if len(best) <= size:
         return best
-    # Equal shares of the nodes deviate by some times the least, which saves the search many long chords.
+    # The deviation of evenly chosen nodes bounds the search, which avoids many long chords.
     best = np.linspace(0, len(x) - 1, size).round().astype(int)
     low, high = 0.0, largest_deviation(x, functions, best)
     while high - low > RESOLUTION * high:
@@ -53,13 +59,13 @@ def best_subset(x: FloatArray, functions: FloatArray, size: int) -> IntArray:
 
 
 def fewest_nodes(x: FloatArray, functions: FloatArray, tolerance: float, window: int = 32) -> IntArray:
-    """The fewest nodes whose chords deviate by at most the tolerance from every function.
+    """Indices of the fewest nodes whose chords deviate from no function by more than the tolerance.
 
-    window: how many nodes ahead chords are expected to end; another costs time, nothing else."""
+    `window`: expected length of a chord in nodes. It affects only the run time."""
     n = len(x)
-    # The slack keeps nodes on one straight line together, whatever the rounding of their values.
+    # With this slack nodes on one straight line need no node between them despite rounding.
     slack = tolerance + 4.0 * np.finfo(float).eps * np.max(np.abs(functions), axis=1)
-    edges = np.full(n, n)  # from the first node, so far
+    edges = np.full(n, n)  # number of chords from the first node, so far
     came_from = np.zeros(n, dtype=int)
     edges[0] = 0
     for i, ends in enumerate(_all_ends_of_chords(x, functions, slack, window)):
@@ -72,7 +78,7 @@ def fewest_nodes(x: FloatArray, functions: FloatArray, tolerance: float, window:
 
 
 def _all_ends_of_chords(x: FloatArray, functions: FloatArray, slack: FloatArray, window: int) -> Iterator[IntArray]:
-    """For each node but the last the nodes after it to which a chord may go."""
+    """For each node except the last, the later nodes to which a chord may go."""
     n = len(x)
     for first in range(0, n - 1, ROWS_AT_ONCE):
         begin = np.arange(first, min(first + ROWS_AT_ONCE, n - 1))
@@ -89,8 +95,10 @@ def _all_ends_of_chords(x: FloatArray, functions: FloatArray, slack: FloatArray,
 def _chords(
     x: FloatArray, functions: FloatArray, slack: FloatArray, begin: IntArray, ahead: int
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """(n, ahead): whether the slope of the chord from each node to those ahead passes all nodes between; and (n,)
-    whether a slope is left that passes all of them, so that chords may go farther."""
+    """Which chords from each node to the nodes ahead pass all nodes between, (n, ahead).
+
+    Also, (n,): whether any slope still passes all these nodes, such that longer chords are
+    possible."""
     end = np.minimum(begin[:, None] + np.arange(1, ahead + 1), len(x) - 1)
     step = x[end] - x[begin, None]
     slope = (functions[:, end] - functions[:, begin, None]) / step
@@ -102,5 +110,5 @@ def _chords(
 
 
 def largest_deviation(x: FloatArray, functions: FloatArray, kept: IntArray) -> float:
-    """Of linear interpolation between the kept nodes from the functions."""
+    """Largest deviation of linear interpolation between the kept nodes from the functions."""
     return max(float(np.max(np.abs(np.interp(x, x[kept], f[kept]) - f))) for f in functions)

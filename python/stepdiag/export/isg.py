@@ -1,16 +1,18 @@
-"""The CSV of volumetric compensation in ISG-CNC and Beckhoff TwinCAT CNC. Written from the manuals, tried on none.
+"""CSV for volumetric compensation in ISG-CNC and Beckhoff TwinCAT CNC; not tried on a controller.
 
-Sources: ISG kernel [FCT-C26] and Beckhoff TF5280, "Volumetric Compensation" (sections ISG CSV format, Units of measure,
-List of parameters supported, Interpolation mode, General configuration), and P-VOLC-00001 .. -00020. They say: columns
-named in a header line, arguments X Y Z and ISO 230-1 parameters; rows below; comments after //; a # begins a new
-header; mm and rad; linear interpolation on a grid. What could be read of them does not say the sign (error or
-correction; `negate` turns it), nor how a squareness turns what follows its axis. So the file is written such that
-little depends on how one reads them:
+Sources: ISG kernel [FCT-C26] and Beckhoff TF5280, "Volumetric Compensation" (sections ISG CSV
+format, Units of measure, List of parameters supported, Interpolation mode, General configuration),
+and P-VOLC-00001 .. -00020. According to them a header line names the columns, arguments X Y Z and
+ISO 230-1 parameters; rows follow; comments begin with //; a # begins a new header; units are mm and
+rad; interpolation on the grid is linear. The parts that were available state neither the sign
+(error or correction; `negate` inverts it), nor how a squareness turns the axes after it. The file
+is therefore written such that it depends little on their interpretation:
 
-- errors, actual minus commanded, ISO 230-1;
-- every axis as one that carries the tool (workpiece_axes 0): the tables are those of the functional point, e = sum over
-  axes of delta + theta x L, L = zero position of the tool plus the positions of the axes after it in the chain;
-- squarenesses as the slopes of straightness that they are, unless asked for as parameters.
+- errors are actual minus commanded, ISO 230-1;
+- every axis is treated as one that carries the tool (workpiece_axes 0): the tables are those of the
+  functional point, e = sum over axes of delta + theta x L, L = zero position of the tool plus the
+  positions of the axes after it in the chain;
+- squarenesses are written as slopes of straightness, unless requested as parameters.
 """
 
 from pathlib import Path
@@ -38,12 +40,12 @@ from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 
 UNTRIED: Final = "written from the manual (ISG FCT-C26, Beckhoff TF5280), not tried on a controller"
 MOST_ROWS: Final = 5000
-# What a parabola between two nodes may hide, mm: ten times below what anybody measures.
+# Largest deviation of a parabola between two nodes, mm: ten times below what can be measured.
 HIDDEN: Final = 1e-5
 
 
 def isg(calibration: Calibration, output: Path, options: ExportOptions) -> Export:
-    """The file, and the lines of the compensation list that belong to it."""
+    """The file, and the entries of the compensation list that belong to it."""
     rows = MOST_ROWS if options.rows is None else options.rows
     if not 2 <= rows <= MOST_ROWS:
         raise InvalidArgument(f"`rows`: expected 2 to {MOST_ROWS}, got {rows}")
@@ -92,11 +94,13 @@ Table = tuple[FloatArray, dict[str, FloatArray]]
 def _axis_table(
     exact: Machine, axis: str, letters: list[str], edge: float, origin: FloatArray, rows: int, apart: bool
 ) -> Table:
-    """Controller's positions of an axis, and its six functions there as those of an axis that carries the tool."""
+    """Positions of an axis in the controller's coordinates, and its six functions there.
+
+    The functions are those of an axis that carries the tool."""
     own = {name: table for name, table in exact.errors.functions.items() if name[2] == axis}
     squareness = {} if apart else {n: a for n, a in exact.errors.squareness.items() if n[2] == axis}
     alone = ErrorMap(own, squareness)
-    # L of the controller holds positions with its origin: what that adds is taken off again.
+    # The controller's L contains positions from its own origin. Their contribution is subtracted.
     after = [AXES.index(letter) for letter in letters[letters.index(axis) + 1 :]]
     lever = np.zeros(3)
     lever[after] = -origin[after]
@@ -107,19 +111,21 @@ def _axis_table(
     line[:, AXES.index(axis)] = nodes
     delta = Machine(exact.chain, alone, lever).first_order_error(line)
     if apart:
-        # The controller's squareness counts from its own 0, not from home.
+        # The controller's squareness refers to its own 0, not to home.
         slopes = ErrorMap({}, {n: a for n, a in exact.errors.squareness.items() if n[2] == axis})
         shift = np.where(np.arange(3) == AXES.index(axis), -origin, 0.0)
         delta = delta + Machine(exact.chain, slopes).first_order_error(shift[None, :])
     theta = np.array([alone.function(f"E{turn}{axis}", nodes) for turn in "ABC"])
-    # Rotations count as much as they move the farthest point.
+    # Rotations are weighted by the displacement that they cause at the farthest point.
     kept = best_subset(nodes, np.concatenate([delta.T, theta * 3.0 * edge]), rows)
     columns = dict(zip((f"E{component}{axis}" for component in "XYZABC"), [*delta.T, *theta], strict=True))
     return nodes[kept] + origin[AXES.index(axis)], {name: column[kept] for name, column in columns.items()}
 
 
 def _where_parabolas_hide_little(errors: ErrorMap, axis: str, nodes: FloatArray) -> FloatArray:
-    """More nodes: theta p is a parabola between two nodes of theta, which a chord leaves by step · d(theta) / 4."""
+    """Add nodes such that chords hide little.
+
+    Between two nodes theta p is a parabola; it deviates from its chord by step · d(theta) / 4."""
     theta = np.array([errors.function(f"E{turn}{axis}", nodes) for turn in "ABC"])
     step = np.diff(nodes)
     bulge = 0.25 * step * np.max(np.abs(np.diff(theta, axis=1)), axis=0)
@@ -129,7 +135,7 @@ def _where_parabolas_hide_little(errors: ErrorMap, axis: str, nodes: FloatArray)
 
 
 def _largest_loss(exact: Machine, written: Machine, tables: dict[str, Table], origin: FloatArray) -> float:
-    """Largest distance of the written model's error from the exact one in the volume, mm."""
+    """Largest distance in the volume between the written model's errors and the exact ones, mm."""
     samples = []
     for n, axis in enumerate(AXES):
         x = tables[axis][0]
@@ -139,7 +145,7 @@ def _largest_loss(exact: Machine, written: Machine, tables: dict[str, Table], or
     def loss(points: list[FloatArray]) -> tuple[float, FloatArray]:
         grid = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1).reshape(-1, 3)
         there = exact.error(grid - origin)
-        # Nobody says whether a controller takes products of two errors into account.
+        # The manuals do not say whether a controller includes products of two errors.
         models = (written.error(grid), written.first_order_error(grid))
         distance = np.max([np.linalg.norm(model - there, axis=1) for model in models], axis=0)
         worst = int(np.argmax(distance))
@@ -154,7 +160,7 @@ def _largest_loss(exact: Machine, written: Machine, tables: dict[str, Table], or
 
 
 def _text(lines: list[str], tables: dict[str, Table], squareness: dict[str, float], tool: FloatArray) -> str:
-    """Plain decimals, nine places of a mm and twelve of a rad."""
+    """Decimals without exponent: nine places for mm, twelve for rad."""
     blocks = []
     for axis, (x, columns) in tables.items():
         rows = [f"{axis} {' '.join(columns)}"]
@@ -166,6 +172,6 @@ def _text(lines: list[str], tables: dict[str, Table], squareness: dict[str, floa
     if squareness:
         blocks.append(f"{' '.join(squareness)}\n{' '.join(f'{angle:.12f}' for angle in squareness.values())}")
     blocks.append(f"P0X P0Y P0Z\n{' '.join(f'{t:.9f}' for t in tool)}")
-    # A # begins a new header wherever it stands, and nobody says which characters a comment may have.
+    # A # begins a new header anywhere. The manuals do not say what comments may contain.
     head = "".join(f"// {line}\n" for line in ["stepdiag export --to isg", *lines]).replace("#", "").replace("µ", "u")
     return head + "\n#\n".join(blocks) + "\n"

@@ -1,14 +1,16 @@
-"""LinuxCNC's screw compensation: one COMP_FILE of type 0 for each joint, as usrmotLoadComp and motmod read it.
+"""LinuxCNC's screw compensation: a COMP_FILE of type 0 for each joint (usrmotLoadComp, motmod).
 
-A row is `nominal actual_forward actual_reverse`: where the axis was sent, and where it came to, approached in + and
-in - direction. LinuxCNC moves the motor to position + trim, trim = nominal - actual interpolated linearly, and holds
-the first and last trim outside. So one function of one axis is all that it can correct, while the error of a point
-depends on all three: what is corrected is the positioning error along the line on which the other two stand at `at`,
+A row is `nominal actual_forward actual_reverse`: the commanded position and the positions reached
+in + and in - direction. LinuxCNC moves the motor to position + trim. The trim, nominal - actual, is
+interpolated linearly; beyond the table the first or last trim holds. Such a table corrects one
+function of one axis, while the error of a point depends on all three axes. The corrected function
+is the positioning error along the line on which the other two axes are at `at`,
 
     E(p) = e_a(p on the line) - e_a(home on the line),
 
-which is EXX plus theta x L of that line (Abbe). The trims are those of the inverse, c + E(c) = nominal, and therefore
-exact at every row; `actual` differs from nominal + E by E times its slope, nanometres.
+which is EXX plus theta x L of that line (Abbe). The trims are those of the inverse, c + E(c) =
+nominal, and therefore exact at every row. `actual` differs from nominal + E by E times its slope,
+which is nanometres.
 """
 
 from pathlib import Path
@@ -33,12 +35,13 @@ from stepdiag.export.common import (
 from stepdiag.export.fewest_nodes import best_subset
 from stepdiag.parameters import AXES
 
-MOST_ROWS: Final = 256  # EMCMOT_COMP_SIZE; LinuxCNC 2.9 complains about more, and starts without the rest
+# EMCMOT_COMP_SIZE; LinuxCNC 2.9 reports an error for more rows, and starts without the rest.
+MOST_ROWS: Final = 256
 COMPANION: Final = "compensation.ini"
 
 
 def linuxcnc_comp(calibration: Calibration, output: Path, options: ExportOptions) -> Export:
-    """The three files, and a companion with the INI lines and what the files cannot say themselves."""
+    """The three files, and a companion with the INI lines and the settings."""
     rows = MOST_ROWS if options.rows is None else options.rows
     if not 2 <= rows <= MOST_ROWS:
         raise InvalidArgument(f"`rows`: expected 2 to {MOST_ROWS}, as LinuxCNC takes, got {rows}")
@@ -60,12 +63,12 @@ def linuxcnc_comp(calibration: Calibration, output: Path, options: ExportOptions
 
 
 def _needed() -> list[str]:
-    """What a positioning error away from home is made of."""
+    """The parameters that determine a positioning error away from home."""
     return [f"E{component}{axis}" for axis in AXES for component in (axis, *"ABC")]
 
 
 class JointTable:
-    """The table of one joint: kept nodes, trims in both directions, and what resampling loses."""
+    """The table of one joint: kept nodes, trims in both directions, and the loss by resampling."""
 
     def __init__(self, machine: Machine, volume: FloatArray, axis: str, at: FloatArray, rows: int) -> None:
         self.axis, self.index = axis, AXES.index(axis)
@@ -83,19 +86,21 @@ class JointTable:
         return "".join(sign if axis == self.axis else "+" for axis in AXES)
 
     def _exact_trim(self, error: FloatArray, nominal: FloatArray) -> FloatArray:
-        """By how much the motor must go elsewhere for the axis to come to these positions."""
+        """The correction with which the axis comes to these positions, mm."""
         comes_to = self.nodes + error
         if np.any(np.diff(comes_to) <= 0.0):
             raise InvalidArgument(f"E{self.axis}{self.axis}: so steep that positions of the axis are not distinct")
-        beyond = np.clip(nominal, comes_to[0], comes_to[-1])  # outside the table the end's error holds
+        beyond = np.clip(nominal, comes_to[0], comes_to[-1])  # the error holds beyond
         return np.asarray(np.interp(beyond, comes_to, self.nodes) - beyond)
 
     def trim(self, nominal: FloatArray, direction: int) -> FloatArray:
-        """What LinuxCNC adds to a position when it moves in direction 0 (+) or 1 (-)."""
+        """What LinuxCNC adds to a position when it moves in direction 0 (+) or 1 (-), mm."""
         return np.asarray(np.interp(nominal, self.nodes[self.kept], self.trims[direction, self.kept]))
 
     def _largest_loss(self) -> float:
-        """Largest deviation of the table's trims from the exact ones, mm; both are linear between these positions."""
+        """Largest deviation of the table's trims from the exact ones, mm.
+
+        Both are linear between the positions compared."""
         where = np.unique(np.concatenate([self.nodes, *(self.nodes + self.error).clip(0.0, self.nodes[-1])]))
         return max(
             float(np.max(np.abs(self.trim(where, d) - self._exact_trim(error, where))))
@@ -103,7 +108,7 @@ class JointTable:
         )
 
     def text(self, origin: float) -> str:
-        """Nine digits after the point: picometres."""
+        """Rows with nine digits after the point (picometres)."""
         rows = []
         for p, there, back in zip(self.nodes[self.kept], *self.trims[:, self.kept], strict=True):
             nominal = float(p) + origin
@@ -135,7 +140,7 @@ def _what_the_files_are(
 
 
 def _what_is_left(machine: Machine, volume: FloatArray, joints: list[JointTable]) -> list[str]:
-    """Largest errors in the volume without and with the compensation, on a grid, in both directions of all axes."""
+    """Largest errors in the volume with and without compensation, on a grid, in both directions."""
     axes = [spread(joint.nodes, 21) for joint in joints]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     before, after = [], []

@@ -1,6 +1,6 @@
-"""The table that LinuxCNC's kinematics module stepdiagkins loads: a calibration CSV (docs/linuxcnc.md).
+"""The table for LinuxCNC's kinematics module stepdiagkins (docs/linuxcnc.md).
 
-It is the CSV of the calibration, with its chain, volume and tool.
+It is the calibration's CSV, with chain, volume and tool.
 """
 
 import tempfile
@@ -19,7 +19,7 @@ def linuxcnc_kins(calibration: Calibration, output: Path, options: ExportOptions
     missing = require(calibration, [*FUNCTIONS, *SQUARENESSES], options)
     tool, origin = tool_of(calibration, options), origin_of(options)
     table = _with_tool(calibration, tool)
-    # What the module would refuse is refused here.
+    # Reports here what the module would refuse.
     loaded = Compensator(
         table,
         calibration.chain,
@@ -27,7 +27,7 @@ def linuxcnc_kins(calibration: Calibration, output: Path, options: ExportOptions
         approach=options.approach or "mean",
         accept_rejected=options.accept_rejected,
     )
-    # INI files do not pass on quotes, and the module knows where the bed is.
+    # INI files do not pass on quotes; the module derives the primes from the place of the bed.
     arguments = f"table={output.absolute()} chain={''.join(c for c in calibration.chain.name if c.isalpha())}"
     if origin.any():
         arguments += f" origin={','.join(repr(o) for o in origin.tolist())}"

@@ -1,7 +1,8 @@
-"""`export_calibration` writes a calibration in the format of a controller.
+"""Export of a calibration in the format of a controller: `export_calibration`.
 
-Every error here is actual minus commanded, of the tool relative to the workpiece; what compensates it has the opposite
-sign. Each format says in its file, or beside it, which of the two it holds, for which chain, tool and reference point.
+All errors here are actual minus commanded, of the tool relative to the workpiece; the compensation
+has the opposite sign. Every format states, in its file or beside it, which of the two it contains,
+and for which chain, tool and reference point.
 """
 
 from collections.abc import Mapping
@@ -22,7 +23,7 @@ from stepdiag.io.data_files import is_netcdf, read_calibration
 from stepdiag.io.whole_files import check_output, make_folder, write_whole
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 
-# Format -> the options that it takes beside `tool`, `origin`, `incomplete` and `accept_rejected`.
+# Format -> its options besides `tool`, `origin`, `incomplete` and `accept_rejected`.
 FORMATS: Final[Mapping[str, tuple[str, ...]]] = {
     "linuxcnc-comp": ("at", "rows"),
     "linuxcnc-kins": ("approach",),
@@ -32,9 +33,10 @@ FORMATS: Final[Mapping[str, tuple[str, ...]]] = {
 
 
 def read_what_is_exported(path: Path) -> Calibration:
-    """A calibration, CSV or netCDF; or an error map with chain, volume and tool: what it lacks is 0.
+    """Read a calibration, CSV or netCDF, or an error map with chain, volume and tool.
 
-    Raises InvalidArgument naming the file, and the line or variable."""
+    Parameters that an error map lacks are 0. Raises InvalidArgument naming the file, and the line
+    or variable."""
     calibration = read_calibration(path)
     if is_netcdf(path) or not read_error_map(path).header.get("format", "").startswith("stepdiag error map"):
         return calibration
@@ -56,7 +58,9 @@ def read_what_is_exported(path: Path) -> Calibration:
 
 
 def check_fit(calibration: Calibration, name: str, accept_rejected: bool) -> None:
-    """Raises InvalidArgument for a calibration, called `name`, whose fit was rejected, unless that is accepted."""
+    """Raise InvalidArgument for a rejected fit unless that is accepted.
+
+    `name` is used in messages."""
     if calibration.fit == "rejected" and not accept_rejected:
         raise InvalidArgument(
             f"{name}: fit=rejected: {MEANING['rejected']}; measure again, or export it all the same with "
@@ -67,11 +71,20 @@ def check_fit(calibration: Calibration, name: str, accept_rejected: bool) -> Non
 def export_calibration(
     calibration: Calibration, to: str, output: Path, options: ExportOptions | None = None
 ) -> list[str]:
-    """Writes a calibration for a controller and returns what is to say: settings, losses, what is not corrected.
+    """Write a calibration for a controller. Returns notes: settings, losses, what is not corrected.
 
-    to: a key of FORMATS. output: a file; of linuxcnc-comp a folder, which is made. Files are written whole or not at
-    all. Raises InvalidArgument for an option that the format has no use for, for what the calibration does not
-    determine unless `incomplete`, for a rejected fit unless `accept_rejected`, and for what the format cannot hold.
+    Files are written completely or not at all.
+
+    Args:
+        calibration: the calibration to export.
+        to: format: "linuxcnc-kins", "linuxcnc-comp", "isg" or "csv-grid" (docs/exports.md).
+        output: the file to write; for linuxcnc-comp a folder, which is created.
+        options: see ExportOptions; None: the defaults.
+
+    Raises:
+        InvalidArgument: an option does not belong to the format, the calibration does not determine
+            a required value (unless `incomplete`), its fit was rejected (unless `accept_rejected`),
+            or the format cannot represent it.
     """
     export = _prepare(calibration, to, output, options or ExportOptions())
     if to == "linuxcnc-comp":

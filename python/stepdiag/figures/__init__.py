@@ -1,1 +1,1 @@
-"""Pictures of results, in the one style of style.py."""
+"""Figures of results, in the common style of style.py."""

@@ -1,4 +1,4 @@
-"""The curve of `stepdiag plan`: the largest uncertainty that the fastest plans give, over their measuring time."""
+"""Figure of `stepdiag plan`: largest uncertainty of the fastest plans over measuring time."""
 
 import math
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from stepdiag.parameters import REPORT_UNIT, in_report_units
 from stepdiag.planning.plan_by_time import FAMILIES, Family, Outcome, complete
 from stepdiag.style import own_style, save
 
-# After Okabe and Ito: told apart with any colour vision; then again from the first, with another line.
+# Colours by Okabe and Ito, safe for colour-blind readers; repeated with another line style.
 COLOURS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 STYLES: Final = ("-", (0, (4, 1.6)), (0, (1, 1.4)))
 TITLES: Final[dict[Family, str]] = {
@@ -23,7 +23,9 @@ TITLES: Final[dict[Family, str]] = {
 
 
 def draw_plans(found: Sequence[Outcome], taken: Outcome | None, minutes: float, suffix: str) -> bytes:
-    """The figure as the content of a file, "png" or "svg". Same plans, same bytes. `taken`: the plan to mark."""
+    """Draw the plans: content of a "png" or "svg" file, same bytes for same plans.
+
+    `taken` is the plan to mark."""
     plans = [o for o in complete(found) if all(math.isfinite(o.worst(family)) for family in FAMILIES)]
     with own_style():
         figure = Figure(figsize=(10.0, 3.8), layout="constrained")
@@ -42,7 +44,7 @@ def draw_plans(found: Sequence[Outcome], taken: Outcome | None, minutes: float, 
 
 
 def _draw_family(axes: Axes, plans: Sequence[Outcome], family: Family, minutes: float) -> None:
-    """For each number of steps what is best by the time, as stairs: until the next plan is affordable."""
+    """For each number of steps, a staircase: the best plan until the next one is affordable."""
     for index, steps in enumerate(sorted({o.candidate.steps for o in plans})):
         colour, style = COLOURS[index % len(COLOURS)], STYLES[index // len(COLOURS) % len(STYLES)]
         own = sorted((o for o in plans if o.candidate.steps == steps), key=lambda o: o.seconds)

@@ -1,1 +1,1 @@
-"""Described heads: read, checked, drawn, and how sensitive their readings are. shipped/ holds those of the package."""
+"""Described heads: read, check, draw, and their sensitivities. shipped/ has the package's own."""

@@ -1,4 +1,4 @@
-"""What `stepdiag head check` tells of a head: constants, light at the detectors, limits, mirror."""
+"""The report of `stepdiag head check`: constants, light at the detectors, limits, mirror."""
 
 from collections.abc import Iterator, Sequence
 
@@ -17,11 +17,11 @@ from stepdiag.head.trace import (
 )
 from stepdiag.units import MICRO
 
-SQUARE = 1e-9  # rad: what rounding leaves
+SQUARE = 1e-9  # rad; allows for rounding
 
 
 def check_report(head: _core.Head, distances: Sequence[float]) -> Iterator[str]:
-    """The lines of the report, for an aligned mirror at each of the distances, mm."""
+    """Lines of the report, for an aligned mirror at each of the distances (mm)."""
     design = head.design
     assert design is not None
     yield f"{design.name}: layout {design.layout}, reads {', '.join(head.signals)}"
@@ -43,7 +43,7 @@ def _calibration(head: _core.Head) -> Iterator[str]:
     yield "Nominal calibration (all that an evaluation knows of the head):"
     names = [name for name in head.signals if name.startswith("d")]
     for name, constant in zip(names, calibration.head_constants, strict=False):
-        yield f"  {name + ' constant':<20}{constant:14.6f} mm, taken off its readings: glass, way before the plane"
+        yield f"  {name + ' constant':<20}{constant:14.6f} mm, subtracted from readings: glass, path before the plane"
     for name, (u, v) in zip(names, calibration.beam_offsets, strict=False):
         yield f"  {name + ' beam at (u, v)':<20}{_tidy(u):14.6f}, {_tidy(v):.6f} mm"
     if calibration.psd_distance is not None:
@@ -67,7 +67,7 @@ def _light(head: _core.Head, distances: Sequence[float]) -> Iterator[str]:
                 out_of_square[detector.beam] = angle_to_z(segments, found[0], distance)
     for beam, angle in out_of_square.items():
         if angle > SQUARE:
-            yield f"  {beam} leaves {angle * MICRO:.3g} µrad out of square to z: that reads as a misaligned laser does"
+            yield f"  {beam} leaves {angle * MICRO:.3g} µrad out of square to z, which reads like a misaligned laser"
 
 
 def _arrival(found: list[Arrival]) -> str:
@@ -77,13 +77,13 @@ def _arrival(found: list[Arrival]) -> str:
 
 
 def _tidy(value: float) -> float:
-    """Without the sign of a zero that has come from rounding."""
+    """The value without the sign of a zero that comes from rounding."""
     return 0.0 if abs(value) < 5e-7 else value
 
 
 def _limits(head: _core.Head, distances: Sequence[float]) -> Iterator[str]:
     size = "" if head.mirror is None else f" of {head.mirror[0]:g} x {head.mirror[1]:g} mm"
-    yield f"All readings are there for tilts (at travel 0) and travels (at tilt 0) of a mirror{size} between:"
+    yield f"All readings exist for tilts (at travel 0) and travels (at tilt 0) of a mirror{size} between:"
     yield f"  {'mirror':>9}{'alpha':>21}{'beta':>21}{'x':>21}{'y':>21}"
     yield f"  {'mm':>9}{'mrad':>21}{'mrad':>21}{'mm':>21}{'mm':>21}"
     for distance in distances:
@@ -102,7 +102,7 @@ def _span(limits: Limits, scale: float) -> str:
 
 
 def _mirror(head: _core.Head, distances: Sequence[float]) -> Iterator[str]:
-    """The smallest mirror with its middle on z that the axes of all beams meet."""
+    """The smallest mirror, centred on z, that the axes of all beams meet."""
     half = np.zeros(2)
     for distance in distances:
         for segment in _core.trace_beams(head, distance=distance):
@@ -110,4 +110,4 @@ def _mirror(head: _core.Head, distances: Sequence[float]) -> Iterator[str]:
                 half = np.maximum(half, np.abs(segment.end[:2]))
     width, height = 2.0 * half
     yield f"Smallest mirror, its middle on the head's z: {width:.4g} x {height:.4g} mm for the axes of the beams;"
-    yield "to it come the beams' diameters and the lateral excursion of the plan."
+    yield "add the beams' diameters and the lateral excursion of the plan."

@@ -1,6 +1,6 @@
-"""A head description: one TOML file that says of which bodies, beams and sensors a head is made.
+"""Head descriptions: TOML files that list the bodies, beams and sensors of a head.
 
-docs/head.md lists every key. Two descriptions come with the package; they are found by their names.
+docs/head.md describes every key. Two descriptions come with the package and are found by name.
 """
 
 import math
@@ -41,29 +41,31 @@ from stepdiag.config.toml_text import check_keys, located, parse_toml
 from stepdiag.io.whole_files import read_text
 from stepdiag.units import MICROMETRE, MILLIRADIAN, NANOMETRE, PPM
 
-ROOM: Final = 100.0  # mm between a head that is looked at by itself and its mirror
+ROOM: Final = 100.0  # mm between a head and its mirror where no scenario gives the distance
 FOLDER: Final = Path(str(resource_files("stepdiag.head") / "shipped"))
 
 
 def shipped_heads() -> list[str]:
-    """The names of the descriptions that come with the package."""
+    """The names of the heads that come with the package."""
     return sorted(file.stem for file in FOLDER.glob("*.toml"))
 
 
 def shipped_head(name: str) -> _core.HeadDesign:
-    """A head that comes with the package: "three_beams" or "beam_and_psd"."""
+    """Return a head that comes with the package: "three_beams" or "beam_and_psd".
+
+    Raises InvalidArgument for another name."""
     return read_head_design(find_shipped_head(name))
 
 
 def find_head(name: str, folder: str | PathLike[str] = ".") -> Path:
-    """The file of a head: a shipped one by its name, else a path, relative to `folder`."""
+    """The file of a head: a shipped one by name, otherwise a path relative to `folder`."""
     if name.endswith(".toml") or "/" in name:
         return Path(folder) / name
     return find_shipped_head(name)
 
 
 def find_shipped_head(name: str) -> Path:
-    """The file of a head that comes with the package."""
+    """The file of a shipped head. Raises InvalidArgument for another name."""
     if name not in shipped_heads():
         raise InvalidArgument(
             f"expected the name of a shipped head ({', '.join(shipped_heads())}) or the path of a TOML file, "
@@ -73,12 +75,16 @@ def find_shipped_head(name: str) -> Path:
 
 
 def read_head_design(path: str | PathLike[str]) -> _core.HeadDesign:
-    """Reads and checks a head description. Raises InvalidArgument naming the file and the line or key."""
+    """Read and check a head description (TOML).
+
+    Raises InvalidArgument naming the file, and the line or key."""
     return parse_head_design(read_text(Path(path)), path)
 
 
 def parse_head_design(text: str, path: str | PathLike[str] = "head.toml") -> _core.HeadDesign:
-    """A head from the text of its description. `path` names it in messages."""
+    """Parse and check the text of a head description; `path` names it in messages.
+
+    Raises InvalidArgument naming `path`, and the line or key."""
     file = str(path)
     keys = parse_head_keys(text, path)
     bodies = [_located(_body, f"{file}: body.{name}", name, body) for name, body in keys.body.items()]
@@ -94,22 +100,22 @@ def parse_head_design(text: str, path: str | PathLike[str] = "head.toml") -> _co
             most_hits=keys.limits.most_hits,
             least_power=keys.limits.least_power,
         )
-        before_the_head(design)  # refuses beams on one line, which no single component shows
+        before_the_head(design)  # checks the beams together: all on one line are refused
     return design
 
 
 def reach(design: _core.HeadDesign) -> float:
-    """How far the head stands out beyond its reference plane: a mirror is farther away. In mm."""
+    """How far the head extends beyond its reference plane, mm. The mirror must be farther away."""
     return max([0.0, *(float(outline[:, 2].max()) for body in design.bodies for outline in body.outlines)])
 
 
 def before_the_head(design: _core.HeadDesign, mirror: tuple[float, float] | None = None) -> _core.Head:
-    """The head to look at by itself, whose mirror may come as near as it reaches."""
+    """A head without a scenario, whose mirror may be as near as the head reaches."""
     return _core.Head.from_design(design, standoff=reach(design) + ROOM, mirror=mirror)
 
 
 def parse_head_keys(text: str, path: str | PathLike[str] = "head.toml") -> HeadFile:
-    """The keys of a description, each sound by itself."""
+    """Parse the keys of a description; each is checked by itself."""
     file = str(path)
     content = parse_toml(text, file)
     if not content:
@@ -122,7 +128,7 @@ def parse_head_keys(text: str, path: str | PathLike[str] = "head.toml") -> HeadF
 
 
 def components(design: _core.HeadDesign) -> list[str]:
-    """The names that pose errors may be given for."""
+    """Names of the components that can have pose errors."""
     parts: list[_core.HeadBody | _core.HeadBeam | _core.SpotSensor] = [*design.bodies, *design.beams, *design.sensors]
     return [part.name for part in parts]
 
@@ -153,7 +159,7 @@ def _check_beam(name: str, beam: BeamKeys, keys: HeadFile, file: str) -> None:
 
 @contextmanager
 def _beam_named(keys: HeadFile) -> Iterator[None]:
-    """Glass and air know which wavelength is out of their range; we know whose it is."""
+    """Add the beam's name to errors about wavelengths, which glass and air raise without it."""
     try:
         yield
     except InvalidArgument as error:

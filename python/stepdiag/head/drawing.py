@@ -1,4 +1,4 @@
-"""The picture of a head: bodies, beams and detectors from two sides, by themselves and with the way to the mirror."""
+"""The figure of a head: bodies, beams and detectors from two sides, alone and with the mirror."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,20 +17,20 @@ from stepdiag.head.trace import arrivals, detectors
 from stepdiag.style import own_style, save
 
 FloatArray = npt.NDArray[np.float64]
-Box = tuple[FloatArray, FloatArray]  # lowest and highest corner
+Box = tuple[FloatArray, FloatArray]  # corners with the lowest and highest coordinates
 
-# Beams after Okabe and Ito: told apart with any colour vision.
+# Colours of beams by Okabe and Ito, safe for colour-blind readers.
 COLOURS: Final = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 GLASS: Final = "#a9cbe3"
 DARK: Final = "#333333"
-WEAKEST: Final = 1e-6  # share of the power that is drawn palest
-MARGIN: Final = 0.12  # of the head's size, around it
+WEAKEST: Final = 1e-6  # share of the power with the palest colour
+MARGIN: Final = 0.12  # around the head, as a share of its size
 LABEL: Final = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
 
 
 @dataclass(frozen=True)
 class View:
-    """A side view: which axis of the head points upwards. z points to the right."""
+    """A side view: the axis of the head that points upwards. z points to the right."""
 
     name: str
     axis: int
@@ -44,7 +44,9 @@ VIEWS: Final = (View("x", 0), View("y", 1))
 
 
 def draw_head(head: _core.Head, distance: float, suffix: str) -> bytes:
-    """The head before an aligned mirror at a distance, mm: the content of a file, "png" or "svg"."""
+    """Draw a head in front of an aligned mirror at a distance (mm).
+
+    Returns the content of a "png" or "svg" file."""
     design = head.design
     if design is None or head.mirror is None:
         raise ValueError("draw_head: expected a head with a design and a mirror")
@@ -52,7 +54,7 @@ def draw_head(head: _core.Head, distance: float, suffix: str) -> bytes:
     outlines = _outlines(design)
     low, high = _extent(outlines)
     width, height_x, height_y = (high - low)[[2, 0, 1]]
-    scale = min(5.5 / width, 6.5 / (height_x + height_y))  # inches a mm
+    scale = min(5.5 / width, 6.5 / (height_x + height_y))  # inches per mm
     with own_style():
         figure = Figure(figsize=(width * scale + 4.5, (height_x + height_y) * scale + 1.6), layout="constrained")
         panels = figure.subplots(
@@ -82,7 +84,7 @@ def draw_head(head: _core.Head, distance: float, suffix: str) -> bytes:
 
 
 def _outlines(design: _core.HeadDesign) -> dict[str, list[FloatArray]]:
-    """The faces of every component in the head's frame: bodies, squares around sources, areas of sensors."""
+    """Faces of every component, head frame: bodies, squares at sources, areas of sensors."""
     faces = {body.name: list(body.outlines) for body in design.bodies}
     faces |= {beam.name: [_corners(beam.position, beam.rotation, beam.size, beam.size)] for beam in design.beams}
     return faces | {s.name: [_corners(s.position, s.rotation, *s.size)] for s in design.sensors}
@@ -94,7 +96,7 @@ def _corners(place: FloatArray, rotation: FloatArray, width: float, height: floa
 
 
 def _extent(outlines: dict[str, list[FloatArray]]) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest x, y, z, with some room around."""
+    """Lowest and highest x, y, z, with a margin."""
     points = np.concatenate([face for faces in outlines.values() for face in faces])
     low, high = points.min(axis=0), points.max(axis=0)
     margin = MARGIN * float(max(high - low))
@@ -115,7 +117,9 @@ def _draw_bodies(axes: Axes, view: View, design: _core.HeadDesign) -> None:
 def _draw_beams(
     axes: Axes, view: View, design: _core.HeadDesign, segments: Sequence[_core.BeamSegment], distance: float
 ) -> None:
-    """The way to the detector full, everything else dashed, the paler the weaker; not what was not followed."""
+    """Draw paths to the detectors solid and other light dashed; weaker light is paler.
+
+    Light that was not traced further is not drawn."""
     ways = [arrival.way for detector in detectors(design) for arrival in arrivals(segments, detector, distance)[:1]]
     main = {k for way in ways for k in way}
     for number, beam in enumerate(design.beams):
@@ -150,7 +154,7 @@ def _draw_detectors(axes: Axes, view: View, design: _core.HeadDesign, outlines: 
 
 
 def _plain(name: str) -> str:
-    """A name as it is: between dollar signs Matplotlib would read a formula."""
+    """The name with its dollar signs escaped: Matplotlib reads formulas between them."""
     return name.replace("$", r"\$")
 
 
@@ -159,12 +163,12 @@ def _colour(beam: int) -> str:
 
 
 def _excess(design: _core.HeadDesign, beam: int) -> float:
-    """The first beams are drawn broader, so that they are seen where later ones lie upon them."""
+    """Extra line width of the first beams, so that they show below later ones."""
     return 1.2 * (len(design.beams) - 1 - beam) if len(design.beams) <= 6 else 0.0
 
 
 def _name_components(axes: Axes, view: View, outlines: dict[str, list[FloatArray]]) -> None:
-    """Each name at an upper or lower corner of its component where nothing else is; else above it, on top of others."""
+    """Write each name at a free upper or lower corner of its component, otherwise above it."""
     boxes = {}
     for name, faces in outlines.items():
         points = view.project(np.concatenate(faces))
@@ -173,7 +177,7 @@ def _name_components(axes: Axes, view: View, outlines: dict[str, list[FloatArray
     line, gap = 0.05 * height, 0.012 * height
     taken: list[Box] = []
     for name, (low, high) in sorted(boxes.items(), key=lambda item: (item[1][0][0], -item[1][1][1])):
-        size = np.array([0.6 * line * len(name), line])  # about that of the text
+        size = np.array([0.6 * line * len(name), line])  # approximate size of the text
         above, below = np.array([low[0], high[1] + gap]), np.array([low[0], low[1] - gap - line])
         others = [box for other, box in boxes.items() if other != name] + taken
         stacked = [above + np.array([0.0, k * line]) for k in range(len(boxes))]

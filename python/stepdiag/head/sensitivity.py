@@ -1,4 +1,4 @@
-"""What `stepdiag head sensitivity` tells: what each imperfection of a head changes, the strongest effects first."""
+"""The report of `stepdiag head sensitivity`: the effect of each imperfection, strongest first."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -6,17 +6,17 @@ from typing import Final
 
 from stepdiag import _core
 
-# By quantity, or else by unit: how much of an imperfection the table looks at, and how it is called.
+# By quantity, otherwise by unit: amount of the imperfection in the table, and its text.
 AMOUNTS: Final = {"humidity": (0.01, "%RH"), "mm": (1e-3, "µm"), "rad": (1e-6, "µrad"), "1": (1e-6, "ppm")}
 AMOUNTS_OF_AIR: Final = {"K": (1.0, "K"), "Pa": (100.0, "hPa")}
 NANO: Final = 1e6  # mm to nm
 NANORAD: Final = 1e9
-SMALLEST: Final = 1e-6  # nm and nrad: less is rounding
+SMALLEST: Final = 1e-6  # nm and nrad; smaller effects are rounding errors
 
 
 @dataclass(frozen=True)
 class Row:
-    """What one amount of an imperfection changes: distance in nm, tilts in nrad."""
+    """Effect of an amount of an imperfection: distance in nm, tilts in nrad."""
 
     component: str
     quantity: str
@@ -31,7 +31,9 @@ class Row:
 
 
 def sensitivity_report(head: _core.Head, distance: float, tilt: Sequence[float]) -> Iterator[str]:
-    """The lines of two tables, for a mirror at this distance, mm, and tilt, rad, in air of 20 °C and 1013.25 hPa."""
+    """Lines of two tables, for a mirror at this distance (mm) and tilt (rad).
+
+    The air has 20 °C and 1013.25 hPa."""
     design = head.design
     assert design is not None
     found = _core.head_sensitivities(head, distance=distance, tilt=tilt, environment=_core.Environment.from_air())

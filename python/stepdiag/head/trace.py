@@ -1,4 +1,4 @@
-"""What the light of a head does: where it arrives and by which ways, and up to where all readings are there."""
+"""Where a head's light arrives and on which paths, and the range in which all readings exist."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ from stepdiag import _core
 FloatArray = npt.NDArray[np.float64]
 Pair = tuple[float, float]
 
-LARGEST_TILT: Final = 0.1  # rad; beyond it no set-up is meant
+LARGEST_TILT: Final = 0.1  # rad; no set-up has more
 LARGEST_TRAVEL: Final = 1e3  # mm
-SMALLEST: Final = 1e-5  # of the largest: where the search for a limit begins
-ON_MIRROR: Final = 1e-6  # mm; a point on a face is off by rounding, 1e-12 mm
-HALVINGS: Final = 14  # of the bracket that the search finds
+SMALLEST: Final = 1e-5  # share of the largest, at which the search for a limit starts
+ON_MIRROR: Final = 1e-6  # mm; rounding moves a point on a face by 1e-12 mm
+HALVINGS: Final = 14  # bisections of the interval found by the search
 
 
 @dataclass(frozen=True)
@@ -24,28 +24,28 @@ class Detector:
     """An interferometer's collimator, or a sensor."""
 
     name: str
-    beam: str  # whose light it is for
+    beam: str  # the beam that it detects
     position: FloatArray
     rotation: FloatArray  # head_R_detector
 
     def local(self, point: FloatArray) -> FloatArray:
-        """A point of the head's frame in the detector's."""
+        """A point of the head's frame in the detector's frame."""
         return (point - self.position) @ self.rotation
 
 
 @dataclass(frozen=True)
 class Arrival:
-    """Light that comes to the detector of its beam: the indices of its segments from the source on."""
+    """Light at the detector of its beam: the indices of its segments from the source on."""
 
     detector: Detector
     way: tuple[int, ...]
-    spot: FloatArray  # in the detector's frame, mm
+    spot: FloatArray  # detector frame, mm
     length: float  # optical path from the source, mm
-    power: float  # share of the source's
+    power: float  # share of the source's power
 
 
 def detectors(design: _core.HeadDesign) -> list[Detector]:
-    """One for each beam, in the order of the beams."""
+    """One detector for each beam, in the order of the beams."""
     sensors = {sensor.name: sensor for sensor in design.sensors}
     found = []
     for beam in design.beams:
@@ -55,8 +55,10 @@ def detectors(design: _core.HeadDesign) -> list[Detector]:
 
 
 def arrivals(segments: Sequence[_core.BeamSegment], detector: Detector, distance: float) -> list[Arrival]:
-    """The light of the detector's beam that comes to it from an aligned mirror at this distance, strongest first, then
-    straylight that never saw the mirror. What follows the first are ghosts; none where only straylight came."""
+    """Light of the detector's beam that arrives at it, for an aligned mirror at this distance (mm).
+
+    Strongest first, then stray light that never met the mirror. All after the first are ghosts. The
+    list is empty if only stray light arrives."""
     found = []
     for index, segment in enumerate(segments):
         if segment.beam != detector.beam or segment.arrives != detector.name:
@@ -74,14 +76,14 @@ def arrivals(segments: Sequence[_core.BeamSegment], detector: Detector, distance
 
 
 def angle_to_z(segments: Sequence[_core.BeamSegment], arrival: Arrival, distance: float) -> float:
-    """Of the beam that comes to the mirror first, rad."""
+    """Angle between z and the beam that first meets the mirror, rad."""
     (first, *_) = (segments[k] for k in arrival.way if meets_mirror(segments[k], distance))
     along = first.end - first.start
     return float(np.arctan2(np.hypot(along[0], along[1]), along[2]))
 
 
 def meets_mirror(segment: _core.BeamSegment, distance: float) -> bool:
-    """Whether it ends on an aligned mirror, which stands beyond all other faces."""
+    """Whether a segment ends on an aligned mirror, which stands beyond all other faces."""
     return segment.fate != "left" and abs(float(segment.end[2]) - distance) < ON_MIRROR
 
 
@@ -95,19 +97,19 @@ def _way_to(segments: Sequence[_core.BeamSegment], index: int) -> tuple[int, ...
 
 @dataclass(frozen=True)
 class Limits:
-    """Lowest and highest value of one thing between which all readings are there; none: no end was found."""
+    """Lowest and highest value between which all readings exist; None if no limit was found."""
 
     low: float | None
     high: float | None
 
 
 def tilt_limits(head: _core.Head, distance: float) -> dict[str, Limits]:
-    """Of the mirror's tilts alpha and beta, rad, for a mirror in the middle."""
+    """Limits of the mirror's tilts alpha and beta, rad, for a centred mirror."""
     return _limits(LARGEST_TILT, ("alpha", "beta"), lambda tilt: _is_read(head, distance, tilt, (0.0, 0.0)))
 
 
 def travel_limits(head: _core.Head, distance: float) -> dict[str, Limits]:
-    """Of the mirror's way along x and y, mm, for a mirror without tilt."""
+    """Limits of the mirror's displacement along x and y, mm, for a mirror without tilt."""
     return _limits(LARGEST_TRAVEL, ("x", "y"), lambda lateral: _is_read(head, distance, (0.0, 0.0), lateral))
 
 
@@ -133,7 +135,9 @@ def _limits(largest: float, names: tuple[str, str], is_read: Callable[[Pair], bo
 
 
 def _first_lost(largest: float, is_read: Callable[[float], bool]) -> float | None:
-    """The largest value up to which all is read: by doubling, then by halving the bracket."""
+    """The largest value up to which all is read: doubling, then bisection.
+
+    None if there is no limit."""
     low, high = 0.0, SMALLEST * largest
     while is_read(high):
         low, high = high, 2.0 * high

@@ -1,4 +1,4 @@
-"""Measurements and calibrations in files, as CSV or netCDF (.nc): the ending of the name decides."""
+"""Measurements and calibrations as CSV or netCDF files; the ending of the name decides."""
 
 import os
 from datetime import UTC, datetime
@@ -8,7 +8,7 @@ from pathlib import Path
 from stepdiag import _core
 from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement
 
-# What is imported inside a function keeps those fast who read and write CSV only.
+# Imports inside functions keep programs fast that use CSV only.
 
 
 def is_netcdf(path: str | PathLike[str]) -> bool:
@@ -17,7 +17,9 @@ def is_netcdf(path: str | PathLike[str]) -> bool:
 
 
 def read_measurement(path: str | PathLike[str]) -> Measurement:
-    """Reads a measurement, CSV or netCDF. Raises InvalidArgument naming the file, and the line or variable."""
+    """Read a measurement, CSV or netCDF (.nc).
+
+    Raises InvalidArgument naming the file, and the line or variable."""
     if not is_netcdf(path):
         return _core.read_measurement(path)
     from stepdiag.io.netcdf_read import read_measurement_netcdf
@@ -26,7 +28,9 @@ def read_measurement(path: str | PathLike[str]) -> Measurement:
 
 
 def read_calibration(path: str | PathLike[str]) -> Calibration:
-    """Reads a calibration, CSV or netCDF. Raises InvalidArgument naming the file, and the line or variable."""
+    """Read a calibration, CSV or netCDF (.nc).
+
+    Raises InvalidArgument naming the file, and the line or variable."""
     if not is_netcdf(path):
         return _core.read_calibration(path)
     from stepdiag.io.netcdf_read import read_calibration_netcdf
@@ -35,9 +39,9 @@ def read_calibration(path: str | PathLike[str]) -> Calibration:
 
 
 def write_measurement(measurement: Measurement, path: str | PathLike[str]) -> None:
-    """Writes a measurement, CSV or netCDF, that is read back to the same bits.
+    """Write a measurement, CSV or netCDF (.nc). Reading it returns the same bits.
 
-    Raises InvalidArgument where it cannot be written."""
+    Raises InvalidArgument naming the file if it cannot be written."""
     if not is_netcdf(path):
         measurement.write(path)
         return
@@ -49,10 +53,20 @@ def write_measurement(measurement: Measurement, path: str | PathLike[str]) -> No
 def write_calibration(
     result: Calibration | Adjustment, path: str | PathLike[str], *, measurement: Measurement | None = None
 ) -> None:
-    """Writes a calibration, CSV or netCDF, that is read back to the same bits; one without a date gets today's.
+    """Write a calibration, CSV or netCDF (.nc). Reading it returns the same bits.
 
-    netCDF also keeps a covariance and, of an adjustment, set-ups, residuals and the rest; `measurement` then labels its
-    readings. CSV keeps the calibration alone. Raises InvalidArgument where it cannot be written."""
+    A calibration without a date gets the current one. CSV contains the calibration only. netCDF
+    also contains the covariance and, for an Adjustment, set-ups, residuals and test values.
+
+    Args:
+        result: a Calibration, or an Adjustment.
+        path: the file to write.
+        measurement: labels the residuals of an adjustment with run, line, point and direction
+            (netCDF).
+
+    Raises:
+        InvalidArgument: the file cannot be written; names the file.
+    """
     calibration = result if isinstance(result, Calibration) else result.calibration
     date = calibration.date or date_of_today()
     if not is_netcdf(path):
@@ -64,7 +78,7 @@ def write_calibration(
 
 
 def date_of_today() -> str:
-    """Date and time, ISO 8601 in UTC; those of SOURCE_DATE_EPOCH (seconds) where the environment has it."""
+    """The current time, ISO 8601 in UTC, or that of SOURCE_DATE_EPOCH (seconds) if it is set."""
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
     if not epoch:
         return f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"

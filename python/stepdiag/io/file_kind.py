@@ -1,4 +1,4 @@
-"""Which of our files is this, by its first lines."""
+"""Recognises stepdiag's files by their first lines."""
 
 import re
 from pathlib import Path
@@ -8,7 +8,7 @@ from stepdiag._core import InvalidArgument
 from stepdiag.io.whole_files import read_beginning
 
 CHECKPOINT_BEGINS: Final = "stepdiag checkpoint "
-# By the format that a table states.
+# Kind by the format that a table states.
 _FORMATS: Final = {
     "measurement": "measurement",
     "calibration": "calibration",
@@ -20,7 +20,7 @@ _FORMATS: Final = {
     "error grid": "error grid",
 }
 _NUMBER: Final = r"[-+]?[\d.]+(?:e[-+]?\d+)?"
-# What else there is, by how it begins.
+# Other kinds, by a pattern for the beginning of the file.
 _BEGINNINGS: Final = {
     "checkpoint": CHECKPOINT_BEGINS,
     "PNG picture": "\ufffdPNG\r\n\x1a\n",
@@ -29,7 +29,7 @@ _BEGINNINGS: Final = {
     "ISG table": "// stepdiag export --to isg\n",
     "compensation.ini": "# stepdiag export --to linuxcnc-comp\n",
     "COMP_FILE": rf"(?:{_NUMBER} {_NUMBER} {_NUMBER}\n)+\Z",
-    "study cells": r"(?s:.*\n)?[0-9a-f]{64} \{|\s*[0-9a-f]{1,64} ?\Z",  # or the first half of its first line
+    "study cells": r"(?s:.*\n)?[0-9a-f]{64} \{|\s*[0-9a-f]{1,64} ?\Z",  # also a torn first line
     "table of steps": "steps,mirror_width_mm,",
     "table of plans": "minutes,lines,scale_lines,",
     "table of points": "case,points,x_mm,",
@@ -39,8 +39,9 @@ NETCDF_BEGINS: Final = ("\ufffdHDF", "CDF")
 
 
 def kind_of_file(path: Path) -> str | None:
-    """What a file is by how it begins, whatever its name is; None for what is not known. It may be damaged all the
-    same. Raises InvalidArgument where it cannot be read."""
+    """The kind of a file by its beginning, whatever its name; None if it is not recognised.
+
+    The file may still be damaged. Raises InvalidArgument if it cannot be read."""
     text = read_beginning(path)
     if not text.startswith(NETCDF_BEGINS):
         return kind_of_text(text)
@@ -53,7 +54,7 @@ def kind_of_file(path: Path) -> str | None:
 
 
 def kind_of_text(text: str) -> str | None:
-    """The same of the beginning of a text file."""
+    """The kind of a file by the beginning of its text."""
     comments, header = head_of(text)
     leading = dict(re.findall(r"(?m)^#\s*(\w+)\s*=\s*(.*?)\s*$", "\n".join(comments)))
     columns = {column.strip().strip('"') for column in header.split(",")}
@@ -73,7 +74,7 @@ def kind_of_text(text: str) -> str | None:
 
 
 def head_of(text: str) -> tuple[list[str], str]:
-    """The comments above the first other line, and that line."""
+    """The leading comments, and the first other line."""
     comments: list[str] = []
     for line in text.splitlines():
         if line.strip() and not line.startswith("#"):

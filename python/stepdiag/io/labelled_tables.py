@@ -1,4 +1,4 @@
-"""Runs and calibrations as labelled tables (xarray). Units are native and said: mm, rad."""
+"""Measurements and calibrations as labelled tables (xarray), in native units: mm, rad."""
 
 import re
 from typing import Any
@@ -31,10 +31,10 @@ _CHANNEL = {
 
 
 def measurement_table(measurement: Measurement) -> xr.Dataset:
-    """One row per reading along the dimension `reading`; lost readings are NaN.
+    """A measurement along the dimension `reading`; lost readings are NaN.
 
-    Coordinates: line, point, run, direction, and the commanded position x, y, z (mm). Variables: the channels,
-    and their standard uncertainties as NAME_u where the run gives them."""
+    Coordinates are line, point, run, direction, and the commanded position x, y, z (mm). Variables
+    are the channels, and their standard uncertainties as NAME_u if the measurement has them."""
     coordinates: dict[str, Any] = {
         "line": ("reading", np.asarray(measurement.line, dtype=str), {"long_name": "measurement line"}),
         "point": ("reading", measurement.point, {"long_name": "point number on the line"}),
@@ -70,12 +70,13 @@ def position_axis(coordinates: dict[str, Any], name: str, position: Any) -> str:
 def calibration_table(calibration: Calibration) -> xr.Dataset:
     """The determined parameters by name, each with its standard uncertainty as NAME_u.
 
-    Functions lie over the position x, y or z (mm) of their axis; one whose nodes differ from those of its
-    axis has a dimension of its own (x_EXX). Squarenesses are scalars. Where backward runs tell reversal errors,
-    functions are those of the + direction; those of the - direction are less by NAME_reversal, and NAME_negative_u is
-    their uncertainty. NAME_functional_point is the straightness of the functional point where it is not the table's.
-    A full covariance lies over the dimensions entry and entry_2, which covariance_parameter and covariance_position
-    label. What is not determined is absent, and the attributes say so."""
+    Functions have the dimension x, y or z, the position of their axis (mm). A function with other
+    nodes has a dimension of its own, such as x_EXX. Squarenesses are scalars. If reversal errors
+    are known, functions belong to the + direction. Those of the - direction are smaller by
+    NAME_reversal and have the standard uncertainty NAME_negative_u. NAME_functional_point is the
+    straightness of the functional point, if it differs from the table's. A full covariance has the
+    dimensions entry and entry_2, labelled by covariance_parameter and covariance_position.
+    Undetermined parameters are absent; the attributes list them."""
     coordinates: dict[str, Any] = {}
     variables: dict[str, Any] = {}
 
@@ -97,7 +98,7 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
         }
         variables[f"{name}_reversal"] = (axis, value, attributes)
         variables[f"{name}_reversal_u"] = (axis, uncertainty, _uncertainty_of(attributes))
-        negative = calibration.negative_functions.get(name)  # none without the function itself
+        negative = calibration.negative_functions.get(name)  # None without NAME
         if negative is not None:
             variables[f"{name}_negative_u"] = (
                 axis,
@@ -138,12 +139,12 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
 
 
 def channel_units(name: str) -> str | None:
-    """The native unit of a measurement's channel; none for a name that is no channel's."""
+    """The native unit of a measurement's channel; None if there is no such channel."""
     return _CHANNEL[name][0] if name in _CHANNEL else "mm" if re.fullmatch(r"d[1-9][0-9]*", name) else None
 
 
 def _order(function: str) -> tuple[int, int]:
-    """Axis by axis, displacements before rotations."""
+    """Sort key: axis by axis, displacements before rotations."""
     return "XYZ".index(function[2]), "XYZABC".index(function[1])
 
 

@@ -1,6 +1,6 @@
-"""netCDF files (netCDF-4): written whole or not at all, read with every doubt said.
+"""netCDF-4 files: written completely or not at all, and checked when read.
 
-What a measurement or a calibration looks like in one: labelled_tables.py, netcdf_read.py, docs/files.md.
+labelled_tables.py, netcdf_read.py and docs/files.md describe their contents.
 """
 
 import struct
@@ -18,17 +18,18 @@ from xarray.backends import NetCDF4DataStore
 from stepdiag._core import InvalidArgument, __version__
 from stepdiag.io.whole_files import read_bytes, whole_file
 
-# What a file may declare beyond a hundred times its own size: a header is no data, and compression has its bounds.
+# A file may declare this much, plus a hundred times its size: compression is limited.
 _FREE_SIZE = 64 * 2**20
 _LARGEST_COMPRESSION = 100
 
-_FILL = netCDF4.default_fillvals["f8"]  # netCDF's own mark of a value that was never written
+_FILL = netCDF4.default_fillvals["f8"]  # netCDF's mark of values never written
 
 
 def write_dataset(dataset: xr.Dataset, path: Path, attributes: dict[str, Any]) -> None:
-    """Writes a table, these global attributes in front of its own. Raises InvalidArgument where it cannot be written.
+    """Write a table, with these global attributes before its own.
 
-    Texts become characters and numbers get a check sum (Fletcher-32), so that damage is noticed when they are read."""
+    Texts are stored as characters. Numbers get a Fletcher-32 checksum, so that readers notice
+    damage. Raises InvalidArgument if the file cannot be written."""
     first = {"Conventions": "CF-1.11", "source": f"stepdiag {__version__}"} | attributes
     dataset = dataset.assign_attrs(first)
     dataset.attrs = first | dataset.attrs
@@ -43,13 +44,15 @@ def write_dataset(dataset: xr.Dataset, path: Path, attributes: dict[str, Any]) -
     with whole_file(path) as temporary:
         try:
             dataset.to_netcdf(temporary, mode="w", engine="netcdf4", format="NETCDF4")
-        except RuntimeError as error:  # of the C libraries
+        except RuntimeError as error:  # raised by the C libraries
             raise InvalidArgument(f"{path}: cannot be written: {error}") from None
 
 
 @contextmanager
 def open_dataset(path: Path) -> Iterator["NetcdfFile"]:
-    """A netCDF file to read from. Raises InvalidArgument naming the file for whatever is wrong with it."""
+    """Open a netCDF file for reading.
+
+    Raises InvalidArgument naming the file for any fault in it."""
     content = read_bytes(path)
     _check_heaps(content, path)
     try:
@@ -59,14 +62,14 @@ def open_dataset(path: Path) -> Iterator["NetcdfFile"]:
         dataset = xr.open_dataset(store, decode_times=False, decode_timedelta=False)
     except InvalidArgument:
         raise
-    except Exception as error:  # whatever the libraries make of a damaged file
+    except Exception as error:  # the libraries raise anything for a damaged file
         raise InvalidArgument(f"{path}: expected a netCDF file: {_one_line(error)}") from None
     with dataset:
         yield NetcdfFile(path, dataset)
 
 
 class NetcdfFile:
-    """The variables and attributes of an open file, each asked for as what it should be."""
+    """Checked access to the variables and attributes of an open file."""
 
     def __init__(self, path: Path, dataset: xr.Dataset) -> None:
         self.path = path
@@ -88,7 +91,7 @@ class NetcdfFile:
     def numbers(
         self, name: str, dimensions: Sequence[str], units: str | None, *, missing: bool = False
     ) -> npt.NDArray[np.float64]:
-        """A variable of these dimensions and units, as doubles; NaN only where values may be missing."""
+        """A variable with these dimensions and units, as doubles; NaN only if `missing`."""
         variable = self._variable(name, dimensions)
         if variable.dtype.kind not in "fiu":
             raise self.fail(name, f"expected numbers, got values of type {variable.dtype}")
@@ -119,7 +122,7 @@ class NetcdfFile:
             raise self.fail(name, "expected UTF-8 text") from None
 
     def text(self, attribute: str, default: str | None = None, *, of: str | None = None) -> str:
-        """A text among the global attributes, or among those of a variable."""
+        """A text: a global attribute, or an attribute of the variable `of`."""
         where = self._dataset.attrs if of is None else self._variable(of).attrs
         name = f"attribute {attribute}" if of is None else f"{of}: attribute {attribute}"
         value = where.get(attribute, default)
@@ -130,7 +133,7 @@ class NetcdfFile:
         return value
 
     def lengths(self, attribute: str) -> npt.NDArray[np.float64]:
-        """Three lengths among the global attributes."""
+        """A global attribute with three lengths."""
         value = self._dataset.attrs.get(attribute)
         if value is None:
             raise self.fail(f"attribute {attribute}", "missing")
@@ -140,7 +143,7 @@ class NetcdfFile:
         return lengths.astype(np.float64)
 
     def number(self, attribute: str) -> float | None:
-        """A number among the global attributes; None where it is missing."""
+        """A global attribute with a number; None if it is missing."""
         value = self._dataset.attrs.get(attribute)
         if value is None:
             return None
@@ -161,20 +164,20 @@ class NetcdfFile:
     def _load(self, name: str, variable: xr.Variable) -> npt.NDArray[Any]:
         try:
             return np.asarray(variable.values)
-        except Exception as error:  # a check sum that is wrong, for one
+        except Exception as error:  # such as a wrong checksum
             raise self.fail(name, f"cannot be read: {_one_line(error)}") from None
 
 
 def _check_size(file: netCDF4.Dataset, size: int, path: Path) -> None:
-    """A small file can declare any number of values; nobody's memory is to be filled with them."""
-    declared = sum(v.size * max(np.dtype(v.dtype).itemsize, 16) for v in file.variables.values())  # 16: of a text
+    """Refuse a file that declares far more values than its size can hold, to protect the memory."""
+    declared = sum(v.size * max(np.dtype(v.dtype).itemsize, 16) for v in file.variables.values())
     if declared > _FREE_SIZE + _LARGEST_COMPRESSION * size:
         raise InvalidArgument(f"{path}: declares {declared / 2**20:.0f} MiB of values, but has {size / 2**20:.3g} MiB")
 
 
 def _check_heaps(content: bytes, path: Path) -> None:
-    """Walks through the global heaps of HDF5: its library never comes back from one whose sizes are damaged."""
-    signature = b"GCOL\x01\0\0\0"  # with the version
+    """Check the sizes of HDF5's global heaps: the library loops forever over damaged ones."""
+    signature = b"GCOL\x01\0\0\0"  # including the version
     start = content.find(signature)
     while start >= 0:
         size = struct.unpack_from("<Q", content, start + 8)[0] if start + 16 <= len(content) else 0
@@ -182,7 +185,7 @@ def _check_heaps(content: bytes, path: Path) -> None:
         at, end = start + 16, start + size
         while sound and at + 16 <= end:
             index, length = struct.unpack_from("<H6xQ", content, at)
-            step = length if index == 0 else 16 + (length + 7) // 8 * 8  # index 0: free, its header counted
+            step = length if index == 0 else 16 + (length + 7) // 8 * 8  # 0: free space
             at += step
             sound = step >= 16 and at <= end
         if not sound:

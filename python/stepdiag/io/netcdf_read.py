@@ -1,6 +1,6 @@
-"""Measurements and calibrations from netCDF files, with the bits that were written.
+"""Measurements and calibrations from netCDF files, bit by bit as they were written.
 
-Units, dimensions and labels are checked here, what the values must be in the core.
+This module checks units, dimensions and labels; the core checks the values.
 """
 
 import re
@@ -25,8 +25,10 @@ _SQUARENESS = re.compile(r"C0Y|B0Z|A0Z")
 
 
 def kind_of_netcdf(path: Path) -> str:
-    """ "measurement", "calibration", "uncertainty" or what else a format of ours says; of files without one the first
-    or the second, by variables. Raises InvalidArgument for other files."""
+    """ "measurement", "calibration", "uncertainty", ... according to the attribute `format`.
+
+    Without that attribute the variables decide between the first two. Raises InvalidArgument for
+    other files."""
     with open_dataset(path) as file:
         ours = re.fullmatch(r"stepdiag (.+) \d+", file.text("format", ""))
         if ours is not None:
@@ -39,7 +41,7 @@ def kind_of_netcdf(path: Path) -> str:
 
 
 def read_measurement_netcdf(path: Path) -> Measurement:
-    """A run from a netCDF file. Raises InvalidArgument naming file and variable."""
+    """Read a measurement. Raises InvalidArgument naming file and variable."""
     with open_dataset(path) as file:
         _check_format(file, MEASUREMENT_FORMAT)
         rows = file.dimensions("line")
@@ -57,7 +59,7 @@ def read_measurement_netcdf(path: Path) -> Measurement:
 
 
 def read_calibration_netcdf(path: Path) -> Calibration:
-    """A calibration from a netCDF file. Raises InvalidArgument naming file and variable."""
+    """Read a calibration. Raises InvalidArgument naming file and variable."""
     with open_dataset(path) as file:
         _check_format(file, CALIBRATION_FORMAT)
         functions = {name: _function(file, name) for name in file.names if _FUNCTION.fullmatch(name)}
@@ -94,13 +96,13 @@ def read_calibration_netcdf(path: Path) -> Calibration:
 
 
 def _check_format(file: NetcdfFile, expected: str) -> None:
-    given = file.text("format", expected)  # others need not write it
+    given = file.text("format", expected)  # files of other programs may lack it
     if given != expected:
         raise file.fail("attribute format", f'expected "{expected}", got "{given}"')
 
 
 def _channels(file: NetcdfFile, rows: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What was read, and its standard uncertainties."""
+    """The channels, and their standard uncertainties."""
     channels: dict[str, Any] = {}
     uncertainties: dict[str, Any] = {}
     for name in file.names:
@@ -114,7 +116,7 @@ def _channels(file: NetcdfFile, rows: tuple[str, ...]) -> tuple[dict[str, Any], 
 
 
 def _function(file: NetcdfFile, name: str) -> tuple[Any, Any, Any]:
-    """Position, value and standard uncertainty, which is NaN where it is not known."""
+    """Position, value and standard uncertainty (NaN if unknown)."""
     dimensions = file.dimensions(name)
     if len(dimensions) != 1:
         raise file.fail(name, f"expected one dimension, that of its positions, got {len(dimensions)}")
@@ -131,7 +133,7 @@ def _squareness(file: NetcdfFile, name: str) -> tuple[float, float]:
 
 
 def _flag(file: NetcdfFile, name: str, attribute: str) -> bool:
-    """True unless the file says otherwise."""
+    """The flag in an attribute; True if it is missing."""
     given = file.text(attribute, "true", of=name)
     if given not in ("true", "false"):
         raise file.fail(f"{name}: attribute {attribute}", f'expected "true" or "false", got "{given}"')

@@ -1,4 +1,4 @@
-"""Measurements, calibrations and adjustments as netCDF files that explain themselves."""
+"""Self-describing netCDF files of measurements, calibrations and adjustments."""
 
 from pathlib import Path
 from typing import Final
@@ -49,14 +49,16 @@ _OF_ADJUSTMENT: Final = {
 
 
 def write_measurement_netcdf(measurement: Measurement, path: Path, date: str) -> None:
-    """Writes a run. Raises InvalidArgument where it cannot be written."""
+    """Write a measurement. Raises InvalidArgument if the file cannot be written."""
     write_dataset(measurement_table(measurement), path, _OF_MEASUREMENT | {"date": date})
 
 
 def write_calibration_netcdf(
     result: Calibration | Adjustment, path: Path, date: str, measurement: Measurement | None = None
 ) -> None:
-    """Writes a calibration, or an adjustment with all that it found. Raises InvalidArgument where that fails."""
+    """Write a calibration, or an adjustment with all its results.
+
+    Raises InvalidArgument if the file cannot be written."""
     attributes = _OF_CALIBRATION | {"date": date}
     if isinstance(result, Calibration):
         table = calibration_table(result)

@@ -1,8 +1,9 @@
-"""What a command may write over. Every command that writes claims its files here first.
+"""What a command may overwrite. Every command that writes claims its files here first.
 
-A result that can be computed again replaces an older result of its own kind. A measurement, which may be the work of
-hours, and a checkpoint are replaced only where the user says so. Nothing else is ever replaced, nor what the command
-itself reads. What a file is, is seen from its content (file_kind.py), not from its name. An empty file is no loss.
+A result that can be computed again replaces an older result of the same kind. A measurement
+(perhaps hours of work) and a checkpoint are replaced only if the user asks for it. Nothing else is
+replaced, and never an input of the command. The content of a file decides its kind (file_kind.py),
+not its name. An empty file may be replaced.
 """
 
 import os
@@ -18,8 +19,10 @@ from stepdiag.io.whole_files import check_output
 
 @dataclass(frozen=True)
 class FileKind:
-    """What a command writes: its name as file_kind.py has it, and the endings of its files. `kept`: why one is not
-    replaced by another of its kind, and what to do; empty for what can be computed again."""
+    """A kind of file that a command writes: its name as in file_kind.py, and the endings of paths.
+
+    `kept`: why it is not replaced by another one of its kind, and what the user can do; empty if it
+    can be computed again."""
 
     name: str
     endings: tuple[str, ...] = ()
@@ -38,7 +41,7 @@ OBSERVATION: Final = FileKind("table of steps", (".csv",))
 PLANS: Final = FileKind("table of plans", (".csv",))
 PNG: Final = FileKind("PNG picture", (".png",))
 SVG: Final = FileKind("SVG picture", (".svg",))
-# Not .nc, which is a usual ending of programs, too: in stepdiag it says netCDF.
+# Not .nc: a usual ending of programs, but in stepdiag it means netCDF.
 PROGRAM: Final = FileKind("measuring program", (".ngc", ".iso", ".cnc", ".tap", ".mpf", ".txt"))
 KINEMATICS_TABLE: Final = FileKind("calibration", (".csv",))
 ISG_TABLE: Final = FileKind("ISG table", (".csv",))
@@ -49,12 +52,10 @@ RAW: Final = FileKind("raw readings", (".jsonl",))
 CHECKPOINT: Final = FileKind(
     "checkpoint",
     (".checkpoint",),
-    "is the checkpoint of an earlier run: `resume` goes on with it; or remove it, or name another one",
+    "is the checkpoint of an earlier run: `resume` continues it; or remove it, or name another file",
 )
-CELLS: Final = FileKind(
-    "study cells", (), "cells of an interrupted study; `resume` goes on with them, or delete the file"
-)
-# Of the demonstrations.
+CELLS: Final = FileKind("study cells", (), "cells of an interrupted study; `resume` continues it, or delete the file")
+# Files of the demonstrations.
 ERROR_MAP: Final = FileKind("error map")
 REPORT: Final = FileKind("report of the demonstration")
 POINTS: Final = FileKind("table of points")
@@ -62,14 +63,16 @@ POINTS: Final = FileKind("table of points")
 
 @dataclass(frozen=True)
 class OutputFile:
-    """A file that a command is to write, as its user named it: of one of these kinds, by its ending."""
+    """A file to write, as named by the user: of one of these kinds, chosen by its ending."""
 
     path: Path
     kinds: tuple[FileKind, ...]
 
     def claim(self, *inputs: Path, error_map: Path | None = None, overwrite: bool = False) -> Path:
-        """The path, to write to. `inputs`: what the command reads; `error_map`: that of its scenario. Raises
-        InvalidArgument where something would be lost, or cannot be written, before the work."""
+        """Return the path, after checking that nothing would be lost and that it can be written.
+
+        `inputs`: files that the command reads. `error_map`: that of its scenario. Raises
+        InvalidArgument before the work begins."""
         path = self.path
         if any(_is_same(path, given) for given in inputs):
             raise InvalidArgument(f"{path}: is also an input; give the output another name")
@@ -89,14 +92,15 @@ class OutputFile:
 
 
 def claim(path: Path, kind: FileKind, *, overwrite: bool = False) -> None:
-    """Raises InvalidArgument where a file of this kind cannot be written there, or would replace what is to be kept.
-    `overwrite`: also one of its own kind that is not computed again so easily."""
+    """Raise InvalidArgument if a file of this kind cannot be written or would replace another file.
+
+    `overwrite`: a file of the same kind that is normally kept may be replaced."""
     check_output(path)
     if not path.exists() or path.stat().st_size == 0:
         return
     found = kind_of_file(path)
     if found != kind.name:
-        is_what = f"is {_a(found)}" if found else "is nothing that stepdiag knows"
+        is_what = f"is {_a(found)}" if found else "is not a file that stepdiag recognises"
         raise InvalidArgument(
             f"{path}: {is_what}, and is not replaced by {_a(kind.name)}: move it away, or name another file"
         )
@@ -105,14 +109,15 @@ def claim(path: Path, kind: FileKind, *, overwrite: bool = False) -> None:
 
 
 def claim_folder(folder: Path, files: Mapping[str, FileKind | str], marks: Iterable[str]) -> Path:
-    """The same for files in a folder, there or not; `files` by their names in it. A text stands for a file that must
-    not have been changed since. Where any of the files is there, one of the `marks` must be: they tell that the folder
-    is ours."""
+    """Claim files in a folder, which need not exist.
+
+    `files` maps names in the folder to a kind, or to a text: that file must not have been changed
+    since. If any of the files exists, one of `marks` must exist too: it shows that stepdiag made
+    the folder. Raises InvalidArgument."""
     there = [name for name in files if os.path.lexists(folder / name)]
     if there and not set(marks) & set(there):
         raise InvalidArgument(
-            f"{folder / there[0]}: is there already, and {folder} is no folder that this command has written: "
-            "name another one"
+            f"{folder / there[0]}: exists already, and {folder} was not written by this command: name another folder"
         )
     for name in there:
         expected = files[name]
@@ -130,7 +135,7 @@ def _is_text(path: Path, text: str) -> bool:
 
 
 def _is_same(one: Path, other: Path) -> bool:
-    """By name too: a result that fills the place of a missing error map would be taken for the machine's errors."""
+    """Compares names too: a result with the name of a missing error map would be read as one."""
     if os.path.realpath(one) == os.path.realpath(other):
         return True
     return one.exists() and other.exists() and one.samefile(other)

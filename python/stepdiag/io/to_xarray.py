@@ -1,6 +1,7 @@
-"""`to_xarray()` of the extension's classes. Made in Python, so that the extension knows nothing of this package.
+"""`to_xarray()` of the extension's classes, attached when stepdiag is imported.
 
-`import stepdiag` attaches them; xarray, which takes its time, is imported when one is called.
+They are written in Python because the extension does not import the package. xarray is slow to
+import and is imported only when one of them is called.
 """
 
 from typing import TYPE_CHECKING
@@ -12,14 +13,14 @@ if TYPE_CHECKING:
 
 
 def calibration_to_xarray(self: Calibration) -> "xarray.Dataset":
-    """The calibration as a labelled table."""
+    """The calibration as a labelled table (xarray.Dataset)."""
     from stepdiag.io.labelled_tables import calibration_table
 
     return calibration_table(self)
 
 
 def measurement_to_xarray(self: Measurement) -> "xarray.Dataset":
-    """The run as a labelled table."""
+    """The measurement as a labelled table (xarray.Dataset)."""
     from stepdiag.io.labelled_tables import measurement_table
 
     return measurement_table(self)

@@ -1,4 +1,4 @@
-"""Reading and writing of small text files: whole or not at all."""
+"""Reads and writes small files, completely or not at all."""
 
 import os
 import stat
@@ -9,14 +9,14 @@ from pathlib import Path
 
 from stepdiag._core import InvalidArgument
 
-# No scenario is larger; a device that never ends is not read to its end.
+# No scenario is larger. The limit also ends the reading of an endless device.
 LARGEST_TEXT = 16 * 2**20
-# The whole covariance of a thousand steps has 2.6 GB.
+# The full covariance for a thousand steps has 2.6 GB.
 LARGEST_BINARY = 8 * 2**30
 
 
 def read_text(path: Path) -> str:
-    """The file's text. Raises InvalidArgument where it cannot be read, is empty, or is not UTF-8 text."""
+    """Read a text file. Raises InvalidArgument if it cannot be read, is empty, or is not UTF-8."""
     content = _read(path, LARGEST_TEXT + 1)
     if len(content) > LARGEST_TEXT:
         raise InvalidArgument(f"{path}: larger than {LARGEST_TEXT // 2**20} MiB")
@@ -32,12 +32,14 @@ def read_text(path: Path) -> str:
 
 
 def read_beginning(path: Path) -> str:
-    """Enough of the file to tell what it is; what is no text comes as it may."""
+    """The beginning of a file, enough to recognise its kind; invalid UTF-8 is replaced."""
     return _read(path, 2**16).decode("utf-8-sig", errors="replace")
 
 
 def read_bytes(path: Path) -> bytes:
-    """The file's bytes. Raises InvalidArgument where it cannot be read, is empty, or is no regular file."""
+    """Read a file.
+
+    Raises InvalidArgument if it cannot be read, is empty, or is not a regular file."""
     try:
         status = path.stat()
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
@@ -63,22 +65,22 @@ def _read(path: Path, size: int) -> bytes:
 
 
 def check_input(path: Path) -> None:
-    """Raises InvalidArgument for devices: some never end."""
+    """Raise InvalidArgument for devices: some never end."""
     if path.exists() and not (path.is_file() or path.is_dir() or path.is_fifo()):
         raise InvalidArgument(f"{path}: expected a file, got a device")
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Writes a file as a whole: `path` is the old file or the whole new one, on the disk when this returns."""
+    """Write a file: `path` is either the old or the complete new one, on disk when this returns."""
     with whole_file(path) as temporary:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path` to write, which takes its place when the block ends without an error."""
+    """A temporary file beside `path`, which replaces it when the block ends without an error."""
     check_output(path)
-    target = Path(os.path.realpath(path))  # a symbolic link stays one
+    target = Path(os.path.realpath(path))  # keeps a symbolic link
     try:
         handle, temporary = tempfile.mkstemp(prefix=f"{target.name}.", dir=target.parent)
     except OSError as error:
@@ -99,7 +101,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 def sync_folder(folder: Path) -> None:
-    """So that the name of a new file outlasts a power cut, as its content does after fsync."""
+    """Sync a folder, so that the name of a new file survives a power cut."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -108,7 +110,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def check_output(path: Path) -> None:
-    """Raises InvalidArgument where `path` cannot become a file: before the work, not after it."""
+    """Raise InvalidArgument if `path` cannot be written. To be called before the work."""
     folder = path.parent
     if _is_device_name(path):
         raise InvalidArgument(f"{path}: cannot be written: expected the name of a file, got one under /dev")
@@ -129,13 +131,13 @@ def check_output(path: Path) -> None:
 
 
 def _is_device_name(path: Path) -> bool:
-    # Not by what it leads to: /dev/stdout may be a file, which renaming would put in place of the link.
+    # Do not resolve: /dev/stdout may lead to a file, and renaming would replace the link.
     name = os.path.abspath(path)
-    return name.startswith("/dev/") and not name.startswith("/dev/shm/")  # a disk in memory holds files
+    return name.startswith("/dev/") and not name.startswith("/dev/shm/")  # a file system in memory
 
 
 def make_folder(path: Path) -> None:
-    """Makes the folder, and those above it."""
+    """Make a folder and its parents."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The files of a simulated three-axis machine for LinuxCNC: what a session (session.py) starts."""
+"""Configuration files of a simulated three-axis machine for LinuxCNC (used by session.py)."""
 
 import re
 import shutil
@@ -8,9 +8,9 @@ from pathlib import Path
 
 AXES = "XYZ"
 
-RECORD_DEPTH = 8000  # servo periods that may pass before they are fetched
+RECORD_DEPTH = 8000  # servo periods kept until they are read
 
-# Counts servo periods: each adds the offset to what came out in the last.
+# Counts servo periods: each one adds the offset to the last output.
 CLOCK = """\
 loadrt offset names=session-clock
 addf session-clock.update-output servo-thread
@@ -31,23 +31,23 @@ net tool-changed iocontrol.0.tool-change => iocontrol.0.tool-changed
 
 @dataclass(frozen=True)
 class MachineConfiguration:
-    """What is simulated. Lengths in mm, speeds in mm/s; the defaults are faster than any machine."""
+    """The simulated machine. Lengths in mm, speeds in mm/s; faster than any machine by default."""
 
     kinematics: str = "trivkins"  # [KINS]KINEMATICS: module and its arguments
-    limits: tuple[float, float] = (-10000.0, 10000.0)  # of every axis; the joints' are 10 mm wider
+    limits: tuple[float, float] = (-10000.0, 10000.0)  # of every axis; joints have 10 mm more at each end
     speed: float = 20000.0
     acceleration: float = 2e6
     servo_period: int = 1000000  # ns
-    compensation: Mapping[int, str] = field(default_factory=dict)  # COMP_FILE of a joint
+    compensation: Mapping[int, str] = field(default_factory=dict)  # joint -> COMP_FILE
     compensation_type: int = 0
-    tools: Mapping[int, tuple[float, float, float]] = field(default_factory=dict)  # offsets of tools by number
-    record: Sequence[str] = ()  # pins of numbers that are written down every servo period
-    hal: Sequence[str] = ()  # lines after those of the machine
-    ini: Mapping[str, Mapping[str, str | float | int]] = field(default_factory=dict)  # further keys, by section
+    tools: Mapping[int, tuple[float, float, float]] = field(default_factory=dict)  # tool number -> offset, mm
+    record: Sequence[str] = ()  # numeric pins to record in every servo period
+    hal: Sequence[str] = ()  # lines added after those of the machine
+    ini: Mapping[str, Mapping[str, str | float | int]] = field(default_factory=dict)  # section -> further keys
 
 
 def write_configuration(folder: Path, machine: MachineConfiguration, display: str) -> Path:
-    """Writes the configuration into a folder and returns its INI file."""
+    """Write the configuration into a folder. Returns its INI file."""
     (folder / "machine.hal").write_text(_hal(machine), encoding="utf-8")
     (folder / "tool.tbl").write_text(_tools(machine), encoding="utf-8")
     (folder / "linuxcnc.var").write_text("5161\t0\n", encoding="utf-8")
@@ -57,7 +57,7 @@ def write_configuration(folder: Path, machine: MachineConfiguration, display: st
 
 
 def copy_configuration(folder: Path, configuration: Path, display: str) -> Path:
-    """The same of somebody's own configuration: a copy of its folder, with this display and a clock."""
+    """Copy a user's configuration folder, with this display and a clock. Returns its INI file."""
     shutil.copytree(configuration.parent, folder, dirs_exist_ok=True)
     ini = folder / configuration.name
     text = re.sub(r"(?m)^DISPLAY *=.*$", f"DISPLAY = {display}", ini.read_text(encoding="utf-8"))
@@ -75,7 +75,7 @@ def _hal(machine: MachineConfiguration) -> str:
             "addf sampler.0 servo-thread",
         ]
     for column, pin in enumerate(machine.record):
-        own = [f"joint-{j}" for j in range(3) if pin == f"joint.{j}.motor-pos-cmd"]  # has a signal already
+        own = [f"joint-{j}" for j in range(3) if pin == f"joint.{j}.motor-pos-cmd"]  # already has a signal
         recorder.append(f"net {own[0] if own else f'record-{column} {pin}'} => sampler.0.pin.{column}")
     return HAL + CLOCK + "\n".join([*loops, *recorder, *machine.hal]) + "\n"
 
@@ -113,11 +113,11 @@ def _ini(machine: MachineConfiguration, display: str) -> str:
             "MIN_LIMIT": low - 10.0,
             "MAX_LIMIT": high + 10.0,
             **moves,
-            "FERROR": 1000.0,  # a simulated joint has none but the lag of a servo period, at any speed
+            "FERROR": 1000.0,  # a simulated joint only lags by a servo period, at any speed
             "MIN_FERROR": 1000.0,
             "HOME": 0.0,
             "HOME_OFFSET": 0.0,
-            "HOME_SEARCH_VEL": 0.0,  # homed where it stands
+            "HOME_SEARCH_VEL": 0.0,  # homes at its present position
             "HOME_LATCH_VEL": 0.0,
             "HOME_SEQUENCE": 0,
         }

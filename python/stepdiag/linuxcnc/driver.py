@@ -1,8 +1,9 @@
 #!/usr/bin/python3
-"""Runs inside LinuxCNC, as its display: makes the machine ready and does what a session (session.py) asks for,
-one JSON object a line over a Unix socket. LinuxCNC ends when this program ends.
+"""Runs inside LinuxCNC as its display and executes the requests of a session (session.py).
 
-For Debian's own Python, which has LinuxCNC's modules; nothing else of this package is imported here.
+Requests are JSON objects, one per line, on a Unix socket. LinuxCNC ends when this program ends. It
+runs with Debian's own Python, which has LinuxCNC's modules, and imports nothing else of this
+package.
 """
 
 import contextlib
@@ -17,8 +18,8 @@ from typing import Any
 import hal  # type: ignore[import-not-found]
 import linuxcnc  # type: ignore[import-not-found]
 
-POLL = 0.001  # s between looks at the status: below the servo period nothing new is seen
-LATE = 0.2  # s for what else LinuxCNC says of an error: its motion and its task tell one after the other
+POLL = 0.001  # s between polls of the status; it does not change within a servo period
+LATE = 0.2  # s to wait for further messages: motion and task report an error one after the other
 
 
 class Trouble(Exception):
@@ -31,9 +32,9 @@ class Driver:
         self.command = linuxcnc.command()
         self.status = linuxcnc.stat()
         self.errors = linuxcnc.error_channel()
-        self.messages: list[str] = []  # of the move or program under way
-        self.code = ""  # of the MDI move under way
-        # Pins can only be read by a component; this one has none of its own.
+        self.messages: list[str] = []  # of the current move or program
+        self.code = ""  # of the current MDI move
+        # Only a component can read pins; this one has none of its own.
         self.component = hal.component("stepdiag-session")
         self.component.ready()
         self.status.poll()
@@ -41,7 +42,7 @@ class Driver:
 
     # --- waiting ---
     def end_if_alone(self) -> None:
-        """Ends LinuxCNC with this program when the session is gone, be it by a crash."""
+        """Exit if the session is gone, for example after a crash. This ends LinuxCNC."""
         try:
             if not self.connection.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT):
                 sys.exit(1)
@@ -49,7 +50,7 @@ class Driver:
             pass
 
     def complaints(self) -> list[str]:
-        """What LinuxCNC has said since the last look, errors and messages of the program alike."""
+        """LinuxCNC's messages since the last call: errors and messages of the program."""
         said = []
         while entry := self.errors.poll():
             kind, text = entry
@@ -83,7 +84,9 @@ class Driver:
         return bool(self.status.echo_serial_number >= self.command.serial)
 
     def done(self, what: str, timeout: float) -> None:
-        """Until the last command has been carried out. (LinuxCNC's wait_complete cannot be interrupted.)"""
+        """Wait until the last command is executed.
+
+        LinuxCNC's wait_complete cannot be interrupted."""
         self.wait_for(what, lambda: self.received() and self.status.state != linuxcnc.RCS_EXEC, timeout)
         if self.status.state == linuxcnc.RCS_ERROR:
             time.sleep(LATE)
@@ -100,10 +103,10 @@ class Driver:
             self.done("change of mode", timeout)
             self.wait_for("change of mode", lambda: self.status.task_mode == mode, timeout)
 
-    # --- what a session asks for ---
+    # --- requests of a session ---
     def turn_on(self, home: bool = True, timeout: float = 20.0) -> None:
         self.wait_for("status", lambda: self.status.joints > 0, timeout)
-        # What is sent before LinuxCNC's task has started is lost.
+        # Commands sent before LinuxCNC's task has started are lost.
         end = time.monotonic() + timeout
         while True:
             self.command.state(linuxcnc.STATE_ESTOP_RESET)
@@ -133,7 +136,7 @@ class Driver:
         self.switch_to(linuxcnc.MODE_MDI, timeout)
 
     def jog_joint(self, joint: int, distance: float, speed: float, world: bool, timeout: float = 60.0) -> None:
-        """Moves one joint, in joint mode."""
+        """Move one joint in joint mode."""
         self.messages = []
         self.switch_to(linuxcnc.MODE_MANUAL, timeout)
         self.free(True, timeout)
@@ -146,7 +149,7 @@ class Driver:
             self.switch_to(linuxcnc.MODE_MDI, timeout)
 
     def free(self, joints: bool, timeout: float) -> None:
-        """Joint mode, or world mode."""
+        """Switch to joint mode or to world mode."""
         mode = linuxcnc.TRAJ_MODE_FREE if joints else linuxcnc.TRAJ_MODE_TELEOP
         self.command.teleop_enable(not joints)
         self.wait_for("joint or world mode", lambda: self.status.motion_mode == mode, timeout)
@@ -168,7 +171,7 @@ class Driver:
         self.take_complaints(self.code)
 
     def visit(self, points: list[list[float]], timeout: float = 60.0) -> list[list[float]]:
-        """Goes to each point by G53 G0 and reads where the joints are told to stand (joint.N.motor-pos-cmd)."""
+        """Go to each point by G53 G0; return the joints' commands there (joint.N.motor-pos-cmd)."""
         seen = []
         for x, y, z in points:
             self.mdi(f"G53 G0 X{x:.17f} Y{y:.17f} Z{z:.17f}", timeout)
@@ -176,8 +179,10 @@ class Driver:
         return seen
 
     def at_rest(self, timeout: float = 10.0) -> list[float]:
-        """The joints' commands once they have been the same for 6 servo cycles: the interpolation between trajectory
-        points goes on for 4 after the end of a move. The status is newer than that afterwards."""
+        """The joints' commands, after they were constant for 6 servo cycles.
+
+        The interpolation between trajectory points lasts for 4 cycles after the end of a move.
+        Afterwards the status is newer than that."""
         end = time.monotonic() + timeout
         started, last = self.clock(), self.motors()
         while self.clock() - started < 6.5:
@@ -187,12 +192,12 @@ class Driver:
                 started, last = self.clock(), now
             if time.monotonic() > end:
                 raise Trouble(f"joints: not at rest within {timeout:g} s")
-        self.command.debug(self.status.debug)  # changes nothing; received with a status of its own
+        self.command.debug(self.status.debug)  # changes nothing, but yields a new status
         self.wait_for("status", self.received, timeout)
         return last
 
     def clock(self) -> float:
-        """Servo periods gone by."""
+        """Number of servo periods since the start."""
         return float(hal.get_value("session-clock.out"))
 
     def motors(self) -> list[float]:
@@ -209,12 +214,12 @@ class Driver:
 
     def resume(self, timeout: float = 600.0) -> dict[str, Any]:
         self.command.auto(linuxcnc.AUTO_RESUME)
-        # Not until it is no longer paused: the next stop may have come before anybody has looked.
+        # Do not wait for the end of the pause: the next pause may begin before the next poll.
         self.wait_for("resume", self.received, timeout)
         return self.until_pause(timeout)
 
     def until_pause(self, timeout: float) -> dict[str, Any]:
-        """Until the program is at its end or waits (M0, M1, M60)."""
+        """Wait until the program ends or pauses (M0, M1, M60)."""
 
         def stands() -> bool:
             s = self.status

@@ -1,4 +1,4 @@
-"""The one LinuxCNC that a computer can run: whose turn it is, whether one runs, and ending what is left of one."""
+"""The one LinuxCNC that can run on a computer: a lock, a check for others, and clean-up."""
 
 import contextlib
 import fcntl
@@ -10,28 +10,29 @@ import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-# Keys: messages to and from LinuxCNC's task (linuxcnc.nml), motion, then HAL, RTAPI and their clients.
+# Keys of shared memory: LinuxCNC's task (linuxcnc.nml), motion, HAL, RTAPI and their clients.
 SHARED_MEMORY = {1001, 1002, 1003, 1004, 1005, 100, 0x48414C32, 0x90280A48, 0x48484C34}
-PROCESSES = ("rtapi_app", "milltask", "linuxcncsvr")  # a LinuxCNC that runs has all of these
+PROCESSES = ("rtapi_app", "milltask", "linuxcncsvr")  # a running LinuxCNC has all of these
 
 
 class LinuxcncError(RuntimeError):
-    """LinuxCNC is missing, did not start, refused what was asked, or took too long. Its output is in the text or in
-    the session's log."""
+    """LinuxCNC is missing, does not start, refuses a request, or takes too long.
+
+    Its output is in the message or in the session's log."""
 
 
-_held: list[int] = []  # this process's lock: waiting for oneself would take for ever
+_held: list[int] = []  # the lock of this process, which must not wait for itself
 
 
 @contextlib.contextmanager
 def linuxcnc_lock(timeout: float = 1800.0) -> Iterator[None]:
-    """Held while LinuxCNC runs, or its modules are being installed: there is one of each on a computer."""
+    """Lock to hold while LinuxCNC runs or its modules are installed: a computer has one of each."""
     if _held:
-        raise LinuxcncError("this process runs LinuxCNC already; one session at a time can")
+        raise LinuxcncError("this process runs LinuxCNC already; only one session can run at a time")
     path = Path(tempfile.gettempdir()) / "stepdiag-linuxcnc.lock"
     with contextlib.suppress(FileExistsError):
         os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)  # somebody else's file may be locked too
+    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)  # also for another user's file
     try:
         end = time.monotonic() + timeout
         while True:
@@ -50,16 +51,20 @@ def linuxcnc_lock(timeout: float = 1800.0) -> Iterator[None]:
 
 
 def refuse_a_running_one(patience: float = 15.0) -> None:
-    """Another LinuxCNC, of a user or a real machine, must not be touched. One of a session that has crashed ends by
-    itself or is ended here: the lock is held, so that no other session lives."""
+    """Raise LinuxcncError if another LinuxCNC runs: it may belong to a user or a real machine.
+
+    A LinuxCNC of a crashed session ends by itself or is ended here. No other session can be alive,
+    because this process holds the lock."""
     end = time.monotonic() + patience
     while True:
         running = sorted({name for _, name in processes() if name in PROCESSES})
-        old = of_sessions("/")  # also the script that clears up last, and would clear away what is begun now
+        old = of_sessions("/")  # also a clean-up script, still running
         if not running and not old:
             break
         if time.monotonic() > end:
-            raise LinuxcncError(f"another LinuxCNC runs on this computer ({', '.join(running)}); one at a time can")
+            raise LinuxcncError(
+                f"another LinuxCNC runs on this computer ({', '.join(running)}); only one can run at a time"
+            )
         if time.monotonic() > end - patience / 2:
             end_processes(old)
         time.sleep(0.1)
@@ -67,9 +72,9 @@ def refuse_a_running_one(patience: float = 15.0) -> None:
 
 
 def remove_leavings() -> None:
-    """What a LinuxCNC that was killed leaves: its lock file, and shared memory that would confuse the next one."""
+    """Remove a killed LinuxCNC's lock file and shared memory, which disturb the next one."""
     with contextlib.suppress(OSError):
-        Path("/tmp/linuxcnc.lock").unlink()  # at this place whatever TMPDIR says
+        Path("/tmp/linuxcnc.lock").unlink()  # this path does not depend on TMPDIR
     with contextlib.suppress(OSError, ValueError):
         _, *segments = Path("/proc/sysvipc/shm").read_text().splitlines()
         for key, number, _, _, _, _, users, *_ in map(str.split, segments):
@@ -90,7 +95,7 @@ def processes() -> list[tuple[int, str]]:
 
 
 def of_sessions(folder: str) -> list[int]:
-    """The processes of LinuxCNC that a session with a folder like this has started: it is in their environment."""
+    """LinuxCNC's processes started by sessions in such a folder, found by their environment."""
     marker = f"STEPDIAG_SESSION_SOCKET={folder}".encode()
     found = []
     for number, _ in processes():
@@ -107,8 +112,10 @@ def end_processes(numbers: list[int], sign: signal.Signals = signal.SIGKILL) -> 
 
 
 def end_all_of(folder: str, environment: Mapping[str, str]) -> None:
-    """Ends what a session has started. The real-time process has left the process group, and hides its environment
-    from an ordinary user: halrun asks it to end."""
+    """End all processes of a session.
+
+    The real-time process has left the process group and hides its environment from ordinary users.
+    It ends at halrun's request."""
     with contextlib.suppress(OSError, subprocess.TimeoutExpired):
         if of_sessions(folder) or any(name == "rtapi_app" for _, name in processes()):
             subprocess.run(["halrun", "-U"], env=environment, stdin=subprocess.DEVNULL,

@@ -1,4 +1,4 @@
-"""What can be asked of a machine that LinuxcncSession runs: moves, programs, joints, pins."""
+"""Requests to a machine run by LinuxcncSession: moves, programs, joints, pins."""
 
 import json
 import os
@@ -15,7 +15,7 @@ Setting = float | int | bool
 
 
 class LinuxcncRequests:
-    """The requests of a session that has started."""
+    """The requests of a started session. Lengths in mm, times in s. They raise LinuxcncError."""
 
     folder: Path
     _connection: socket.socket
@@ -23,12 +23,12 @@ class LinuxcncRequests:
 
     @property
     def log(self) -> str:
-        """Everything that LinuxCNC has printed."""
+        """LinuxCNC's complete output."""
         raise NotImplementedError
 
     def _ask(self, verb: str, patience: float = 60.0, /, **arguments: Any) -> Any:
         request = {"do": verb, **arguments}
-        self._connection.settimeout(patience + 10.0)  # the driver's own limit comes first
+        self._connection.settimeout(patience + 10.0)  # after the driver's own limit
         try:
             self._lines.write(json.dumps(request) + "\n")
             self._lines.flush()
@@ -43,18 +43,18 @@ class LinuxcncRequests:
         return answer["result"]
 
     def mdi(self, code: str, timeout: float = 60.0) -> None:
-        """One line of G-code; returns when the machine stands."""
+        """Execute a line of G-code; return when the machine stands still."""
         self._ask("mdi", timeout, code=code, timeout=timeout)
 
     def start_mdi(self, code: str) -> None:
-        """Begins one line of G-code; `finish_mdi` waits for its end."""
+        """Start a line of G-code; `finish_mdi` waits for its end."""
         self._ask("start_mdi", code=code)
 
     def finish_mdi(self, timeout: float = 60.0) -> None:
         self._ask("finish_mdi", timeout, timeout=timeout)
 
     def jog_joint(self, joint: int, distance: float, speed: float = 100.0, *, world: bool = True) -> None:
-        """Moves one joint by itself, without kinematics, by a distance in mm; then back to world mode or not."""
+        """Move a joint by `distance` mm without kinematics; return to world mode if `world`."""
         self._ask("jog_joint", joint=joint, distance=distance, speed=speed, world=world)
 
     def run_program(
@@ -63,8 +63,10 @@ class LinuxcncRequests:
         on_pause: Callable[[Self, int, list[str]], None] | None = None,
         timeout: float = 600.0,
     ) -> list[str]:
-        """Runs a program to its end; returns its messages. At each stop (M0) `on_pause(session, line, messages since
-        the last stop)` is called, then the program goes on."""
+        """Run a program to its end; return its messages.
+
+        At each stop (M0) `on_pause(session, line, messages since the last stop)` is called. Then
+        the program continues."""
         own = self.folder / Path(path).name
         shutil.copyfile(path, own)
         said: list[str] = []
@@ -79,27 +81,29 @@ class LinuxcncRequests:
             outcome = self._ask("resume", timeout, timeout=timeout)
 
     def visit(self, points: Sequence[Sequence[float]], timeout: float = 60.0) -> list[list[float]]:
-        """The joints' commands (motor-pos-cmd, screw compensation included) at machine positions, one by one."""
+        """Go to machine positions and return the joints' commands at each, mm.
+
+        Commands are motor-pos-cmd: they include screw compensation."""
         rows = [[float(v) for v in point] for point in points]
         joints: list[list[float]] = self._ask("visit", timeout * max(1, len(rows)), points=rows, timeout=timeout)
         return joints
 
     def joints(self) -> list[float]:
-        """joint.N.motor-pos-cmd, mm, once the joints stand."""
+        """joint.N.motor-pos-cmd in mm, when the joints stand still."""
         joints: list[float] = self._ask("at_rest")
         return joints
 
     def joint_commands(self) -> list[float]:
-        """joint.N.pos-cmd, mm: without LinuxCNC's screw compensation."""
+        """joint.N.pos-cmd in mm: without LinuxCNC's screw compensation."""
         return [float(v) for v in self.pins([f"joint.{j}.pos-cmd" for j in range(3)])]
 
     def position(self) -> list[float]:
-        """Where LinuxCNC says that the tool is, X, Y, Z in machine coordinates, mm: from the joints' feedback."""
+        """LinuxCNC's tool position X, Y, Z in machine coordinates, mm, by the joints' feedback."""
         self._ask("at_rest")
         return [float(v) for v in self.state()["actual_position"][:3]]
 
     def recorded(self, timeout: float = 20.0) -> list[list[float]]:
-        """What has been recorded until now: of each servo period its number and the pins' values."""
+        """The recording so far: number and pin values of each servo period."""
         wanted, end = int(self.pin("sampler.0.sample-num")), time.monotonic() + timeout
         while True:
             *lines, _ = (self.folder / "record.txt").read_text(encoding="ascii").split("\n")

@@ -4,8 +4,9 @@
         session.mdi("G0 X100 Y20")
         print(session.joints(), session.position())
 
-LinuxCNC's own modules for Python belong to Debian's /usr/bin/python3: driver.py runs there, as LinuxCNC's
-display, and does what is asked for over a Unix socket. One LinuxCNC at a time runs on a computer; a lock sees to it.
+LinuxCNC's Python modules belong to Debian's /usr/bin/python3. There driver.py runs as LinuxCNC's
+display and executes the requests that it receives on a Unix socket. Only one LinuxCNC can run on a
+computer; a lock enforces this.
 """
 
 import contextlib
@@ -33,14 +34,21 @@ __all__ = ["LinuxcncError", "LinuxcncSession", "linuxcnc_lock"]
 
 
 class LinuxcncSession(LinuxcncRequests):
-    """Starts LinuxCNC in a folder of its own on entry, ends it and clears up on exit.
+    """A simulated machine: starts LinuxCNC in a temporary folder on entry, ends it on exit.
 
-    table, chain: load the kinematics `stepdiagkins` with this calibration and chain ("wX'bYZt"); `options` are its
-    further arguments, {"outside": "refuse", "margin": 5}. Without a table: `kinematics`.
-    configuration: an INI file of one's own instead, used in a copy of its folder; nothing else then counts.
-    comp_files: {joint: file}, LinuxCNC's own screw compensation, of type `comp_type`.
-    record: pins whose values in every servo period `recorded` returns.
-    hal, ini: further lines and keys. Everything else as in MachineConfiguration.
+    Lengths are in mm, speeds in mm/s. Raises LinuxcncError.
+
+    Args:
+        table: calibration for the kinematics `stepdiagkins`.
+        chain: chain of the machine for these kinematics, such as "wX'bYZt".
+        options: their further arguments, such as {"outside": "refuse", "margin": 5}.
+        kinematics: other kinematics, used without `table`.
+        configuration: a user's INI file; a copy of its folder is used, and the options of the
+            machine are ignored.
+        comp_files: {joint: file} for LinuxCNC's screw compensation, of type `comp_type`.
+        record: pins to record in every servo period; `recorded` returns the values.
+        hal: further HAL lines.
+        ini: further INI keys, by section. Other arguments: see MachineConfiguration.
     """
 
     def __init__(
@@ -102,7 +110,7 @@ class LinuxcncSession(LinuxcncRequests):
             if kind is None:
                 self._lines.write('{"do": "end"}\n')
                 self._lines.flush()
-            else:  # perhaps in the middle of a request, which the driver gives up when nobody is there
+            else:  # perhaps within a request, which the driver abandons without a session
                 self._connection.shutdown(socket.SHUT_RDWR)
             self._process.wait(15)
         self._stack.close()
@@ -119,7 +127,7 @@ class LinuxcncSession(LinuxcncRequests):
         else:
             ini = copy_configuration(self.folder, self._configuration, "./display")
         self._write_display()
-        self.folder.chmod(0o1777 if os.geteuid() == 0 else 0o755)  # the real-time process is somebody else's then
+        self.folder.chmod(0o1777 if os.geteuid() == 0 else 0o755)  # for another user's process
 
         socket_path = self.folder / "session"
         listener = self._stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
@@ -160,10 +168,10 @@ class LinuxcncSession(LinuxcncRequests):
         environment |= {
             "STEPDIAG_SESSION_SOCKET": str(socket_path),
             "RTAPI_FIFO_PATH": str(self.folder / "rtapi"),
-            "HOME": str(self.folder),  # LinuxCNC leaves files there
+            "HOME": str(self.folder),  # LinuxCNC writes files there
             "LANG": "C.UTF-8",
         }
-        if os.geteuid() == 0:  # LinuxCNC's real-time process refuses to be root
+        if os.geteuid() == 0:  # LinuxCNC's real-time process refuses to run as root
             environment["RTAPI_UID"] = str(NOBODY)
         return environment
 
@@ -181,7 +189,9 @@ class LinuxcncSession(LinuxcncRequests):
         return MachineConfiguration(kinematics=kinematics, compensation=comp, **self._machine)
 
     def _own_table(self) -> str:
-        """A copy that LinuxCNC's real-time process may read, whoever it runs as; a missing file stays missing."""
+        """A copy of the table that the real-time process may read as any user.
+
+        A missing file stays missing."""
         assert self._table is not None
         own = self.folder / "table.csv"
         if Path(self._table).is_file():
@@ -197,7 +207,7 @@ class LinuxcncSession(LinuxcncRequests):
         display.chmod(0o755)
 
     def _accept(self, listener: socket.socket) -> socket.socket:
-        """The driver's connection: there when LinuxCNC has started."""
+        """Wait for the driver's connection: it exists when LinuxCNC has started."""
         end = time.monotonic() + self._start_timeout
         listener.settimeout(0.1)
         while time.monotonic() < end:
@@ -209,7 +219,7 @@ class LinuxcncSession(LinuxcncRequests):
         raise LinuxcncError(f"LinuxCNC did not start within {self._start_timeout:g} s:\n{self.log}")
 
     def _end_processes(self) -> None:
-        """What is left after an orderly end is nothing; after a crash or a hang, everything that was started."""
+        """End the processes left by a crash or a hang; after an orderly end there are none."""
         if self._process.poll() is None:
             for sign, patience in ((signal.SIGTERM, 8.0), (signal.SIGKILL, 5.0)):
                 with contextlib.suppress(ProcessLookupError):
@@ -224,7 +234,7 @@ class LinuxcncSession(LinuxcncRequests):
 
     @property
     def log(self) -> str:
-        """Everything that LinuxCNC has printed."""
+        """LinuxCNC's complete output."""
         with contextlib.suppress(OSError):
             return self._log_path.read_text(encoding="utf-8", errors="replace")
         return getattr(self, "_kept_log", "")

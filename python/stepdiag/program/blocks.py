@@ -1,4 +1,4 @@
-"""The blocks of a measuring program: its head, and the lines for each action."""
+"""The blocks of a measuring program: its header, and the lines for each action."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -102,7 +102,9 @@ class Body:
                 return self.writer.dwell(self.times.settle + self.times.measure)
 
     def _set_up(self, visit: Visit) -> list[str]:
-        """What to mount, and where: the beam's origin lies before the first point, and the mirror faces it."""
+        """What to mount, and where.
+
+        The beam starts before the first point, and the mirror faces it."""
         plan, writer = self.known.plan, self.writer
         head = self.known.heads[visit.line]
         towards = plan.frame(visit.line)[:, 2]

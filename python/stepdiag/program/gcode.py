@@ -1,4 +1,4 @@
-"""The words of a measuring program: G-code of LinuxCNC, and what ISO 6983 and most controllers have in common."""
+"""The words of a measuring program: LinuxCNC's G-code, or the common part of ISO 6983."""
 
 import textwrap
 import unicodedata
@@ -9,10 +9,11 @@ Dialect = Literal["linuxcnc", "iso"]
 Trigger = Literal["handshake", "pulse", "dwell", "code"]
 DwellWord = Literal["P", "X", "F", "PMS"]
 
-WIDTH: Final = 100  # of comments; LinuxCNC takes lines of 255 characters
+WIDTH: Final = 100  # columns of a comment; LinuxCNC accepts 255 per line
 PULSE: Final = 0.05  # s
 
-# A reading in LinuxCNC: says which one, asks for it by output 0, waits until input 0 says that it is stored.
+# A reading in LinuxCNC: states its number, requests it by output 0, and waits until input 0 shows
+# that it is stored.
 HANDSHAKE: Final = """\
 o<reading> sub
   M68 E0 Q#1
@@ -34,15 +35,15 @@ o<reading> endsub
 
 @dataclass(frozen=True)
 class Writer:
-    """Words, lines and comments of one dialect."""
+    """Words, lines and comments in one dialect."""
 
     dialect: Dialect
     decimals: int
-    coordinates: str  # G53 (of the machine) or G54 to G59
+    coordinates: str  # G53 (machine coordinates) or G54 to G59
     dwell_word: DwellWord = "P"
 
     def number(self, value: float) -> str:
-        """Always with a decimal point: without it some controllers count increments."""
+        """A number with a decimal point: without it some controllers count increments."""
         text = f"{value:.{self.decimals}f}".rstrip("0")
         text = text + "0" if text.endswith(".") else text
         return "0.0" if text == "-0.0" else text
@@ -62,12 +63,14 @@ class Writer:
         return [f"({line})" for line in _wrapped(self._plain(text))]
 
     def stop(self, text: str) -> list[str]:
-        """Stops until cycle start, with a message where the dialect has them."""
+        """Stop until cycle start, with a message if the dialect has messages."""
         message = f"MSG, {self._plain(text)}" if self.dialect == "linuxcnc" else self._plain(text)
         return [*([f"({message})"] if self.dialect == "linuxcnc" else self.comment(text)), "M0"]
 
     def _plain(self, text: str) -> str:
-        """ASCII without parentheses, which would end a comment, or %, which ends a program; ISO's are capitals."""
+        """The text without characters that end a comment or the program.
+
+        ASCII; no parentheses, no %; capitals in the dialect iso."""
         text = unicodedata.normalize("NFKD", text.replace("µ", "u"))
         text = text.replace("(", "[").replace(")", "]").replace("%", "?")
         text = "".join(c if " " <= c <= "~" else "?" for c in text if not unicodedata.combining(c))
@@ -75,12 +78,12 @@ class Writer:
 
 
 def _wrapped(text: str) -> list[str]:
-    # What goes on does not begin a line: (MSG, ...), (PY, ...) and the like are more than comments to LinuxCNC.
+    # A continued word does not begin a line: LinuxCNC executes (MSG, ...), (PY, ...) and the like.
     return textwrap.wrap(text, WIDTH, subsequent_indent="... ") or [""]
 
 
 def numbered(lines: list[str]) -> list[str]:
-    """With a block number, N10, N20 ..., before each line that is more than a comment."""
+    """Add block numbers N10, N20, ... to the lines that are not comments only."""
     result, number = [], 0
     for line in lines:
         if line and line[0] not in "(%:O":

@@ -1,6 +1,7 @@
-"""The measuring program of a scenario's plan: G-code that moves the axes through its points and asks for the readings.
+"""The measuring program of a scenario's plan: G-code that moves the axes and requests the readings.
 
-Every point stands in the program as numbers, in the order of order_of_run.py. docs/measuring.md says how to run it.
+The program contains the numbers of every point, in the order of order_of_run.py. docs/measuring.md
+explains how to run it.
 """
 
 from dataclasses import dataclass, field
@@ -19,18 +20,18 @@ from stepdiag.units import MINUTE
 
 @dataclass(frozen=True)
 class Program:
-    """A program's text, and what there is to say of it."""
+    """The text of a program, and notes about it."""
 
     text: str
     readings: int
     seconds: float
     set_up_seconds: float
     rounding: float  # mm, largest
-    unapproached: list[str] = field(default_factory=list)  # points that an axis does not come to from its side in full
+    unapproached: list[str] = field(default_factory=list)  # points without a full overrun
 
     @property
     def summary(self) -> list[str]:
-        """Lines for a terminal, and for the program's own head."""
+        """Notes for a terminal and for the program's header."""
         lines = [
             f"{self.readings} readings, about {_minutes(self.seconds)}, "
             f"of these {_minutes(self.set_up_seconds)} for set-ups"
@@ -41,7 +42,9 @@ class Program:
 
 
 def measuring_program(known: Known, options: Options) -> Program:
-    """The program for a scenario's plan, with the feed and times of its [plan_by_time]. Raises InvalidArgument."""
+    """The program for a scenario's plan, with feed and times of [plan_by_time].
+
+    Raises InvalidArgument if an option does not suit, or a move would leave the limits."""
     times = times_of(known.keys.plan_by_time, f"{known.path}: plan_by_time")
     writer, trigger = writer_of(options), trigger_of(options)
     space = space_of(known, options)
@@ -71,14 +74,14 @@ def measuring_program(known: Known, options: Options) -> Program:
 
 
 def _rounding(actions: list[Action], writer: Writer) -> float:
-    """By how much the numbers of points that are read differ from the plan's."""
+    """Largest difference between the written positions of points and the plan's, mm."""
     positions = np.array([action.position for action in actions if isinstance(action, Feed)])
     written = np.array([float(writer.number(value)) for value in positions.ravel()]).reshape(positions.shape)
     return float(np.max(np.abs(written - positions)))
 
 
 def _duration(actions: list[Action], space: Space, times: Times) -> tuple[float, float]:
-    """Of all, and of the set-ups in it, s; every move with the feed."""
+    """Total time and time for set-ups, s; all moves at the feed."""
     place, seconds, set_ups = space.safe.copy(), 0.0, 0.0
     for action in actions:
         if isinstance(action, Rapid | Feed):
@@ -97,7 +100,7 @@ def _duration(actions: list[Action], space: Space, times: Times) -> tuple[float,
 
 
 def _unapproached(actions: list[Action], space: Space) -> list[str]:
-    """What the limits of travel keep from being approached, in words."""
+    """Texts for points that the limits of travel keep from a full approach."""
     texts = []
     visit: Visit | None = None
     for action in actions:

@@ -1,4 +1,4 @@
-"""How a measuring program is written: what one may choose, its defaults and its checks."""
+"""Options of a measuring program, with defaults and checks."""
 
 from dataclasses import dataclass
 from typing import Final, get_args
@@ -15,19 +15,19 @@ COORDINATES: Final = ("G53", "G54", "G55", "G56", "G57", "G58", "G59")
 
 @dataclass(frozen=True)
 class Options:
-    """How the program of a plan is written. Lengths mm, in the controller's coordinates; what is None has a default."""
+    """Options of a program. Lengths in mm, in the controller's coordinates. None has a default."""
 
     dialect: Dialect = "linuxcnc"
-    coordinates: str | None = None  # G53 in LinuxCNC, else G54
-    decimals: int | None = None  # 6 in LinuxCNC, else 4
+    coordinates: str | None = None  # None: G53 for linuxcnc, else G54
+    decimals: int | None = None  # None: 6 for linuxcnc, else 4
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     safe: tuple[float, float, float] | None = None
     retreat: str = "ZXY"
     overrun: float = 1.0
     limits: tuple[float, float, float, float, float, float] | None = None  # X from, to, Y from, to, Z from, to
-    trigger: Trigger | None = None  # handshake in LinuxCNC, else dwell
+    trigger: Trigger | None = None  # None: handshake for linuxcnc, else dwell
     trigger_code: str = ""
-    timeout: float = 300.0  # s, for a reading
+    timeout: float = 300.0  # s, of a handshake
     dwell_word: DwellWord = "P"
     align: bool = True
     line_numbers: bool = False
@@ -65,7 +65,7 @@ def space_of(known: Known, options: Options) -> Space:
         if not np.all(np.isfinite(getattr(options, name) or 0.0)):
             raise InvalidArgument(f"{name}: expected finite lengths, got {getattr(options, name)}")
     origin, volume = np.asarray(options.origin), known.plan.volume
-    # Z as far as it goes: on most machines that is up, away from the table.
+    # The far end of Z: on most machines up, away from the table.
     safe = origin + volume * (0.5, 0.5, 1.0) if options.safe is None else np.asarray(options.safe)
     lowest, highest = np.full(3, -np.inf), np.full(3, np.inf)
     if options.limits is not None:

@@ -1,9 +1,10 @@
-"""What a measuring program does, one action after the other, whatever the language it is written in.
+"""The actions of a measuring program one after the other, in no particular language.
 
-Assumed: a line's head stands outside the volume, `standoff` before the line's first point, and nothing else is in the
-way of the mirror within the volume and `overrun` around it. Between set-ups the axes move one at a time, to the safe
-position in the order `retreat`, from there in the reverse order; within a set-up they keep to the line, so that the
-beam is not interrupted, on a straight way even when they go back to its beginning.
+Assumptions: the head of a line stands outside the volume, `standoff` before the first point of the
+line, and nothing else obstructs the mirror in the volume and `overrun` around it. Between set-ups
+the axes move one at a time, to the safe position in the order `retreat` and from there in the
+reverse order. Within a set-up they stay on the line, so that the beam is not interrupted; they also
+return to its beginning in a straight line.
 """
 
 from collections.abc import Iterator
@@ -18,16 +19,16 @@ from stepdiag.scenario.order_of_run import Visit
 Vector = npt.NDArray[np.float64]
 
 AXES = "XYZ"
-SLACK = 1e-9  # mm: sums of origins and positions round
+SLACK = 1e-9  # mm; allows for rounding in sums of origin and position
 
 
 @dataclass(frozen=True)
 class Space:
-    """Where the axes may go: controller's coordinates, mm."""
+    """Where the axes may move: controller's coordinates, mm."""
 
-    origin: Vector  # of home
+    origin: Vector  # home
     safe: Vector
-    retreat: str = "ZXY"  # a permutation of XYZ
+    retreat: str = "ZXY"  # order of the axes, a permutation of XYZ
     overrun: float = 1.0
     lowest: Vector = field(default_factory=lambda: np.full(3, -np.inf))
     highest: Vector = field(default_factory=lambda: np.full(3, np.inf))
@@ -35,14 +36,14 @@ class Space:
 
 @dataclass(frozen=True)
 class SetUp:
-    """The axes are at the safe position. Head and mirror are set up for the line of this visit."""
+    """A stop at the safe position to set up head and mirror for the line of this visit."""
 
     visit: Visit
 
 
 @dataclass(frozen=True)
 class Align:
-    """The axes are at the line's first point, for the beam to be aligned."""
+    """A stop at the first point of the line to align the beam."""
 
     visit: Visit
 
@@ -61,7 +62,7 @@ class Rapid:
 @dataclass(frozen=True)
 class Feed:
     position: Vector  # (3,)
-    short: tuple[int, ...] = ()  # axes that the travel kept from overrunning in full
+    short: tuple[int, ...] = ()  # axes whose overrun the limits shorten
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,9 @@ Action = SetUp | Align | Begin | Rapid | Feed | Read
 
 
 def actions_of(visits: list[Visit], space: Space, *, align: bool = True) -> Iterator[Action]:
-    """All actions, from the safe position back to it. Raises InvalidArgument for what is out of the travel."""
+    """All actions, from the safe position back to it.
+
+    Raises InvalidArgument for positions outside the limits."""
     _check(visits, space)
     set_up = 0
     for visit in visits:
@@ -95,8 +98,10 @@ def actions_of(visits: list[Visit], space: Space, *, align: bool = True) -> Iter
 
 
 def _approach(first: Vector, visit: Visit, space: Space) -> Iterator[Feed]:
-    """Beyond the first point, for every axis to come to it from its side. From there on the steps of a line keep to
-    that: an axis that it moves goes on as it came, and the others stand still."""
+    """Move beyond the first point, such that every axis approaches it from the specified side.
+
+    The later steps of the line keep that direction: moved axes continue as they came, the others
+    stand still."""
     if space.overrun == 0.0:
         return
     wanted = first - space.overrun * visit.approach

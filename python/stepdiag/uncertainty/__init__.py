@@ -1,1 +1,1 @@
-"""Uncertainty of a calibration: propagation, virtual calibrations by the million, studies of many scenarios."""
+"""Uncertainty of a calibration: propagation, virtual calibrations, studies of many scenarios."""

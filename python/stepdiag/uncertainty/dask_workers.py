@@ -1,11 +1,12 @@
-"""Monte Carlo runs on the workers of Dask distributed: of another computer's scheduler, or processes of this one.
+"""Monte Carlo runs on Dask distributed: on a remote scheduler's workers, or on local processes.
 
-A task is a pure function of the source of a model, the bytes of the bins and a range of leaves; it gives the bytes of
-the statistics of these leaves. They are merged by the numbers of the leaves, so neither who computed what, nor how
-leaves were shared out, nor a worker that is lost on the way (others do its tasks again) changes a bit of the result.
-Bits do depend on the instruction set: workers that use another one than this program take no part.
+A task is a pure function of the source of a model, the bytes of the bins and a range of leaves. It
+returns the bytes of the statistics of these leaves. The results are merged by the numbers of the
+leaves. Therefore the bits of the result do not depend on how leaves are distributed, or on a worker
+that is lost (others repeat its tasks). They do depend on the instruction set: workers with another
+one than this program are not used.
 
-Dask is imported when it is used: it is an optional dependency.
+Dask is an optional dependency and imported on first use.
 """
 
 import ipaddress
@@ -24,7 +25,7 @@ from stepdiag._core import Bins, InvalidArgument, PartialStatistics
 from stepdiag.uncertainty.model_source import ModelSource, model_of
 from stepdiag.uncertainty.monte_carlo import Executor, LeafRange
 
-TASKS_A_THREAD: Final = 2  # under way: one that is computed, one that waits
+TASKS_A_THREAD: Final = 2  # submitted at a time: one computed, one waiting
 CONNECT_SECONDS: Final = 10.0
 START_SECONDS: Final = 120.0
 LOOPBACK: Final = "127.0.0.1"
@@ -40,7 +41,7 @@ class WorkersLost(ConnectionError):
 
 @dataclass(frozen=True)
 class Platform:
-    """What bits depend on beside the task: our version, and the instruction set in use."""
+    """What the bits of a result depend on besides the task: version and instruction set."""
 
     version: str
     instruction_set: str
@@ -51,7 +52,7 @@ class Platform:
 
 @dataclass(frozen=True)
 class Refusal:
-    """The answer of a worker that is not the machine that a task is for."""
+    """Answer of a worker whose platform is not the one that a task requires."""
 
     machine: Platform
 
@@ -60,8 +61,8 @@ def this_machine() -> Platform:
     return Platform(_core.__version__, _core.instruction_set())
 
 
-# --- tasks: what workers do ------------------------------------------------------------------------------------------
-# One thread each: a worker has as many tasks at a time as it has threads, its share of the computer.
+# --- tasks: executed by workers --------------------------------------------------------------------------------------
+# One thread each: a worker executes as many tasks at a time as it has threads.
 def perform(machine: Platform, function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
     return function(*arguments) if this_machine() == machine else Refusal(this_machine())
 
@@ -77,7 +78,7 @@ def _bins_of(content: bytes) -> Bins:
 
 # --- the client ------------------------------------------------------------------------------------------------------
 class Workers:
-    """Those of a scheduler that take part. Make it with `workers_of`."""
+    """The workers of a scheduler that have this program's platform. Made by `workers_of`."""
 
     def __init__(self, client: Any, warn: Warn) -> None:
         self._client = client
@@ -98,7 +99,7 @@ class Workers:
         return str(self._client.scheduler.address)
 
     def executor(self, source: ModelSource) -> Executor:
-        """For run_monte_carlo: each range of leaves is a task."""
+        """An executor for run_monte_carlo: each range of leaves is a task."""
 
         def compute(bins: Bins, ranges: Iterable[LeafRange]) -> Iterator[PartialStatistics]:
             content = bins.to_bytes()
@@ -108,8 +109,10 @@ class Workers:
         return compute
 
     def compute(self, function: Callable[..., Any], arguments: Iterable[Sequence[Any]]) -> Iterator[tuple[int, Any]]:
-        """A pure function of each of these arguments, as the answers come: which, and the answer. A few are under way
-        at a time. What one worker refuses is given to others; closing the iterator gives up what is under way."""
+        """Apply a pure function to these arguments; yield (index, answer) as answers arrive.
+
+        Only a few tasks are submitted at a time. A task that a worker refuses is given to others.
+        Closing the iterator cancels submitted tasks."""
         tasks = enumerate(arguments)
         return self._answers(function, tasks)
 
@@ -124,7 +127,7 @@ class Workers:
         def submit(task: tuple[int, Sequence[Any]] | None) -> None:
             if task is not None:
                 arguments = perform, self.machine, function, task[1]
-                # Others are asked where the chosen ones are gone: a worker that is started again has a new address.
+                # Other workers are allowed because a restarted worker has a new address.
                 future = self._client.submit(
                     *arguments, pure=False, workers=self._chosen, allow_other_workers=self._chosen is not None
                 )
@@ -148,22 +151,22 @@ class Workers:
         except lost as error:
             raise WorkersLost(f"{self.address}: the scheduler is gone: {error}") from None
         finally:
-            futures.clear()  # lets go of what is under way
+            futures.clear()  # cancels submitted tasks
 
     def _machines(self) -> dict[str, Platform | Exception]:
-        """By address; of one that has another stepdiag, or none, the error of asking."""
+        """Platform by address; an exception for workers that have another stepdiag or none."""
         found: dict[str, Platform | Exception] = self._client.run(this_machine, on_error="return")
         return found
 
     def _choose(self, found: Mapping[str, Platform | Exception]) -> None:
-        """Keeps to the workers that are what this machine is, and says which are not."""
+        """Keep the workers with this platform, and warn about the others."""
         self._chosen = sorted(address for address, machine in found.items() if machine == self.machine)
         refused = {address: machine for address, machine in sorted(found.items()) if machine != self.machine}
         if not self._chosen:
             said = "; ".join(f"{address} has {machine}" for address, machine in refused.items())
             raise WorkersLost(f"{self.address}: no worker has {self.machine}, as this program does: {said}")
         for address in refused.keys() - self._refused:
-            self._warn(f"worker {address} takes no part: it has {refused[address]}, this program {self.machine}")
+            self._warn(f"worker {address} is not used: it has {refused[address]}, this program {self.machine}")
         self._refused |= refused.keys()
 
 
@@ -172,10 +175,19 @@ class Workers:
 def workers_of(
     scheduler: str | None = None, count: int | None = None, warn: Warn = lambda _: None
 ) -> Iterator[Workers]:
-    """The workers of a scheduler, "tls://HOST:PORT" or "tcp://HOST:PORT"; or `count` processes of this computer, which
-    share its threads and serve nobody but this process. Raises InvalidArgument where there are none."""
+    """Connect to the workers of a scheduler, or start local ones; a context manager.
+
+    Args:
+        scheduler: address, "tls://HOST:PORT" or "tcp://HOST:PORT".
+        count: without a scheduler, number of processes to start on this computer. They share its
+            threads, and only this process can use them.
+        warn: called with a text for each worker that is not used, and for insecure connections.
+
+    Raises:
+        InvalidArgument: Dask is missing, the address is invalid, or there are no workers.
+    """
     distributed = _dask()
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # a worker that is lost is no news to users
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # Dask would report lost workers
     if scheduler is not None:
         with _connected(distributed, scheduler, warn) as client:
             yield Workers(client, warn)
@@ -184,15 +196,18 @@ def workers_of(
         _local_cluster(distributed, count) as cluster,
         distributed.Client(cluster, set_as_default=False) as client,
     ):
-        client.wait_for_workers(count or 1, timeout=START_SECONDS)  # on a busy computer some are there before others
+        client.wait_for_workers(count or 1, timeout=START_SECONDS)  # they start at different times
         yield Workers(client, warn)
 
 
 @contextmanager
 def _local_cluster(distributed: Any, count: int | None) -> Iterator[Any]:
-    """Other users of this computer reach its ports, too: every connection needs the credentials, which exist in the
-    memory of these processes only, and nothing is served by HTTP. Dask puts its folder of temporary files first on
-    Python's path, so that this folder is private; by default it belongs to whoever made it first."""
+    """A cluster that only this process can use.
+
+    Other users of the computer can reach its ports. Therefore every connection needs credentials,
+    which exist only in the memory of these processes, and nothing is served by HTTP. Dask puts its
+    folder for temporary files first on Python's path. That folder is private here; by default it
+    belongs to the user who first created it."""
     from dask import config
 
     try:
@@ -202,7 +217,7 @@ def _local_cluster(distributed: Any, count: int | None) -> Iterator[Any]:
     with TemporaryDirectory(prefix="stepdiag-", ignore_cleanup_errors=True) as folder:
         options = {
             "temporary-directory": folder,
-            # Dask's HTTP servers cannot be switched off: they start with nothing to serve, and PRELOAD stops them.
+            # Dask always starts its HTTP servers: they have no routes, and PRELOAD stops them.
             "distributed.scheduler.http.routes": [],
             "distributed.worker.http.routes": [],
         }
@@ -216,7 +231,7 @@ def _local_cluster(distributed: Any, count: int | None) -> Iterator[Any]:
                     security=credentials,
                     dashboard_address=None,
                     scheduler_kwargs={"dashboard_address": f"{LOOPBACK}:0", "preload": PRELOAD},  # not port 8787
-                    memory_limit=0,  # what a run takes is known beforehand, and Dask would stop workers
+                    memory_limit=0,  # memory use is known; Dask would stop workers
                     silence_logs=logging.CRITICAL,
                     preload=PRELOAD,
                 ) as cluster,
@@ -227,7 +242,7 @@ def _local_cluster(distributed: Any, count: int | None) -> Iterator[Any]:
 
 
 def check_scheduler(address: str) -> str:
-    """Raises InvalidArgument for what is no address of a scheduler."""
+    """Return the address. Raises InvalidArgument if it is not the address of a scheduler."""
     kind, separator, rest = address.partition("://")
     host, _, port = rest.rpartition(":")
     if kind not in ("tcp", "tls") or not separator or not host or not port.isdecimal() or int(port) > 65535:
@@ -251,7 +266,7 @@ def _connected(distributed: Any, address: str, warn: Warn) -> Iterator[Any]:
 
 
 def _configured_credentials(distributed: Any, address: str) -> Any:
-    """Those of the user, which are complete where the address is one with TLS; all connections then are."""
+    """The user's credentials from Dask's configuration; they must be complete for TLS."""
     if not address.startswith("tls:"):
         security = distributed.Security()
         if security.require_encryption:
@@ -261,7 +276,7 @@ def _configured_credentials(distributed: Any, address: str) -> Any:
     try:
         complete = security.get_connection_args("client")["ssl_context"] is not None
         said = ""
-    except OSError as error:  # says neither which file nor where it is named
+    except OSError as error:  # it names neither the file nor the key
         complete, said = False, f": {error}"
     if not complete:
         raise InvalidArgument(f"`scheduler`: {address}: expected {CREDENTIALS}; got {security}{said}")

@@ -1,6 +1,7 @@
-"""Runs of the Monte Carlo method (JCGM 101): with progress, checkpoints and resuming, here or by an executor elsewhere.
+"""Runs of the Monte Carlo method (JCGM 101) with progress, checkpoints and executors.
 
-The bits of a result depend on its set of leaves alone, so a run that was interrupted goes on to the same result.
+The bits of a result depend only on its set of leaves. An interrupted run therefore continues to the
+same result.
 """
 
 import os
@@ -29,16 +30,18 @@ from stepdiag.io.outputs import CHECKPOINT, claim
 from stepdiag.io.whole_files import check_output, read_bytes, write_whole
 
 LeafRange = tuple[int, int]  # half-open
-Progress = Callable[[int, int], object]  # samples done, and how many there are to be (at most, of an adaptive run)
+Progress = Callable[[int, int], object]  # samples done, and their total (adaptive: at most)
 
 SECONDS_BETWEEN_CHECKPOINTS = 10.0
-LEAVES_OF_A_TASK = 5  # of an executor
+LEAVES_OF_A_TASK = 5  # leaves in a task of an executor
 MAGIC = f"{CHECKPOINT_BEGINS}1\n".encode()
 
 
 class Executor(Protocol):
-    """Computes ranges of leaves elsewhere: gives the statistics of each, in any order. It takes ranges as it can do
-    with them (there may be no end of them), and gives up those in hand when it is closed."""
+    """Computes the statistics of ranges of leaves elsewhere and yields them in any order.
+
+    It takes ranges as it can process them (there may be infinitely many), and cancels its remaining
+    work when it is closed."""
 
     def __call__(self, bins: Bins, ranges: Iterable[LeafRange]) -> Iterator[PartialStatistics]: ...
 
@@ -55,16 +58,30 @@ def run_monte_carlo(
     progress: Progress | None = None,
     executor: Executor | None = None,
 ) -> MonteCarloResult:
-    """Draws `samples`, rounded up to whole leaves of 2,000; adaptive: whole blocks until all outputs are stable, and at
-    most about that many (result.stability tells). checkpoint: a new file that is written every ten seconds, where the
-    run ends, and where an exception (Ctrl-C) ends it, which goes on then; resume: goes on from there, also to more
-    samples than before. Raises InvalidArgument, also for a checkpoint of another run, and without `resume` for any file
-    that the checkpoint would replace."""
+    """Run the Monte Carlo method on a model (JCGM 101).
+
+    Args:
+        model: the sample model, such as VirtualCalibrations.
+        samples: number of samples, rounded up to leaves of 2,000.
+        adaptive: draw blocks until all outputs are stable, and at most about `samples` samples;
+            `stability` of the result tells which.
+        options: statistics to compute; None: the defaults.
+        threads: number of threads; 0: all of the computer's.
+        checkpoint: a new file, written every ten seconds, at the end, and when an exception such as
+            KeyboardInterrupt ends the run (it is raised again).
+        resume: continue from the checkpoint, also to more samples than before.
+        progress: called with the samples done and their total.
+        executor: computes the leaves elsewhere, see `Workers.executor`.
+
+    Raises:
+        InvalidArgument: an argument is invalid, the checkpoint belongs to another run, or without
+            `resume` a file would be replaced by the checkpoint.
+    """
     if samples < 1:
         raise InvalidArgument(f"samples: expected 1 or more, got {samples}")
     if resume and checkpoint is None:
-        raise InvalidArgument("resume: expected a checkpoint to go on from")
-    saved = read_bytes(checkpoint) if resume and checkpoint else None  # before the work
+        raise InvalidArgument("resume: expected a checkpoint to continue")
+    saved = read_bytes(checkpoint) if resume and checkpoint else None  # fails before the work
     if checkpoint and resume:
         check_output(checkpoint)
     elif checkpoint:
@@ -85,7 +102,7 @@ def run_monte_carlo(
 
 
 def plan_ranges(leaves: int, done: Sequence[LeafRange], size: int) -> Iterator[LeafRange]:
-    """What is missing of the leaves 0 ... leaves - 1, in ranges of at most `size`."""
+    """The missing ones of leaves 0 ... leaves - 1, in ranges of at most `size`."""
     for first, end in _missing(leaves, done):
         for start in range(first, end, size):
             yield start, min(start + size, end)
@@ -100,7 +117,9 @@ def _missing(leaves: int, done: Sequence[LeafRange]) -> Iterator[LeafRange]:
 
 
 def _threads_of(model: SampleModel, threads: int, report: Callable[[int], None]) -> Executor:
-    """Ranges computed here, as many at a time as there are threads. `report` is told the leaves done of those."""
+    """An executor that uses this process's threads, one range per thread at a time.
+
+    `report` is called with the number of leaves done in the current ranges."""
     at_a_time = threads or os.cpu_count() or 1
 
     def compute(bins: Bins, ranges: Iterable[LeafRange]) -> Iterator[PartialStatistics]:
@@ -112,7 +131,7 @@ def _threads_of(model: SampleModel, threads: int, report: Callable[[int], None])
 
 
 class _Run(ABC):
-    """The statistics so far, their checkpoint, and what is told of them."""
+    """The statistics so far, their checkpoint, and the progress report."""
 
     kind = "with a fixed number of samples"
 
@@ -135,6 +154,7 @@ class _Run(ABC):
     def go(self, executor: Executor) -> None: ...
 
     def go_here(self, model: SampleModel, threads: int) -> None:
+        """Run on the threads of this process, leaf by leaf, pausing now and then to save."""
         self.go(_threads_of(model, threads, self.report))
 
     @abstractmethod
@@ -157,7 +177,7 @@ class _Run(ABC):
         self.due = time.monotonic() + SECONDS_BETWEEN_CHECKPOINTS
 
     def restore(self, saved: bytes, name: str) -> None:
-        """Raises InvalidArgument for what is no checkpoint of this run."""
+        """Continue from a checkpoint. Raises InvalidArgument if it is not one of this run."""
         statistics, procedure = _parts_of(saved, name)
         its_kind = _AdaptiveRun.kind if procedure else _FixedRun.kind
         if its_kind != self.kind:
@@ -181,7 +201,7 @@ class _FixedRun(_Run):
             before = self.done()
 
             def go_on(leaves_done: int, before: int = before) -> bool:
-                if self.progress:  # the statistics themselves are being added to
+                if self.progress:  # not from the statistics, which are changing
                     self.progress((before + leaves_done) * leaf_samples, self.leaves * leaf_samples)
                 return self.checkpoint is None or time.monotonic() < self.due
 
@@ -203,7 +223,7 @@ class _FixedRun(_Run):
 
 
 class _AdaptiveRun(_Run):
-    """Blocks one after the other: whether a block is the last one depends on those before it alone."""
+    """Blocks in order: whether a block is the last depends only on the blocks before it."""
 
     kind = "by the adaptive procedure"
 
@@ -211,7 +231,7 @@ class _AdaptiveRun(_Run):
         super().__init__(bins, samples, checkpoint, progress)
         self.procedure = AdaptiveProcedure(bins)
         self.size = AdaptiveProcedure.leaves_per_block(bins.options.coverage)
-        self.most = max(2, -(-self.leaves // self.size))  # blocks; the spread of one block is not known
+        self.most = max(2, -(-self.leaves // self.size))  # blocks; one block alone has no spread
         self.leaves = self.most * self.size
 
     def procedure_bytes(self) -> bytes:
@@ -242,7 +262,7 @@ class _AdaptiveRun(_Run):
 
 
 def _closing(parts: Iterator[PartialStatistics]) -> Iterator[PartialStatistics]:
-    """The same; what the executor still has in hand is given up when nobody wants more."""
+    """Yield all parts; close the executor when no more are wanted."""
     try:
         yield from parts
     finally:

@@ -1,4 +1,4 @@
-"""What an uncertainty evaluation found: outputs with their propagation and their Monte Carlo result, side by side."""
+"""Result of an uncertainty evaluation: outputs with their propagation and Monte Carlo results."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -20,14 +20,16 @@ FAMILIES: Final = (*KINDS, "derived")
 
 @dataclass(frozen=True, eq=False)
 class UncertaintyResult:
-    """Of all outputs of a scenario's virtual calibrations, in their order: the entries of the calibration, then what
-    is derived from it. Native units (mm, rad)."""
+    """Result for all outputs of a scenario's virtual calibrations, in native units (mm, rad).
+
+    The outputs are the entries of the calibration, followed by derived quantities. All arrays have
+    this order. Parts of the result that were not requested are None."""
 
     known: Known
     method: str
     seed: int
-    outputs: Sequence[Any]  # with name, position (NaN where it has none) and unit
-    entries: int  # how many of them are the calibration's own
+    outputs: Sequence[Any]  # with name, position (mm, or NaN) and unit
+    entries: int  # number of outputs that are the calibration's entries
     coverage: float
     digits: int
     propagation: Any | None = None
@@ -40,7 +42,7 @@ class UncertaintyResult:
         return np.array([output.position for output in self.outputs])
 
     def families(self) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
-        """Which outputs belong to each family; families without any are left out."""
+        """Names of the families and indices of their outputs; empty families are omitted."""
         of = [kind_of(o.name) if k < self.entries else "derived" for k, o in enumerate(self.outputs)]
         for family in FAMILIES:
             members = np.flatnonzero([name == family for name in of])
@@ -48,20 +50,22 @@ class UncertaintyResult:
                 yield family, members
 
     def uncertainties(self) -> FloatArray:
-        """Those of the Monte Carlo method, or without one of the propagation."""
+        """Standard uncertainties by the Monte Carlo method if it was used, else by propagation."""
         source = self.propagation if self.monte_carlo is None else self.monte_carlo
         assert source is not None
         return np.asarray(source.standard_uncertainty)
 
 
 def label(output: Any) -> str:
-    """What reports call an output: "EXX at 800 mm", "C0Y"."""
+    """Text for an output in reports: "EXX at 800 mm", "C0Y"."""
     return str(output.name) if math.isnan(output.position) else f"{output.name} at {output.position:g} mm"
 
 
 def find_output(outputs: Sequence[Any], text: str, option: str) -> int:
-    """The output that a user means by "C0Y", "EXX@400" or the label of a derived quantity; of a function without a
-    position that at its last node. Raises InvalidArgument."""
+    """Index of the output named "C0Y", "EXX@400" or by the label of a derived quantity.
+
+    For a function without a position it is the output at the last node. Raises InvalidArgument
+    naming `option`."""
     name, at, place = text.partition("@")
     found = [k for k, output in enumerate(outputs) if output.name == name]
     if not found:

@@ -1,7 +1,8 @@
-"""A parameter study: every cell of a grid of scenarios with its virtual calibrations; what is done is kept on the way.
+"""Parameter studies: virtual calibrations for every cell of a grid of scenarios.
 
-Finished cells stand line by line in a file beside the result. A cell's line is found again by a digest of all that its
-result depends on, so that a study may be changed between two runs: what is still asked for is not computed again.
+Finished cells are kept in a file beside the result, one per line. Lines are identified by a digest
+of everything that the cell's result depends on. Therefore a study may be changed between two runs:
+cells that it still contains are not computed again.
 """
 
 import hashlib
@@ -21,12 +22,12 @@ from stepdiag.uncertainty.study_cell import CellJob, CellResult, compute_cell
 from stepdiag.uncertainty.study_keys import Cell, Study
 
 Index = tuple[int, ...]
-CellProgress = Callable[[int, int], None]  # cells done, and how many there are
+CellProgress = Callable[[int, int], None]  # cells done, and their total
 
 
 @dataclass(frozen=True)
 class Task:
-    """A cell, and its place in the grid."""
+    """A cell and its place in the grid."""
 
     index: Index
     job: CellJob
@@ -40,7 +41,7 @@ class Task:
 
 
 def tasks_of(study: Study) -> list[Task]:
-    """Raises InvalidArgument for files that cannot be read."""
+    """The tasks of a study. Raises InvalidArgument for files that cannot be read."""
     return [Task(cell.index, _job(study, cell)) for cell in study.cells()]
 
 
@@ -51,7 +52,10 @@ def _job(study: Study, cell: Cell) -> CellJob:
 
 
 class FinishedCells:
-    """The file of those: one line each, written as they come. What an interruption left half written is passed over."""
+    """File with the finished cells of a study, one per line; makes a study resumable.
+
+    A line that an interruption left incomplete is ignored. Raises InvalidArgument if the file
+    cannot be written, or exists without `resume`."""
 
     def __init__(self, path: Path, resume: bool) -> None:
         self.path = path
@@ -63,7 +67,7 @@ class FinishedCells:
             raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
         sync_folder(path.parent)
         if self._file.tell() > 0:
-            self._file.write("\n")  # behind what may be half a line
+            self._file.write("\n")  # the last line may be incomplete
 
     def _read(self) -> Iterator[tuple[str, CellResult]]:
         for line in read_text(self.path).splitlines() if self.path.stat().st_size > 0 else ():
@@ -92,8 +96,17 @@ class FinishedCells:
 def run_study(
     study: Study, finished: FinishedCells, *, workers: Workers | None = None, progress: CellProgress | None = None
 ) -> dict[Index, CellResult]:
-    """All cells, in the order of the grid; by the workers each by one thread, else one after the other by all
-    threads. An interruption (KeyboardInterrupt) leaves what is done with `finished`."""
+    """Compute all cells of a study that are not finished. Returns all results by grid index.
+
+    Results have the order of the grid. An interruption (KeyboardInterrupt) leaves the cells done so
+    far in `finished`.
+
+    Args:
+        study: from `read_study`.
+        finished: keeps the results of finished cells.
+        workers: compute the cells on these workers, one thread each; None: one after the other, on
+            all threads of this computer.
+        progress: called with the number of cells done and their total."""
     tasks = tasks_of(study)
     results: dict[Index, CellResult] = {}
     waiting = []

@@ -1,4 +1,4 @@
-"""One cell of a study: its virtual calibrations, and what is kept of them."""
+"""One cell of a study: its virtual calibrations and the figures kept of them."""
 
 import json
 import time
@@ -16,7 +16,7 @@ from stepdiag.uncertainty.result import FloatArray, UncertaintyResult
 from stepdiag.uncertainty.run import UncertaintyRequest, evaluate_uncertainty
 from stepdiag.uncertainty.study_keys import Method
 
-# What is kept of each parameter and family, by the largest and the median of its values (of absolute ones).
+# Figures kept of each parameter and family: largest and median absolute value of each.
 FIGURES: Final[Mapping[str, str]] = {
     "mean": "mean of the samples",
     "u": "standard uncertainty",
@@ -31,7 +31,7 @@ SUMMARIES: Final = ("largest", "median")
 
 @dataclass(frozen=True)
 class CellJob:
-    """All that a cell's result depends on, beside the instruction set."""
+    """Everything that a cell's result depends on, besides the instruction set."""
 
     packed: PackedScenario
     method: Method
@@ -43,8 +43,10 @@ class CellJob:
 
 @dataclass(frozen=True)
 class CellResult:
-    """`figures`: by the name of a parameter or family, then of the figure, the largest and the median value, mm or rad.
-    `failure`: why there are none; empty where there are."""
+    """The result of a cell.
+
+    `figures`: parameter or family -> figure -> largest and median value (mm or rad). `failure`: why
+    there are no figures, otherwise empty."""
 
     figures: Mapping[str, Mapping[str, tuple[float, float]]]
     samples: int
@@ -67,7 +69,7 @@ class CellResult:
 
 
 def compute_cell(job: CellJob, *, threads: int = 0) -> CellResult:
-    """Mistakes of the cell's scenario, such as a method that has no use for its lines, are failures: data."""
+    """Compute a cell. Errors in its scenario, such as an unsuitable method, become `failure`."""
     start = time.monotonic()
     instruction_set = _core.instruction_set()
     try:
@@ -94,7 +96,7 @@ def compute_cell(job: CellJob, *, threads: int = 0) -> CellResult:
 
 
 def _figures(result: UncertaintyResult) -> dict[str, dict[str, tuple[float, float]]]:
-    """Of each parameter, and of each family."""
+    """The figures of each parameter and each family."""
     values = _values(result)
     rows: dict[str, list[int]] = {}
     for k, output in enumerate(result.outputs[: result.entries]):
@@ -119,6 +121,8 @@ def _values(result: UncertaintyResult) -> dict[str, FloatArray]:
 
 
 def _summary(values: FloatArray) -> tuple[float, float]:
-    """Largest and median absolute value; positions whose value is 0 by definition (home, ends) count as others do."""
+    """Largest and median absolute value.
+
+    Values that are 0 by definition (home, ends) count as well."""
     sizes = np.abs(values)
     return float(np.max(sizes)), float(np.median(sizes))

@@ -4,11 +4,11 @@
 scenario = "scenario.toml"
 samples = 10000
 
-[grid]                              # every value with every other one
+[grid]                              # all combinations
 plan.steps = [10, 20, 50]
 noise.tilt_urad = [0.5, 1.0, 2.0]
 
-[together.volume]                   # the first with the first, the second with the second, ...
+[together.volume]                   # first with first, second with second, ...
 volume.x_mm = [400.0, 800.0]
 volume.y_mm = [300.0, 600.0]
 """
@@ -38,7 +38,7 @@ SECTIONS: Final = ("study", "grid", "together")
 
 
 class StudySection(Section):
-    """What is done in every cell of the grid."""
+    """Settings for every cell of the grid."""
 
     scenario: Annotated[str, Field(min_length=1)] = key(
         "the path of a scenario", "The scenario to vary, relative to this file.", example="scenario.toml"
@@ -66,7 +66,7 @@ class StudyKeys(Section):
 
 @dataclass(frozen=True)
 class Axis:
-    """A dimension of the grid: keys of the scenario that change together, and for each step along it their values."""
+    """A dimension of the grid: keys that change together, and their values at each step."""
 
     name: str
     keys: tuple[str, ...]
@@ -85,6 +85,10 @@ class Cell:
 
 @dataclass(frozen=True)
 class Study:
+    """A study as read from its file.
+
+    `shape`: steps of each axis of the grid, then the number of methods."""
+
     path: Path
     scenario: Path
     content: Mapping[str, Any]
@@ -96,7 +100,7 @@ class Study:
         return (*(len(axis.values) for axis in self.axes), len(self.settings.methods))
 
     def cells(self) -> Iterator[Cell]:
-        """Of the whole grid, the last axis fastest."""
+        """The cells of the whole grid, the last axis varying fastest."""
         for place in itertools.product(*(range(len(axis.values)) for axis in self.axes)):
             content = deepcopy(dict(self.content))
             said = []
@@ -109,7 +113,9 @@ class Study:
 
 
 def read_study(path: str | PathLike[str]) -> Study:
-    """Reads a study and checks the scenario of every cell. Raises InvalidArgument naming the file and the key."""
+    """Read a study and check the scenario of every cell.
+
+    Raises InvalidArgument naming the file and the key."""
     file = Path(path)
     content = parse_toml(read_text(file), str(file))
     for name in content:
@@ -135,13 +141,13 @@ def read_study(path: str | PathLike[str]) -> Study:
 
 
 def scenario_of_cell(study: Study, cell: Cell) -> Scenario:
-    """Raises InvalidArgument naming the study, the cell, and what is wrong with its scenario."""
+    """The scenario of a cell. Raises InvalidArgument naming study, cell and error."""
     with located(f"{study.path}: {cell.name}"):
         return scenario_of(cell.content, study.scenario)
 
 
 def _axes(content: Mapping[str, Any], file: Path) -> Iterator[Axis]:
-    """Those of [grid], then those of [together.NAME]. Raises InvalidArgument."""
+    """Axes of [grid], then of [together.NAME]. Raises InvalidArgument."""
     taken: dict[str, str] = {}
 
     def values(table: Any, place: str) -> dict[str, list[Any]]:
@@ -176,7 +182,9 @@ def _axes(content: Mapping[str, Any], file: Path) -> Iterator[Axis]:
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Keys by their dotted names: TOML reads plan.steps = [...] as a table, and "plan.steps" = [...] as a name."""
+    """Keys by dotted names.
+
+    TOML reads plan.steps = [...] as a table, "plan.steps" = [...] as a name."""
     for name, value in table.items():
         if isinstance(value, dict):
             yield from _flat(value, f"{prefix}{name}.")
@@ -185,7 +193,7 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
 
 
 def _put(content: dict[str, Any], names: list[str], value: Any) -> None:
-    """What is in the way is replaced: the scenario's own check says what is wrong with it."""
+    """Set a key, replacing values in its path: the check of the scenario reports these."""
     table = content
     for name in names[:-1]:
         if not isinstance(table.get(name), dict):

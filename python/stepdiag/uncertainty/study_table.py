@@ -1,5 +1,7 @@
-"""A study as a netCDF file: a dimension for each key that was varied, and one for the method: `evaluation` (to `sel` of
-xarray, `method` is something else)."""
+"""The result of a study as a netCDF file: a dimension for each varied key, and one for the method.
+
+The latter is named `evaluation`, because `method` is an argument of xarray's `sel`.
+"""
 
 import math
 import re
@@ -33,7 +35,7 @@ _ABOUT: Final = {
     "determine the parameter, or where the study was interrupted.",
 }
 
-# The units that the endings of keys stand for.
+# Units by the endings of keys.
 _UNITS: Final = {
     "mm": "mm",
     "um": "um",
@@ -49,12 +51,16 @@ _UNITS: Final = {
 
 
 def write_study(study: Study, results: Mapping[tuple[int, ...], CellResult], path: Path) -> None:
-    """Cells that are missing among the results are missing in the file, too."""
+    """Write a result as netCDF. Cells without a result are missing values."""
     date = {"date": date_of_today()}
     write_dataset(study_table(study, results), path, _ABOUT | date)
 
 
 def study_table(study: Study, results: Mapping[tuple[int, ...], CellResult]) -> xr.Dataset:
+    """The results of a study as a labelled table (xarray), in native units: mm, rad.
+
+    Dimensions are the axes of the grid and `evaluation`, the method. Cells without a result are
+    NaN."""
     dimensions, coordinates = _coordinates(study)
     shape = study.shape
     variables: dict[str, Any] = {}
@@ -97,7 +103,7 @@ def study_table(study: Study, results: Mapping[tuple[int, ...], CellResult]) -> 
 
 
 def _columns(results: Sequence[CellResult]) -> list[tuple[str, str]]:
-    """Names and figures that any cell has: families first, then parameters in the order of the calibration."""
+    """Names and figures that any cell has: families, then parameters in the calibration's order."""
     names = dict.fromkeys(name for result in results for name in result.figures)
     ordered = [*(kind for kind in KINDS if kind in names), *(name for name in names if name not in KINDS)]
     figures = [f for f in FIGURES if any(f in of for result in results for of in result.figures.values())]
@@ -105,14 +111,16 @@ def _columns(results: Sequence[CellResult]) -> list[tuple[str, str]]:
 
 
 def _coordinates(study: Study) -> tuple[tuple[str, ...], dict[str, Any]]:
-    """A dimension is named by its key, plan_steps; of keys that change together by their group, each of them along
-    it."""
+    """Dimensions and coordinates.
+
+    A dimension is named after its key (plan_steps). Keys that change together share a dimension
+    with the name of their group, and each key is a coordinate along it."""
     dimensions, coordinates = [], {}
     for axis in study.axes:
         dimension = _named(axis.name)
         dimensions.append(dimension)
         for k, name in enumerate(axis.keys):
-            # A group's dimension has its steps for coordinate, unless it is named as one of its keys.
+            # The dimension of a group has a coordinate of its own, unless a key has its name.
             values = [row[k] for row in axis.values]
             coordinates[_named(name)] = (dimension, *_coordinate(name, values))
         if dimension not in coordinates:
@@ -127,7 +135,7 @@ def _named(key: str) -> str:
 
 
 def _coordinate(name: str, values: Sequence[Any]) -> tuple[npt.NDArray[Any], dict[str, str]]:
-    """Numbers where all are, else texts as TOML has them."""
+    """Values as numbers if all are numbers, otherwise as TOML texts."""
     attributes = {"long_name": name}
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         unit = _UNITS.get(name.rpartition("_")[2]) if "_" in name else None
@@ -142,7 +150,7 @@ def _attributes(study: Study) -> dict[str, Any]:
     return {
         "scenario": str(study.scenario.name),
         "samples_per_cell": settings.samples,
-        "seed": str(settings.seed),  # netCDF's integers end at 2^63
+        "seed": str(settings.seed),  # netCDF integers are below 2^63
         "coverage": settings.coverage,
         "digits": settings.digits,
     }

@@ -1,4 +1,7 @@
-"""The result of an uncertainty evaluation as a labelled table (xarray), and as CSV. Units of the table: mm, rad."""
+"""The result of an uncertainty evaluation as a labelled table (xarray), and the columns of its CSV.
+
+Units of the table are mm and rad.
+"""
 
 import math
 import string
@@ -26,14 +29,16 @@ ABOUT: Final = {
     "standard uncertainty that each group of inputs alone makes.",
 }
 
-# Of a function or a squareness: the ending of its variable, what it is called, its unit where that is another, and all
-# outputs' values.
+# Ending of a variable's name, meaning, unit (None: that of the output), and values of all outputs.
 Column = tuple[str, str, str | None, FloatArray]
 
 
 def uncertainty_table(result: UncertaintyResult) -> xr.Dataset:
-    """Functions over x, y or z (mm), squarenesses as scalars, derived quantities along `derived`; all outputs along
-    `output` for what has a row for each: budget, covariance, kept samples."""
+    """The result as a labelled table (xarray), in native units: mm, rad.
+
+    Functions have the dimension x, y or z (mm), squarenesses are scalars, derived quantities have
+    the dimension `derived`. Budget, covariance and kept samples have the dimension `output`, which
+    contains all outputs."""
     coordinates: dict[str, Any] = {}
     variables: dict[str, Any] = {}
     columns = columns_of(result)
@@ -53,7 +58,7 @@ def uncertainty_table(result: UncertaintyResult) -> xr.Dataset:
 
 
 def _functions(result: UncertaintyResult) -> dict[str, list[int]]:
-    """The rows of each parameter, in the order of the outputs."""
+    """Indices of the outputs of each parameter, in the order of the outputs."""
     rows: dict[str, list[int]] = {}
     for k, output in enumerate(result.outputs[: result.entries]):
         rows.setdefault(output.name, []).append(k)
@@ -175,7 +180,9 @@ def _monte_carlo(result: UncertaintyResult) -> dict[str, Any]:
 
 
 def _joint(result: UncertaintyResult) -> dict[str, Any]:
-    """Each region has dimensions of its own: joint_a, with the cells of the smallest region over joint_a_x, ..."""
+    """Joint coverage regions.
+
+    Each has its own dimensions: joint_a; joint_a_x, ... for the cells."""
     variables: dict[str, Any] = {}
     regions = [] if result.monte_carlo is None else result.monte_carlo.joint
     for letter, region in zip(string.ascii_lowercase, regions, strict=False):
@@ -262,7 +269,7 @@ def attributes_of(result: UncertaintyResult) -> dict[str, Any]:
         attributes |= {
             "samples": found.samples,
             "samples_without_result": found.lost,
-            "seed": str(result.seed),  # netCDF attributes have no unsigned 64 bits that all readers know
+            "seed": str(result.seed),  # not all readers of netCDF know unsigned 64-bit attributes
             "instruction_set": found.target,
         }
     return attributes

@@ -1,4 +1,4 @@
-"""The result of an uncertainty evaluation in a file: netCDF, or CSV in the units of reports."""
+"""Writes the result of an uncertainty evaluation: netCDF, or CSV in the units of reports."""
 
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,9 @@ from stepdiag.units import report_value
 
 
 def write_uncertainty(result: UncertaintyResult, path: Path) -> None:
-    """Writes a result, CSV or netCDF (.nc). Raises InvalidArgument where it cannot be written."""
+    """Write a result, netCDF (.nc) or CSV (.csv).
+
+    Raises InvalidArgument if it cannot be written."""
     if is_netcdf(path):
         write_dataset(uncertainty_table(result), path, ABOUT | {"date": date_of_today()})
     elif path.suffix.lower() == ".csv":
@@ -26,7 +28,7 @@ def write_uncertainty(result: UncertaintyResult, path: Path) -> None:
 
 
 def uncertainty_csv(result: UncertaintyResult) -> str:
-    """A row an output, µm and µrad, what the table has in words above it as `# key=value`."""
+    """The result as CSV: a row per output in µm and µrad, attributes as `# key=value` lines."""
     columns = columns_of(result)
     facts = {"format": UNCERTAINTY_FORMAT, "date": date_of_today()} | attributes_of(result)
     named = [(ending or "_mean").removeprefix("_").replace("_u", "_standard_uncertainty") for ending, *_ in columns]

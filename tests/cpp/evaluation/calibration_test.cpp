@@ -6,6 +6,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <limits>
 
 #include "support/refuses.hpp"
@@ -39,6 +40,29 @@ void expect_file_refused(const std::string& text, const std::string& culprit) {
     expect_refused([&] { stepdiag::read_calibration(path); }, path);
     expect_refused([&] { stepdiag::read_calibration(path); }, culprit);
     std::filesystem::remove(path);
+}
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+// Three values: EXX at two nodes, and C0Y.
+Calibration sound() {
+    Calibration calibration{
+        "by hand", stepdiag::Chain::parse("[w b X Y Z t]"), {800.0, 600.0, 500.0}, {0.0, 0.0, 0.0}, {}, {}, {}, {}};
+    calibration.functions[0] = stepdiag::CalibratedFunction{{0.0, 800.0}, {0.0, 0.01}, {0.0, 2.0}};
+    calibration.squarenesses[0] = stepdiag::CalibratedSquareness{1e-5, 3.0};
+    calibration.reversal[0] = stepdiag::CalibratedReversal{{0.0, 800.0}, {0.0, 0.01}, {0.0, unknown}, {unknown, 1.0}};
+    calibration.covariance.setZero(3, 3);
+    calibration.covariance(1, 1) = 4.0;
+    calibration.covariance(2, 2) = 9.0;
+    calibration.covariance(1, 2) = calibration.covariance(2, 1) = -6.0;  // fully correlated is allowed
+    return calibration;
+}
+
+void expect_spoiled(const std::function<void(Calibration&)>& spoil, const std::string& culprit) {
+    Calibration calibration = sound();
+    spoil(calibration);
+    expect_refused([&] { check(calibration); }, culprit);
 }
 
 }  // namespace

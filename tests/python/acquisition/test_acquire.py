@@ -132,7 +132,7 @@ def test_measurement_is_started_anew_where_moving_the_head_interrupted_the_beams
         result = acquire_through(described, twin, tmp_path / "run.csv", operator=operator)
     assert result.complete
     assert result.lost == 0
-    started = [text for text in operator.told if "its measurement is started anew" in text]
+    started = [text for text in operator.told if "restarting its measurement" in text]
     assert len(started) == 2
     assert "system idle" in started[0]
     assert "interrupted" in started[1]

@@ -83,7 +83,7 @@ def test_resumed_run_is_the_run_without_a_break(tmp_path: Path, whole: Path, end
     assert result.complete
     assert readings(output) == readings(whole)
     visit, point, _ = points_of(described)[end]
-    assert f"going on with visit {visit} " in operator.told[0]
+    assert f"continuing with visit {visit} " in operator.told[0]
     assert f"point {point} " in operator.told[0]
 
 
@@ -106,7 +106,7 @@ def test_beam_lost_in_a_break_is_not_read_with_another_constant(tmp_path: Path) 
     with Twin(described) as twin:
         stop_after(described, twin, output, 3)
         twin.instrument.stop()
-        with pytest.raises(OSError, match="would give this set-up another constant: use `restart_set_up`"):
+        with pytest.raises(OSError, match="would change the constant of this set-up: use `restart_set_up`"):
             acquire_through_to_failure(described, twin, output, 3)
         assert twin.instrument.mode == "system idle"
         assert acquire_through(described, twin, output, resume="set-up").complete
@@ -139,13 +139,13 @@ def test_complete_run_has_nothing_to_go_on_with(tmp_path: Path, whole: Path) -> 
         scenario(), "ids3010://127.0.0.1:1", whole, trigger=TcpTrigger(), resume="point", operator=operator
     )
     assert result.complete
-    assert operator.told == ["every point of the plan is read already"]
+    assert operator.told == ["all points of the plan have been read"]
     assert len(read_measurement(whole)) == 28
 
 
 def test_raw_file_is_never_written_over(whole: Path) -> None:
     before = whole.with_suffix(".raw.jsonl").read_bytes()
-    with pytest.raises(InvalidArgument, match=r"whole.raw.jsonl: exists already: `resume` goes on with it"):
+    with pytest.raises(InvalidArgument, match=r"whole.raw.jsonl: exists already: `resume` continues it"):
         acquiring.acquire(scenario(), "ids3010://127.0.0.1:1", whole, trigger=TcpTrigger())
     assert whole.with_suffix(".raw.jsonl").read_bytes() == before
 

@@ -188,14 +188,14 @@ def test_missing_beams_are_told() -> None:
     followed.begin()
     with pytest.raises(StillWaitingError):
         followed.wait(1)
-    assert "no beam: where the mirror rests cannot be told" in followed.operator.told
+    assert "no beam: cannot tell where the mirror rests" in followed.operator.told
 
 
 def test_step_that_no_distance_tells_is_the_operators() -> None:
     followed = Followed(at(0.0))
     followed.begin()
     assert followed.wait(1, (0, 0.001, 1, 2))
-    assert followed.operator.asked[-1].startswith("the distance does not change to it: read visit 1 ")
+    assert followed.operator.asked[-1].startswith("the distance does not change in this step: read visit 1 ")
 
 
 def wait_for(condition: Callable[[], bool], what: str) -> None:

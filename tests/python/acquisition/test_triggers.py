@@ -52,7 +52,7 @@ def test_only_the_next_point_is_read(tmp_path: Path) -> None:
             assert controller.ask("READ 1 0") == "FAIL expected visit 1 point 2, got visit 1 point 0"
             controller.run(2)
         assert running.result(10).complete
-    assert sum("asked in vain" in text for text in operator.told) == 3
+    assert sum("refused a request" in text for text in operator.told) == 3
 
 
 def test_last_point_is_read_again_for_a_controller_that_had_no_answer(tmp_path: Path) -> None:
@@ -182,7 +182,7 @@ def hang() -> tuple[list[int], list[int]]:
 def test_nobody_is_waited_for_without_end(tmp_path: Path) -> None:
     described = scenario(plan=LINE)
     with Twin(described) as twin:
-        for trigger, told in ((TcpTrigger(), "nobody asked for it in 0.1 s"), (SettleTrigger(), "did not come there")):
+        for trigger, told in ((TcpTrigger(), "no request within 0.1 s"), (SettleTrigger(), "did not arrive")):
             with pytest.raises(Stopped, match=told):
                 acquire(
                     described,

@@ -59,10 +59,10 @@ def test_operator_who_leaves_can_come_back(
         monkeypatch.setattr(sys, "stdin", io.StringIO("\n" * 5))
         assert "standard input ended" in refused(capsys, *command)
         assert len(read_measurement(folder / "run.csv")) == 5
-        assert "exists already: --resume goes on with it" in refused(capsys, *command)
+        assert "exists already: --resume continues it" in refused(capsys, *command)
         monkeypatch.setattr(sys, "stdin", io.StringIO("\n" * 30))
         assert main([*command, "--resume"]) == 0
-        assert "going on with visit 1 (line ppp, run 0, forward), point 5 at X80 Y60 Z25" in capsys.readouterr().out
+        assert "continuing with visit 1 (line ppp, run 0, forward), point 5 at X80 Y60 Z25" in capsys.readouterr().out
     assert len(read_measurement(folder / "run.csv")) == 28
 
 
@@ -105,7 +105,7 @@ def test_run_is_made_from_the_raw_file_alone(folder: Path, capsys: pytest.Captur
         (["scenario.toml", "--source", "ids3010://h", "--settle-limit-um", "0"], "settle-limit-um"),
         (["scenario.toml", "--source", "ids3010://h", "--settle-limit-um", "nan"], "limit_um: expected"),
         (["scenario.toml", "--source", "ids3010://h", "--timeout", "inf"], "timeout: expected"),
-        (["scenario.toml", "--source", "ids3010://h", "--resume"], "run.raw.jsonl: cannot go on with it"),
+        (["scenario.toml", "--source", "ids3010://h", "--resume"], "run.raw.jsonl: cannot be continued"),
         (
             ["scenario.toml", "--source", "ids3010://h", "--resume", "--restart-line"],
             "expected one of --resume, --restart-line and --restart-set-up",

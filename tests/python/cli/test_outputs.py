@@ -239,7 +239,7 @@ def test_older_result_is_replaced_where_it_can_be_computed_again(
 ) -> None:
     refusals = {
         "simulate": "perhaps the work of hours: --overwrite replaces it",
-        "uncertainty": "is the checkpoint of an earlier run: --resume goes on with it; or remove it",
+        "uncertainty": "is the checkpoint of an earlier run: --resume continues it; or remove it",
         "acquire": "exists already: --resume" if way.ending == ".jsonl" else "move it away, or name another -o",
     }
     way.out.write_bytes(made.own[way])

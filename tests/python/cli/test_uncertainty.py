@@ -189,9 +189,7 @@ def test_checkpoint_of_an_interrupted_run_is_not_overwritten_by_another(
     kept = Path("scenario.checkpoint").read_bytes()
     capsys.readouterr()
     assert run("-n", SAMPLES, "--seed", "1") == 2
-    assert (
-        "scenario.checkpoint: is the checkpoint of an earlier run: --resume goes on with it" in capsys.readouterr().err
-    )
+    assert "scenario.checkpoint: is the checkpoint of an earlier run: --resume continues it" in capsys.readouterr().err
     assert run() == 0, "a propagation draws nothing"
     assert Path("scenario.checkpoint").read_bytes() == kept
     assert run("-n", SAMPLES, "--resume") == 0
@@ -233,7 +231,7 @@ def test_result_that_cannot_be_written_leaves_the_checkpoint(
         assert run("-n", SAMPLES, "-o", f"u.{ending}") == status
     told = capsys.readouterr().err
     assert said in told
-    assert f"u.{ending}.checkpoint keeps what is done; the same command with --resume goes on" in told
+    assert f"u.{ending}.checkpoint has the finished samples: repeat the command with --resume" in told
     assert run("-n", SAMPLES, "-o", f"u.{ending}", "--resume") == 0
     assert Path(f"u.{ending}").read_bytes() == Path(f"whole.{ending}").read_bytes()
     assert {path.name for path in folder.iterdir()} == {"scenario.toml", f"whole.{ending}", f"u.{ending}"}
@@ -270,7 +268,7 @@ REFUSED = [
     (["-n", "1e4", "--joint", "C0Y,C0Y"], "--joint: expected one to 3 different outputs, such as C0Y,B0Z, got"),
     (["-n", "1e4", "--joint", "C0Y,B0Z,A0Z,EXX"], "--joint: expected one to 3 different outputs"),
     (["--coverage", "95"], "--coverage: expected a probability between 0 and 1, got 95"),
-    (["--point", "1,2"], "expected X,Y,Z in mm, or X,Y,Z and the offset of a tool behind them"),
+    (["--point", "1,2"], "expected X,Y,Z in mm, or X,Y,Z followed by a tool offset"),
     (["--point", "1,2,nan"], "expected X,Y,Z in mm"),
     (["-o", "u.txt"], "u.txt: expected a name that ends in .nc or .csv"),
     (["-o", "nowhere/u.nc"], "the folder nowhere does not exist"),

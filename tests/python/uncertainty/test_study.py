@@ -204,7 +204,7 @@ def test_interrupted_study_goes_on_to_the_same_table(
     with open(stopped.path, "a") as file:
         file.write('0123 {"figures": {"EX')  # what a fall of the power leaves
     assert main(["study", "study.toml", "-o", "study.nc"]) == 2
-    assert "--resume goes on with them, or delete the file" in capsys.readouterr().err
+    assert "--resume continues it, or delete the file" in capsys.readouterr().err
     computed = []
     monkeypatch.setattr(
         "stepdiag.uncertainty.study.compute_cell", lambda job: computed.append(job) or compute_cell(job)
@@ -243,7 +243,7 @@ def test_interruption_of_the_command_gives_130_and_says_how_to_go_on(
 
     monkeypatch.setattr("stepdiag.uncertainty.study.compute_cell", interrupted)
     assert main(["study", "study.toml", "-o", "study.nc"]) == 130
-    assert "study.nc.cells keeps what is done; the same command with --resume goes on" in capsys.readouterr().err
+    assert "study.nc.cells has the finished cells: repeat the command with --resume" in capsys.readouterr().err
     assert not Path("study.nc").exists()
     assert Path("study.nc.cells").exists()
 
@@ -273,7 +273,7 @@ def test_uncertainty_on_workers_writes_what_it_writes_here(folder: Path) -> None
 def test_scheduler_and_workers_exclude_each_other(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     both = ["--workers", "2", "--scheduler", "tcp://127.0.0.1:9"]
     assert main(["study", "study.toml", "-o", "study.nc", *both]) == 2
-    assert "--workers: goes without --scheduler" in capsys.readouterr().err
+    assert "--workers: cannot be combined with --scheduler" in capsys.readouterr().err
     assert main(["uncertainty", "scenario.toml", "--workers", "2"]) == 2
     assert "--scheduler and --workers: go with the Monte Carlo method" in capsys.readouterr().err
     assert {path.name for path in folder.iterdir()} == {"scenario.toml", "study.toml"}

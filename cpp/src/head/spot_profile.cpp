@@ -1,7 +1,8 @@
+#include "head/spot_profile.hpp"
+
 #include <cmath>
 
 #include "head/checks.hpp"
-#include "head/spot_profile.hpp"
 #include "stepdiag/core/units.hpp"
 #include "stepdiag/head/spot_sensor.hpp"
 
