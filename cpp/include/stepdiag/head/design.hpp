@@ -10,9 +10,9 @@
 #include <variant>
 #include <vector>
 
-#include "stepdiag/measurement/head_layout.hpp"
 #include "stepdiag/head/interferometer.hpp"
 #include "stepdiag/head/spot_sensor.hpp"
+#include "stepdiag/measurement/head_layout.hpp"
 #include "stepdiag/optics/body.hpp"
 #include "stepdiag/optics/medium.hpp"
 #include "stepdiag/optics/ray_tree.hpp"
