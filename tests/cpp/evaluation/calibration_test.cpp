@@ -157,3 +157,37 @@ TEST(Calibration, HeaderThatMakesNoSenseIsRefused) {
     expect_file_refused(chain + size + tool + "# undetermined_slopes=EXQ\n" + table, "EXQ");
     expect_file_refused(chain + size + tool + "# undetermined_reversal_constants=C0Y\n" + table, "C0Y");
 }
+TEST(CheckCalibration, SoundOnePasses) {
+    EXPECT_NO_THROW(check(sound()));
+    Calibration open = sound();
+    open.functions[0]->standard_uncertainty = {unknown, unknown};
+    open.squarenesses[0]->standard_uncertainty = unknown;
+    EXPECT_NO_THROW(check(open));
+}
+
+TEST(CheckCalibration, PartsThatDoNotFitAreRefused) {
+    expect_spoiled([](Calibration& c) { c.volume[1] = 0.0; }, "volume");
+    expect_spoiled([](Calibration& c) { c.tool[1] = infinite; }, "tool");
+    expect_spoiled([](Calibration& c) { c.date = "today\n"; }, "date");
+    expect_spoiled([](Calibration& c) { c.undetermined = {"all\r"}; }, "undetermined");
+    expect_spoiled([](Calibration& c) { c.functions[0]->value.pop_back(); }, "EXX");
+    expect_spoiled([](Calibration& c) { c.functions[0] = stepdiag::CalibratedFunction{}; }, "EXX");
+    expect_spoiled([](Calibration& c) { c.functions[0]->position = {0.0, 0.0}; }, "EXX");
+    expect_spoiled([](Calibration& c) { c.functions[0]->value[1] = unknown; }, "EXX");
+    expect_spoiled([](Calibration& c) { c.functions[0]->standard_uncertainty[1] = -2.0; }, "EXX");
+    expect_spoiled([](Calibration& c) { c.squarenesses[0]->value = infinite; }, "C0Y");
+    expect_spoiled([](Calibration& c) { c.squarenesses[0]->standard_uncertainty = -3.0; }, "C0Y");
+    expect_spoiled([](Calibration& c) { c.reversal[0]->value.clear(); }, "reversal of EXX");
+    expect_spoiled([](Calibration& c) { c.reversal[0]->negative_standard_uncertainty.clear(); }, "reversal of EXX");
+    expect_spoiled([](Calibration& c) { c.reversal[0]->position = {8.0, 0.0}; }, "ascend");
+    expect_spoiled([](Calibration& c) { c.reversal[0]->negative_standard_uncertainty[1] = -1.0; }, "reversal of EXX");
+}
+
+TEST(CheckCalibration, MatrixThatIsNoCovarianceOfTheseValuesIsRefused) {
+    expect_spoiled([](Calibration& c) { c.covariance.setZero(2, 2); }, "covariance: expected 3 rows");
+    expect_spoiled([](Calibration& c) { c.covariance(1, 1) = 4.1; }, "square of the standard uncertainty");
+    expect_spoiled([](Calibration& c) { c.covariance(0, 0) = unknown; }, "row 0, column 0");
+    expect_spoiled([](Calibration& c) { c.covariance(1, 2) = -5.0; }, "symmetric");
+    expect_spoiled([](Calibration& c) { c.covariance(0, 2) = 1e-9; }, "at most the product");
+    expect_spoiled([](Calibration& c) { c.covariance(1, 2) = unknown; }, "covariance of EXX and C0Y");
+}
