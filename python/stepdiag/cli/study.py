@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from stepdiag.cli.options import PATH, out_file, tell
+from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, out_file, tell
 from stepdiag.cli.workers import chosen_workers, worker_options
 from stepdiag.io.outputs import STUDY, OutputFile
 
@@ -15,16 +15,21 @@ from stepdiag.io.outputs import STUDY, OutputFile
 @out_file("Result to write, netCDF (.nc).", STUDY)
 @click.option("--resume", is_flag=True, help="Continue an interrupted study.")
 @worker_options
-def study(file: Path, output: OutputFile, resume: bool, scheduler: str | None, workers: int | None) -> None:
+@click.pass_context
+def study(
+    context: click.Context, file: Path, output: OutputFile, resume: bool, scheduler: str | None, workers: int | None
+) -> None:
     """Vary keys of a scenario over a grid, with virtual calibrations for each cell.
 
     STUDY (TOML) names the scenario, the keys and their values, methods and the number of samples;
     see docs/study.md. The result has a dimension for each key. For each parameter and family it
     contains the largest and the median mean, standard uncertainty and coverage interval over the
-    nodes. For a cell that cannot be computed it states the reason.
+    nodes. For a cell that cannot be computed it states the reason. If more than 0.1 % of a cell's
+    virtual calibrations give no result, the command ends with a warning and exit code 3.
 
     Finished cells are kept in a file beside the result until that is written.
     """
+    from stepdiag.uncertainty.result import only_survivors
     from stepdiag.uncertainty.study import FinishedCells, run_study
     from stepdiag.uncertainty.study_keys import read_study
     from stepdiag.uncertainty.study_table import write_study
@@ -57,3 +62,7 @@ def study(file: Path, output: OutputFile, resume: bool, scheduler: str | None, w
     click.echo(f"wrote {path}: {len(results)} cells of {' x '.join(map(str, wanted.shape))}")
     for failure in dict.fromkeys(failures):
         click.echo(f"no result in {failures.count(failure)} cells: {failure}")
+    found = list(filter(None, (only_survivors(result.samples, result.lost) for result in results.values())))
+    if found:
+        tell("warning", f"cells not to be trusted: {len(found)}; in one of them, {found[0]}")
+        context.exit(NOT_TO_BE_TRUSTED)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, Writes, tell
+from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, tell
 from stepdiag.cli.workers import chosen_workers, worker_options
 from stepdiag.io.outputs import CHECKPOINT, UNCERTAINTY, OutputFile
 
@@ -129,7 +129,9 @@ def _points(context: click.Context, option: click.Parameter, texts: tuple[str, .
     "-o", "output", type=Writes(UNCERTAINTY), metavar="FILE", help="Result to write, netCDF (.nc) or CSV (.csv)."
 )
 @worker_options
+@click.pass_context
 def uncertainty(
+    context: click.Context,
     scenario: Path,
     samples: int | None,
     method: Any,
@@ -164,6 +166,9 @@ def uncertainty(
     enhanced      distances, tilts and scale lines, to first order: ten times faster
     conventional  the distances of body diagonals
     one_step      the adjustment's first step from the solution without deviations
+
+    If more than 0.1 % of the virtual calibrations give no result, the command ends with a warning
+    and exit code 3: its Monte Carlo figures are those of the others.
     """
     from stepdiag.io.data_files import is_netcdf
     from stepdiag.report.uncertainty import input_rows, opening_rows, result_rows
@@ -218,6 +223,9 @@ def uncertainty(
             click.echo(line)
     if wanted.draws and checkpoint is None:  # a checkpoint named by the user is kept: it can continue to more samples
         kept.path.unlink(missing_ok=True)
+    if result.warning is not None:
+        tell("warning", result.warning)
+        context.exit(NOT_TO_BE_TRUSTED)
 
 
 @contextmanager

@@ -39,6 +39,8 @@ def _distribution(distribution: _core.Distribution, name: str, unit: float) -> s
 def opening_rows(result: UncertaintyResult) -> Iterator[str]:
     """What is calibrated, and how many things are uncertain about it."""
     known, plan = result.known, result.known.plan
+    if result.warning is not None:
+        yield f"not to be trusted: {result.warning}"
     derived = len(result.outputs) - result.entries
     yield (
         f"virtual calibrations: method {result.method}, {len(plan.lines)} lines of {plan.steps} steps, "

@@ -17,6 +17,21 @@ FloatArray = npt.NDArray[np.float64]
 
 FAMILIES: Final = (*KINDS, "derived")
 
+# If a larger share of the samples has no result, the figures describe the others only.
+LARGEST_LOST_SHARE: Final = 1e-3
+
+
+def only_survivors(samples: int, lost: int) -> str | None:
+    """What to say of figures from which too many samples without a result were left out; else None.
+
+    `samples`: with a result. `lost`: without one."""
+    if lost <= LARGEST_LOST_SHARE * (samples + lost):
+        return None
+    return (
+        f"{lost:,} of {samples + lost:,} virtual calibrations gave no result: the Monte Carlo figures are those of "
+        "the others, which may be the better ones"
+    )
+
 
 @dataclass(frozen=True, eq=False)
 class UncertaintyResult:
@@ -48,6 +63,12 @@ class UncertaintyResult:
             members = np.flatnonzero([name == family for name in of])
             if len(members):
                 yield family, members
+
+    @property
+    def warning(self) -> str | None:
+        """Why the result does not deserve trust; None if it does."""
+        found = self.monte_carlo
+        return None if found is None else only_survivors(found.samples, found.lost)
 
     def uncertainties(self) -> FloatArray:
         """Standard uncertainties by the Monte Carlo method if it was used, else by propagation."""

@@ -272,4 +272,6 @@ def attributes_of(result: UncertaintyResult) -> dict[str, Any]:
             "seed": str(result.seed),  # not all readers of netCDF know unsigned 64-bit attributes
             "instruction_set": found.target,
         }
+    if result.warning is not None:
+        attributes["warning"] = result.warning
     return attributes

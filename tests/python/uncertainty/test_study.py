@@ -277,3 +277,20 @@ def test_scheduler_and_workers_exclude_each_other(folder: Path, capsys: pytest.C
     assert main(["uncertainty", "scenario.toml", "--workers", "2"]) == 2
     assert "--scheduler and --workers: go with the Monte Carlo method" in capsys.readouterr().err
     assert {path.name for path in folder.iterdir()} == {"scenario.toml", "study.toml"}
+
+
+# --- samples without a result ----------------------------------------------------------------------------------------
+def test_commands_whose_samples_are_survivors_end_untrusted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    narrow = SCENARIO.replace('layout = "ideal"', 'layout = "ideal"\naperture_mm = 3.0')
+    Path("scenario.toml").write_text(narrow + "[uncertainty]\nlaser_urad = 3000.0\n")
+    assert main(["uncertainty", "scenario.toml", "-n", "2000", "-m", "enhanced", "-o", "u.nc"]) == 3
+    said = capsys.readouterr()
+    assert said.out.startswith("not to be trusted: 1,")
+    assert said.err.startswith("warning: 1,")
+    assert "virtual calibrations gave no result" in said.err
+    with xr.open_dataset("u.nc") as table:
+        assert "gave no result" in table.attrs["warning"]
+    one_cell = '[study]\nscenario = "scenario.toml"\nsamples = 2000\nmethods = ["enhanced"]\n[grid]\nplan.steps = [2]\n'
+    Path("study.toml").write_text(one_cell)
+    assert main(["study", "study.toml", "-o", "s.nc"]) == 3
+    assert "warning: cells not to be trusted: 1; in one of them, " in capsys.readouterr().err

@@ -16,11 +16,11 @@ from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag.io.netcdf import open_dataset
-from stepdiag.report.uncertainty import result_rows
+from stepdiag.report.uncertainty import opening_rows, result_rows
 from stepdiag.scenario.description import parse_scenario
-from stepdiag.uncertainty.result import UncertaintyResult, find_output, label
+from stepdiag.uncertainty.result import UncertaintyResult, find_output, label, only_survivors
 from stepdiag.uncertainty.table import uncertainty_table
-from stepdiag.uncertainty.write import write_uncertainty
+from stepdiag.uncertainty.write import uncertainty_csv, write_uncertainty
 
 NODES = (0.0, 40.0, 80.0)
 
@@ -207,3 +207,21 @@ def test_output_that_is_none_is_refused(text: str, message: str) -> None:
 def test_result_of_another_ending_is_refused(tmp_path: Path) -> None:
     with pytest.raises(sd.InvalidArgument, match=r"u\.txt: expected a name that ends in \.nc or \.csv"):
         write_uncertainty(made_up(), tmp_path / "u.txt")
+
+
+def test_figures_of_survivors_say_so_in_first_line_and_file() -> None:
+    sound, spoilt = made_up(), made_up()
+    spoilt.monte_carlo.lost = 101  # of 100,101 samples
+    assert sound.warning is None
+    assert spoilt.warning is not None
+    assert spoilt.warning.startswith("101 of 100,101 virtual calibrations gave no")
+    assert next(iter(opening_rows(spoilt))) == f"not to be trusted: {spoilt.warning}"
+    assert next(iter(opening_rows(sound))).startswith("virtual calibrations")
+    assert uncertainty_table(spoilt).attrs["warning"] == spoilt.warning
+    assert "warning" not in uncertainty_table(sound).attrs
+    assert f"# warning={spoilt.warning}\n" in uncertainty_csv(spoilt)
+
+
+@pytest.mark.parametrize(("samples", "lost", "says"), [(999, 1, False), (998, 2, True), (0, 5, True), (7, 0, False)])
+def test_one_sample_in_a_thousand_may_be_lost(samples: int, lost: int, says: bool) -> None:
+    assert (only_survivors(samples, lost) is not None) == says
