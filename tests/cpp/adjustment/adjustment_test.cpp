@@ -121,13 +121,13 @@ TEST(Adjustment, SaysWhatWithoutScaleLinesStaysOpenAndKeepsTheShapes) {
     Workshop shop;
     shop.scale_lines.clear();
     const Adjustment result = shop.adjust(shop.run());
-    for (const auto& [parameter, line] : {std::pair("EXX", "p00"), std::pair("EYY", "0p0"), std::pair("EZZ", "00p")}) {
+    for (const auto& scale : {std::pair("EXX", "p00"), std::pair("EYY", "0p0"), std::pair("EZZ", "00p")}) {
         const auto& findings = result.calibration.findings;
         EXPECT_TRUE(std::any_of(findings.begin(), findings.end(), [&](const stepdiag::Undetermined& finding) {
             return finding.part == stepdiag::OpenPart::slope &&
-                   finding.parameters == std::vector<std::string>{parameter} &&
-                   finding.remedies == std::vector{stepdiag::Remedy::axis_line} && finding.line == line;
-        })) << parameter;
+                   finding.parameters == std::vector<std::string>{scale.first} &&
+                   finding.remedies == std::vector{stepdiag::Remedy::axis_line} && finding.line == scale.second;
+        })) << scale.first;
     }
     EXPECT_FALSE(result.calibration.functions[0]->slope_determined);
     EXPECT_TRUE(result.calibration.squarenesses[0]);
