@@ -147,6 +147,14 @@ std::vector<SetupEstimate> setup_estimates(const AdjustmentProblem& problem, con
     return estimates;
 }
 
+int degrees_of_freedom(const GaussNewton& solver) {
+    const AdjustmentProblem& problem = solver.equations().problem();
+    int count = int(solver.equations().smooth_rows().size()) - problem.unknowns() + int(solver.dependent().size());
+    for (const AdjustedReading& reading : problem.readings()) count += reading.used();
+    count += problem.informative_priors();
+    return count;
+}
+
 std::vector<ReadingResidual> reading_residuals(const NormalEquations& equations, const BorderedBand& inverse) {
     const AdjustmentProblem& problem = equations.problem();
     std::vector<ReadingResidual> residuals;

@@ -14,6 +14,7 @@ constexpr double doubtful_below = 1e-2;
 constexpr double doubtful_above = 1.0 - 1e-3;
 constexpr double uneven_below = 1e-2;  // of the whole family of comparisons between lines and between channels
 constexpr double farthest_prior = 5.0;
+constexpr double significant_gain = 28.0;  // of a fault, in chi-square
 
 // The readings of one line or of one channel.
 struct Share {
@@ -79,6 +80,22 @@ void compare_with_priors(const Adjustment& adjustment, std::vector<FitReason>& r
     }
 }
 
+void judge_faults(const Adjustment& adjustment, std::vector<FitReason>& reasons) {
+    for (std::size_t k = 0; k < adjustment.faults.size(); ++k) {
+        const FaultClass& found = adjustment.faults[k];
+        const Fault& best = found.members.front();
+        FitReason reason{FitFinding::fault, best.chi_square_gain, significant_gain, best.line, best.channel};
+        reason.fault = int(k) + 1;
+        if (!found.corrected) reasons.push_back(reason);
+        if (!(found.spread > found.plausible)) continue;
+        reason.finding = FitFinding::alternatives;
+        reason.parameter = found.widest;
+        reason.value = found.spread;
+        reason.limit = found.plausible;
+        reasons.push_back(reason);
+    }
+}
+
 }  // namespace
 
 std::string name(FitFinding finding) {
@@ -89,14 +106,18 @@ std::string name(FitFinding finding) {
         case FitFinding::no_misfit: return "no_misfit";
         case FitFinding::uneven_misfit: return "uneven_misfit";
         case FitFinding::prior: return "prior";
+        case FitFinding::fault: return "fault";
+        case FitFinding::alternatives: return "alternatives";
     }
     return "";
 }
 
 Verdict judge(const Adjustment& adjustment, const Measurement& measurement) {
-    if (adjustment.degrees_of_freedom <= 0) return {Fit::unchecked, {{FitFinding::no_redundancy, 0.0, 1.0}}};
     Verdict verdict{Fit::accepted, {}};
     auto& reasons = verdict.reasons;
+    judge_faults(adjustment, reasons);
+    if (reasons.empty() && adjustment.degrees_of_freedom <= 0)
+        return {Fit::unchecked, {{FitFinding::no_redundancy, 0.0, 1.0}}};
     const double probability = adjustment.chi_square_probability;
     const double factor = std::sqrt(adjustment.variance_factor());
     if (!(factor <= largest_noise_factor)) reasons.push_back({FitFinding::noise_factor, factor, largest_noise_factor});
