@@ -6,7 +6,6 @@
 #include <unsupported/Eigen/SpecialFunctions>
 #include <utility>
 
-#include "adjustment/adjustment_result.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -431,6 +430,8 @@ std::vector<FaultClass> FaultSearch::classes(const Solution& solution, const Cal
     if (left_) add(*left_, FaultTreatment::none);
     return classes;
 }
+
+std::string name(Slips slips) { return slips == Slips::report ? "report" : "estimate"; }
 
 std::string name(FaultTreatment treatment) {
     switch (treatment) {

@@ -16,6 +16,7 @@
 #include <optional>
 #include <vector>
 
+#include "adjustment/adjustment_result.hpp"
 #include "adjustment/fault_tests.hpp"
 #include "adjustment/solution.hpp"
 

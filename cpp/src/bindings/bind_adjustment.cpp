@@ -34,7 +34,6 @@ struct Outlier {
     double residual;
     double normalised;
     int number;
-    bool left_out;
 };
 
 // What Python sees: an adjustment, and the run's rows that it belongs to.
@@ -59,6 +58,12 @@ struct AdjustmentOfRun {
 };
 
 using ChannelArrays = py::typing::Dict<py::str, DoubleArray>;
+
+Slips to_slips(const std::string& slips) {
+    for (const Slips choice : {Slips::report, Slips::estimate})
+        if (slips == name(choice)) return choice;
+    throw InvalidArgument("adjustment slips: expected \"report\" or \"estimate\", got \"" + slips + "\"");
+}
 
 PriorLike none() { return py::reinterpret_borrow<PriorLike>(py::none()); }
 
@@ -109,15 +114,17 @@ void bind_options(py::module_& m) {
         "What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all "
         "lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its "
         "set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has "
-        "no angular errors. outlier_probability: of any false alarm in a run; 0: no reading is left out. plausible: "
-        "what a machine can be.")
+        "no angular errors. outlier_probability: of a false alarm among a thousand tests for faults; 0: they are named "
+        "and not corrected. slips: \"report\" rejects a run with a slip, \"estimate\" makes it an unknown and accepts "
+        "that. plausible: what a machine can be.")
         .def(py::init([](const ReadingUncertainty& uncertainty, const Priors& setup,
                          const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
                          bool rotations, const std::optional<Smoothness>& smoothness, double outlier_probability,
-                         bool full_covariance, const PlausibleLimits& plausible) {
-                 AdjustmentOptions options{uncertainty,     setup.value, {},         one_setup_per_line,
-                                           reversal,        rotations,   smoothness, outlier_probability,
-                                           full_covariance, plausible};
+                         const std::string& slips, bool full_covariance, const PlausibleLimits& plausible) {
+                 AdjustmentOptions options{uncertainty,         setup.value,      {},
+                                           one_setup_per_line,  reversal,         rotations,
+                                           smoothness,          outlier_probability,
+                                           to_slips(slips),     full_covariance,  plausible};
                  for (const auto& [line, priors] : setup_by_line) options.setup_by_line[line] = priors.value;
                  return options;
              }),
@@ -125,7 +132,7 @@ void bind_options(py::module_& m) {
              py::arg("setup_by_line") = std::map<std::string, Priors>{},
              py::arg("one_setup_per_line") = usual.one_setup_per_line, py::arg("reversal") = usual.reversal,
              py::arg("rotations") = usual.rotations, py::arg("smoothness") = std::nullopt,
-             py::arg("outlier_probability") = usual.outlier_probability,
+             py::arg("outlier_probability") = usual.outlier_probability, py::arg("slips") = name(usual.slips),
              py::arg("full_covariance") = usual.full_covariance, py::arg("plausible") = usual.plausible,
              "adjust() checks them.")
         .def_readonly("uncertainty", &AdjustmentOptions::uncertainty)
@@ -141,6 +148,7 @@ void bind_options(py::module_& m) {
         .def_readonly("rotations", &AdjustmentOptions::rotations)
         .def_readonly("smoothness", &AdjustmentOptions::smoothness)
         .def_readonly("outlier_probability", &AdjustmentOptions::outlier_probability)
+        .def_property_readonly("slips", [](const AdjustmentOptions& o) { return name(o.slips); })
         .def_readonly("full_covariance", &AdjustmentOptions::full_covariance)
         .def_readonly("plausible", &AdjustmentOptions::plausible);
 }
@@ -158,7 +166,7 @@ void bind_result(py::module_& m) {
             "Standard uncertainty of its prior; infinite where it is free (1 m, 1 rad, 1 for a free lateral offset, "
             "roll, gain).");
 
-    py::class_<Outlier>(m, "Outlier", "A reading that did not fit.")
+    py::class_<Outlier>(m, "Outlier", "A reading that was left out.")
         .def_readonly("row", &Outlier::row)
         .def_readonly("run", &Outlier::run)
         .def_readonly("line", &Outlier::line)
@@ -166,11 +174,32 @@ void bind_result(py::module_& m) {
         .def_readonly("channel", &Outlier::channel)
         .def_readonly("residual", &Outlier::residual, "mm or rad")
         .def_readonly("normalised", &Outlier::normalised, "In its standard uncertainties.")
-        .def_readonly("number", &Outlier::number, "Counted from 1, the worst first.")
-        .def_readonly(
-            "left_out", &Outlier::left_out,
-            "False: fitted as badly as the outlier of this number, and no other reading tells which of them is "
-            "wrong; the other was left out because the error functions are smoother without it.");
+        .def_readonly("number", &Outlier::number, "Of its class in Adjustment.faults, from 1.");
+
+    py::class_<Fault>(m, "Fault", "A fault that explains the readings, if it is the one.")
+        .def_property_readonly(
+            "kind", [](const Fault& f) { return name(f.kind); },
+            "\"reading\", or \"slip\": an offset of its channel from this reading on.")
+        .def_readonly("row", &Fault::row)
+        .def_readonly("run", &Fault::run)
+        .def_readonly("line", &Fault::line)
+        .def_readonly("point", &Fault::point)
+        .def_readonly("channel", &Fault::channel)
+        .def_readonly("size", &Fault::size, "What was read too much, mm or rad.")
+        .def_readonly("standard_uncertainty", &Fault::standard_uncertainty, "Of the size.")
+        .def_readonly("chi_square_gain", &Fault::chi_square_gain, "What it takes off chi-square.");
+    py::class_<FaultClass>(m, "FaultClass", "Faults of which the readings do not tell which one happened.")
+        .def_readonly("members", &FaultClass::members, "The best first.")
+        .def_property_readonly(
+            "treatment", [](const FaultClass& c) { return name(c.treatment); },
+            "\"left_out\": all readings that may be the wrong one; \"estimated\": their sizes are unknowns, which share "
+            "the fault between them, so that the spread of the alternatives is in the uncertainties; \"none\".")
+        .def_readonly("corrected", &FaultClass::corrected, "Whether the verdict is that of the fit after its treatment.")
+        .def_property_readonly("told_apart", &FaultClass::told_apart)
+        .def_readonly("widest", &FaultClass::widest,
+                      "The parameter that estimated alternatives differ in most; empty where there are none.")
+        .def_readonly("spread", &FaultClass::spread, "By how much they differ in it, mm or rad.")
+        .def_readonly("plausible", &FaultClass::plausible, "The plausible limit of that parameter.");
 
     py::class_<FitReason>(m, "FitReason", "Why a fit is not accepted.")
         .def_property_readonly(
@@ -179,13 +208,17 @@ void bind_result(py::module_& m) {
             "of "
             "one so large, or so small; \"uneven_misfit\": noise factor of one line or channel, and as the limit that "
             "of "
-            "the others; \"prior\": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2).")
+            "the others; \"prior\": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); \"fault\": what "
+            "a fault that was not corrected takes off chi-square; \"alternatives\": by how much alternative faults "
+            "differ in `parameter`.")
         .def_readonly("value", &FitReason::value)
         .def_readonly("limit", &FitReason::limit)
         .def_readonly("line", &FitReason::line, "Of an uneven misfit or a prior; else empty.")
         .def_readonly("channel", &FitReason::channel,
                       "Of an uneven misfit; of a prior the set-up quantity; else empty.")
-        .def_readonly("component", &FitReason::component, "Of a prior: as of SetupEstimate.");
+        .def_readonly("component", &FitReason::component, "Of a prior: as of SetupEstimate.")
+        .def_readonly("fault", &FitReason::fault, "Of a fault or alternatives: its class, from 1; else 0.")
+        .def_readonly("parameter", &FitReason::parameter, "Of alternatives; else empty.");
     py::class_<Verdict>(
         m, "Verdict",
         "Whether the readings of an adjustment agree with each other, with their uncertainties and with "
@@ -246,16 +279,19 @@ void bind_result(py::module_& m) {
                                [](const Result& r) {
                                    std::vector<Outlier> list;
                                    for (const ReadingResidual& x : r.adjustment.residuals) {
-                                       if (x.used() && x.suspect == 0) continue;
+                                       if (x.used()) continue;
                                        const Station& s = r.stations[x.row];
                                        list.push_back({x.row, s.run, s.line.name(), s.point, x.channel, x.residual,
-                                                       x.normalised, x.used() ? x.suspect : x.outlier, !x.used()});
+                                                       x.normalised, x.outlier});
                                    }
-                                   std::stable_sort(list.begin(), list.end(), [](const Outlier& a, const Outlier& b) {
-                                       return std::pair(a.number, b.left_out) < std::pair(b.number, a.left_out);
-                                   });
+                                   std::stable_sort(
+                                       list.begin(), list.end(),
+                                       [](const Outlier& a, const Outlier& b) { return a.number < b.number; });
                                    return list;
                                })
+        .def_property_readonly(
+            "faults", [](const Result& r) { return r.adjustment.faults; },
+            "Classes of faults that were found, and what was done about them.")
         .def_property_readonly("verdict", [](const Result& r) { return r.adjustment.verdict; })
         .def_property_readonly("weighted_square_sum", [](const Result& r) { return r.adjustment.weighted_square_sum; })
         .def_property_readonly("variance_factor", [](const Result& r) { return r.adjustment.variance_factor(); })

@@ -41,6 +41,7 @@ struct Smoothness {
 // What becomes of slips (FaultKind::slip) that are found. They are unknowns of the adjustment in any case, so that they
 // do not spoil its values; report: and the fit is rejected; estimate: that counts as a correction.
 enum class Slips { report, estimate };
+std::string name(Slips slips);  // "report", "estimate"
 
 struct AdjustmentOptions {
     ReadingUncertainty uncertainty;
@@ -83,6 +84,10 @@ struct ReadingResidual {
     bool used() const { return outlier == 0; }
 };
 
+// What may be wrong with the readings of one channel in one set-up. A slip is an offset of all of them from a point on,
+// in the order in which they were made: a fringe counter that lost count, a head that was knocked.
+enum class FaultKind { reading, slip };
+std::string name(FaultKind kind);  // "reading", "slip"
 // One fault that explains the readings, if it is the one.
 struct Fault {
     FaultKind kind;
