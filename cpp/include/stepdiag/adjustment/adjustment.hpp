@@ -81,6 +81,11 @@ struct ReadingResidual {
     bool used() const { return outlier == 0; }
 };
 
+// What may be wrong with the readings of one channel in one set-up. A slip is an offset of all of them from a point on,
+// in the order in which they were made: a fringe counter that lost count, a head that was knocked.
+enum class FaultKind { reading, slip };
+std::string name(FaultKind kind);  // "reading", "slip"
+
 // Why a fit is not accepted.
 enum class FitFinding {
     no_redundancy,  // nothing controls the readings
