@@ -70,8 +70,11 @@ public:
     static constexpr double significant = 28.0;  // gain in chi-square
     static constexpr int usual_most_solutions = 1000;
 
-    // At the equations' last linearisation. `factor` and `inverse`: of N there. `residuals`: weighted, at the minimum of
-    // that linear problem. Equations, factor and hypotheses must outlive this.
+    // At the equations' last linearisation. `factor` and `inverse`: of N there. All must outlive this.
+    FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const BorderedBand& inverse,
+               const FaultHypotheses& hypotheses, int most_solutions = usual_most_solutions)
+        : FaultTests(equations, factor, inverse, hypotheses, equations.residuals(), most_solutions) {}
+    // The same somewhere else than at the minimum. `residuals`: weighted, at the minimum of that linear problem.
     FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const BorderedBand& inverse,
                const FaultHypotheses& hypotheses, const Eigen::VectorXd& residuals,
                int most_solutions = usual_most_solutions);
