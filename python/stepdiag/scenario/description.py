@@ -85,7 +85,7 @@ def adjust_scenario(
     scenario: Scenario | Known, measurement: _core.Measurement, *, full_covariance: bool = False
 ) -> _core.Adjustment:
     """The exact adjustment of a run, with the unknowns that the scenario's [adjustment] and [smoothness] name: the
-    calibration, and with it the set-up that was found, residuals, outliers and how well it all fits."""
+    calibration, and with it the set-up that was found, residuals, faults and how well it all fits."""
     known = scenario.known
     return _core.adjust(
         only(measurement, known.signals),
@@ -124,6 +124,7 @@ def adjustment_options(known: Known, *, full_covariance: bool = False) -> _core.
         rotations=keys.angles == "free",
         smoothness=known.smoothness,
         outlier_probability=keys.outlier_probability,
+        slips=keys.slips,
         full_covariance=full_covariance,
         plausible=known.plausible,
     )
