@@ -14,6 +14,7 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double alternative = 25.0;  // in chi-square: what is less behind the best may be it
 constexpr std::size_t most_exact = 20;
+constexpr std::size_t most_members = 40;  // which are near enough to what is behind them
 
 // Two-sided, squared: 28 for a probability of 1.2e-7.
 double gain_of_probability(double probability) { return std::pow(Eigen::numext::ndtri(0.5 * probability), 2); }
@@ -130,8 +131,19 @@ FaultSearch::Tested FaultSearch::test(Solution& solution, const Eigen::VectorXd&
     const Eigen::VectorXd residuals = equations.residuals() - equations.image(dx);
     Tested tested{std::make_unique<FaultHypotheses>(solution.problem()), nullptr, equations.square_sum(residuals, x + dx),
                   solution.degrees_of_freedom()};
-    tested.tests = std::make_unique<FaultTests>(equations, solution.solver().factor(), solution.inverse(),
-                                                *tested.hypotheses, residuals);
+    const auto make = [&](int most_solutions) {
+        tested.tests = std::make_unique<FaultTests>(equations, solution.solver().factor(), solution.inverse(),
+                                                    *tested.hypotheses, residuals, most_solutions);
+    };
+    // A sound run needs no more than to be known as one.
+    constexpr int few = 150;
+    constexpr double near_limit = 0.7;
+    make(few);
+    for (const FaultScore& score : tested.tests->scores())
+        if (score.gain >= near_limit * limit_ * tested.noise_beside(score.gain)) {
+            make(FaultTests::usual_most_solutions);
+            break;
+        }
     return tested;
 }
 
@@ -170,7 +182,7 @@ FaultSearch::SolutionPointer FaultSearch::without_gross(const SolutionPointer& p
         const double best = tested.tests->scores()[order.front()].gain;
         Found all{{}, Handling::open};
         for (const int h : order)
-            if (all.members.size() < 2 * most_exact &&
+            if (all.members.size() < most_members &&
                 best - tested.tests->scores()[h].gain < alternative * tested.noise_beside(best))
                 all.members.push_back(tested.candidate(h));
         open.push_back(std::move(all));
@@ -284,8 +296,8 @@ FaultSearch::Found FaultSearch::class_of(int number, const Solution& solution) c
     std::vector<Candidate> members;
     for (const int h : order) {
         const double less = best - tested.tests->scores()[h].gain;
-        if (less < behind || (best > large && members.size() < most_exact && less < behind + second_order * best))
-            members.push_back(tested.candidate(h));
+        const bool may_be = best > large && members.size() < most_exact && less < behind + second_order * best;
+        if (members.size() < most_members && (less < behind || may_be)) members.push_back(tested.candidate(h));
     }
     if (best > large) adjust_exactly(members, number, solution);
     Found found{members, Handling::shared};
@@ -340,18 +352,23 @@ bool FaultSearch::is_told_by_leaving_out(const std::vector<Candidate>& members, 
 }
 
 FaultSearch::SolutionPointer FaultSearch::solve_treated(const Solution& solution) {
-    // From zero where that leads as far: as if the readings left out had been lost.
-    const SolutionPointer near = solution_of(handled());
-    const bool is_near = near->solve_from(carried(solution, near->problem()));
-    const SolutionPointer far = solution_of(handled());
-    if (far->solve_from_zero() && (!is_near || far->square_sum() <= near->square_sum() * (1.0 + 1e-6) + 1e-3)) return far;
-    if (is_near) return near;
+    // With one of each class as a free unknown it was this; as one of several known to be about as large it costs 1.
+    const double expected = 1.01 * solution.square_sum() + 2.0 * double(found_.size());
+    const auto solve = [&]() -> SolutionPointer {
+        // From zero where that leads as far: as if the readings left out had been lost.
+        for (const bool from_zero : {true, false}) {
+            SolutionPointer next = solution_of(handled());
+            if ((from_zero ? next->solve_from_zero() : next->solve_from(carried(solution, next->problem()))) &&
+                next->square_sum() <= expected)
+                return next;
+        }
+        return nullptr;
+    };
+    if (SolutionPointer next = solve()) return next;
     // Gross alternatives that no one solution stands between: all of them are free then.
     for (Found& found : found_)
         if (found.handling == Handling::shared) found.handling = Handling::open;
-    const SolutionPointer open = solution_of(handled());
-    if (open->solve_from(carried(solution, open->problem())) || open->solve_from_zero()) return open;
-    return nullptr;
+    return solve();
 }
 
 // --- what is said ---

@@ -1,6 +1,6 @@
 """The core's findings in words: what the readings leave open (`Undetermined`, `KnownCombination`) and the verdict of a
-fit (`FitReason`; docs/conventions.md, "Verdict of a fit"), faults of the readings (`FaultClass`), and where an error map breaks the frame choice. All
-sentences about them are here."""
+fit (`FitReason`; docs/conventions.md, "Verdict of a fit"), faults of readings (`FaultClass`), and where an error map
+breaks the frame choice. All sentences about them are here."""
 
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
