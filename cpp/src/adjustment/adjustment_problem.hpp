@@ -57,7 +57,7 @@ struct EstimatedFault {
     std::vector<int> readings;
     PriorUncertainty prior;  // of the size
     double usual;            // size that it may have where nothing tells it
-    int group;               // of alternatives, of which one is the fault: together they are one thing that was not known
+    int group;  // of alternatives, of which one is the fault: together they are one thing that was not known
     int unknown = no_unknown;
 };
 

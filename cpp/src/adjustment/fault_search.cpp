@@ -29,6 +29,7 @@ struct FaultSearch::Tested {
     std::unique_ptr<FaultTests> tests;
     double square_sum;
     int freedom;
+    SolutionPointer at = nullptr;  // kept for the tests, where nobody else does
 
     double noise_beside(double gain) const { return noise(square_sum - gain, freedom - 1); }
     // By falling gain.
@@ -63,15 +64,14 @@ FaultSearch::SolutionPointer FaultSearch::run() {
         throw InvalidArgument(
             "adjustment: finds no machine and set-up that explain the readings; check the plan, the head, and "
             "units and signs of the readings");
-    if (corrects && !correct(solution)) {
+    const bool corrected = corrects && correct(solution);
+    if (corrected && found_.empty()) return solution;
+    if (corrects && !corrected && plain) {
         // It is not a few readings that do not fit: all stay, and chi-square tells.
-        if (plain) {
-            found_.clear();
-            solution = plain;
-        }
+        found_.clear();
+        solution = plain;
     }
-    const int count = int(found_.size());
-    if (worst(test(*solution, solution->x()))) left_ = class_of(count, *solution);
+    left_ = class_of(int(found_.size()), *solution);
     return solution;
 }
 
@@ -129,8 +129,8 @@ FaultSearch::Tested FaultSearch::test(Solution& solution, const Eigen::VectorXd&
     Eigen::VectorXd dx = equations.gradient(x);
     solution.solver().factor().solve(dx);
     const Eigen::VectorXd residuals = equations.residuals() - equations.image(dx);
-    Tested tested{std::make_unique<FaultHypotheses>(solution.problem()), nullptr, equations.square_sum(residuals, x + dx),
-                  solution.degrees_of_freedom()};
+    Tested tested{std::make_unique<FaultHypotheses>(solution.problem()), nullptr,
+                  equations.square_sum(residuals, x + dx), solution.degrees_of_freedom()};
     const auto make = [&](int most_solutions) {
         tested.tests = std::make_unique<FaultTests>(equations, solution.solver().factor(), solution.inverse(),
                                                     *tested.hypotheses, residuals, most_solutions);
@@ -157,59 +157,82 @@ std::optional<FaultSearch::Candidate> FaultSearch::worst(const Tested& tested) c
 
 // --- what there is ---
 
-// On the problem linearised at zero. What its second order leaves counts as scatter: faults are sought as far as they
-// stand out of it.
+// On the problem linearised at zero, and then where that leads. What second order leaves counts as scatter: faults are
+// sought as far as they stand out of it.
 FaultSearch::SolutionPointer FaultSearch::without_gross(const SolutionPointer& plain) {
-    const auto at_zero = [&](int without) {
-        SolutionPointer solution = solution_of(handled(without));
-        return std::pair(solution, test(*solution, solution->x()));
-    };
-    for (;;) {
-        const auto [solution, tested] = at_zero(-1);
-        const auto next = worst(tested);
-        if (!next) break;
-        if (int(found_.size()) == most_) {
-            found_.clear();
-            return nullptr;
+    SolutionPointer solution;
+    for (int pass = 0; pass < 2; ++pass) {
+        const std::vector<Found> before = std::exchange(found_, {});
+        SolutionPointer next = find_linearly(solution) ? solution_of(handled()) : nullptr;
+        if (next && !next->solve_from_zero()) next.reset();
+        if (next && next->square_sum() < (solution ? solution : plain ? plain : next)->square_sum() * 1.01) {
+            solution = next;
+            continue;
         }
+        found_ = before;
+        if (!solution) return nullptr;
+    }
+    std::vector<Found> told;
+    for (int k = 0; k < int(found_.size()); ++k)
+        if (const auto found = class_of(k, *solution)) told.push_back({{found->members.front()}});
+    std::swap(found_, told);
+    if (SolutionPointer next = solve_near(*solution)) return next;
+    std::swap(found_, told);
+    return solution;
+}
+
+// Each with all that it may be instead, all of them free. False: there are none, or too many.
+bool FaultSearch::find_linearly(const SolutionPointer& where) {
+    const auto tested = [&](int without) {
+        const SolutionPointer at = solution_of(handled(without));
+        Tested result = test(*at, where ? carried(*where, at->problem()) : at->x());
+        result.at = at;
+        return result;
+    };
+    while (const auto next = worst(tested(-1))) {
+        if (int(found_.size()) == most_) return false;
         found_.push_back({{*next}});
     }
     std::vector<Found> open;
     for (int k = 0; k < int(found_.size()); ++k) {
-        const auto [solution, tested] = at_zero(k);
-        const std::vector<int> order = tested.order();
-        if (!worst(tested)) continue;  // beside the others it is none
-        const double best = tested.tests->scores()[order.front()].gain;
+        const Tested rest = tested(k);
+        if (!worst(rest)) continue;  // beside the others it is none
+        const std::vector<int> order = rest.order();
+        const double best = rest.tests->scores()[order.front()].gain;
         Found all{{}, Handling::open};
         for (const int h : order)
             if (all.members.size() < most_members &&
-                best - tested.tests->scores()[h].gain < alternative * tested.noise_beside(best))
-                all.members.push_back(tested.candidate(h));
+                best - rest.tests->scores()[h].gain < alternative * rest.noise_beside(best))
+                all.members.push_back(rest.candidate(h));
         open.push_back(std::move(all));
     }
     found_ = open;
-    if (found_.empty()) return nullptr;
-    SolutionPointer solution = solution_of(handled());
-    if (!solution->solve_from_zero() || (plain && plain->square_sum() <= solution->square_sum())) {
-        found_.clear();
-        return nullptr;
-    }
-    std::vector<Found> told;
-    for (int k = 0; k < int(found_.size()); ++k) told.push_back({{class_of(k, *solution).members.front()}});
-    std::swap(found_, told);
-    if (SolutionPointer next = solve_near(*solution)) return next;
-    found_ = open;
-    return solution;
+    return !found_.empty();
 }
 
 // Corrects what there is, and says whether it could.
 bool FaultSearch::correct(SolutionPointer& solution) {
-    constexpr int most_rounds = 5;
+    const int most_rounds = 5 + most_;
     for (int round = 0; round < most_rounds; ++round) {
         if (!find_more(solution)) return false;
         if (found_.empty()) return true;
         std::vector<Found> classes;
-        for (int k = 0; k < int(found_.size()); ++k) classes.push_back(class_of(k, *solution));
+        std::vector<int> none;  // beside the others
+        for (int k = 0; k < int(found_.size()); ++k) {
+            auto found = class_of(k, *solution);
+            if (found) classes.push_back(std::move(*found));
+            else none.push_back(k);
+        }
+        if (!none.empty()) {
+            const std::vector<Found> before = found_;
+            found_.erase(found_.begin() + none.back());
+            if (SolutionPointer next = solve_near(*solution)) {
+                solution = next;
+                continue;
+            }
+            found_ = before;
+            return true;
+        }
         const std::vector<Found> single = std::exchange(found_, classes);
         SolutionPointer treated = solve_treated(*solution);
         if (!treated) {
@@ -244,8 +267,9 @@ bool FaultSearch::find_more(SolutionPointer& solution) {
         found_.push_back({{*next}});
         SolutionPointer more = solve_near(*solution);
         if (!more) {
-            found_.back() = {{class_of(int(before.size()), *solution).members.front()}};
-            more = solve_near(*solution);
+            const auto found = class_of(int(before.size()), *solution);
+            if (found) found_.back() = {{found->members.front()}};
+            if (found) more = solve_near(*solution);
         }
         if (more && drop_or_exchange(*more)) more = solve_near(*more);
         if (!more) {
@@ -284,13 +308,13 @@ bool FaultSearch::drop_or_exchange(const Solution& solution) {
 
 // The class of a fault, were it the only one that is not known: on the problem linearised at the solution, and by exact
 // adjustments where it is so large that second order may tell.
-FaultSearch::Found FaultSearch::class_of(int number, const Solution& solution) const {
-    constexpr double large = 1000.0;        // of a gain
-    constexpr double second_order = 0.02;   // of a large gain
+std::optional<FaultSearch::Found> FaultSearch::class_of(int number, const Solution& solution) const {
+    constexpr double large = 1000.0;       // of a gain
+    constexpr double second_order = 0.02;  // of a large gain
     SolutionPointer rest = solution_of(handled(number));
     const Tested tested = test(*rest, carried(solution, rest->problem()));
+    if (!worst(tested)) return std::nullopt;
     const std::vector<int> order = tested.order();
-    if (order.empty()) return found_[number];
     const double best = tested.tests->scores()[order.front()].gain;
     const double behind = alternative * tested.noise_beside(best);
     std::vector<Candidate> members;

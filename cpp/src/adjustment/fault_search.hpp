@@ -66,10 +66,12 @@ private:
     std::optional<Candidate> worst(const Tested& tested) const;  // if it is significant
 
     SolutionPointer without_gross(const SolutionPointer& plain);  // none where that helps nothing
+    bool find_linearly(const SolutionPointer& where);             // at zero where there is no solution yet
     bool correct(SolutionPointer& solution);
     bool find_more(SolutionPointer& solution);
     bool drop_or_exchange(const Solution& solution);
-    Found class_of(int number, const Solution& solution) const;
+    // None where that is not significant.
+    std::optional<Found> class_of(int number, const Solution& solution) const;
     void adjust_exactly(std::vector<Candidate>& candidates, int number, const Solution& solution) const;
     bool is_told_by_leaving_out(const std::vector<Candidate>& members, const Tested& tested) const;
 

@@ -30,7 +30,7 @@ public:
     void solve_again();  // for another smoothness; throws InvalidArgument where it is not reached
     // Equations, factor and inverse at any x, with what is open known to be there.
     void linearise(const Eigen::VectorXd& x);
-    void look();  // the same at the minimum
+    void look();                                              // the same at the minimum
     const BorderedBand& inverse() const { return inverse_; }  // after one of these two
 
     double square_sum() const { return square_sum_; }

@@ -121,10 +121,9 @@ void bind_options(py::module_& m) {
                          const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
                          bool rotations, const std::optional<Smoothness>& smoothness, double outlier_probability,
                          const std::string& slips, bool full_covariance, const PlausibleLimits& plausible) {
-                 AdjustmentOptions options{uncertainty,         setup.value,      {},
-                                           one_setup_per_line,  reversal,         rotations,
-                                           smoothness,          outlier_probability,
-                                           to_slips(slips),     full_covariance,  plausible};
+                 AdjustmentOptions options{uncertainty,     setup.value,     {},         one_setup_per_line,
+                                           reversal,        rotations,       smoothness, outlier_probability,
+                                           to_slips(slips), full_covariance, plausible};
                  for (const auto& [line, priors] : setup_by_line) options.setup_by_line[line] = priors.value;
                  return options;
              }),
@@ -192,9 +191,11 @@ void bind_result(py::module_& m) {
         .def_readonly("members", &FaultClass::members, "The best first.")
         .def_property_readonly(
             "treatment", [](const FaultClass& c) { return name(c.treatment); },
-            "\"left_out\": all readings that may be the wrong one; \"estimated\": their sizes are unknowns, which share "
+            "\"left_out\": all readings that may be the wrong one; \"estimated\": their sizes are unknowns, which "
+            "share "
             "the fault between them, so that the spread of the alternatives is in the uncertainties; \"none\".")
-        .def_readonly("corrected", &FaultClass::corrected, "Whether the verdict is that of the fit after its treatment.")
+        .def_readonly("corrected", &FaultClass::corrected,
+                      "Whether the verdict is that of the fit after its treatment.")
         .def_property_readonly("told_apart", &FaultClass::told_apart)
         .def_readonly("widest", &FaultClass::widest,
                       "The parameter that estimated alternatives differ in most; empty where there are none.")
@@ -208,7 +209,8 @@ void bind_result(py::module_& m) {
             "of "
             "one so large, or so small; \"uneven_misfit\": noise factor of one line or channel, and as the limit that "
             "of "
-            "the others; \"prior\": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); \"fault\": what "
+            "the others; \"prior\": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); \"fault\": "
+            "what "
             "a fault that was not corrected takes off chi-square; \"alternatives\": by how much alternative faults "
             "differ in `parameter`.")
         .def_readonly("value", &FitReason::value)
@@ -284,9 +286,9 @@ void bind_result(py::module_& m) {
                                        list.push_back({x.row, s.run, s.line.name(), s.point, x.channel, x.residual,
                                                        x.normalised, x.outlier});
                                    }
-                                   std::stable_sort(
-                                       list.begin(), list.end(),
-                                       [](const Outlier& a, const Outlier& b) { return a.number < b.number; });
+                                   std::stable_sort(list.begin(), list.end(), [](const Outlier& a, const Outlier& b) {
+                                       return a.number < b.number;
+                                   });
                                    return list;
                                })
         .def_property_readonly(

@@ -79,7 +79,7 @@ struct ReadingResidual {
     double residual;    // read - model, native units
     double redundancy;  // 0: nothing controls this reading; 1: all others know it better
     double normalised;  // residual/(u sqrt(redundancy)); 0 where nothing controls it
-    int outlier = 0;  // n: left out with the n-th class of faults; redundancy and normalised: of a control reading
+    int outlier = 0;    // n: left out with the n-th class of faults; redundancy and normalised: of a control reading
 
     bool used() const { return outlier == 0; }
 };
@@ -138,10 +138,10 @@ struct FitReason {
     FitFinding finding;
     double value;
     double limit;
-    std::string line = {};     // of an uneven misfit or a prior
-    std::string channel = {};  // of an uneven misfit: "distance", ...; of a prior: the set-up quantity
-    int component = 0;         // of a prior
-    int fault = 0;             // of a fault and of alternatives: number of the class, from 1
+    std::string line = {};       // of an uneven misfit or a prior
+    std::string channel = {};    // of an uneven misfit: "distance", ...; of a prior: the set-up quantity
+    int component = 0;           // of a prior
+    int fault = 0;               // of a fault and of alternatives: number of the class, from 1
     std::string parameter = {};  // of alternatives: "EXX", ...
 };
 
