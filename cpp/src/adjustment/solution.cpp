@@ -74,7 +74,8 @@ bool Solution::solve_from_zero() {
 bool Solution::solve_from(const Eigen::VectorXd& start) {
     if (!solver_.dependent().empty()) solver_.equations().assume_usual(observability_.determined(), start);
     Eigen::VectorXd x = start;
-    const std::optional<int> count = solver_.try_solve(x);
+    constexpr int most_steps = 20;  // what is near takes five
+    const std::optional<int> count = solver_.try_solve(x, most_steps);
     if (!count) return false;
     iterations_ = *count;
     x_ = x;
