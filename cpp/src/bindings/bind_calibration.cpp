@@ -61,7 +61,8 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
                              const std::optional<ArrayLike>& covariance, const Tables& reversal,
                              const Arrays& reversal_negative_uncertainty, const Names& undetermined_reversal_constants,
                              const std::string& date, const std::optional<std::string>& fit,
-                             const std::optional<double>& variance_factor) {
+                             const std::optional<double>& variance_factor, const Names& fit_reasons,
+                             const std::optional<double>& uncertainty_scaled) {
     Calibration calibration{method, to_chain(chain), to_vector3(volume, "volume"), to_vector3(tool, "tool"), {}, {},
                             {},     undetermined};
     for (const auto& [name, table] : functions)
@@ -92,6 +93,8 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
     calibration.date = date;
     if (fit) calibration.fit = fit_of({{"fit", *fit}}, "calibration");
     calibration.variance_factor = variance_factor;
+    calibration.fit_reasons = fit_reasons;
+    calibration.uncertainty_scaled = uncertainty_scaled;
     check(calibration);
     return calibration;
 }
@@ -114,6 +117,7 @@ void bind_calibration(py::module_& m) {
              py::arg("covariance") = std::nullopt, py::arg("reversal") = Tables{},
              py::arg("reversal_negative_uncertainty") = Arrays{}, py::arg("undetermined_reversal_constants") = Names{},
              py::arg("date") = "", py::arg("fit") = std::nullopt, py::arg("variance_factor") = std::nullopt,
+             py::arg("fit_reasons") = Names{}, py::arg("uncertainty_scaled") = std::nullopt,
              "A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: "
              "name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises "
              "InvalidArgument naming the parameter for what is none: nodes that do not "
@@ -125,6 +129,10 @@ void bind_calibration(py::module_& m) {
             "controls the readings); None where it is not known.")
         .def_readonly("variance_factor", &Calibration::variance_factor,
                       "Of the fit: 1 is expected; None where nothing controls the readings, or it is not known.")
+        .def_readonly("fit_reasons", &Calibration::fit_reasons, "Why that verdict, a sentence each.")
+        .def_readonly("uncertainty_scaled", &Calibration::uncertainty_scaled,
+                      "What all uncertainties were multiplied by, beyond what follows from those of the readings "
+                      "(scale_uncertainty); None: by nothing.")
         .def_property_readonly(
             "straightness_reference", [](const Calibration& c) { return straightness_reference(c.chain, c.tool); },
             "One line: to which point the straightnesses refer, and what they are at the functional point.")
@@ -135,7 +143,17 @@ void bind_calibration(py::module_& m) {
                 check(c);
                 return c;
             },
-            py::arg("date"), "The same calibration with this date. Raises InvalidArgument for more than one line.");
+            py::arg("date"), "The same calibration with this date. Raises InvalidArgument for more than one line.")
+        .def(
+            "judged",
+            [](Calibration c, const std::string& fit, const Names& reasons) {
+                c.fit = fit_of({{"fit", fit}}, "calibration");
+                c.fit_reasons = reasons;
+                check(c);
+                return c;
+            },
+            py::arg("fit"), py::arg("fit_reasons") = Names{},
+            "The same calibration with this verdict of its fit. Raises InvalidArgument for another word.");
 }
 
 }  // namespace stepdiag::bindings

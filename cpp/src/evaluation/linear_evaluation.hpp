@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "evaluation/fit_test.hpp"
 #include "evaluation/step_systems.hpp"
 #include "stepdiag/core/error.hpp"
 
@@ -185,6 +186,61 @@ void add_up_steps(const AxisSystem& system, const std::vector<Number>& lengths, 
         out[1][i + 1] = y;
         out[2][i + 1] = z;
     }
+}
+
+// What the steps of one axis say twice: `channels` of the readings, one equation of a step each.
+template <class Number>
+void add_contradictions(const AxisSystem& system, const std::vector<Number>& readings, const std::vector<int>& channels,
+                        const std::vector<Pass>& passes, std::vector<Number>& out) {
+    for (const StepSystem& interval : system.intervals) {
+        const Eigen::MatrixXd& contradictions = interval.solution->contradictions;
+        std::vector<Number> increments;
+        for (const Step& step : interval.steps)
+            for (const int c : channels) {
+                const std::size_t from = values_per_reading * (passes[step.pass].first_reading + step.point) + c;
+                increments.push_back(step.sign * (readings[from + values_per_reading] - readings[from]));
+            }
+        for (Eigen::Index i = 0; i < contradictions.rows(); ++i) {
+            Number sum = Number::Zero();
+            for (std::size_t j = 0; j < increments.size(); ++j)
+                sum += contradictions(i, Eigen::Index(j)) * increments[j];
+            out.push_back(sum);
+        }
+    }
+}
+
+// A map's contradictions in place of its parameters.
+template <class Map>
+struct Contradictions {
+    const Map& map;
+
+    template <class Number>
+    std::vector<Number> apply(const ReadingRows<Number>& readings) const {
+        return map.template contradictions<Number>(readings);
+    }
+};
+
+// Tests whether the readings contradict each other: t^T Cov(t)^-1 t of the map's contradictions t is chi-square, its
+// freedom the rank of Cov(t). Sets fit and variance factor of the calibration. Neighbouring steps share readings, which
+// Cov(t) counts. Of very many contradictions some hundreds, evenly spaced, are taken.
+template <class Map>
+void test_fit(const Map& map, const std::vector<Pass>& passes, Calibration& calibration) {
+    constexpr int width = 8;
+    constexpr std::size_t most = 400;
+    const Contradictions<Map> contradictions{map};
+    const auto all = contradictions.template apply<Row<1>>({readings_of(passes), -1, true});
+    std::vector<std::size_t> taken;
+    for (std::size_t i = 0; i < all.size(); ++i)
+        if (all.size() <= most || i * most / all.size() != (i + 1) * most / all.size()) taken.push_back(i);
+    Eigen::VectorXd values(taken.size());
+    for (std::size_t i = 0; i < taken.size(); ++i) values[Eigen::Index(i)] = all[taken[i]][0];
+    ShareSum covariance(values.size());
+    for_each_share<width>(contradictions, passes, [&](const std::vector<Row<width>>& block, int columns) {
+        for (int c = 0; c < columns; ++c) covariance.add([&](std::size_t i) { return block[taken[i]][c]; });
+    });
+    const ChiSquare test = chi_square(values, covariance.matrix());
+    calibration.fit = fit_of_noise(test.square_sum, test.freedom);
+    if (test.freedom > 0) calibration.variance_factor = test.square_sum / test.freedom;
 }
 
 }  // namespace stepdiag

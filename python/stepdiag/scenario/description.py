@@ -124,6 +124,7 @@ def adjustment_options(known: Known, *, full_covariance: bool = False) -> _core.
         rotations=keys.angles == "free",
         smoothness=known.smoothness,
         outlier_probability=keys.outlier_probability,
+        scale_uncertainty=keys.scale_uncertainty,
         full_covariance=full_covariance,
         plausible=known.plausible,
     )
