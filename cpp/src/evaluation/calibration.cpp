@@ -235,6 +235,8 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
     for (const auto& [key, factor] : factors(calibration))
         if (factor) table.header[key] = format_decimal(*factor, 0);
     if (!calibration.fit_reasons.empty()) table.header["fit_reasons"] = join(calibration.fit_reasons, sentence_break);
+    if (calibration.method == "conventional" || calibration.method == "enhanced")
+        table.header["uncertainties"] = "of the noise of the readings alone";
     if (!slopes.empty()) table.header["undetermined_slopes"] = join(slopes, " ");
     if (!constants.empty()) table.header["undetermined_reversal_constants"] = join(constants, " ");
     std::vector<std::string> undetermined = calibration.undetermined;

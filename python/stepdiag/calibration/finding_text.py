@@ -70,6 +70,15 @@ MEANING: Final = {
     "unchecked": "nothing controls the readings",
 }
 
+# The better first.
+FITS: Final = ("accepted", "unchecked", "doubtful", "rejected")
+# Of calibrations by linear methods, whose uncertainties know of nothing else.
+NOISE_ALONE: Final = {
+    "conventional": "note: uncertainties are of noise alone: what rotations, laser and mirror do to distances is not in "
+    "them, and not corrected",
+    "enhanced": "note: uncertainties are of noise alone: what laser and mirror angles do at second order is not in them, "
+    "and not corrected",
+}
 # Of what is accepted.
 NOT_SEEN: Final = (
     "note: no fit shows a wrong wavelength, temperature, chain or tool offset: the parameters absorb them"
@@ -159,6 +168,8 @@ def fit_rows(calibration: Calibration) -> Iterator[str]:
     yield from (f"{calibration.fit} because {reason}" for reason in calibration.fit_reasons)
     if calibration.uncertainty_scaled is not None:
         yield f"note: all standard uncertainties were multiplied by {calibration.uncertainty_scaled:.3g}"
+    if calibration.method in NOISE_ALONE:
+        yield NOISE_ALONE[calibration.method]
     if calibration.fit == "accepted":
         yield NOT_SEEN
 

@@ -76,4 +76,6 @@ def _with_tool(calibration: Calibration, tool: FloatArray) -> Calibration:
         date=calibration.date,
         fit=calibration.fit,
         variance_factor=calibration.variance_factor,
+        fit_reasons=calibration.fit_reasons,
+        uncertainty_scaled=calibration.uncertainty_scaled,
     )
