@@ -74,15 +74,13 @@ MEANING: Final = {
 FITS: Final = ("accepted", "unchecked", "doubtful", "rejected")
 # Of calibrations by linear methods, whose uncertainties know of nothing else.
 NOISE_ALONE: Final = {
-    "conventional": "note: uncertainties are of noise alone: what rotations, laser and mirror do to distances is not in "
-    "them, and not corrected",
-    "enhanced": "note: uncertainties are of noise alone: what laser and mirror angles do at second order is not in them, "
-    "and not corrected",
+    "conventional": "note: uncertainties are of noise alone: what rotations, laser and mirror do to distances is "
+    "neither in them nor corrected",
+    "enhanced": "note: uncertainties are of noise alone: what laser and mirror angles do at second order is "
+    "neither in them nor corrected",
 }
 # Of what is accepted.
-NOT_SEEN: Final = (
-    "note: no fit shows a wrong wavelength, temperature, chain or tool offset: the parameters absorb them"
-)
+NOT_SEEN: Final = "note: no fit shows a wrong wavelength, temperature, chain or tool offset: the parameters absorb them"
 
 
 def undetermined_text(finding: Undetermined) -> str:
@@ -222,7 +220,9 @@ def reason_text(reason: FitReason) -> str:
         case "misfit" | "no_misfit":
             return f"the noise is about {noise} what is stated"
         case "scaled":
-            return f"all uncertainties were multiplied by {noise.removesuffix(' times')}, which the readings' scatter says"
+            return (
+                f"all uncertainties were multiplied by {noise.removesuffix(' times')}, which the readings' scatter says"
+            )
         case _:
             return "nothing controls the readings"
 

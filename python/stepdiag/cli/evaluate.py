@@ -41,8 +41,8 @@ def evaluate(
     The first line of the report is the verdict of the fit, which is also stored in the calibration.
     If the fit is rejected, the command ends with a warning and exit code 3; the calibration is
     written, but must not be used. For the linear methods it is the worse of two verdicts: that of
-    their own test, and that of the adjustment of the same readings. A result that no machine can have ([plausible] in the scenario)
-    is an error, and nothing is written.
+    their own test, and that of the adjustment of the same readings. A result that no machine can
+    have ([plausible] in the scenario) is an error, and nothing is written.
 
     \b
     adjustment    all readings at once and exactly: the machine's errors, and how head and mirror were set up

@@ -28,9 +28,7 @@ def adjustment_table(adjustment: Adjustment, measurement: Measurement | None = N
         variables |= _setup(adjustment.setup)
     if adjustment.outliers:
         variables |= _outliers(adjustment.outliers)
-    return table.assign(variables).assign_attrs(
-        combinations="\n".join(map(combination_text, adjustment.combinations))
-    )
+    return table.assign(variables).assign_attrs(combinations="\n".join(map(combination_text, adjustment.combinations)))
 
 
 def _test_values(adjustment: Adjustment) -> dict[str, Any]:
@@ -44,8 +42,8 @@ def _test_values(adjustment: Adjustment) -> dict[str, Any]:
             {
                 "units": "1",
                 "long_name": f"{square_sum}, by the degrees of freedom",
-                "comment": "1 is expected; the standard uncertainties of this file are multiplied by its root only where "
-                "the attribute uncertainty_scaled says so",
+                "comment": "1 is expected; the standard uncertainties of this file are multiplied by its root only "
+                "where the attribute uncertainty_scaled says so",
             },
         ),
         "chi_square_probability": (

@@ -30,7 +30,9 @@ def _published(judged: JudgedEvaluation, measurement: Measurement, known: Known)
     first, *rest = fit_rows(calibration)
     yield first
     adjusted = "none" if judged.adjustment is None else judged.adjustment.verdict.fit
-    yield f"that is the worse of the method's own test ({judged.own}) and the adjustment of the same readings ({adjusted})"
+    yield (
+        f"that is the worse of the method's own test ({judged.own}) and the adjustment of the same readings ({adjusted})"
+    )
     yield from rest
     yield from _what_was_done(calibration, measurement, known)
     yield from uncertainty_rows(calibration)

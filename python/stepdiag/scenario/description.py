@@ -154,8 +154,8 @@ def simulation_options(scenario: Scenario) -> _core.SimulationOptions:
 def adjustment_options(
     known: Known, *, full_covariance: bool = False, of_samples: bool = False
 ) -> _core.AdjustmentOptions:
-    """What an adjustment of the scenario's runs takes for known and unknown. `of_samples`: of many simulated runs, whose
-    noise is what is stated: none of their readings is left out, no uncertainty is scaled."""
+    """What an adjustment of the scenario's runs takes for known and unknown. `of_samples`: of many simulated runs,
+    whose noise is what is stated: none of their readings is left out, no uncertainty is scaled."""
     keys = known.keys.adjustment
     return _core.AdjustmentOptions(
         uncertainty=known.uncertainty,

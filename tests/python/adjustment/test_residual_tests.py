@@ -21,7 +21,9 @@ Rows = np.ndarray
 Change = Callable[[str, sd.Measurement], np.ndarray | float]
 
 
-def noisy(run: sd.Measurement, seed: int = 0, factor: Change | float = 1.0, offset: Change | float = 0.0) -> sd.Measurement:
+def noisy(
+    run: sd.Measurement, seed: int = 0, factor: Change | float = 1.0, offset: Change | float = 0.0
+) -> sd.Measurement:
     """A run with noise of `factor` times what is stated, and offsets, by channel."""
     random, channels = np.random.default_rng(seed), dict(run.channels)
     for name, u in STATED.items():

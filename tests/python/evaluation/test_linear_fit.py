@@ -1,4 +1,4 @@
-"""Whether the readings of a linear evaluation contradict each other: a test of its own, and the adjustment beside it."""
+"""Whether readings of a linear evaluation contradict each other: a test of its own, and the adjustment beside it."""
 
 from pathlib import Path
 
