@@ -31,7 +31,8 @@ def _published(judged: JudgedEvaluation, measurement: Measurement, known: Known)
     yield first
     adjusted = "none" if judged.adjustment is None else judged.adjustment.verdict.fit
     yield (
-        f"that is the worse of the method's own test ({judged.own}) and the adjustment of the same readings ({adjusted})"
+        f"that is the worse of the method's own test ({judged.own}) and of the adjustment of the same readings "
+        f"({adjusted})"
     )
     yield from rest
     yield from _what_was_done(calibration, measurement, known)

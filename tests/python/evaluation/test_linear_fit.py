@@ -125,7 +125,7 @@ def test_conventional_is_rejected_by_its_own_test_where_the_machine_has_rotation
         assert evaluate("conventional", output) == 3
         said = capsys.readouterr()
         assert said.out.startswith("fit: REJECTED: ")
-        assert "own test (rejected) and the adjustment of the same readings (accepted)" in said.out
+        assert "own test (rejected) and of the adjustment of the same readings (accepted)" in said.out
         assert said.err.startswith("warning: ")
         calibration = sd.read_calibration(output)
         assert calibration.fit == "rejected"
@@ -140,5 +140,5 @@ def test_a_linear_method_takes_over_what_the_adjustment_rejects(
     channels["alpha"], channels["beta"] = channels["beta"], channels["alpha"]
     sd.Measurement(run.line, run.point.tolist(), run.position, channels).write("run.csv")
     assert evaluate("enhanced") == 3
-    assert "the adjustment of the same readings (rejected)" in capsys.readouterr().out
+    assert "of the adjustment of the same readings (rejected)" in capsys.readouterr().out
     assert any("adjustment of the same readings: " in r for r in sd.read_calibration("calibration.csv").fit_reasons)
