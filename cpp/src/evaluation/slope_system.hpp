@@ -35,13 +35,8 @@ public:
     }
 
     template <class Number>
-    void add_contradictions(const std::vector<Number>& lengths, std::vector<Number>& out) const {
-        const std::vector<Number> sums = right_sides(lengths);
-        for (Eigen::Index i = 0; i < contradictions_.rows(); ++i) {
-            Number sum = Number::Zero();
-            for (std::size_t j = 0; j < sums.size(); ++j) sum += contradictions_(i, Eigen::Index(j)) * sums[j];
-            out.push_back(sum);
-        }
+    void add_contradictions(const std::vector<Number>& lengths, Thinning& thinning, std::vector<Number>& out) const {
+        stepdiag::add_contradictions<Number>(contradictions_, right_sides(lengths), thinning, out);
     }
 
     template <class Number>
