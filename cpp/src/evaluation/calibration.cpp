@@ -23,6 +23,18 @@ void check_one_line(const std::string& text, const char* what) {
         throw InvalidArgument(std::string(what) + ": expected one line of text, got a line break");
 }
 
+void check_provenance(const std::map<std::string, std::string>& provenance) {
+    for (const auto& [key, text] : provenance) {
+        if (std::find(provenance_keys.begin(), provenance_keys.end(), key) == provenance_keys.end()) {
+            std::string known;
+            for (const char* one : provenance_keys) known += (known.empty() ? "" : ", ") + std::string(one);
+            throw InvalidArgument("provenance: expected the keys " + known + ", got \"" + key + "\"");
+        }
+        if (text.empty()) throw InvalidArgument("provenance, " + key + ": expected a text, got an empty one");
+        check_one_line(text, ("provenance, " + key).c_str());
+    }
+}
+
 void check_sizes(const std::string& name, std::size_t nodes, std::initializer_list<std::size_t> others) {
     if (nodes == 0 || std::any_of(others.begin(), others.end(), [&](std::size_t size) { return size != nodes; }))
         throw InvalidArgument(name + ": expected as many values and uncertainties as positions, and at least one");
@@ -99,6 +111,7 @@ void check(const Calibration& calibration) {
     if (!calibration.tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
     check_one_line(calibration.method, "method");
     check_one_line(calibration.date, "date");
+    check_provenance(calibration.provenance);
     if (const auto& factor = calibration.variance_factor; factor && !(std::isfinite(*factor) && *factor >= 0.0))
         throw InvalidArgument("variance_factor: expected a finite number of at least 0");
     for (const std::string& sentence : calibration.undetermined) check_one_line(sentence, "undetermined");
@@ -220,6 +233,7 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
                     {"tool_mm", format_lengths(calibration.tool)}};
     table.header["straightness_reference"] = straightness_reference(calibration.chain, calibration.tool);
     if (!calibration.date.empty()) table.header["date"] = calibration.date;
+    table.header.insert(calibration.provenance.begin(), calibration.provenance.end());
     if (calibration.fit) table.header["fit"] = name(*calibration.fit);
     if (calibration.variance_factor) table.header["variance_factor"] = format_decimal(*calibration.variance_factor, 0);
     if (!slopes.empty()) table.header["undetermined_slopes"] = join(slopes, " ");
@@ -249,6 +263,8 @@ Calibration read_calibration(const std::string& path) {
                             {}};
     calibration.undetermined = split(optional_value("undetermined"), sentence_break);
     calibration.date = optional_value("date");
+    for (const char* key : provenance_keys)
+        if (std::string text = optional_value(key); !text.empty()) calibration.provenance[key] = std::move(text);
     calibration.fit = fit_of(table.header, path);
     if (const std::string factor = optional_value("variance_factor"); !factor.empty()) {
         calibration.variance_factor = parse_decimal(factor, 0);

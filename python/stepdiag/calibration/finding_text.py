@@ -49,6 +49,14 @@ REMEDIES: Final = {
     "fixed": "take it as fixed",
     "scales": "make the scales known",
 }
+# By Calibration.provenance_keys().
+PROVENANCE: Final = {
+    "program": "made by",
+    "run_sha256": "run, SHA-256",
+    "scenario_sha256": "scenario, SHA-256",
+    "heads_sha256": "heads, SHA-256",
+    "options": "options",
+}
 # Unknowns of a set-up, by component.
 SETUP: Final = {
     "reflector": ("reflector tilt about local x", "reflector tilt about local y"),
@@ -146,6 +154,12 @@ def fit_row(calibration: Calibration) -> str:
     factor = calibration.variance_factor
     figures = "" if factor is None else f" (variance factor {factor:.3g})"
     return f"fit: {_shown(calibration.fit)}: {MEANING[calibration.fit]}{figures}"
+
+
+def provenance_rows(calibration: Calibration) -> list[str]:
+    """What a calibration was made from, as far as its file says."""
+    made = calibration.provenance
+    return [f"{words}: {made[key]}" for key, words in PROVENANCE.items() if key in made]
 
 
 def verdict_rows(adjustment: Adjustment) -> Iterator[str]:

@@ -53,6 +53,7 @@ def evaluate(
     from stepdiag.io.whole_files import check_input
     from stepdiag.report.evaluation import evaluation_report
     from stepdiag.scenario.description import adjust_scenario, evaluate_scenario, read_scenario
+    from stepdiag.scenario.provenance import provenance_of
 
     check_input(run)
     if covariance and not is_netcdf(output.path):
@@ -61,13 +62,14 @@ def evaluate(
     path = output.claim(scenario, run, error_map=described.truth.error_map)
     known = described.known
     measurement = read_measurement(run)
+    provenance = provenance_of(known, run, method=method)
     with located(str(run)):
         result = (
             adjust_scenario(known, measurement, full_covariance=covariance)
             if method == "adjustment"
             else evaluate_scenario(known, measurement, method=method, full_covariance=covariance)
         )
-    write_calibration(result, path, measurement=measurement)
+    write_calibration(result, path, measurement=measurement, provenance=provenance)
     for line in evaluation_report(result, measurement, known):
         click.echo(line)
     tell_fit(context, path, (result if isinstance(result, Calibration) else result.calibration).fit)

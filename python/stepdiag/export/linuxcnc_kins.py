@@ -76,4 +76,5 @@ def _with_tool(calibration: Calibration, tool: FloatArray) -> Calibration:
         date=calibration.date,
         fit=calibration.fit,
         variance_factor=calibration.variance_factor,
+        provenance=calibration.provenance,
     )
