@@ -131,6 +131,7 @@ if TYPE_CHECKING:
         simulate_scenario,
     )
     from stepdiag.scenario.known import Known
+    from stepdiag.scenario.provenance import provenance_of
     from stepdiag.scenario.truth import Truth
     from stepdiag.uncertainty.dask_workers import workers_of
     from stepdiag.uncertainty.model_source import ModelSource
@@ -251,6 +252,7 @@ __all__ = [
     "power_inside",
     "propagate",
     "propagate_linear",
+    "provenance_of",
     "random_error_map",
     "read_calibration",
     "read_distance",
@@ -327,6 +329,7 @@ _LATER = {
         "simulate_scenario",
     ),
     "scenario.known": ("Known",),
+    "scenario.provenance": ("provenance_of",),
     "scenario.truth": ("Truth",),
     "uncertainty.dask_workers": ("workers_of",),
     "uncertainty.model_source": ("ModelSource",),

@@ -937,7 +937,12 @@ class Calibration:
     """
     The 21 parameters as far as the readings determine them, with standard uncertainties; native units (mm, rad).
     """
-    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    @staticmethod
+    def provenance_keys() -> list[str]:
+        """
+        The keys that a provenance may have.
+        """
+    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None, provenance: collections.abc.Mapping[str, str] = {}) -> None:
         """
         A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises InvalidArgument naming the parameter for what is none: nodes that do not ascend, values that are not finite, a covariance that is not one of these values.
         """
@@ -956,6 +961,10 @@ class Calibration:
     def to_xarray(self) -> xarray.Dataset:
         """
         The calibration as a labelled table (xarray.Dataset).
+        """
+    def with_provenance(self, provenance: collections.abc.Mapping[str, str]) -> Calibration:
+        """
+        The same calibration with this provenance, by the keys of the property. Raises InvalidArgument for other keys, and for texts that are empty or of more than one line.
         """
     def write(self, path: str | os.PathLike[str]) -> None:
         """
@@ -1006,6 +1015,11 @@ class Calibration:
     def negative_functions(self) -> dict[str, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]]:
         """
         name -> (position, value, standard uncertainty) of functions approached in - direction, which are functions - reversal.
+        """
+    @property
+    def provenance(self) -> dict[str, str]:
+        """
+        What it was made from, as far as it is known: program and version, SHA-256 of the run, the scenario and the descriptions of heads, options that are not the default ones. Keys: program, run_sha256, scenario_sha256, heads_sha256, options.
         """
     @property
     def reversal(self) -> dict[str, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]]:

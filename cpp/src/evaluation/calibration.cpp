@@ -24,6 +24,18 @@ void check_one_line(const std::string& text, const char* what) {
         throw InvalidArgument(std::string(what) + ": expected one line of text, got a line break");
 }
 
+void check_provenance(const std::map<std::string, std::string>& provenance) {
+    for (const auto& [key, text] : provenance) {
+        if (std::find(provenance_keys.begin(), provenance_keys.end(), key) == provenance_keys.end()) {
+            std::string known;
+            for (const char* one : provenance_keys) known += (known.empty() ? "" : ", ") + std::string(one);
+            throw InvalidArgument("provenance: expected the keys " + known + ", got \"" + key + "\"");
+        }
+        if (text.empty()) throw InvalidArgument("provenance, " + key + ": expected a text, got an empty one");
+        check_one_line(text, ("provenance, " + key).c_str());
+    }
+}
+
 void check_sizes(const std::string& name, std::size_t nodes, std::initializer_list<std::size_t> others) {
     if (nodes == 0 || std::any_of(others.begin(), others.end(), [&](std::size_t size) { return size != nodes; }))
         throw InvalidArgument(name + ": expected as many values and uncertainties as positions, and at least one");
@@ -111,6 +123,7 @@ void check(const Calibration& calibration) {
     for (const auto& [key, factor] : factors(calibration))
         if (factor && !(std::isfinite(*factor) && *factor >= 0.0))
             throw InvalidArgument(std::string(key) + ": expected a finite number of at least 0");
+    check_provenance(calibration.provenance);
     for (const std::string& sentence : calibration.undetermined) check_one_line(sentence, "undetermined");
     for (const std::string& sentence : calibration.fit_reasons) check_one_line(sentence, "fit_reasons");
     for (int i = 0; i < function_count; ++i) {
@@ -231,6 +244,7 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
                     {"tool_mm", format_lengths(calibration.tool)}};
     table.header["straightness_reference"] = straightness_reference(calibration.chain, calibration.tool);
     if (!calibration.date.empty()) table.header["date"] = calibration.date;
+    table.header.insert(calibration.provenance.begin(), calibration.provenance.end());
     if (calibration.fit) table.header["fit"] = name(*calibration.fit);
     for (const auto& [key, factor] : factors(calibration))
         if (factor) table.header[key] = format_decimal(*factor, 0);
@@ -265,6 +279,8 @@ Calibration read_calibration(const std::string& path) {
     calibration.undetermined = split(optional_value("undetermined"), sentence_break);
     calibration.fit_reasons = split(optional_value("fit_reasons"), sentence_break);
     calibration.date = optional_value("date");
+    for (const char* key : provenance_keys)
+        if (std::string text = optional_value(key); !text.empty()) calibration.provenance[key] = std::move(text);
     calibration.fit = fit_of(table.header, path);
     for (auto& [key, factor] : factors(calibration)) {
         const std::string given = optional_value(key);

@@ -49,6 +49,14 @@ REMEDIES: Final = {
     "fixed": "take it as fixed",
     "scales": "make the scales known",
 }
+# By Calibration.provenance_keys().
+PROVENANCE: Final = {
+    "program": "made by",
+    "run_sha256": "run, SHA-256",
+    "scenario_sha256": "scenario, SHA-256",
+    "heads_sha256": "heads, SHA-256",
+    "options": "options",
+}
 # Unknowns of a set-up, by component.
 SETUP: Final = {
     "reflector": ("reflector tilt about local x", "reflector tilt about local y"),
@@ -170,6 +178,12 @@ def fit_rows(calibration: Calibration) -> Iterator[str]:
         yield NOISE_ALONE[calibration.method]
     if calibration.fit == "accepted":
         yield NOT_SEEN
+
+
+def provenance_rows(calibration: Calibration) -> list[str]:
+    """What a calibration was made from, as far as its file says."""
+    made = calibration.provenance
+    return [f"{words}: {made[key]}" for key, words in PROVENANCE.items() if key in made]
 
 
 def verdict_rows(adjustment: Adjustment) -> Iterator[str]:

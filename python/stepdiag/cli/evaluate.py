@@ -59,6 +59,7 @@ def evaluate(
         evaluate_beside_adjustment,
         read_scenario,
     )
+    from stepdiag.scenario.provenance import provenance_of
 
     check_input(run)
     if covariance and not is_netcdf(output.path):
@@ -67,6 +68,7 @@ def evaluate(
     path = output.claim(scenario, run, error_map=described.truth.error_map)
     known = described.known
     measurement = read_measurement(run)
+    provenance = provenance_of(known, run, method=method)
     with located(str(run)):
         result = (
             adjust_scenario(known, measurement, full_covariance=covariance)
@@ -74,7 +76,10 @@ def evaluate(
             else evaluate_beside_adjustment(known, measurement, method=method, full_covariance=covariance)
         )
     write_calibration(
-        result.calibration if isinstance(result, JudgedEvaluation) else result, path, measurement=measurement
+        result.calibration if isinstance(result, JudgedEvaluation) else result,
+        path,
+        measurement=measurement,
+        provenance=provenance,
     )
     for line in evaluation_report(result, measurement, known):
         click.echo(line)

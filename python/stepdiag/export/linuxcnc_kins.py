@@ -81,4 +81,5 @@ def _with_tool(calibration: Calibration, tool: FloatArray) -> Calibration:
         variance_factor=calibration.variance_factor,
         fit_reasons=calibration.fit_reasons,
         uncertainty_scaled=calibration.uncertainty_scaled,
+        provenance=calibration.provenance,
     )

@@ -128,6 +128,7 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
         variables,
         coordinates,
         verdict
+        | calibration.provenance
         | {
             "title": "calibration of a three-axis machine",
             "method": calibration.method,
