@@ -10,30 +10,26 @@ namespace stepdiag {
 std::optional<int> solve_from_zero(GaussNewton& solver, const std::vector<bool>& determined, Eigen::VectorXd& x) {
     // The second order of what is open may lead astray: other ways from zero then, the last of them with the open
     // unknowns held, and whichever fits best.
-    struct Way {
-        double part;
-        bool accelerated;
-    };
-    constexpr Way ways[] = {{1.0, true}, {1.0, false}, {1e-4, true}, {1e-4, false}};
+    constexpr double parts[] = {1.0, 1e-4};
     constexpr double good_fit = 4.0;
     const double readings = double(solver.equations().problem().readings().size());
     std::optional<int> count;
     double least = std::numeric_limits<double>::infinity();
-    Way best = ways[0];
-    for (const Way& way : ways) {
+    double best = parts[0];
+    for (const double part : parts) {
         Eigen::VectorXd solution = Eigen::VectorXd::Zero(x.size());
-        solver.equations().assume_usual(determined, solution, way.part);
-        const std::optional<int> steps = solver.try_solve(solution, GaussNewton::usual_most_steps, way.accelerated);
+        solver.equations().assume_usual(determined, solution, part);
+        const std::optional<int> steps = solver.try_solve(solution);
         const double square_sum = solver.equations().square_sum(solution);
         if (steps && square_sum < least) {
             count = steps;
             x = solution;
             least = square_sum;
-            best = way;
+            best = part;
         }
         if (solver.dependent().empty() || (count && least < good_fit * readings)) break;
     }
-    if (!count || solver.dependent().empty() || best.part < 1.0) return count;
+    if (!count || solver.dependent().empty() || best < 1.0) return count;
     Eigen::VectorXd again = x;
     solver.equations().assume_usual(determined, x);
     const std::optional<int> more = solver.try_solve(again);

@@ -156,7 +156,7 @@ void SimdAdjustment::move() {
     }
 }
 
-// What is open is taken to be at 0 first, then where it came out (outlier_search.cpp).
+// What is open is taken to be at 0 first, then where it came out (solve_from_zero.cpp).
 void SimdAdjustment::recentre(std::size_t lane) {
     for (Eigen::Index j = 0; j < start_.pattern.start.size(); ++j) centre_.at(j)[lane] = x_.at(j)[lane];
     progress_[lane] = {};
