@@ -126,8 +126,8 @@ std::optional<int> GaussNewton::try_solve(Eigen::VectorXd& x, int most_steps) {
 // then is held by a part of what is usual, more of it until the square sum falls (K. Levenberg, Quart. Appl. Math. 2
 // (1944) 164).
 bool GaussNewton::descend(Eigen::VectorXd& x, const Step& step) {
-    constexpr double good = 0.75;    // share of what a quadratic would fall by
-    constexpr double small = 1e-3;   // of the square sum: next to the minimum Newton's steps shrink faster
+    constexpr double good = 0.75;   // share of what a quadratic would fall by
+    constexpr double small = 1e-3;  // of the square sum: next to the minimum Newton's steps shrink faster
     constexpr double first = 1e-2, least = 1e-4, climbs = 10.0, falls = 100.0;
     constexpr double most = 1e12;
     constexpr double rounding = 1e-10;
