@@ -6,6 +6,7 @@
 
 #include "adjustment/adjustment_result.hpp"
 #include "adjustment/outlier_search.hpp"
+#include "adjustment/reliability.hpp"
 #include "adjustment/smoothness.hpp"
 #include "adjustment/verdict.hpp"
 #include "stepdiag/core/error.hpp"
@@ -95,6 +96,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     if (!is_anything_determined(result.calibration)) throw NothingDetermined("adjustment", result.calibration.findings);
     refuse_implausible(result.calibration, measurement, plan, options.plausible);
     if (options.full_covariance) result.calibration.covariance = full_covariance(problem, forms, solver.factor());
+    if (options.reliability) result.reliability = reliability(solver, inverse, forms);
     result.setup = setup_estimates(problem, known, x, inverse);
     result.residuals = outliers.residuals();
     std::stable_sort(result.residuals.begin(), result.residuals.end(),

@@ -82,10 +82,15 @@ def evaluate_scenario(
 
 
 def adjust_scenario(
-    scenario: Scenario | Known, measurement: _core.Measurement, *, full_covariance: bool = False
+    scenario: Scenario | Known,
+    measurement: _core.Measurement,
+    *,
+    full_covariance: bool = False,
+    reliability: bool = False,
 ) -> _core.Adjustment:
     """The exact adjustment of a run, with the unknowns that the scenario's [adjustment] and [smoothness] name: the
-    calibration, and with it the set-up that was found, residuals, outliers and how well it all fits."""
+    calibration, and with it the set-up that was found, residuals, outliers and how well it all fits. `reliability`:
+    also which faults the readings control."""
     known = scenario.known
     return _core.adjust(
         only(measurement, known.signals),
@@ -93,7 +98,7 @@ def adjust_scenario(
         of_run(known.heads),
         known.chain,
         known.tool,
-        adjustment_options(known, full_covariance=full_covariance),
+        adjustment_options(known, full_covariance=full_covariance, reliability=reliability),
     )
 
 
@@ -112,7 +117,9 @@ def simulation_options(scenario: Scenario) -> _core.SimulationOptions:
     )
 
 
-def adjustment_options(known: Known, *, full_covariance: bool = False) -> _core.AdjustmentOptions:
+def adjustment_options(
+    known: Known, *, full_covariance: bool = False, reliability: bool = False
+) -> _core.AdjustmentOptions:
     """What an adjustment of the scenario's runs takes for known and unknown."""
     keys = known.keys.adjustment
     return _core.AdjustmentOptions(
@@ -126,6 +133,7 @@ def adjustment_options(known: Known, *, full_covariance: bool = False) -> _core.
         outlier_probability=keys.outlier_probability,
         full_covariance=full_covariance,
         plausible=known.plausible,
+        reliability=reliability,
     )
 
 
