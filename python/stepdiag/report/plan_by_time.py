@@ -60,13 +60,15 @@ def advice(found: Sequence[Outcome], minutes: float, spacing: float, family: Fam
 
 def fault_advice(taken: Controlled, telling: Controlled | None) -> Iterator[str]:
     """Whether faults of the readings are told apart in the plan to take, and which plan would."""
-    yield f"  its faults, told apart: {_told(taken)}"
+    yield f"faults told apart in the plan to take: {_told(taken)}"
     if telling is None:
         yield "no plan of as many steps that is as certain tells all faults apart"
     elif telling is not taken:
         more = telling.plan.minutes - taken.plan.minutes
-        yield f"all faults told apart: {_named(telling.plan)}, in {telling.plan.minutes:.1f} minutes ({more:+.1f})"
-        yield f"  its faults, told apart: {_told(telling)}"
+        yield (
+            f"all faults told apart: {_named(telling.plan)}, in {telling.plan.minutes:.1f} minutes ({more:+.1f}): "
+            f"{_told(telling)}"
+        )
 
 
 def _told(one: Controlled) -> str:

@@ -216,7 +216,7 @@ def test_plan_that_tells_faults_apart_is_named_with_its_minutes() -> None:
     assert telling_all.plan is twice
     assert not any(c.twins or c.uncontrolled for c in telling_all.faults)
     said = list(fault_advice(taken, telling_all))
-    assert said[0].startswith("  its faults, told apart: wrong distance none; slip of distances none; ")
+    assert said[0].startswith("faults told apart in the plan to take: wrong distance none; slip of distances none; ")
     assert f"(+{twice.minutes - once.minutes:.1f})" in said[1]
     assert len(list(fault_advice(telling_all, telling_all))) == 1
     assert telling(scenario, [once], once)[1] is None
@@ -238,7 +238,7 @@ def test_command_says_which_plan_to_take(scenario: str, capsys: pytest.CaptureFi
     assert Path("plan.png").read_bytes().startswith(b"\x89PNG")
     (row,) = [line for line in said.splitlines() if line.startswith(" *")]
     assert float(row.split()[1]) <= 20.0
-    assert "its faults, told apart: " in said
+    assert "\nfaults told apart in the plan to take: " in said
 
 
 @pytest.mark.slow
