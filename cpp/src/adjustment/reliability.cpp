@@ -73,8 +73,9 @@ private:
 
 class Reliability {
 public:
-    Reliability(const GaussNewton& solver, const BorderedBand& inverse, const CalibratedForms& forms)
-        : problem_(solver.equations().problem()),
+    Reliability(const GaussNewton& solver, const BorderedBand& inverse, const CalibratedForms& forms, double noise)
+        : noise_(noise),
+          problem_(solver.equations().problem()),
           values_(calibrated_values(forms, inverse)),
           hypotheses_(problem_),
           tests_(solver.equations(), solver.factor(), inverse, hypotheses_),
@@ -103,12 +104,13 @@ private:
         const Eigen::VectorXd effect = tests_.effect(h);
         const Eigen::VectorXd& changes = effects_.add(h, effect);
         const double u = tests_.scores()[h].standard_uncertainty;
+        const double size_found = power_of_99_percent * noise_ * u;
         if (std::isinf(u)) return note_uncontrolled(h, changes, control);
         ++control.count;
-        control.found_from = std::max(control.found_from, power_of_99_percent * u);
+        control.found_from = std::max(control.found_from, size_found);
         for (std::size_t i = 0; i < values_.size(); ++i) {
             double& hidden = (control.*values_[i].family).hidden;
-            hidden = std::max(hidden, power_of_99_percent * u * std::abs(changes[Eigen::Index(i)]));
+            hidden = std::max(hidden, size_found * std::abs(changes[Eigen::Index(i)]));
         }
         std::vector<double> correlations = tests_.correlations(h, effect);
         double nearest = 0.0;
@@ -135,7 +137,9 @@ private:
             }
         }
         if (has_twin) ++control.twins;
-        else control.told_from = std::max(control.told_from, std::sqrt(told_apart / (1.0 - nearest * nearest)) * u);
+        else
+            control.told_from =
+                std::max(control.told_from, noise_ * std::sqrt(told_apart / (1.0 - nearest * nearest)) * u);
     }
 
     // Of any size. It does no harm where it is a constant that the set-up takes up.
@@ -158,6 +162,7 @@ private:
         return false;
     }
 
+    double noise_;
     const AdjustmentProblem& problem_;
     std::vector<CalibratedValue> values_;
     FaultHypotheses hypotheses_;
@@ -168,8 +173,8 @@ private:
 }  // namespace
 
 std::vector<FaultControl> reliability(const GaussNewton& solver, const BorderedBand& inverse,
-                                      const CalibratedForms& forms) {
-    return Reliability(solver, inverse, forms).look();
+                                      const CalibratedForms& forms, double noise) {
+    return Reliability(solver, inverse, forms, noise).look();
 }
 
 }  // namespace stepdiag

@@ -5,7 +5,7 @@ from typing import Literal
 
 import click
 
-from stepdiag._core import Calibration, InvalidArgument
+from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import PATH, Writes, out_file, tell_fit
 from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
 
@@ -42,8 +42,9 @@ def evaluate(
 
     The first line of the report is the verdict of the fit, which is also stored in the calibration.
     If the fit is rejected, the command ends with a warning and exit code 3; the calibration is
-    written, but must not be used. A result that no machine can have ([plausible] in the scenario)
-    is an error, and nothing is written.
+    written, but must not be used. For the linear methods it is the worse of two verdicts: that of
+    their own test, and that of the adjustment of the same readings. A result that no machine can
+    have ([plausible] in the scenario) is an error, and nothing is written.
 
     \b
     adjustment    all readings at once and exactly: the machine's errors, and how head and mirror were set up
@@ -54,7 +55,13 @@ def evaluate(
     from stepdiag.io.data_files import is_netcdf, read_measurement, write_calibration
     from stepdiag.io.whole_files import check_input
     from stepdiag.report.evaluation import evaluation_report
-    from stepdiag.scenario.description import adjust_scenario, evaluate_scenario, read_scenario
+    from stepdiag.scenario.description import (
+        JudgedEvaluation,
+        adjust_scenario,
+        evaluate_beside_adjustment,
+        read_scenario,
+    )
+    from stepdiag.scenario.provenance import provenance_of
 
     check_input(run)
     if covariance and not is_netcdf(output.path):
@@ -65,16 +72,22 @@ def evaluate(
     path = output.claim(scenario, run, error_map=described.truth.error_map)
     known = described.known
     measurement = read_measurement(run)
+    provenance = provenance_of(known, run, method=method)
     with located(str(run)):
         result = (
             adjust_scenario(known, measurement, full_covariance=covariance, reliability=reliability)
             if method == "adjustment"
-            else evaluate_scenario(known, measurement, method=method, full_covariance=covariance)
+            else evaluate_beside_adjustment(known, measurement, method=method, full_covariance=covariance)
         )
-    write_calibration(result, path, measurement=measurement)
+    write_calibration(
+        result.calibration if isinstance(result, JudgedEvaluation) else result,
+        path,
+        measurement=measurement,
+        provenance=provenance,
+    )
     for line in evaluation_report(result, measurement, known):
         click.echo(line)
-    tell_fit(context, path, (result if isinstance(result, Calibration) else result.calibration).fit)
+    tell_fit(context, path, result.calibration.fit)
 
 
 def _step_counts(context: click.Context, option: click.Parameter, text: str | None) -> tuple[int, ...] | None:

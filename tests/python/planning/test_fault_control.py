@@ -140,6 +140,20 @@ def test_fault_of_a_reading_that_nothing_controls_may_do_anything() -> None:
     assert " any" in rows
 
 
+def test_faults_must_be_larger_where_all_noise_is() -> None:
+    scenario = parse_scenario(SMALL.replace("steps = 2", "steps = 10") + "tilt_urad = 1.0\n")
+    smaller = parse_scenario(
+        SMALL.replace("steps = 2", "steps = 10") + "[uncertainty]\ndistance_um = 0.025\ntilt_urad = 0.25\n"
+    )
+    run = sd.simulate_scenario(scenario)
+    one, other = (adjust_scenario(s, run, reliability=True) for s in (scenario, smaller))
+    noise = other.variance_factor**0.5
+    assert noise == pytest.approx(4.0, rel=0.15)
+    for a, b in zip(one.reliability, other.reliability, strict=True):
+        # Priors weigh less where readings are said to be better.
+        assert b.found_from == pytest.approx(a.found_from * max(1.0, one.variance_factor) ** -0.5 * noise / 4, rel=0.02)
+
+
 @pytest.fixture
 def scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.chdir(tmp_path)

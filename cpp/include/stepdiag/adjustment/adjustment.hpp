@@ -51,6 +51,10 @@ struct AdjustmentOptions {
     // Readings that do not fit are left out, the worst first, at this probability of any false alarm in a run; 0: none
     // is. No more than one in fifty, or ten: where more do not fit, it is the model that does not, and all stay.
     double outlier_probability = 0.01;
+    // Where the variance factor is above 1, all stated uncertainties (functions, reversal, squarenesses, set-ups, known
+    // combinations, covariance) are multiplied by its root. The fit is then doubtful at best: such readings no longer
+    // test what was stated of their noise. Sound only for noise that is larger by one factor throughout.
+    bool scale_uncertainty = false;
     bool full_covariance = false;
     PlausibleLimits plausible = {};
     bool reliability = false;  // also say which faults the readings control: Adjustment::reliability
@@ -87,24 +91,41 @@ struct ReadingResidual {
 enum class FaultKind { reading, slip };
 std::string name(FaultKind kind);  // "reading", "slip"
 
-// Why a fit is not accepted.
+// Why a fit is not accepted, or what its residuals have in common.
 enum class FitFinding {
     no_redundancy,  // nothing controls the readings
-    noise_factor,   // root of the variance factor: the misfit in terms of the stated uncertainties
-    misfit,         // probability of a misfit as large as this one
-    no_misfit,      // probability of a misfit as small as this one
-    uneven_misfit,  // root of the variance factor of one line or one channel, where it differs from that of the others
+    noise_factor,   // root of the variance factor, beyond what is credible
+    misfit,         // root of the variance factor: the readings scatter by it more than stated
+    no_misfit,      // root of the variance factor: the readings scatter by it less than stated
+    uneven_misfit,  // root of the variance factor of one group of readings, where it differs from that of the others
+    trend,          // residuals of one channel run with time or position: from the first reading to the last
     prior,          // distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2)
+    scaled,         // root of the variance factor, by which the uncertainties were multiplied (scale_uncertainty)
 };
 std::string name(FitFinding finding);  // "no_redundancy", ...
 
+// Which readings scatter unevenly, or what a trend runs with.
+enum class FitAspect {
+    whole,
+    second_half,       // of the run, in the order of time (of the rows, where there is no time)
+    far_half,          // of the lines
+    time,              // as second_half counts it
+    position,          // along the line
+    time_or_position,  // which are alike in this run
+};
+std::string name(FitAspect aspect);  // "" of the whole, "second_half", ...
+
 struct FitReason {
     FitFinding finding;
-    double value;
-    double limit;
-    std::string line = {};     // of an uneven misfit or a prior
-    std::string channel = {};  // of an uneven misfit: "distance", ...; of a prior: the set-up quantity
+    double value;              // of a trend mm or rad
+    double limit;              // of an uneven misfit that of the other readings; of noise and trends what is expected
+    std::string line = {};     // of an uneven misfit, a trend or a prior; empty: all
+    std::string channel = {};  // of an uneven misfit or a trend: "distance", ..., empty: all; of a prior: the quantity
     int component = 0;         // of a prior
+    double standard_uncertainty = 0.0;  // of the value of a misfit, no_misfit, trend, scaled
+    int run = -1;                       // of an uneven misfit: this run alone; -1: all
+    FitAspect aspect = FitAspect::whole;
+    bool alternative = false;  // of a trend: instead of the one before; the readings do not tell which
 };
 
 // Whether the readings of an adjustment agree with each other, with their uncertainties and with the priors. It does
