@@ -192,6 +192,21 @@ void NormalEquations::gather(const AdjustedPoint& point, const BorderedBand& inv
                 covariance(i, j) = element(inverse, all.unknown[i], all.unknown[j]);
 }
 
+Eigen::VectorXd NormalEquations::reading_variances(const BorderedBand& inverse) const {
+    Eigen::VectorXd variances(residuals_.size()), image;
+    Square covariance;
+    for (const AdjustedPoint& point : problem_->points()) {
+        gather(point, inverse, covariance);
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            const Row row = this->row(point, r);
+            const Eigen::Map<const Eigen::VectorXd> derivative(row.derivative, row.size);
+            image.noalias() = covariance * derivative;
+            variances[r] = derivative.dot(image);
+        }
+    }
+    return variances;
+}
+
 BorderedBand NormalEquations::matrix() const { return BorderedBand(problem_->reach(), problem_->border()); }
 
 void NormalEquations::assemble(BorderedBand& matrix) const {

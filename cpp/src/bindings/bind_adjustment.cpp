@@ -117,15 +117,16 @@ void bind_options(py::module_& m) {
         "set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has "
         "no angular errors. outlier_probability: of any false alarm in a run; 0: no reading is left out. "
         "scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and "
-        "the "
-        "fit is doubtful at best. plausible: what a machine can be.")
+        "the fit is doubtful at best. plausible: what a machine can be. reliability: also which faults the readings "
+        "control.")
         .def(py::init([](const ReadingUncertainty& uncertainty, const Priors& setup,
                          const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
                          bool rotations, const std::optional<Smoothness>& smoothness, double outlier_probability,
-                         bool scale_uncertainty, bool full_covariance, const PlausibleLimits& plausible) {
+                         bool scale_uncertainty, bool full_covariance, const PlausibleLimits& plausible,
+                         bool reliability) {
                  AdjustmentOptions options{uncertainty,       setup.value,     {},         one_setup_per_line,
                                            reversal,          rotations,       smoothness, outlier_probability,
-                                           scale_uncertainty, full_covariance, plausible};
+                                           scale_uncertainty, full_covariance, plausible,  reliability};
                  for (const auto& [line, priors] : setup_by_line) options.setup_by_line[line] = priors.value;
                  return options;
              }),
@@ -135,7 +136,8 @@ void bind_options(py::module_& m) {
              py::arg("rotations") = usual.rotations, py::arg("smoothness") = std::nullopt,
              py::arg("outlier_probability") = usual.outlier_probability,
              py::arg("scale_uncertainty") = usual.scale_uncertainty, py::arg("full_covariance") = usual.full_covariance,
-             py::arg("plausible") = usual.plausible, "adjust() checks them.")
+             py::arg("plausible") = usual.plausible, py::arg("reliability") = usual.reliability,
+             "adjust() checks them.")
         .def_readonly("uncertainty", &AdjustmentOptions::uncertainty)
         .def_property_readonly("setup", [](const AdjustmentOptions& o) { return Priors{o.setup}; })
         .def_property_readonly("setup_by_line",
@@ -151,7 +153,8 @@ void bind_options(py::module_& m) {
         .def_readonly("outlier_probability", &AdjustmentOptions::outlier_probability)
         .def_readonly("scale_uncertainty", &AdjustmentOptions::scale_uncertainty)
         .def_readonly("full_covariance", &AdjustmentOptions::full_covariance)
-        .def_readonly("plausible", &AdjustmentOptions::plausible);
+        .def_readonly("plausible", &AdjustmentOptions::plausible)
+        .def_readonly("reliability", &AdjustmentOptions::reliability);
 }
 
 void bind_result(py::module_& m) {
@@ -232,6 +235,37 @@ void bind_result(py::module_& m) {
         .def_readonly("value", &KnownCombination::value, "rad; of slopes mm/mm.")
         .def_readonly("standard_uncertainty", &KnownCombination::standard_uncertainty);
 
+    const auto by_family = [](double FaultControl::Effect::* effect) {
+        return [effect](const FaultControl& c) {
+            return std::map<std::string, double>{{"positioning", c.positioning.*effect},
+                                                 {"straightness", c.straightness.*effect},
+                                                 {"angle", c.angle.*effect},
+                                                 {"squareness", c.squareness.*effect}};
+        };
+    };
+    py::class_<FaultControl>(
+        m, "FaultControl",
+        "Which faults of one kind the readings control (reliability, W. Baarda 1968). One is found "
+        "with a probability of 99 % where it is 7.6 times as large as the standard uncertainty of "
+        "its size, and told from another one where that makes chi-square larger by 25. Twins are "
+        "not told apart at any size: their effects have a correlation of 0.999 and more, but the calibration differs.")
+        .def_property_readonly(
+            "kind", [](const FaultControl& c) { return name(c.kind); },
+            "\"reading\", or \"slip\": an offset of its channel from a reading on.")
+        .def_readonly("channel", &FaultControl::channel, "\"distance\", \"tilt\" or \"spot\".")
+        .def_readonly("count", &FaultControl::count, "Of controlled faults, one a place (of long runs: evenly spaced).")
+        .def_readonly("uncontrolled", &FaultControl::uncontrolled, "More of them, which no other reading controls.")
+        .def_readonly("twins", &FaultControl::twins, "Those of `count` that have a twin.")
+        .def_readonly("found_from", &FaultControl::found_from, "All of `count` are found from here on; mm or rad.")
+        .def_readonly("told_from", &FaultControl::told_from,
+                      "Those without a twin are told from all others from here on; mm or rad.")
+        .def_property_readonly("hidden", by_family(&FaultControl::Effect::hidden),
+                               "Kind of parameter -> largest effect of a fault just not found, mm or rad; infinite: of "
+                               "one that nothing controls.")
+        .def_property_readonly("shared", by_family(&FaultControl::Effect::shared),
+                               "Kind of parameter -> by how much it differs, by the size of a fault, if its twin was "
+                               "it; in mm or rad each.");
+
     using Result = AdjustmentOfRun;
     py::class_<Result>(m, "Adjustment", "What an adjustment found: calibration, set-ups, and how the readings fit.")
         .def_property_readonly("calibration", [](const Result& r) { return r.adjustment.calibration; })
@@ -276,6 +310,8 @@ void bind_result(py::module_& m) {
                                    });
                                    return list;
                                })
+        .def_property_readonly(
+            "reliability", [](const Result& r) { return r.adjustment.reliability; }, "If it was asked for.")
         .def_property_readonly("verdict", [](const Result& r) { return r.adjustment.verdict; })
         .def_property_readonly("weighted_square_sum", [](const Result& r) { return r.adjustment.weighted_square_sum; })
         .def_property_readonly("variance_factor", [](const Result& r) { return r.adjustment.variance_factor(); })

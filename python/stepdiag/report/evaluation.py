@@ -9,6 +9,7 @@ from stepdiag._core import Adjustment, Calibration, Measurement, Outlier, straig
 from stepdiag.calibration.finding_text import NOISE_ALONE, combination_text, fit_rows, verdict_rows
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
+from stepdiag.report.fault_control import control_rows
 from stepdiag.report.setup_table import setup_rows
 from stepdiag.scenario.adjustment import scale_line_angle
 from stepdiag.scenario.description import JudgedEvaluation
@@ -58,6 +59,8 @@ def _adjusted(adjustment: Adjustment, measurement: Measurement, known: Known) ->
     yield from smoothness_rows(adjustment.smoothness)
     yield from cosine_rows(known)
     yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
+    if adjustment.reliability:
+        yield from control_rows(adjustment.reliability)
 
 
 def _what_was_done(calibration: Calibration, measurement: Measurement, known: Known) -> Iterator[str]:

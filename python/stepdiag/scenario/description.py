@@ -121,10 +121,15 @@ def evaluate_beside_adjustment(
 
 
 def adjust_scenario(
-    scenario: Scenario | Known, measurement: _core.Measurement, *, full_covariance: bool = False
+    scenario: Scenario | Known,
+    measurement: _core.Measurement,
+    *,
+    full_covariance: bool = False,
+    reliability: bool = False,
 ) -> _core.Adjustment:
     """The exact adjustment of a run, with the unknowns that the scenario's [adjustment] and [smoothness] name: the
-    calibration, and with it the set-up that was found, residuals, outliers and how well it all fits."""
+    calibration, and with it the set-up that was found, residuals, outliers and how well it all fits. `reliability`:
+    also which faults the readings control."""
     known = scenario.known
     return _core.adjust(
         only(measurement, known.signals),
@@ -132,7 +137,7 @@ def adjust_scenario(
         of_run(known.heads),
         known.chain,
         known.tool,
-        adjustment_options(known, full_covariance=full_covariance),
+        adjustment_options(known, full_covariance=full_covariance, reliability=reliability),
     )
 
 
@@ -152,7 +157,7 @@ def simulation_options(scenario: Scenario) -> _core.SimulationOptions:
 
 
 def adjustment_options(
-    known: Known, *, full_covariance: bool = False, of_samples: bool = False
+    known: Known, *, full_covariance: bool = False, of_samples: bool = False, reliability: bool = False
 ) -> _core.AdjustmentOptions:
     """What an adjustment of the scenario's runs takes for known and unknown. `of_samples`: of many simulated runs,
     whose noise is what is stated: none of their readings is left out, no uncertainty is scaled."""
@@ -169,6 +174,7 @@ def adjustment_options(
         scale_uncertainty=keys.scale_uncertainty and not of_samples,
         full_covariance=full_covariance,
         plausible=known.plausible,
+        reliability=reliability,
     )
 
 

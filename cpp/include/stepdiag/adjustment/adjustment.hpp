@@ -57,6 +57,7 @@ struct AdjustmentOptions {
     bool scale_uncertainty = false;
     bool full_covariance = false;
     PlausibleLimits plausible = {};
+    bool reliability = false;  // also say which faults the readings control: Adjustment::reliability
 };
 
 // One set-up unknown, as it was found.
@@ -84,6 +85,11 @@ struct ReadingResidual {
 
     bool used() const { return outlier == 0; }
 };
+
+// What may be wrong with the readings of one channel in one set-up. A slip is an offset of all of them from a point on,
+// in the order in which they were made: a fringe counter that lost count, a head that was knocked.
+enum class FaultKind { reading, slip };
+std::string name(FaultKind kind);  // "reading", "slip"
 
 // Why a fit is not accepted, or what its residuals have in common.
 enum class FitFinding {
@@ -144,6 +150,28 @@ struct KnownCombination {
     double standard_uncertainty = 0.0;
 };
 
+// Which faults of one kind the readings control (reliability, W. Baarda 1968), to first order. A test finds a fault
+// with a probability of 99 % where it is 7.6 times as large as the standard uncertainty of its size; it is told from
+// another one where chi-square with that one would be larger by 25. Two faults are twins, which no size tells apart,
+// where their effects on the readings have a correlation of 0.999 and more and those on the calibration differ. Of long
+// runs the faults of evenly spaced places stand for all.
+struct FaultControl {
+    FaultKind kind;
+    std::string channel;      // "distance" (of all beams), "tilt" or "spot"
+    int count = 0;            // of controlled faults, one a place
+    int uncontrolled = 0;     // more of them, which no other reading controls
+    int twins = 0;            // those of `count` that have a twin
+    double found_from = 0.0;  // all of `count` are found from this size on; mm or rad
+    double told_from = 0.0;   // those without a twin are told from all others from this size on
+
+    // Largest of the calibrated values of one kind (mm or rad).
+    struct Effect {
+        double hidden = 0.0;  // of faults just not found; infinite: of what nothing controls
+        double shared = 0.0;  // by the size of a fault, where its twin may have been it; in mm or rad each
+    };
+    Effect positioning = {}, straightness = {}, angle = {}, squareness = {};
+};
+
 struct Adjustment {
     Calibration calibration;  // carries fit and variance factor
     std::vector<SetupEstimate> setup;
@@ -155,6 +183,7 @@ struct Adjustment {
     std::vector<KnownCombination> combinations;
     std::array<double, function_count> smoothness = {};  // deviations of second differences in force; 0: none
     Verdict verdict = {};
+    std::vector<FaultControl> reliability = {};  // if it was asked for
 
     double variance_factor() const;             // weighted_square_sum/degrees_of_freedom; 1 without freedom
     std::vector<std::size_t> outliers() const;  // into `residuals`, by their number
