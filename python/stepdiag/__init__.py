@@ -32,6 +32,7 @@ from stepdiag._core import (
     ErrorMap,
     Fault,
     FaultClass,
+    FaultControl,
     FitReason,
     FunctionModel,
     GaussianMode,
@@ -100,8 +101,9 @@ from stepdiag._core import (
     volumetric_accuracy,
     with_covariance,
     word_findings_with,
+    word_reasons_with,
 )
-from stepdiag.calibration.finding_text import undetermined_text
+from stepdiag.calibration.finding_text import reason_texts, undetermined_text
 from stepdiag.io.to_xarray import attach
 
 if TYPE_CHECKING:
@@ -132,6 +134,7 @@ if TYPE_CHECKING:
         simulate_scenario,
     )
     from stepdiag.scenario.known import Known
+    from stepdiag.scenario.provenance import provenance_of
     from stepdiag.scenario.truth import Truth
     from stepdiag.uncertainty.dask_workers import workers_of
     from stepdiag.uncertainty.model_source import ModelSource
@@ -166,6 +169,7 @@ __all__ = [
     "ExportOptions",
     "Fault",
     "FaultClass",
+    "FaultControl",
     "FinishedCells",
     "FitReason",
     "FunctionModel",
@@ -254,6 +258,7 @@ __all__ = [
     "power_inside",
     "propagate",
     "propagate_linear",
+    "provenance_of",
     "random_error_map",
     "read_calibration",
     "read_distance",
@@ -330,6 +335,7 @@ _LATER = {
         "simulate_scenario",
     ),
     "scenario.known": ("Known",),
+    "scenario.provenance": ("provenance_of",),
     "scenario.truth": ("Truth",),
     "uncertainty.dask_workers": ("workers_of",),
     "uncertainty.model_source": ("ModelSource",),
@@ -351,6 +357,7 @@ _MODULE_OF = {name: module for module, names in _LATER.items() for name in names
 
 attach()
 word_findings_with(undetermined_text)  # the extension's findings are worded here
+word_reasons_with(reason_texts)
 
 
 def __getattr__(name: str) -> Any:

@@ -69,63 +69,69 @@ FaultTests::FaultTests(const NormalEquations& equations, const BorderedFactor& f
     const std::vector<FaultHypothesis>& all = hypotheses.all();
     const Eigen::VectorXd variance = equations.reading_variances(inverse);
     c_r_c_.resize(all.size());
+    scores_.resize(all.size());
+    exact_.assign(all.size(), false);
     for (std::size_t h = 0; h < all.size(); ++h) {
         if (all[h].kind != FaultKind::reading) continue;
         const int r = *hypotheses.readings(all[h]).begin();
-        c_r_c_[h] = 1.0 - variance[r] < controlled_share ? 0.0 : weight_[r] * weight_[r] * (1.0 - variance[r]);
+        const double share = 1.0 - variance[r];
+        set(int(h), share < controlled_share ? 0.0 : weight_[r] * weight_[r] * share);
+        exact_[h] = true;
     }
     test_slips(most_solutions);
-
-    scores_.resize(all.size());
-    for (std::size_t h = 0; h < all.size(); ++h) {
-        scores_[h].standard_uncertainty = 1.0 / std::sqrt(c_r_c_[h]);
-        if (c_r_c_[h] == 0.0) continue;
-        double sum = 0.0;
-        for (const int r : hypotheses.readings(all[h])) sum += weight_[r] * residuals[r];
-        scores_[h].size = sum / c_r_c_[h];
-        scores_[h].gain = sum * scores_[h].size;
-    }
 }
 
 void FaultTests::test_slips(int most_solutions) {
     const std::vector<FaultHypothesis>& all = hypotheses_->all();
-    std::vector<int> slips;
-    for (std::size_t h = 0; h < all.size(); ++h)
-        if (all[h].kind == FaultKind::slip) slips.push_back(int(h));
-    const int count = int(slips.size());
+    // By sequence and by the axis that moved last: q goes up and down with that.
+    std::map<std::pair<int, int>, std::vector<int>> alike;
+    int count = 0;
+    for (std::size_t h = 0; h < all.size(); ++h) {
+        if (all[h].kind != FaultKind::slip) continue;
+        const ReadingSequence& sequence = hypotheses_->sequences()[all[h].sequence];
+        const int axes = equations_->problem().setups()[sequence.setup].line.moved_axes();
+        alike[{all[h].sequence, all[h].first % axes}].push_back(int(h));
+        ++count;
+    }
     const int step = std::max(1, (count + most_solutions - 1) / std::max(1, most_solutions));
-    const auto compute = [&](int h) { c_r_c_[h] = controlled(h, effect(h)); };
     std::vector<std::pair<double, int>> likely;  // minus gain: the largest comes first
-    for (int first = 0, end; first < count; first = end) {
-        end = first;
-        while (end < count && all[slips[end]].sequence == all[slips[first]].sequence) ++end;
-        for (int i = first, next; i < end; i = next) {
-            compute(slips[i]);
-            next = std::min(i + step, i + 1 < end ? end - 1 : end);
-        }
-        for (int i = first, next; i + 1 < end; i = next) {
-            next = std::min(i + step, end - 1);
-            double sum = 0.0;
-            for (const int r : hypotheses_->readings(all[slips[next]])) sum += weight_[r] * residuals_[r];
-            for (int k = next - 1; k > i; --k) {
+    for (const auto& [place, slips] : alike)
+        for (int i = 0, next, last = int(slips.size()) - 1; i <= last; i = next) {
+            next = i == last ? last + 1 : std::min(i + step, last);
+            refine(slips[i]);
+            if (i == last) break;
+            refine(slips[next]);
+            for (int k = i + 1; k < next; ++k) {
                 const double part = double(k - i) / double(next - i);
-                double& q = c_r_c_[slips[k]];
-                q = (1.0 - part) * c_r_c_[slips[i]] + part * c_r_c_[slips[next]];
-                const int* reading = hypotheses_->readings(all[slips[k]]).begin();
-                const int* later = hypotheses_->readings(all[slips[k + 1]]).begin();
-                for (; reading != later; ++reading) sum += weight_[*reading] * residuals_[*reading];
-                if (4.0 * sum * sum >= significant * q) likely.emplace_back(q > 0.0 ? -sum * sum / q : 0.0, slips[k]);
+                set(slips[k], (1.0 - part) * c_r_c_[slips[i]] + part * c_r_c_[slips[next]]);
+                if (4.0 * scores_[slips[k]].gain >= significant) likely.emplace_back(-scores_[slips[k]].gain, slips[k]);
             }
         }
-    }
     std::sort(likely.begin(), likely.end());
     if (int(likely.size()) > most_solutions) likely.resize(std::size_t(most_solutions));
-    for (const auto& [gain, h] : likely) compute(h);
+    for (const auto& [gain, h] : likely) refine(h);
 }
 
-double FaultTests::square(const FaultHypothesis& hypothesis) const {
+void FaultTests::refine(int hypothesis) {
+    if (exact_[hypothesis]) return;
+    set(hypothesis, controlled(hypothesis, effect(hypothesis)));
+    exact_[hypothesis] = true;
+}
+
+void FaultTests::set(int hypothesis, double c_r_c) {
+    c_r_c_[hypothesis] = c_r_c;
+    FaultScore& score = scores_[hypothesis];
+    score = {0.0, 1.0 / std::sqrt(c_r_c), 0.0};
+    if (c_r_c == 0.0) return;
     double sum = 0.0;
-    for (const int r : hypotheses_->readings(hypothesis)) sum += weight_[r] * weight_[r];
+    for (const int r : hypotheses_->readings(hypotheses_->all()[hypothesis])) sum += weight_[r] * residuals_[r];
+    score.size = sum / c_r_c;
+    score.gain = sum * score.size;
+}
+
+double FaultTests::square(int hypothesis) const {
+    double sum = 0.0;
+    for (const int r : hypotheses_->readings(hypotheses_->all()[hypothesis])) sum += weight_[r] * weight_[r];
     return sum;
 }
 
@@ -152,13 +158,12 @@ double FaultTests::controlled(int hypothesis, const Eigen::VectorXd& effect) con
     double q = 0.0;
     for (const int r : hypotheses_->readings(h))
         if (weight_[r] > 0.0) q += weight_[r] * (weight_[r] - equations_->row(r).product(effect));
-    return q < controlled_share * square(h) ? 0.0 : q;
+    return q < controlled_share * square(hypothesis) ? 0.0 : q;
 }
 
-std::vector<double> FaultTests::correlations(int hypothesis) const {
+std::vector<double> FaultTests::correlations(int hypothesis, const Eigen::VectorXd& effect) const {
     const std::vector<FaultHypothesis>& all = hypotheses_->all();
     std::vector<double> correlations(all.size(), 0.0);
-    const Eigen::VectorXd effect = this->effect(hypothesis);
     const double own = controlled(hypothesis, effect);
     if (own == 0.0) return correlations;
     Eigen::VectorXd shown = Eigen::VectorXd::Zero(weight_.size());  // R c

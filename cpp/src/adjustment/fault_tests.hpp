@@ -62,9 +62,9 @@ struct FaultScore {
 };
 
 // Of readings scores cost nothing, because the inverse is there; of slips a solution each. Where a run has more slips
-// than `most_solutions`, q is computed at evenly spaced ones of each sequence and interpolated between them (along a
-// line it changes by the share of one reading from one point to the next), and then computed where the gain so found
-// is above a quarter of what counts, at the `most_solutions` largest.
+// than `most_solutions`, q is computed at evenly spaced ones of each sequence and interpolated between them, for each
+// axis that moves by itself (along a line it changes slowly so), and then computed where the gain so found is above a
+// quarter of what counts, at the `most_solutions` largest. So a long run takes at most about twice as many solutions.
 class FaultTests {
 public:
     static constexpr double significant = 28.0;  // gain in chi-square
@@ -81,19 +81,22 @@ public:
 
     const FaultHypotheses& hypotheses() const { return *hypotheses_; }
     const std::vector<FaultScore>& scores() const { return scores_; }  // by hypothesis
+    void refine(int hypothesis);                                       // to the exact score, where it is not that
 
+    double square(int hypothesis) const;  // c.c
     // What a fault of size 1 that is not accounted for does to all unknowns: N^-1 J^T c.
     Eigen::VectorXd effect(int hypothesis) const;
     // Of one hypothesis with each, from one solution; 0 where nothing controls one of the two. (Where q of the other
     // one is interpolated, this is as good as that.)
-    std::vector<double> correlations(int hypothesis) const;
+    std::vector<double> correlations(int hypothesis) const { return correlations(hypothesis, effect(hypothesis)); }
+    std::vector<double> correlations(int hypothesis, const Eigen::VectorXd& effect) const;  // that has this effect
     double correlation(int h, int k) const { return correlations(h)[k]; }
 
 private:
     Eigen::VectorXd gradient(const FaultHypothesis& hypothesis) const;  // J^T c
-    double square(const FaultHypothesis& hypothesis) const;             // c.c
     double controlled(int hypothesis, const Eigen::VectorXd& effect) const;
     void test_slips(int most_solutions);
+    void set(int hypothesis, double c_r_c);
 
     const NormalEquations* equations_;
     const BorderedFactor* factor_;
@@ -102,6 +105,7 @@ private:
     Eigen::VectorXd weight_;     // by reading: 1/u, 0 where it is left out
     std::vector<double> c_r_c_;  // q, by hypothesis; 0 where nothing controls it
     std::vector<FaultScore> scores_;
+    std::vector<bool> exact_;
 };
 
 }  // namespace stepdiag

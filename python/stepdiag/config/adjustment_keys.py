@@ -83,6 +83,13 @@ class AdjustmentSection(AdjustmentKeys):
         "report: the fit is rejected; estimate: it is judged with them.",
         "report",
     )
+    scale_uncertainty: bool = key(
+        "true or false",
+        "Where the readings scatter more than stated (variance factor above 1), all stated uncertainties are "
+        "multiplied by the root of the variance factor, and the fit is doubtful at best. For noise that is larger by "
+        "one factor throughout.",
+        False,
+    )
     by_line: dict[str, AdjustmentKeys] = tables("LINE")
 
 
