@@ -141,10 +141,9 @@ def test_fault_of_a_reading_that_nothing_controls_may_do_anything() -> None:
 
 
 def test_faults_must_be_larger_where_all_noise_is() -> None:
-    scenario = parse_scenario(SMALL.replace("steps = 2", "steps = 10") + "tilt_urad = 1.0\n")
-    smaller = parse_scenario(
-        SMALL.replace("steps = 2", "steps = 10") + "[uncertainty]\ndistance_um = 0.025\ntilt_urad = 0.25\n"
-    )
+    text = SMALL.replace("steps = 2", "steps = 10")
+    scenario = parse_scenario(text + "[noise]\ndistance_um = 0.1\ntilt_urad = 1.0\nseed = 1\n")
+    smaller = parse_scenario(text + "[uncertainty]\ndistance_um = 0.025\ntilt_urad = 0.25\n")
     run = sd.simulate_scenario(scenario)
     one, other = (adjust_scenario(s, run, reliability=True) for s in (scenario, smaller))
     noise = other.variance_factor**0.5
