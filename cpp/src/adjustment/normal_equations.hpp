@@ -59,7 +59,9 @@ public:
     double square_sum(const Eigen::VectorXd& x) const;  // of residuals, priors and smoothness, not of what is usual
 
     BorderedBand matrix() const;
-    void assemble(BorderedBand& matrix) const;                 // J^T J + P
+    void assemble(BorderedBand& matrix) const;  // J^T J + P
+    // Adds what the readings' second derivatives by the set-ups make of the residuals at x, the last linearise.
+    void add_curvature(const Eigen::VectorXd& x, BorderedBand& matrix);
     Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;  // J^T w - P x
     Eigen::VectorXd product(const Eigen::VectorXd& v) const;   // (J^T J + P) v
 

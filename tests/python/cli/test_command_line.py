@@ -119,7 +119,8 @@ def test_calibration_has_the_same_bytes_when_the_truth_is_deleted(case: str, met
     assert without_truth(scenario) != scenario
     assert outcomes[0] == outcomes[1]
     # Six face diagonals are no body diagonals: the conventional method refuses them. The others contradict it, since
-    # their machines have rotations (three beams are too noisy to tell more than doubt), as a displaced position sensing device contradicts the enhanced method.
+    # their machines have rotations (three beams are too noisy to tell more than doubt), as a displaced position sensing
+    # device contradicts the enhanced method.
     if method == "conventional":
         expected = {"faces": 2, "three_beams": 0}.get(case, 3)
     else:
