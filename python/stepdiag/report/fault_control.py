@@ -81,6 +81,6 @@ def _hidden(control: FaultControl, kind: str) -> str:
 
 def _shared(control: FaultControl) -> str:
     scale = report_value(_UNITS[control.channel], 1.0)[0]
-    shares = {kind: in_report_units(kind, control.shared[kind]) / scale for kind in KINDS}
-    said = [f"{kind} {share:.2g} {REPORT_UNIT[kind]}" for kind, share in shares.items() if share > ROUNDING]
+    shares = [(kind, in_report_units(kind, control.shared[kind]) / scale) for kind in KINDS]
+    said = [f"{kind} {share:.2g} {REPORT_UNIT[kind]}" for kind, share in shares if share > ROUNDING]
     return ", ".join(said) or "nothing"
