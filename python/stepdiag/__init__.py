@@ -30,6 +30,7 @@ from stepdiag._core import (
     Environment,
     ErrorAtPoint,
     ErrorMap,
+    FaultControl,
     FitReason,
     FunctionModel,
     GaussianMode,
@@ -98,8 +99,9 @@ from stepdiag._core import (
     volumetric_accuracy,
     with_covariance,
     word_findings_with,
+    word_reasons_with,
 )
-from stepdiag.calibration.finding_text import undetermined_text
+from stepdiag.calibration.finding_text import reason_texts, undetermined_text
 from stepdiag.io.to_xarray import attach
 
 if TYPE_CHECKING:
@@ -163,6 +165,7 @@ __all__ = [
     "ErrorAtPoint",
     "ErrorMap",
     "ExportOptions",
+    "FaultControl",
     "FinishedCells",
     "FitReason",
     "FunctionModel",
@@ -350,6 +353,7 @@ _MODULE_OF = {name: module for module, names in _LATER.items() for name in names
 
 attach()
 word_findings_with(undetermined_text)  # the extension's findings are worded here
+word_reasons_with(reason_texts)
 
 
 def __getattr__(name: str) -> Any:

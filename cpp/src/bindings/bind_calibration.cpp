@@ -62,7 +62,8 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
                              const std::optional<ArrayLike>& covariance, const Tables& reversal,
                              const Arrays& reversal_negative_uncertainty, const Names& undetermined_reversal_constants,
                              const std::string& date, const std::optional<std::string>& fit,
-                             const std::optional<double>& variance_factor, const Texts& provenance) {
+                             const std::optional<double>& variance_factor, const Names& fit_reasons,
+                             const std::optional<double>& uncertainty_scaled, const Texts& provenance) {
     Calibration calibration{method, to_chain(chain), to_vector3(volume, "volume"), to_vector3(tool, "tool"), {}, {},
                             {},     undetermined};
     for (const auto& [name, table] : functions)
@@ -93,6 +94,8 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
     calibration.date = date;
     if (fit) calibration.fit = fit_of({{"fit", *fit}}, "calibration");
     calibration.variance_factor = variance_factor;
+    calibration.fit_reasons = fit_reasons;
+    calibration.uncertainty_scaled = uncertainty_scaled;
     calibration.provenance = provenance;
     check(calibration);
     return calibration;
@@ -116,6 +119,7 @@ void bind_calibration(py::module_& m) {
              py::arg("covariance") = std::nullopt, py::arg("reversal") = Tables{},
              py::arg("reversal_negative_uncertainty") = Arrays{}, py::arg("undetermined_reversal_constants") = Names{},
              py::arg("date") = "", py::arg("fit") = std::nullopt, py::arg("variance_factor") = std::nullopt,
+             py::arg("fit_reasons") = Names{}, py::arg("uncertainty_scaled") = std::nullopt,
              py::arg("provenance") = Texts{},
              "A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: "
              "name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises "
@@ -128,6 +132,10 @@ void bind_calibration(py::module_& m) {
             "controls the readings); None where it is not known.")
         .def_readonly("variance_factor", &Calibration::variance_factor,
                       "Of the fit: 1 is expected; None where nothing controls the readings, or it is not known.")
+        .def_readonly("fit_reasons", &Calibration::fit_reasons, "Why that verdict, a sentence each.")
+        .def_readonly("uncertainty_scaled", &Calibration::uncertainty_scaled,
+                      "What all uncertainties were multiplied by, beyond what follows from those of the readings "
+                      "(scale_uncertainty); None: by nothing.")
         .def_readonly("provenance", &Calibration::provenance,
                       "What it was made from, as far as it is known: program and version, SHA-256 of the run, the "
                       "scenario and the descriptions of heads, options that are not the default ones. Keys: program, "
@@ -143,6 +151,16 @@ void bind_calibration(py::module_& m) {
                 return c;
             },
             py::arg("date"), "The same calibration with this date. Raises InvalidArgument for more than one line.")
+        .def(
+            "judged",
+            [](Calibration c, const std::string& fit, const Names& reasons) {
+                c.fit = fit_of({{"fit", fit}}, "calibration");
+                c.fit_reasons = reasons;
+                check(c);
+                return c;
+            },
+            py::arg("fit"), py::arg("fit_reasons") = Names{},
+            "The same calibration with this verdict of its fit. Raises InvalidArgument for another word.")
         .def_static(
             "provenance_keys", [] { return Names(provenance_keys.begin(), provenance_keys.end()); },
             "The keys that a provenance may have.")
