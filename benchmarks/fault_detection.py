@@ -355,7 +355,7 @@ def reported(tasks: Tasks, runs: int) -> bool:
 def worst(calibration: sd.Calibration | None, machine: sd.Machine, found: str) -> list[object]:
     """Columns of the table: the value that is most u off. Good is an error below 4 u, or a verdict that says no."""
     if calibration is None:
-        return ["error", "", "", "", "", found, True]
+        return ["error", "", "", "", "", found, False]
     values = list(deviations(calibration, machine.errors))
     name, z, error, u = max(values, key=lambda value: float(np.max(np.abs(value[1]))))
     k, micro = int(np.argmax(np.abs(z))), 1e3 if kind_of(name) in ("positioning", "straightness") else 1e6
