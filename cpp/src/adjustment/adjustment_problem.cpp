@@ -45,8 +45,22 @@ double usable(const RawValue& raw, const Measurement& measurement, std::size_t r
     return raw.value;
 }
 
-bool has_tilts(const Measurement& measurement) {
-    return measurement.find("alpha") != nullptr || measurement.find("spot_x") != nullptr;
+// On all of the line's runs.
+LineReadings line_readings(const Measurement& measurement, const Line& line, const Plan& plan, int beams) {
+    const Channel* time = measurement.find("time");
+    std::vector<const Channel*> tilts;
+    for (const char* name : {"alpha", "beta", "spot_x", "spot_y"})
+        if (const Channel* channel = measurement.find(name)) tilts.push_back(channel);
+    LineReadings readings{beams > 0, time != nullptr, {}};
+    for (std::size_t row = 0; row < measurement.size(); ++row) {
+        if (!(measurement.stations()[row].line == line)) continue;
+        for (const Channel* tilt : tilts) readings.tilts = readings.tilts || tilt->value[row];
+        readings.times = readings.times && time->value[row];
+    }
+    const LateralExcursion beside = plan.lateral_excursion(line);
+    const double rounding = 1e-12 * plan.volume().norm();
+    for (int c = 0; c < 2; ++c) readings.beside[c] = beside.highest[c] - beside.lowest[c] > rounding;
+    return readings;
 }
 
 }  // namespace
@@ -87,8 +101,8 @@ void AdjustmentProblem::collect_setups(const Measurement& measurement, const Adj
             const bool scale = plan_.is_scale_line(line);
             const Eigen::Vector3d origin = planned.front().commanded + tool_ - head.standoff * frame.col(2);
             LineSetup setup{entry.first.first, line, scale, ChannelModel(kind_, head, frame, origin), {}, {}, {}};
-            setup.prior = setup_priors(options, line.name(), scale, line.moved_axes() == 1,
-                                       kind_ == HeadLayout::multi_beam || has_tilts(measurement), setup.model);
+            const LineReadings readings = line_readings(measurement, line, plan_, measurement.beam_count());
+            setup.prior = setup_priors(options, line.name(), scale, readings, setup.model);
             setup.unknown.assign(setup.prior.size(), no_unknown);
             current[line.name()] = int(setups_.size());
             setups_.push_back(std::move(setup));
@@ -128,11 +142,8 @@ void AdjustmentProblem::collect_points(const Measurement& measurement, const Adj
         check_station(measurement, row, line);
 
         const LineSetup& setup = setups_[setup_of_row_[row]];
-        // Without a reflector angle of their own the tilts of a scale line would be taken for the machine's.
-        const bool distance_only =
-            setup.is_scale_line && kind_ != HeadLayout::multi_beam && setup.prior[setup::reflector] == fixed_unknown;
         AdjustedPoint point{setup_of_row_[row], {no_unknown, no_unknown, no_unknown}, {}, int(readings_.size()), 0};
-        for (int c = 0; c < int(names.size()) && !(distance_only && c > 0); ++c)
+        for (int c = 0; c < int(names.size()); ++c)
             if (const auto raw =
                     raw_value(measurement.find(names[c]), row, usual_uncertainty(options.uncertainty, names[c])))
                 readings_.push_back({row, c, usable(*raw, measurement, row, names[c]), raw->standard_uncertainty});

@@ -56,7 +56,7 @@ struct SetupQuantityRecord {
 // clang-format off
 inline constexpr std::array<SetupQuantityRecord, setup_quantity_count> setup_quantities = {{
     {"reflector", "reflector_urad", "reflector", "reflector", "rad", "urad",
-     "tilt (a, b) of the mirror about local x and y", free_unknown, fixed_unknown, "ab", {}, false, free_unknown, 2e-3},
+     "tilt (a, b) of the mirror about local x and y", free_unknown, 2e-3, "ab", {}, false, free_unknown, 2e-3},
     {"laser", "laser_urad", "laser", "laser", "rad", "urad",
      "tilt (a, b) of the beam and the sensor's axes", free_unknown, 500e-6, "ab", {}, false, free_unknown, 2e-3},
     {"distance_constant", "distance_constant_mm", "distance constant", "constant", "mm", "um",
@@ -68,9 +68,9 @@ inline constexpr std::array<SetupQuantityRecord, setup_quantity_count> setup_qua
     {"lateral", "lateral_mm", "lateral", "lateral", "mm", "mm",
      "the beam's origin beside its nominal place, along local x and y", 1.0, 1.0, "xy", {}, false, 1e3},
     {"roll", "roll_urad", "roll", "roll", "rad", "urad",
-     "roll of the head about its beam", 20e-3, fixed_unknown, "", {}, false, 1.0},
+     "roll of the head about its beam", 20e-3, 20e-3, "", {}, false, 1.0},
     {"gain", "gain", "gain", "gain", "1", "ppm",
-     "tilts (spots; the beams' offsets) read 1 + gain times themselves", 0.01, fixed_unknown, "", {}, false, 1.0},
+     "tilts (spots; the beams' offsets) read 1 + gain times themselves", 0.01, 0.01, "", {}, false, 1.0},
     {"drift", "drift_um_per_h", "drift", "drift", "mm s-1", "um_per_h",
      "what distances read too much for every hour since the set-up's first reading", fixed_unknown, fixed_unknown},
     {"scale_length", "scale_um", "scale length", "scale length", "mm", "um",
