@@ -46,16 +46,16 @@ double usable(const RawValue& raw, const Measurement& measurement, std::size_t r
 }
 
 // On all of the line's runs.
-LineReadings line_readings(const Measurement& measurement, const Line& line, const Plan& plan, int beams) {
+LineReadings line_readings(const Measurement& measurement, const Line& line, const Plan& plan) {
     const Channel* time = measurement.find("time");
     std::vector<const Channel*> tilts;
     for (const char* name : {"alpha", "beta", "spot_x", "spot_y"})
         if (const Channel* channel = measurement.find(name)) tilts.push_back(channel);
-    LineReadings readings{beams > 0, time != nullptr, {}};
+    LineReadings readings{measurement.beam_count() > 0, time != nullptr, {}};
     for (std::size_t row = 0; row < measurement.size(); ++row) {
         if (!(measurement.stations()[row].line == line)) continue;
-        for (const Channel* tilt : tilts) readings.tilts = readings.tilts || tilt->value[row];
-        readings.times = readings.times && time->value[row];
+        for (const Channel* tilt : tilts) readings.tilts = readings.tilts || tilt->value[row].has_value();
+        readings.times = readings.times && time->value[row].has_value();
     }
     const LateralExcursion beside = plan.lateral_excursion(line);
     const double rounding = 1e-12 * plan.volume().norm();
@@ -89,6 +89,7 @@ AdjustmentProblem::AdjustmentProblem(const Measurement& measurement, const Plan&
 void AdjustmentProblem::collect_setups(const Measurement& measurement, const AdjustmentOptions& options) {
     setup_of_row_.resize(measurement.size());
     std::map<std::string, int> current;  // set-up by line
+    std::map<std::string, LineReadings> told;
     for (const auto& entry : rows_by_pass(measurement)) {
         const std::vector<std::size_t>& rows = entry.second;
         const Line line = measurement.stations()[rows.front()].line;
@@ -101,8 +102,10 @@ void AdjustmentProblem::collect_setups(const Measurement& measurement, const Adj
             const bool scale = plan_.is_scale_line(line);
             const Eigen::Vector3d origin = planned.front().commanded + tool_ - head.standoff * frame.col(2);
             LineSetup setup{entry.first.first, line, scale, ChannelModel(kind_, head, frame, origin), {}, {}, {}};
-            const LineReadings readings = line_readings(measurement, line, plan_, measurement.beam_count());
-            setup.prior = setup_priors(options, line.name(), scale, readings, setup.model);
+            auto readings = told.find(line.name());
+            if (readings == told.end())
+                readings = told.emplace(line.name(), line_readings(measurement, line, plan_)).first;
+            setup.prior = setup_priors(options, line.name(), scale, readings->second, setup.model);
             setup.unknown.assign(setup.prior.size(), no_unknown);
             current[line.name()] = int(setups_.size());
             setups_.push_back(std::move(setup));

@@ -17,6 +17,7 @@ namespace stepdiag {
 using PriorUncertainty = double;
 inline constexpr PriorUncertainty free_unknown = std::numeric_limits<double>::infinity();
 inline constexpr PriorUncertainty fixed_unknown = 0.0;
+inline constexpr PriorUncertainty usual_drift = 5e-3 / 3600.0;  // mm/s: 5 um/h
 
 enum class SetupQuantity {
     reflector,          // (a, b): mirror normal R_tool F Exp(a, b, 0) z
@@ -43,7 +44,8 @@ struct SetupQuantityRecord {
     std::string_view unit;         // of the library
     std::string_view report_unit;  // as in keys
     std::string_view meaning;
-    // What an adjustment takes it for by default, on measured lines and on scale lines.
+    // What an adjustment takes it for by default, on measured lines and on scale lines. A drift is fixed where readings
+    // of the line have no time; the angles are fixed on a scale line that has no tilts.
     PriorUncertainty prior, scale_line_prior;
     std::string_view components = {};       // a letter each; empty: a single one without a letter
     std::optional<HeadLayout> layout = {};  // the only one that has it
@@ -72,7 +74,7 @@ inline constexpr std::array<SetupQuantityRecord, setup_quantity_count> setup_qua
     {"gain", "gain", "gain", "gain", "1", "ppm",
      "tilts (spots; the beams' offsets) read 1 + gain times themselves", 0.01, 0.01, "", {}, false, 1.0},
     {"drift", "drift_um_per_h", "drift", "drift", "mm s-1", "um_per_h",
-     "what distances read too much for every hour since the set-up's first reading", fixed_unknown, fixed_unknown},
+     "what distances read too much for every hour since the set-up's first reading", usual_drift, usual_drift},
     {"scale_length", "scale_um", "scale length", "scale length", "mm", "um",
      "what the distances of the line's last point read too much", fixed_unknown, fixed_unknown},
     {"scale_factor", "scale_ppm", "scale factor", "scale factor", "1", "ppm",
