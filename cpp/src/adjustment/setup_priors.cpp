@@ -89,6 +89,10 @@ std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, con
         if (tilts_tell || is_scale_line) error.add(beside ? CosineError{} : tilt_known(laser, mirror));
         else error.add(tilt_unknown(laser));
     }
+    if (is_scale_line && tilts_tell && std::isinf(mirror)) {
+        error.add({0.0, readings.tilt * readings.tilt * laser * laser});
+        priors[setup::laser] = priors[setup::laser + 1] = fixed_unknown;
+    }
     priors[setup::scale_factor] = error.root_mean_square();
     return priors;
 }

@@ -56,11 +56,10 @@ class AdjustmentSection(AdjustmentKeys):
     That is "free", "fixed" at 0, or a number: the standard uncertainty with which it is known to be 0. (Lateral
     offset, roll and gain act on tilts only; "free" is for them 1 m, 1 rad and 1.)
     `[adjustment.LINE]` replaces, for one line, the keys it names. Scale lines take `reflector_urad` and `laser_urad`
-    from a table of their own only: by default their laser stands along the axis to 500, never "free", and their
-    mirror square to it to 2000. Tilts tell the difference of both; what they leave open acts by its square, as an error
-    of the distances by their travel, which is in the uncertainties. So it does on single axes, on faces, where
-    distances alone are read and where beams have constants; there an angle that is "free" counts as known to
-    2000."""
+    from a table of their own only: by default their mirror is free, and their laser stands along the axis to 500 (never
+    "free"). Tilts tell the difference of both; what they leave open acts by its square, as an error of the distances by
+    their travel, which is in the uncertainties. So it does on single axes, on faces, where distances alone are read and
+    where beams have constants; there an angle that is "free" counts as known to 2000."""
 
     angles: Literal["free", "fixed"] = key(
         '"free" or "fixed"', "Rotations of the machine's axes; fixed: it has none.", "free"

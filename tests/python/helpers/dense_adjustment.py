@@ -45,8 +45,8 @@ def default(scenario: reference.Scenario, knowledge: Knowledge, line: str, quant
     is_scale = line in scenario.scale_lines
     if quantity == "laser" and scenario.layout == "multi_beam" and not is_scale:
         return "free" if deviation(scenario, knowledge, line, "beam_constants") == 0 else 2e-3
-    if is_scale and quantity in ("reflector", "laser"):
-        return 2e-3 if quantity == "reflector" else 500e-6
+    if is_scale and quantity == "laser":
+        return 500e-6
     return {"lateral": 1.0, "roll": 0.02, "gain": 0.01, "drift": 5e-3 / 3600}.get(quantity, "free")
 
 
@@ -135,6 +135,8 @@ class DenseAdjustment:
             return self.cosine_prior(line)
         if quantity == "drift" and knowledge_says_nothing(self.knowledge, line, quantity) and not self.has_times(line):
             return 0.0
+        if self.is_scale(line) and quantity == "laser" and self.mirror_is_free(line):
+            return 0.0  # what it does is a cosine error
         if self.is_scale(line) and not self.tilts_tell(line):
             if quantity in ("reflector", "laser", "psd_zero"):
                 return 0.0  # square to each other; what the laser's angle does is a cosine error
@@ -156,6 +158,9 @@ class DenseAdjustment:
     def tilts_tell(self, line: str) -> bool:
         beams = deviation(self.scenario, self.knowledge, line, "beam_constants")
         return self.has_tilts(line) and not (self.scenario.layout == "multi_beam" and beams > 0)
+
+    def mirror_is_free(self, line: str) -> bool:
+        return bool(np.isinf(deviation(self.scenario, self.knowledge, line, "reflector")))
 
     def cosine_prior(self, line: str) -> float:
         """Root mean square of what the squares of unknown angles do to a distance, by travel.

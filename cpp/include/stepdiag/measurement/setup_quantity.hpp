@@ -58,7 +58,7 @@ struct SetupQuantityRecord {
 // clang-format off
 inline constexpr std::array<SetupQuantityRecord, setup_quantity_count> setup_quantities = {{
     {"reflector", "reflector_urad", "reflector", "reflector", "rad", "urad",
-     "tilt (a, b) of the mirror about local x and y", free_unknown, 2e-3, "ab", {}, false, free_unknown, 2e-3},
+     "tilt (a, b) of the mirror about local x and y", free_unknown, free_unknown, "ab", {}, false, free_unknown, 2e-3},
     {"laser", "laser_urad", "laser", "laser", "rad", "urad",
      "tilt (a, b) of the beam and the sensor's axes", free_unknown, 500e-6, "ab", {}, false, free_unknown, 2e-3},
     {"distance_constant", "distance_constant_mm", "distance constant", "constant", "mm", "um",
