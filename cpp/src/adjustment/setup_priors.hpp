@@ -23,9 +23,9 @@ struct LineReadings {
 // two directions across the line. Tilts tell D; points beside the line tell m. Where they do not, the adjustment
 // linearises at what the priors say of them, and the column scale_factor takes what is left: the root mean square of
 // the second order of what remains unknown. A free mirror on a scale line takes D, and the laser's angles are fixed
-// there: what they do to first order, D times their uncertainty, is in the scale_factor too. (As unknowns, whose squares
-// act on lengths, they would let a wrong length bend the solution.) Throws InvalidArgument for a negative prior, and for a free laser on a
-// scale line.
+// there: what they do to first order, D times their uncertainty, is in the scale_factor too. (As unknowns, whose
+// squares act on lengths, they would let a wrong length bend the solution.) Throws InvalidArgument for a negative
+// prior, and for a free laser on a scale line.
 std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, const std::string& line,
                                            bool is_scale_line, const LineReadings& readings, const ChannelModel& model);
 

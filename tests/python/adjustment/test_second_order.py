@@ -106,7 +106,7 @@ def test_without_tilts_the_mirror_of_a_scale_line_is_taken_to_be_square_to_the_b
     adjustment = adjusted(run, plan)
     assert not {s.quantity for s in adjustment.setup if s.line in SCALE_LINES} & {"reflector", "laser", "roll", "gain"}
     _, u = scale_of(adjustment, 1, "X")
-    assert u == pytest.approx(np.hypot(np.sqrt(2) * 500e-6**2, 1e-4 * np.sqrt(2) / VOLUME[0]), rel=0.02)
+    assert u == pytest.approx(np.hypot(np.sqrt(2) * 500e-6**2, 1e-4 * np.sqrt(2) / VOLUME[0]), rel=0.05)
 
 
 def test_tilts_of_aligned_scale_lines_narrow_what_they_tell_and_no_more() -> None:

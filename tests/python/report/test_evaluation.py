@@ -100,7 +100,9 @@ def test_scale_lines_have_a_word_on_their_cosine_error(tmp_path: Path, capsys: p
     run = simulated(tmp_path, NOISY)
     own = "[adjustment.p00]\nlaser_urad = 1000.0\n[adjustment.0p0]\nreflector_urad = 500.0\n"
     said = report(tmp_path, capsys, NOISY + own, run)
-    assert "scale lines p00: a laser that stands along the axis to 1000 µrad reads too short, never too long, by 1" in said
+    assert (
+        "scale lines p00: a laser that stands along the axis to 1000 µrad reads too short, never too long, by 1" in said
+    )
     assert "scale lines 00p: a laser that stands along the axis to 500 µrad" in said
     # Both known to 500 urad: a tilt leaves half of the variance.
     assert "0p0: a laser that stands along the axis to 500 µrad, the mirror square to it to 500 µrad" in said

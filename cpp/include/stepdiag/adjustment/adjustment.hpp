@@ -19,10 +19,10 @@
 namespace stepdiag {
 
 // By SetupQuantity (measurement/setup_quantity.hpp); none: the table's default, but a laser on a measured line is known
-// to 2000 urad where the constants of the layout's beams are not fixed, and a drift is fixed where a reading of its line
-// has no time. A lateral offset, roll or gain acts by the tilts only, which are 0 on a perfect machine: free means known
-// to 1 m, 1 rad, 1, and one whose uncertainty stays above half of that is not determined. What is said of all lines
-// reaches scale lines but for the angles of reflector and laser, which are said by their own names.
+// to 2000 urad where the constants of the layout's beams are not fixed, and a drift is fixed where a reading of its
+// line has no time. A lateral offset, roll or gain acts by the tilts only, which are 0 on a perfect machine: free means
+// known to 1 m, 1 rad, 1, and one whose uncertainty stays above half of that is not determined. What is said of all
+// lines reaches scale lines but for the angles of reflector and laser, which are said by their own names.
 //
 // With D = reflector - laser, the angle that a tilt reads, and m, the reflector's angle to the line, distances read
 // travel (3/2 D^2 - m^2/2) too much, in each direction across the line. Where no point stands beside the line in that
@@ -143,9 +143,9 @@ struct Adjustment {
     std::vector<std::size_t> outliers() const;  // into `residuals`, by their number
 };
 
-// Throws InvalidArgument for readings that do not belong to the plan, channels that do not fit the head, a drift that is
-// not fixed without times, options that make no sense, where nothing at all can be determined, or for a result that is not
-// plausible.
+// Throws InvalidArgument for readings that do not belong to the plan, channels that do not fit the head, a drift that
+// is not fixed without times, options that make no sense, where nothing at all can be determined, or for a result that
+// is not plausible.
 Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
                   const HeadCalibrations& heads, const AdjustmentOptions& options = {});
 
