@@ -30,6 +30,7 @@ from stepdiag._core import (
     Environment,
     ErrorAtPoint,
     ErrorMap,
+    FaultControl,
     FitReason,
     FunctionModel,
     GaussianMode,
@@ -98,8 +99,9 @@ from stepdiag._core import (
     volumetric_accuracy,
     with_covariance,
     word_findings_with,
+    word_reasons_with,
 )
-from stepdiag.calibration.finding_text import undetermined_text
+from stepdiag.calibration.finding_text import reason_texts, undetermined_text
 from stepdiag.io.to_xarray import attach
 
 if TYPE_CHECKING:
@@ -130,6 +132,7 @@ if TYPE_CHECKING:
         simulate_scenario,
     )
     from stepdiag.scenario.known import Known
+    from stepdiag.scenario.provenance import provenance_of
     from stepdiag.scenario.truth import Truth
     from stepdiag.uncertainty.dask_workers import workers_of
     from stepdiag.uncertainty.model_source import ModelSource
@@ -162,6 +165,7 @@ __all__ = [
     "ErrorAtPoint",
     "ErrorMap",
     "ExportOptions",
+    "FaultControl",
     "FinishedCells",
     "FitReason",
     "FunctionModel",
@@ -250,6 +254,7 @@ __all__ = [
     "power_inside",
     "propagate",
     "propagate_linear",
+    "provenance_of",
     "random_error_map",
     "read_calibration",
     "read_distance",
@@ -326,6 +331,7 @@ _LATER = {
         "simulate_scenario",
     ),
     "scenario.known": ("Known",),
+    "scenario.provenance": ("provenance_of",),
     "scenario.truth": ("Truth",),
     "uncertainty.dask_workers": ("workers_of",),
     "uncertainty.model_source": ("ModelSource",),
@@ -347,6 +353,7 @@ _MODULE_OF = {name: module for module, names in _LATER.items() for name in names
 
 attach()
 word_findings_with(undetermined_text)  # the extension's findings are worded here
+word_reasons_with(reason_texts)
 
 
 def __getattr__(name: str) -> Any:

@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'uncertain_quantities', 'volumetric_accuracy', 'with_covariance', 'word_findings_with']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FaultControl', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'uncertain_quantities', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -937,13 +937,22 @@ class Calibration:
     """
     The 21 parameters as far as the readings determine them, with standard uncertainties; native units (mm, rad).
     """
-    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    @staticmethod
+    def provenance_keys() -> list[str]:
+        """
+        The keys that a provenance may have.
+        """
+    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None, provenance: collections.abc.Mapping[str, str] = {}) -> None:
         """
         A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises InvalidArgument naming the parameter for what is none: nodes that do not ascend, values that are not finite, a covariance that is not one of these values.
         """
     def dated(self, date: str) -> Calibration:
         """
         The same calibration with this date. Raises InvalidArgument for more than one line.
+        """
+    def judged(self, fit: str, fit_reasons: collections.abc.Sequence[str] = []) -> Calibration:
+        """
+        The same calibration with this verdict of its fit. Raises InvalidArgument for another word.
         """
     def to_error_map(self) -> ErrorMap:
         """
@@ -952,6 +961,10 @@ class Calibration:
     def to_xarray(self) -> xarray.Dataset:
         """
         The calibration as a labelled table (xarray.Dataset).
+        """
+    def with_provenance(self, provenance: collections.abc.Mapping[str, str]) -> Calibration:
+        """
+        The same calibration with this provenance, by the keys of the property. Raises InvalidArgument for other keys, and for texts that are empty or of more than one line.
         """
     def write(self, path: str | os.PathLike[str]) -> None:
         """
@@ -986,6 +999,11 @@ class Calibration:
         Verdict of the fit: "accepted", "doubtful", "rejected" (not to be used) or "unchecked" (nothing controls the readings); None where it is not known.
         """
     @property
+    def fit_reasons(self) -> list[str]:
+        """
+        Why that verdict, a sentence each.
+        """
+    @property
     def functions(self) -> dict[str, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]]:
         """
         name -> (position, value, standard uncertainty); what is not determined is absent.
@@ -997,6 +1015,11 @@ class Calibration:
     def negative_functions(self) -> dict[str, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]]:
         """
         name -> (position, value, standard uncertainty) of functions approached in - direction, which are functions - reversal.
+        """
+    @property
+    def provenance(self) -> dict[str, str]:
+        """
+        What it was made from, as far as it is known: program and version, SHA-256 of the run, the scenario and the descriptions of heads, options that are not the default ones. Keys: program, run_sha256, scenario_sha256, heads_sha256, options.
         """
     @property
     def reversal(self) -> dict[str, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]]:
@@ -1016,6 +1039,11 @@ class Calibration:
     @property
     def tool(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
+    @property
+    def uncertainty_scaled(self) -> float | None:
+        """
+        What all uncertainties were multiplied by, beyond what follows from those of the readings (scale_uncertainty); None: by nothing.
+        """
     @property
     def undetermined(self) -> list[str]:
         """
@@ -1064,9 +1092,9 @@ class Smoothness:
         ...
 class AdjustmentOptions:
     """
-    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of any false alarm in a run; 0: no reading is left out. plausible: what a machine can be.
+    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of any false alarm in a run; 0: no reading is left out. scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best. plausible: what a machine can be. reliability: also which faults the readings control.
     """
-    def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.01, full_covariance: bool = False, plausible: PlausibleLimits = ...) -> None:
+    def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.01, scale_uncertainty: bool = False, full_covariance: bool = False, plausible: PlausibleLimits = ..., reliability: bool = False) -> None:
         """
         adjust() checks them.
         """
@@ -1083,10 +1111,16 @@ class AdjustmentOptions:
     def plausible(self) -> PlausibleLimits:
         ...
     @property
+    def reliability(self) -> bool:
+        ...
+    @property
     def reversal(self) -> bool:
         ...
     @property
     def rotations(self) -> bool:
+        ...
+    @property
+    def scale_uncertainty(self) -> bool:
         ...
     @property
     def setup(self) -> SetupPriors:
@@ -1172,12 +1206,22 @@ class Outlier:
         ...
 class FitReason:
     """
-    Why a fit is not accepted.
+    Why a fit is not accepted, or what its residuals have in common.
     """
+    @property
+    def alternative(self) -> bool:
+        """
+        Of a trend: it is there instead of the one before; the readings do not tell which.
+        """
+    @property
+    def aspect(self) -> str:
+        """
+        Of an uneven misfit "second_half" of the run or "far_half" of the lines; of a trend what it runs with: "time" (the order of the rows, where there is no time), "position" along the line, "time_or_position", which are alike in this run; else empty.
+        """
     @property
     def channel(self) -> str:
         """
-        Of an uneven misfit; of a prior the set-up quantity; else empty.
+        Of an uneven misfit or a trend; empty: all. Of a prior the set-up quantity.
         """
     @property
     def component(self) -> int:
@@ -1187,7 +1231,7 @@ class FitReason:
     @property
     def finding(self) -> str:
         """
-        "no_redundancy"; "noise_factor": root of the variance factor; "misfit", "no_misfit": probability of one so large, or so small; "uneven_misfit": noise factor of one line or channel, and as the limit that of the others; "prior": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2).
+        "no_redundancy"; "noise_factor", "misfit", "no_misfit": root of the variance factor, not credible, or larger or smaller than chance explains; "uneven_misfit": noise factor of one group of readings, and as the limit that of the others; "trend": what residuals of one channel run by, from the first reading to the last (mm or rad); "prior": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); "scaled": what the uncertainties were multiplied by.
         """
     @property
     def limit(self) -> float:
@@ -1195,7 +1239,17 @@ class FitReason:
     @property
     def line(self) -> str:
         """
-        Of an uneven misfit or a prior; else empty.
+        Of an uneven misfit, a trend or a prior; empty: all.
+        """
+    @property
+    def run(self) -> int:
+        """
+        Of an uneven misfit: the run; -1: all.
+        """
+    @property
+    def standard_uncertainty(self) -> float:
+        """
+        Of the value of a misfit, no_misfit, trend, scaled; else 0.
         """
     @property
     def value(self) -> float:
@@ -1244,6 +1298,55 @@ class KnownCombination:
         """
         rad; of slopes mm/mm.
         """
+class FaultControl:
+    """
+    Which faults of one kind the readings control (reliability, W. Baarda 1968). One is found with a probability of 99 % where it is 7.6 times as large as the standard uncertainty of its size, and told from another one where that makes chi-square larger by 25. Twins are not told apart at any size: their effects have a correlation of 0.999 and more, but the calibration differs.
+    """
+    @property
+    def channel(self) -> str:
+        """
+        "distance", "tilt" or "spot".
+        """
+    @property
+    def count(self) -> int:
+        """
+        Of controlled faults, one a place (of long runs: evenly spaced).
+        """
+    @property
+    def found_from(self) -> float:
+        """
+        All of `count` are found from here on; mm or rad.
+        """
+    @property
+    def hidden(self) -> dict[str, float]:
+        """
+        Kind of parameter -> largest effect of a fault just not found, mm or rad; infinite: of one that nothing controls.
+        """
+    @property
+    def kind(self) -> str:
+        """
+        "reading", or "slip": an offset of its channel from a reading on.
+        """
+    @property
+    def shared(self) -> dict[str, float]:
+        """
+        Kind of parameter -> by how much it differs, by the size of a fault, if its twin was it; in mm or rad each.
+        """
+    @property
+    def told_from(self) -> float:
+        """
+        Those without a twin are told from all others from here on; mm or rad.
+        """
+    @property
+    def twins(self) -> int:
+        """
+        Those of `count` that have a twin.
+        """
+    @property
+    def uncontrolled(self) -> int:
+        """
+        More of them, which no other reading controls.
+        """
 class Adjustment:
     """
     What an adjustment found: calibration, set-ups, and how the readings fit.
@@ -1279,6 +1382,11 @@ class Adjustment:
     def redundancy(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
         """
         channel -> (n,): 0 where nothing controls a reading, 1 where all others know it better.
+        """
+    @property
+    def reliability(self) -> list[FaultControl]:
+        """
+        If it was asked for.
         """
     @property
     def residuals(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
@@ -1329,7 +1437,7 @@ class BatchEvaluator:
     """
     def __init__(self, pattern: Measurement, plan: Plan, heads: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'enhanced', options: AdjustmentOptions | None = None, **kwargs: typing.Any) -> None:
         """
-        pattern: a run whose readings are there; lost ones are not used in any set. method: "conventional", "enhanced", "adjustment" (each set converged to 1e-4 of its values' standard uncertainties, without a search for outliers) or "one_step" (the pattern's values plus gain times what differs: off by terms of second order). The options are AdjustmentOptions, or its fields by name; linear methods take the uncertainty alone. Raises InvalidArgument.
+        pattern: a run whose readings are there; lost ones are not used in any set. method: "conventional", "enhanced", "adjustment" (each set converged to 1e-4 of its values' standard uncertainties, without a search for outliers) or "one_step" (the pattern's values plus gain times what differs: off by terms of second order). The options are AdjustmentOptions, or its fields by name: full_covariance and plausible concern the pattern alone, an outlier_probability other than 0 or the default and scale_uncertainty are refused; linear methods take the uncertainty alone. Raises InvalidArgument.
         """
     def evaluate(self, readings: numpy.typing.ArrayLike, threads: typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -1955,7 +2063,7 @@ class VirtualCalibrations(SampleModel):
     """
     def __init__(self, machine: Machine, plan: Plan, heads: Head | collections.abc.Mapping[str, Head], inputs: UncertainInputs, *, calibration_heads: Head | collections.abc.Mapping[str, Head] | None = None, method: str = 'enhanced', seed: typing.SupportsIndex = 0, derived: collections.abc.Sequence[DerivedOutput] = [], simulation: SimulationOptions | None = None, adjustment: AdjustmentOptions | None = None, **kwargs: typing.Any) -> None:
         """
-        simulation: SimulationOptions as of simulate(); of their noise nothing is used, it is among the inputs. calibration_heads: what the evaluation knows the heads as (none: the heads). method: "conventional", "enhanced", "adjustment" or "one_step". adjustment: AdjustmentOptions as of adjust(); linear methods take the uncertainty alone. The fields of both may be given by name instead. verified_share: of the samples, in each of which one reading of every line is traced again. derived: as derived_at_point gives them, or (name, unit, coefficients of the values of the tables). Raises InvalidArgument.
+        simulation: SimulationOptions as of simulate(); of their noise nothing is used, it is among the inputs. calibration_heads: what the evaluation knows the heads as (none: the heads). method: "conventional", "enhanced", "adjustment" or "one_step". adjustment: AdjustmentOptions as of BatchEvaluator. The fields of both may be given by name instead. verified_share: of the samples, in each of which one reading of every line is traced again. derived: as derived_at_point gives them, or (name, unit, coefficients of the values of the tables). Raises InvalidArgument.
         """
     def evaluate_at(self, deviations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -2133,7 +2241,7 @@ class Compensator:
     """
     def __init__(self, table: str | os.PathLike[str] | Calibration | ErrorMap, chain: Chain | str, *, origin: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), outside: str = 'hold', margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, largest_correction: typing.SupportsFloat | typing.SupportsIndex = 1.0, approach: str = 'mean', largest_tool: typing.SupportsFloat | typing.SupportsIndex = 1000.0, accept_rejected: bool = False) -> None:
         """
-        table: a file, a Calibration or an ErrorMap that carries chain, volume and tool. chain: the controller's. origin: home in the controller's coordinates. outside the calibrated volume: "hold" the error of its nearest point, go on "linear" up to `margin`, or "refuse". largest_correction: command and forward shorten a longer error to this length. approach: "mean", "positive" or "negative", of a table with reversal. accept_rejected: take a table whose fit was rejected. Raises InvalidArgument for a table or options that a controller should not use.
+        table: a file, a Calibration or an ErrorMap that carries chain, volume and tool. chain: the controller's. origin: home in the controller's coordinates. outside the calibrated volume: "hold" the error of its nearest point, go on "linear" up to `margin`, or "refuse". largest_correction: command and forward shorten a longer error to this length. approach: "mean", "positive" or "negative", of a table with reversal. accept_rejected: take a table whose fit was rejected. Warns (UserWarning) of a fit that is not accepted. Raises InvalidArgument for a table or options that a controller should not use.
         """
     def command(self, targets: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -2348,6 +2456,10 @@ def with_covariance(calibration: Calibration, covariance: numpy.typing.ArrayLike
 def word_findings_with(words: collections.abc.Callable[[Undetermined], str]) -> None:
     """
     Sets the function that makes a sentence of an Undetermined; the package does so.
+    """
+def word_reasons_with(words: collections.abc.Callable[[list[FitReason]], collections.abc.Sequence[str]]) -> None:
+    """
+    Sets the function that makes sentences of the reasons of a verdict; the package does so.
     """
 __version__: str = '0.1.0'
 adjusted_quantity_count: int = 9

@@ -38,8 +38,10 @@ def test_readme_has_the_report_of_the_example(tmp_path: Path) -> None:
 def test_method_page_has_the_tables_of_the_examples() -> None:
     page = (EXAMPLES.parent / "docs" / "method.md").read_text(encoding="utf-8")
     assert output_of(EXAMPLES / "variants.py") in page
-    table = output_of("-m", "stepdiag.cli", "observe", EXAMPLES / "scenario.toml").split("mirror that they take:\n")[1]
-    assert table in page
+    said = output_of("-m", "stepdiag.cli", "observe", EXAMPLES / "scenario.toml")
+    faults, by_steps = said.split("faults that the readings control")[1].split("largest standard uncertainties by")
+    assert f"faults that the readings control{faults}" in page
+    assert by_steps.split("mirror that they take:\n")[1] in page
 
 
 def test_own_measurement_goes_from_files_to_a_table(tmp_path: Path) -> None:

@@ -82,6 +82,12 @@ def test_options_and_fields_together_are_refused(call: Callable[..., Any], optio
         call(no_such_field=1)
 
 
+@pytest.mark.parametrize("field", [{"outlier_probability": 0.02}, {"scale_uncertainty": True}])
+def test_what_many_sets_of_readings_cannot_have_is_refused(field: dict[str, Any]) -> None:
+    (name,) = field
+    refused(sd.BatchEvaluator, run(), PLAN, HEAD, CHAIN, method="adjustment", names=f"{name}: expected", **field)
+
+
 def test_fields_are_those_that_were_given_and_defaults_those_of_the_verbs() -> None:
     options = sd.AdjustmentOptions(**ADJUSTMENT)
     for name in ("rotations", "outlier_probability", "full_covariance"):

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <unsupported/Eigen/SpecialFunctions>
 
 #include "adjustment/adjustment_result.hpp"
 #include "adjustment/outlier_search.hpp"
+#include "adjustment/reliability.hpp"
 #include "adjustment/smoothness.hpp"
 #include "adjustment/verdict.hpp"
+#include "evaluation/fit_test.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -103,9 +104,11 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     result.weighted_square_sum = solver.equations().square_sum(x);
     result.degrees_of_freedom = degrees_of_freedom(solver);
     if (result.degrees_of_freedom > 0)
-        result.chi_square_probability =
-            Eigen::numext::igammac(0.5 * result.degrees_of_freedom, 0.5 * result.weighted_square_sum);
-    result.verdict = judge(result, measurement);
+        result.chi_square_probability = chi_square_probability(result.weighted_square_sum, result.degrees_of_freedom);
+    result.verdict = judge(result, residual_patterns(result, measurement, solver.equations(), solver.factor()));
+    if (options.reliability)
+        result.reliability = reliability(solver, inverse, forms, std::sqrt(std::max(1.0, result.variance_factor())));
+    if (options.scale_uncertainty) scale_uncertainties(result);
     result.calibration.fit = result.verdict.fit;
     if (result.degrees_of_freedom > 0) result.calibration.variance_factor = result.variance_factor();
     return result;

@@ -151,32 +151,22 @@ std::vector<ReadingResidual> reading_residuals(const NormalEquations& equations,
     const AdjustmentProblem& problem = equations.problem();
     std::vector<ReadingResidual> residuals;
     residuals.reserve(problem.readings().size());
-    Eigen::MatrixXd covariance;
-    Eigen::VectorXd image;
-    for (const AdjustedPoint& point : problem.points()) {
-        equations.gather(point, inverse, covariance);
-        for (int r = point.first_reading; r < point.end_reading; ++r) {
-            const AdjustedReading& reading = problem.readings()[r];
-            const auto row = equations.row(point, r);
-            const Eigen::Map<const Eigen::VectorXd> derivative(row.derivative, row.size);
-            image.noalias() = covariance * derivative;
-            const double share = derivative.dot(image);  // in units of the reading's own variance
-            const double weighted = equations.residuals()[r];
-            ReadingResidual residual{reading.row,
-                                     problem.channel_name(reading),
-                                     weighted * reading.standard_uncertainty,
-                                     0.0,
-                                     0.0,
-                                     reading.outlier,
-                                     reading.suspect};
-            residual.redundancy = reading.used() ? std::max(0.0, 1.0 - share) : 1.0 / (1.0 + share);
-            // Below this a residual is rounding.
-            constexpr double controlled = 1e-8;
-            if (reading.used() && residual.redundancy < controlled) residual.redundancy = 0.0;
-            else if (reading.used()) residual.normalised = weighted / std::sqrt(residual.redundancy);
-            else residual.normalised = weighted * std::sqrt(residual.redundancy);
-            residuals.push_back(residual);
-        }
+    const Eigen::VectorXd variances = equations.reading_variances(inverse);
+    for (std::size_t r = 0; r < problem.readings().size(); ++r) {
+        const AdjustedReading& reading = problem.readings()[r];
+        const double share = variances[r], weighted = equations.residuals()[r];
+        ReadingResidual residual{reading.row,
+                                 problem.channel_name(reading),
+                                 weighted * reading.standard_uncertainty,
+                                 0.0,
+                                 0.0,
+                                 reading.outlier,
+                                 reading.suspect};
+        residual.redundancy = reading.used() ? std::max(0.0, 1.0 - share) : 1.0 / (1.0 + share);
+        if (reading.used() && residual.redundancy < controlled_share) residual.redundancy = 0.0;
+        else if (reading.used()) residual.normalised = weighted / std::sqrt(residual.redundancy);
+        else residual.normalised = weighted * std::sqrt(residual.redundancy);
+        residuals.push_back(residual);
     }
     return residuals;
 }

@@ -1,6 +1,5 @@
 #include "adjustment/gauss_newton.hpp"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
 
@@ -17,12 +16,22 @@ constexpr double factor_holds = 3e-11;
 GaussNewton::GaussNewton(const AdjustmentProblem& problem, const std::array<double, function_count>& smoothness)
     : equations_(problem), matrix_(equations_.matrix()) {
     equations_.make_smooth(smoothness);
+    stiffness_.setZero(problem.size());
+    for (const LineSetup& setup : problem.setups())
+        for (const int c : setup.active) {
+            const SetupQuantityRecord& of = record(setup::component(c).quantity);
+            stiffness_[setup.unknown[c]] = std::pow(std::min(setup.prior[c], of.usual), -2);
+        }
     equations_.linearise(Eigen::VectorXd::Zero(problem.size()));
     equations_.drop_roundings();
     factorize();
     factorized_at_.setZero(problem.size());
     held_ = factor_->held();
     dependent_ = dependent_unknowns(problem, *factor_);
+}
+
+double GaussNewton::objective(const Eigen::VectorXd& x) const {
+    return equations_.square_sum(x) + (x - equations_.centre()).cwiseAbs2().dot(equations_.usual_weight());
 }
 
 void GaussNewton::assume_usual(const std::vector<bool>& determined) {
@@ -89,84 +98,94 @@ bool GaussNewton::is_settled(const Step& step, double ratio, const Eigen::Vector
     return ratio > 1e-3 && step.decrement < settled * std::max(1.0, scatter);
 }
 
-std::optional<int> GaussNewton::try_solve(Eigen::VectorXd& x, int most_steps, bool accelerated) {
+std::optional<int> GaussNewton::try_solve(Eigen::VectorXd& x, int most_steps) {
     constexpr double slow = 0.1;
     constexpr double infinite = std::numeric_limits<double>::infinity();
     double change = fresh_ && x.isZero(0.0) ? 0.0 : infinite, effect = infinite;
     fresh_ = false;
-    StepHistory history;
+    damping_ = 0.0;
     for (int count = 1; count <= most_steps; ++count) {
         if (change > factor_holds) factorize(x);
         else if (count > 1) equations_.linearise(x);
         if (!equations_.residuals().allFinite()) break;
         const Step step = this->step(x);
         const double ratio = step.effect / effect;
-        const bool is_slow = accelerated && ratio >= slow;
         if (is_settled(step, ratio, x)) {
             x += step.dx;
             return count;
         }
-        // Where residuals are large, steps shrink slowly, along a few directions: the sequence then tells its limit.
-        if (!is_slow) history.clear();
-        history.add(x, step.dx, scale_);
         if (ratio < slow) x += step.dx;
-        else descend(x, is_slow ? history.accelerated() : step.dx, step.dx);
+        else if (!descend(x, step)) break;
         effect = step.effect;
-        change = is_slow ? infinite : step.change;
+        change = ratio < slow ? step.change : infinite;
     }
     return std::nullopt;
 }
 
-void GaussNewton::descend(Eigen::VectorXd& x, const Eigen::VectorXd& move, const Eigen::VectorXd& step) {
-    constexpr int most_halvings = 12;
-    const double before = equations_.square_sum(x);
-    Eigen::VectorXd part = move;
-    for (int i = 0; i <= most_halvings; ++i) {
-        if (i > 0) part = std::ldexp(1.0, -i) * step;
-        equations_.linearise(x + part, false);
-        if (equations_.square_sum(x + part) <= before * 1.0001 + 1.0) break;  // or nearly so: rounding, a flat valley
+// Newton's method, with the curvature of the readings. It is indefinite where the square sum bends downwards: a set-up
+// then is held by a part of what is usual, more of it until the square sum falls (K. Levenberg, Quart. Appl. Math. 2
+// (1944) 164).
+bool GaussNewton::descend(Eigen::VectorXd& x, const Step& step) {
+    constexpr double good = 0.75;   // share of what a quadratic would fall by
+    constexpr double small = 1e-3;  // of the square sum: next to the minimum Newton's steps shrink faster
+    constexpr double first = 1e-2, least = 1e-4, climbs = 10.0, falls = 100.0;
+    constexpr double most = 1e12;
+    constexpr double rounding = 1e-10;
+    const double before = objective(x);
+    const auto moves_by = [&](const Eigen::VectorXd& move, double least_decrease) {
+        Eigen::VectorXd moved = x + move;
+        for (const bool follow : {false, true}) {
+            if (follow) follow_set_ups(moved);
+            equations_.linearise(moved, false);
+            if (!(objective(moved) <= before - least_decrease)) continue;
+            x = moved;
+            return true;
+        }
+        return false;
+    };
+    if (step.decrement > small && moves_by(step.dx, good * step.decrement)) {
+        damping_ = 0.0;
+        return true;
     }
-    x += part;
+    equations_.linearise(x);
+    const Eigen::VectorXd gradient = equations_.gradient(x);
+    BorderedBand curved = matrix_;
+    equations_.assemble(curved);
+    equations_.add_curvature(x, curved);
+    for (; damping_ < most; damping_ = std::max(first, climbs * damping_)) {
+        matrix_ = curved;
+        for (int j = 0; j < matrix_.size(); ++j) element(matrix_, j, j) += damping_ * stiffness_[j];
+        for (const int j : held_) element(matrix_, j, j) = 0.0;
+        factor_->factorize(matrix_);
+        if (factor_->held() != held_) continue;
+        Eigen::VectorXd move = gradient;
+        factor_->solve(move);
+        if (!moves_by(move, -rounding * before)) continue;
+        damping_ = damping_ < least ? 0.0 : damping_ / falls;
+        return true;
+    }
+    return false;
+}
+
+// Machine and constants, on which readings depend linearly, as they fit best where set-ups stay: they follow a set-up
+// through a valley of the square sum that is narrow and bent (variable projection: G. H. Golub and V. Pereyra, SIAM J.
+// Numer. Anal. 10 (1973) 413).
+void GaussNewton::follow_set_ups(Eigen::VectorXd& x) {
+    constexpr double stays = 1e12;
+    equations_.linearise(x);
+    if (!equations_.residuals().allFinite()) return;
+    equations_.assemble(matrix_);
+    for (int j = 0; j < matrix_.size(); ++j) element(matrix_, j, j) += stays * stiffness_[j];
+    for (const int j : held_) element(matrix_, j, j) = 0.0;
+    factor_->factorize(matrix_);
+    Eigen::VectorXd move = equations_.gradient(x);
+    factor_->solve(move);
+    x += move;
 }
 
 int GaussNewton::solve(Eigen::VectorXd& x) {
     if (const auto count = try_solve(x)) return *count;
     throw InvalidArgument("adjustment: finds no machine and set-up that explain the readings");
-}
-
-// Anderson acceleration (D. G. Anderson, J. ACM 12 (1965) 547) of the sequence x + dx(x): the combination of the last
-// steps that is least says where they lead.
-void GaussNewton::StepHistory::add(const Eigen::VectorXd& x, const Eigen::VectorXd& dx, const Eigen::VectorXd& scale) {
-    constexpr std::size_t most = 6;
-    if (last_x.size() > 0) {
-        moves.push_back(x - last_x);
-        changes.push_back(dx - last_dx);
-        if (moves.size() > most) {
-            moves.erase(moves.begin());
-            changes.erase(changes.begin());
-        }
-    }
-    last_x = x;
-    last_dx = dx;
-    weight = scale;
-}
-
-Eigen::VectorXd GaussNewton::StepHistory::accelerated() const {
-    const Eigen::Index count = Eigen::Index(changes.size());
-    Eigen::VectorXd result = last_dx;
-    if (count == 0) return result;
-    Eigen::MatrixXd square(count, count);
-    Eigen::VectorXd right(count);
-    for (Eigen::Index i = 0; i < count; ++i) {
-        const Eigen::VectorXd weighted = changes[i].cwiseProduct(weight).cwiseProduct(weight);
-        right[i] = weighted.dot(last_dx);
-        for (Eigen::Index j = 0; j < count; ++j) square(i, j) = weighted.dot(changes[j]);
-    }
-    square.diagonal() *= 1.0 + 1e-10;  // of steps that are all alike
-    const Eigen::VectorXd share = square.ldlt().solve(right);
-    if (!share.allFinite()) return result;
-    for (Eigen::Index i = 0; i < count; ++i) result -= share[i] * (moves[i] + changes[i]);
-    return result;
 }
 
 }  // namespace stepdiag

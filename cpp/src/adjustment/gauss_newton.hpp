@@ -28,7 +28,7 @@ public:
 
     static constexpr int usual_most_steps = 100;
     // From x to the minimum: the number of steps, or none where it is not reached in `most_steps`, x being the last.
-    std::optional<int> try_solve(Eigen::VectorXd& x, int most_steps = usual_most_steps, bool accelerated = true);
+    std::optional<int> try_solve(Eigen::VectorXd& x, int most_steps = usual_most_steps);
     // Throws InvalidArgument where it is not reached.
     int solve(Eigen::VectorXd& x);
     // Derivatives and factor at x, for what has changed (readings left out, smoothness) or for uncertainties.
@@ -45,18 +45,14 @@ private:
         double decrement;  // of the square sum, were the problem linear
     };
     Step step(const Eigen::VectorXd& x) const;
-    // Moves x by `move`, or by as much of the Gauss-Newton step as does not make the square sum larger.
-    void descend(Eigen::VectorXd& x, const Eigen::VectorXd& move, const Eigen::VectorXd& step);
+    // What is minimised: the square sum, and what is assumed to be usual.
+    double objective(const Eigen::VectorXd& x) const;
+    // Moves x by the step, or by one of Newton's where the square sum is not quadratic enough for that. False where
+    // none makes it smaller.
+    bool descend(Eigen::VectorXd& x, const Step& step);
+    void follow_set_ups(Eigen::VectorXd& x);
     bool is_settled(const Step& step, double ratio, const Eigen::VectorXd& x) const;
 
-    struct StepHistory {
-        Eigen::VectorXd last_x, last_dx, weight;
-        std::vector<Eigen::VectorXd> moves, changes;
-
-        void clear() { *this = {}; }
-        void add(const Eigen::VectorXd& x, const Eigen::VectorXd& dx, const Eigen::VectorXd& scale);
-        Eigen::VectorXd accelerated() const;
-    };
     void factorize();  // with the derivatives that there are
 
     NormalEquations equations_;
@@ -65,6 +61,8 @@ private:
     Eigen::VectorXd scale_;  // square roots of the diagonal at the last factorisation
     std::vector<int> held_, dependent_;
     Eigen::VectorXd factorized_at_;
+    Eigen::VectorXd stiffness_;  // 1/usual^2 of what damping holds: the set-ups
+    double damping_ = 0.0;
     bool fresh_ = true;  // derivatives and factor are those at zero, from the beginning
 };
 

@@ -192,6 +192,21 @@ void NormalEquations::gather(const AdjustedPoint& point, const BorderedBand& inv
                 covariance(i, j) = element(inverse, all.unknown[i], all.unknown[j]);
 }
 
+Eigen::VectorXd NormalEquations::reading_variances(const BorderedBand& inverse) const {
+    Eigen::VectorXd variances(residuals_.size()), image;
+    Square covariance;
+    for (const AdjustedPoint& point : problem_->points()) {
+        gather(point, inverse, covariance);
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            const Row row = this->row(point, r);
+            const Eigen::Map<const Eigen::VectorXd> derivative(row.derivative, row.size);
+            image.noalias() = covariance * derivative;
+            variances[r] = derivative.dot(image);
+        }
+    }
+    return variances;
+}
+
 BorderedBand NormalEquations::matrix() const { return BorderedBand(problem_->reach(), problem_->border()); }
 
 void NormalEquations::assemble(BorderedBand& matrix) const {
@@ -203,6 +218,37 @@ void NormalEquations::assemble(BorderedBand& matrix) const {
             for (int j = 0; j <= i; ++j)
                 if (row.unknown[i] != no_unknown && row.unknown[j] != no_unknown)
                     element(matrix, row.unknown[i], row.unknown[j]) += row.coefficient[i] * row.coefficient[j];
+}
+
+void NormalEquations::add_curvature(const Eigen::VectorXd& x, BorderedBand& matrix) {
+    constexpr double difference = 1e-6;  // rad, and of a metre
+    // All else is added to a reading.
+    constexpr int curved[] = {setup::reflector, setup::reflector + 1, setup::laser, setup::laser + 1,
+                              setup::lateral,   setup::lateral + 1,   setup::roll,  setup::gain};
+    const std::vector<double> derivatives = derivatives_;
+    const Eigen::VectorXd residuals = residuals_;
+    for (const int c : curved) {
+        Eigen::VectorXd shifted = x;  // of all set-ups at once: none has readings of another
+        for (const LineSetup& setup : problem_->setups())
+            if (const int j = setup.unknown[c]; j != no_unknown) shifted[j] += difference / problem_->change_scale()[j];
+        linearise(shifted);
+        for (const AdjustedPoint& point : problem_->points()) {
+            const int j = problem_->setups()[point.setup].unknown[c];
+            if (j == no_unknown) continue;
+            const double per_change = problem_->change_scale()[j] / difference;
+            for (int r = point.first_reading; r < point.end_reading; ++r) {
+                if (!problem_->readings()[r].used()) continue;
+                const Row row = this->row(point, r);
+                for (int i = 0; i < row.size && row.unknown[i] <= j; ++i)
+                    if (row.unknown[i] != no_unknown)
+                        element(matrix, row.unknown[i], j) -=
+                            residuals[r] * per_change *
+                            (row.derivative[i] - derivatives[first_weight_[r] + std::size_t(i)]);
+            }
+        }
+    }
+    derivatives_ = derivatives;
+    residuals_ = residuals;
 }
 
 // J^T J of one point is dense over the nodes of three axes and the set-up: blocks of six where both nodes are in the

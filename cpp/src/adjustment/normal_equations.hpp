@@ -11,6 +11,9 @@
 
 namespace stepdiag {
 
+// Below this part of a reading or a fault, what the others do not explain of it is rounding.
+inline constexpr double controlled_share = 1e-8;
+
 // An entry on the matrix' pattern, in either order.
 double& element(BorderedBand& matrix, int i, int j);
 double element(const BorderedBand& matrix, int i, int j);
@@ -56,7 +59,9 @@ public:
     double square_sum(const Eigen::VectorXd& x) const;  // of residuals, priors and smoothness, not of what is usual
 
     BorderedBand matrix() const;
-    void assemble(BorderedBand& matrix) const;                 // J^T J + P
+    void assemble(BorderedBand& matrix) const;  // J^T J + P
+    // Adds what the readings' second derivatives by the set-ups make of the residuals at x, the last linearise.
+    void add_curvature(const Eigen::VectorXd& x, BorderedBand& matrix);
     Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;  // J^T w - P x
     Eigen::VectorXd product(const Eigen::VectorXd& v) const;   // (J^T J + P) v
 
@@ -69,9 +74,12 @@ public:
         double product(const Eigen::VectorXd& v) const;
     };
     Row row(const AdjustedPoint& point, int reading) const;
+    Row row(int reading) const { return row(problem_->points()[point_of_reading_[reading]], reading); }
     // The part of an inverse that belongs to a point's unknowns; 0 where there is none.
     using Square = Eigen::MatrixXd;
     void gather(const AdjustedPoint& point, const BorderedBand& inverse, Square& covariance) const;
+    // Of what the model says of each reading, used or not, in units of the reading's own.
+    Eigen::VectorXd reading_variances(const BorderedBand& inverse) const;
 
 private:
     Eigen::VectorXd transposed(const Eigen::VectorXd& w, const Eigen::VectorXd& x) const;

@@ -6,6 +6,7 @@
 #include <unsupported/Eigen/SpecialFunctions>
 
 #include "adjustment/smoothness.hpp"
+#include "adjustment/solve_from_zero.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -39,7 +40,7 @@ int OutlierSearch::solve_without_gross(const std::vector<bool>& determined, Eige
     // More are no slips of single readings, but a head that lost count, or a wrong plan.
     constexpr int most_gross = 5;
     for (bool search = true;;) {
-        const std::optional<int> count = solve_from_zero(determined, x);
+        const std::optional<int> count = solve_from_zero(solver_, determined, x);
         const double scatter = solver_.equations().square_sum(x) / double(problem_.readings().size());
         if (count && (scatter < gross_scatter || !search)) return *count;
         Eigen::VectorXd first = Eigen::VectorXd::Zero(x.size());
@@ -68,7 +69,7 @@ void OutlierSearch::run(const std::vector<bool>& determined, Eigen::VectorXd& x)
             x = before;
             return;
         }
-        if (!solver_.try_solve(x) && !solve_from_zero(determined, x)) {
+        if (!solver_.try_solve(x) && !solve_from_zero(solver_, determined, x)) {
             put_back(found_ - 1);
             x = last;
             return;
@@ -82,46 +83,6 @@ void OutlierSearch::look(const Eigen::VectorXd& x) {
     solver_.factor().selected_inverse(inverse_);
     looked_at_ = x;
     residuals_ = reading_residuals(solver_.equations(), inverse_);
-}
-
-// What is open is assumed to be at 0 first, and then, because that pulls at what is determined by its square, where
-// it came out.
-std::optional<int> OutlierSearch::solve_from_zero(const std::vector<bool>& determined, Eigen::VectorXd& x) {
-    // The second order of what is open may lead astray: other ways from zero then, the last of them with the open
-    // unknowns held, and whichever fits best.
-    struct Way {
-        double part;
-        bool accelerated;
-    };
-    constexpr Way ways[] = {{1.0, true}, {1.0, false}, {1e-4, true}, {1e-4, false}};
-    constexpr double good_fit = 4.0;
-    std::optional<int> count;
-    double least = std::numeric_limits<double>::infinity();
-    Way best = ways[0];
-    for (const Way& way : ways) {
-        Eigen::VectorXd solution = Eigen::VectorXd::Zero(x.size());
-        solver_.equations().assume_usual(determined, solution, way.part);
-        const std::optional<int> steps = solver_.try_solve(solution, GaussNewton::usual_most_steps, way.accelerated);
-        const double square_sum = solver_.equations().square_sum(solution);
-        if (steps && square_sum < least) {
-            count = steps;
-            x = solution;
-            least = square_sum;
-            best = way;
-        }
-        if (solver_.dependent().empty() || (count && least < good_fit * double(problem_.readings().size()))) break;
-    }
-    if (!count || solver_.dependent().empty() || best.part < 1.0) return count;
-    Eigen::VectorXd again = x;
-    solver_.equations().assume_usual(determined, x);
-    const std::optional<int> more = solver_.try_solve(again);
-    // Once more may lead astray, too.
-    if (!more || solver_.equations().square_sum(again) > 1.01 * std::max(least, double(problem_.readings().size()))) {
-        solver_.equations().assume_usual(determined, Eigen::VectorXd::Zero(x.size()));
-        return count;
-    }
-    x = again;
-    return *count + *more;
 }
 
 void OutlierSearch::put_back(int kept) {  // all outliers after the first `kept`

@@ -32,7 +32,6 @@ public:
     const BorderedBand& inverse() const { return inverse_; }
 
 private:
-    std::optional<int> solve_from_zero(const std::vector<bool>& determined, Eigen::VectorXd& x);
     std::vector<std::size_t> worst_readings(const Eigen::VectorXd& x, double alike);
     std::size_t roughest(const std::vector<std::size_t>& candidates, const Eigen::VectorXd& x);
     bool leave_out(const std::vector<std::size_t>& worst, const Eigen::VectorXd& x);

@@ -2,67 +2,36 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <unsupported/Eigen/SpecialFunctions>
+
+#include "evaluation/fit_test.hpp"
 
 namespace stepdiag {
 namespace {
 
-constexpr double largest_noise_factor = 3.0;
 constexpr double rejected_below = 3e-4;  // probability of a sound run's misfit
-constexpr double doubtful_below = 1e-2;
-constexpr double doubtful_above = 1.0 - 1e-3;
-constexpr double uneven_below = 1e-2;  // of the whole family of comparisons between lines and between channels
+// Of the most conspicuous of all patterns of residuals: where chi-square finds a misfit, and where it does not.
+constexpr double pattern_below = 1e-2;
+constexpr double pattern_alone_below = 3e-3;
 constexpr double farthest_prior = 5.0;
 
-// The readings of one line or of one channel.
-struct Share {
-    double square_sum = 0.0;
-    double freedom = 0.0;  // sum of redundancy numbers
+double noise_factor(const Adjustment& adjustment) { return std::sqrt(adjustment.variance_factor()); }
 
-    void add(const Share& other) {
-        square_sum += other.square_sum;
-        freedom += other.freedom;
-    }
-};
-
-// Probability that F of these degrees of freedom lies as far from 1 as this one, on its side, or on the other.
-double two_sided_probability(double f, double freedom, double freedom_of_others) {
-    const double x = freedom * f / (freedom * f + freedom_of_others);
-    const double below = Eigen::numext::betainc(0.5 * freedom, 0.5 * freedom_of_others, x);
-    return 2.0 * std::min(below, 1.0 - below);
+// Noise that is larger than stated throughout is a factor with an uncertainty: of a variance of f degrees of freedom it
+// is 1/sqrt(2 f) of it.
+FitReason noise(FitFinding finding, const Adjustment& adjustment) {
+    FitReason reason{finding, noise_factor(adjustment), 1.0};
+    reason.standard_uncertainty = reason.value / std::sqrt(2.0 * adjustment.degrees_of_freedom);
+    return reason;
 }
 
-// The line or channel whose scatter differs most from that of the others, if chance does not explain it. One factor on
-// all uncertainties leaves nothing here: it is the noise then that is stated wrongly, not a reading that is wrong.
-std::optional<FitReason> uneven_misfit(const Adjustment& adjustment, const Measurement& measurement) {
-    std::map<std::string, Share> lines, channels;
-    Share all;
-    for (const ReadingResidual& r : adjustment.residuals) {
-        if (!r.used() || r.redundancy == 0.0) continue;
-        const Share share{r.normalised * r.normalised * r.redundancy, r.redundancy};
-        lines[measurement.stations()[r.row].line.name()].add(share);
-        channels[r.channel].add(share);
-        all.add(share);
-    }
-    constexpr double fewest = 1.0;  // degrees of freedom on either side of a comparison
-    const double comparisons = double(lines.size() + channels.size());
-    double least = uneven_below / comparisons;
-    std::optional<FitReason> reason;
-    for (const bool is_line : {true, false})
-        for (const auto& [name, share] : is_line ? lines : channels) {
-            const double others = all.freedom - share.freedom;
-            if (share.freedom < fewest || others < fewest) continue;
-            const double factor = share.square_sum / share.freedom;
-            const double probability =
-                two_sided_probability(factor * others / (all.square_sum - share.square_sum), share.freedom, others);
-            if (!(probability < least)) continue;
-            least = probability;
-            reason = FitReason{FitFinding::uneven_misfit, std::sqrt(factor),
-                               std::sqrt((all.square_sum - share.square_sum) / others), is_line ? name : "",
-                               is_line ? "" : name};
-        }
-    return reason;
+void compare_with_stated_noise(const Adjustment& adjustment, std::vector<FitReason>& reasons) {
+    const double factor = noise_factor(adjustment);
+    if (!(factor <= largest_noise_factor)) reasons.push_back({FitFinding::noise_factor, factor, largest_noise_factor});
+}
+
+void take_patterns(const std::vector<ResidualPattern>& patterns, double limit, std::vector<FitReason>& reasons) {
+    for (const ResidualPattern& pattern : patterns)
+        if (pattern.probability < limit) reasons.push_back(pattern.reason);
 }
 
 // A value that stands further from its prior than the readings' own uncertainty of it lets chance explain. Five
@@ -88,30 +57,67 @@ std::string name(FitFinding finding) {
         case FitFinding::misfit: return "misfit";
         case FitFinding::no_misfit: return "no_misfit";
         case FitFinding::uneven_misfit: return "uneven_misfit";
+        case FitFinding::trend: return "trend";
         case FitFinding::prior: return "prior";
+        case FitFinding::scaled: return "scaled";
     }
     return "";
 }
 
-Verdict judge(const Adjustment& adjustment, const Measurement& measurement) {
-    if (adjustment.degrees_of_freedom <= 0) return {Fit::unchecked, {{FitFinding::no_redundancy, 0.0, 1.0}}};
-    Verdict verdict{Fit::accepted, {}};
-    auto& reasons = verdict.reasons;
-    const double probability = adjustment.chi_square_probability;
-    const double factor = std::sqrt(adjustment.variance_factor());
-    if (!(factor <= largest_noise_factor)) reasons.push_back({FitFinding::noise_factor, factor, largest_noise_factor});
-    if (!(probability >= rejected_below))
-        if (const auto uneven = uneven_misfit(adjustment, measurement)) reasons.push_back(*uneven);
-    compare_with_priors(adjustment, reasons);
-    if (!reasons.empty()) verdict.fit = Fit::rejected;
-    else if (!(probability >= doubtful_below)) {
-        verdict.fit = Fit::doubtful;
-        reasons.push_back({FitFinding::misfit, probability, doubtful_below});
-    } else if (probability > doubtful_above) {
-        verdict.fit = Fit::doubtful;
-        reasons.push_back({FitFinding::no_misfit, 1.0 - probability, 1.0 - doubtful_above});
+std::string name(FitAspect aspect) {
+    switch (aspect) {
+        case FitAspect::whole: return "";
+        case FitAspect::second_half: return "second_half";
+        case FitAspect::far_half: return "far_half";
+        case FitAspect::time: return "time";
+        case FitAspect::position: return "position";
+        case FitAspect::time_or_position: return "time_or_position";
     }
-    return verdict;
+    return "";
+}
+
+Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& patterns) {
+    if (adjustment.degrees_of_freedom <= 0) return {Fit::unchecked, {{FitFinding::no_redundancy, 0.0, 1.0}}};
+    const double probability = adjustment.chi_square_probability;
+    std::vector<FitReason> reasons;
+    compare_with_stated_noise(adjustment, reasons);
+    if (!(probability >= rejected_below)) take_patterns(patterns, pattern_below, reasons);
+    compare_with_priors(adjustment, reasons);
+    if (!reasons.empty()) return {Fit::rejected, reasons};
+
+    if (!(probability >= doubtful_below)) {
+        take_patterns(patterns, pattern_below, reasons);
+        reasons.push_back(noise(FitFinding::misfit, adjustment));
+    } else {
+        take_patterns(patterns, pattern_alone_below, reasons);
+        if (probability > doubtful_above) reasons.push_back(noise(FitFinding::no_misfit, adjustment));
+    }
+    return {reasons.empty() ? Fit::accepted : Fit::doubtful, reasons};
+}
+
+void scale_uncertainties(Adjustment& adjustment) {
+    const double factor = noise_factor(adjustment);
+    if (adjustment.degrees_of_freedom <= 0 || !(factor > 1.0)) return;
+    Calibration& calibration = adjustment.calibration;
+    const auto scale = [&](std::vector<double>& all) {
+        for (double& u : all) u *= factor;
+    };
+    for (auto& function : calibration.functions)
+        if (function) scale(function->standard_uncertainty);
+    for (auto& reversal : calibration.reversal)
+        if (reversal) {
+            scale(reversal->standard_uncertainty);
+            scale(reversal->negative_standard_uncertainty);
+        }
+    for (auto& squareness : calibration.squarenesses)
+        if (squareness) squareness->standard_uncertainty *= factor;
+    calibration.covariance *= factor * factor;
+    for (SetupEstimate& estimate : adjustment.setup) estimate.standard_uncertainty *= factor;
+    for (KnownCombination& combination : adjustment.combinations) combination.standard_uncertainty *= factor;
+    calibration.uncertainty_scaled = factor;
+    Verdict& verdict = adjustment.verdict;
+    if (verdict.fit == Fit::accepted) verdict.fit = Fit::doubtful;
+    verdict.reasons.push_back(noise(FitFinding::scaled, adjustment));
 }
 
 }  // namespace stepdiag

@@ -5,11 +5,20 @@
 
 #include "adjustment/smoothness.hpp"
 #include "batch/simd_adjustment.hpp"
+#include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
 namespace {
 
-AdjustmentOptions without_outliers(AdjustmentOptions options) {
+// Every set keeps all its readings and the uncertainties that follow from theirs: options that say otherwise are a
+// caller's mistake.
+AdjustmentOptions of_sets(AdjustmentOptions options) {
+    const double asked = options.outlier_probability;
+    if (asked != 0.0 && asked != AdjustmentOptions{}.outlier_probability)
+        throw InvalidArgument(
+            "outlier_probability: expected 0, or nothing said: no reading of many sets is left out as an outlier");
+    if (options.scale_uncertainty)
+        throw InvalidArgument("scale_uncertainty: expected false: many sets have no uncertainties of their own");
     options.outlier_probability = 0.0;
     return options;
 }
@@ -67,7 +76,7 @@ public:
 private:
     static std::unique_ptr<const SimdStart> prepare(const BatchPattern& p, const Adjustment& adjustment) {
         const PreparedAdjustment prepared(p.measurement, p.plan, p.chain, p.tool, p.heads,
-                                          without_outliers(p.options.adjustment), adjustment.smoothness);
+                                          of_sets(p.options.adjustment), adjustment.smoothness);
         return std::make_unique<const SimdStart>(prepared, inputs(prepared.problem, p.measurement),
                                                  standard_uncertainties(adjustment.calibration));
     }
@@ -81,7 +90,7 @@ private:
 
 std::unique_ptr<const BatchMethod> make_adjustment_batch(const BatchPattern& p) {
     const Adjustment adjustment =
-        adjust(p.measurement, p.plan, p.chain, p.tool, p.heads, without_outliers(p.options.adjustment));
+        adjust(p.measurement, p.plan, p.chain, p.tool, p.heads, of_sets(p.options.adjustment));
     return std::make_unique<const AdjustmentBatch>(p, adjustment);
 }
 

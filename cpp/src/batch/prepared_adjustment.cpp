@@ -1,5 +1,8 @@
 #include "batch/prepared_adjustment.hpp"
 
+#include "adjustment/solve_from_zero.hpp"
+#include "stepdiag/core/error.hpp"
+
 namespace stepdiag {
 
 PreparedAdjustment::PreparedAdjustment(const Measurement& measurement, const Plan& plan, const Chain& chain,
@@ -20,9 +23,8 @@ PreparedAdjustment::PreparedAdjustment(const Measurement& measurement, const Pla
     solver.equations().make_smooth(smoothness);
     solver.assume_usual(determined);
     start.setZero(problem.size());
-    solver.solve(start);
-    solver.equations().assume_usual(determined, start);
-    solver.solve(start);
+    if (!solve_from_zero(solver, determined, start))
+        throw InvalidArgument("adjustment: finds no machine and set-up that explain the readings");
     solver.factorize(start);
 }
 

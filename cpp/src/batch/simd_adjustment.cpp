@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "adjustment/solve_from_zero.hpp"
+
 namespace stepdiag {
 namespace {
 
@@ -156,7 +158,7 @@ void SimdAdjustment::move() {
     }
 }
 
-// What is open is taken to be at 0 first, then where it came out (outlier_search.cpp).
+// What is open is taken to be at 0 first, then where it came out (solve_from_zero.cpp).
 void SimdAdjustment::recentre(std::size_t lane) {
     for (Eigen::Index j = 0; j < start_.pattern.start.size(); ++j) centre_.at(j)[lane] = x_.at(j)[lane];
     progress_[lane] = {};
@@ -227,30 +229,16 @@ bool SimdAdjustment::has_all_readings(const double* readings, std::size_t stride
     });
 }
 
-// With derivatives and factor of its own at each step.
+// As it is adjusted alone.
 void SimdAdjustment::adjust_in_full(const double* readings, std::size_t stride, std::size_t lane) {
     if (!in_full_) in_full_ = std::make_unique<PreparedAdjustment>(start_.pattern);
     PreparedAdjustment& own = *in_full_;
     auto& list = own.problem.readings();
     for (std::size_t r = 0; r < list.size(); ++r)
         list[r].value = readings[std::size_t(start_.input[r]) * stride + lane];
+    Eigen::VectorXd x = own.start;
+    const std::optional<int> steps = solve_from_zero(own.solver, own.determined, x);
     counts_[lane].in_full = true;
-    NormalEquations& equations = own.solver.equations();
-    Eigen::VectorXd x = Eigen::VectorXd::Zero(own.start.size());
-    equations.assume_usual(own.determined, x);
-    // If not from near by, then from zero: where set-ups are aligned, no tilt is taken for the effect of a roll, a gain
-    // or a lateral offset.
-    if (progress_[lane].is_near())
-        for (Eigen::Index j = 0; j < x.size(); ++j) x[j] = x_.at(j)[lane];
-    std::optional<int> steps = own.solver.try_solve(x);
-    if (!steps || own.solver.equations().square_sum(x) > gross_scatter * double(start_.input.size())) {
-        x.setZero();
-        steps = own.solver.try_solve(x);
-    }
-    if (steps && !own.solver.dependent().empty()) {
-        equations.assume_usual(own.determined, x);
-        steps = own.solver.try_solve(x);
-    }
     counts_[lane].steps += steps.value_or(0);
     progress_[lane].state = steps ? Progress::settled : Progress::lost;
     for (Eigen::Index j = 0; j < x.size(); ++j) x_.at(j)[lane] = x[j];

@@ -78,7 +78,6 @@ private:
         bool recentred = false;
 
         void add(double largest);
-        bool is_near() const { return steps > 1 && change[0] < 1.0; }
     };
     void begin();
     void step(const double* readings, std::size_t stride);

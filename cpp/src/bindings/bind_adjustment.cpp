@@ -60,6 +60,12 @@ struct AdjustmentOfRun {
 
 using ChannelArrays = py::typing::Dict<py::str, DoubleArray>;
 
+// The function of the package that makes sentences of a verdict's reasons.
+py::object& reason_wording() {
+    static py::object& words = *new py::object(py::none());  // outlives the interpreter
+    return words;
+}
+
 PriorLike none() { return py::reinterpret_borrow<PriorLike>(py::none()); }
 
 }  // namespace
@@ -109,15 +115,18 @@ void bind_options(py::module_& m) {
         "What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all "
         "lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its "
         "set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has "
-        "no angular errors. outlier_probability: of any false alarm in a run; 0: no reading is left out. plausible: "
-        "what a machine can be.")
+        "no angular errors. outlier_probability: of any false alarm in a run; 0: no reading is left out. "
+        "scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and "
+        "the fit is doubtful at best. plausible: what a machine can be. reliability: also which faults the readings "
+        "control.")
         .def(py::init([](const ReadingUncertainty& uncertainty, const Priors& setup,
                          const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
                          bool rotations, const std::optional<Smoothness>& smoothness, double outlier_probability,
-                         bool full_covariance, const PlausibleLimits& plausible) {
-                 AdjustmentOptions options{uncertainty,     setup.value, {},         one_setup_per_line,
-                                           reversal,        rotations,   smoothness, outlier_probability,
-                                           full_covariance, plausible};
+                         bool scale_uncertainty, bool full_covariance, const PlausibleLimits& plausible,
+                         bool reliability) {
+                 AdjustmentOptions options{uncertainty,       setup.value,     {},         one_setup_per_line,
+                                           reversal,          rotations,       smoothness, outlier_probability,
+                                           scale_uncertainty, full_covariance, plausible,  reliability};
                  for (const auto& [line, priors] : setup_by_line) options.setup_by_line[line] = priors.value;
                  return options;
              }),
@@ -126,7 +135,8 @@ void bind_options(py::module_& m) {
              py::arg("one_setup_per_line") = usual.one_setup_per_line, py::arg("reversal") = usual.reversal,
              py::arg("rotations") = usual.rotations, py::arg("smoothness") = std::nullopt,
              py::arg("outlier_probability") = usual.outlier_probability,
-             py::arg("full_covariance") = usual.full_covariance, py::arg("plausible") = usual.plausible,
+             py::arg("scale_uncertainty") = usual.scale_uncertainty, py::arg("full_covariance") = usual.full_covariance,
+             py::arg("plausible") = usual.plausible, py::arg("reliability") = usual.reliability,
              "adjust() checks them.")
         .def_readonly("uncertainty", &AdjustmentOptions::uncertainty)
         .def_property_readonly("setup", [](const AdjustmentOptions& o) { return Priors{o.setup}; })
@@ -141,8 +151,10 @@ void bind_options(py::module_& m) {
         .def_readonly("rotations", &AdjustmentOptions::rotations)
         .def_readonly("smoothness", &AdjustmentOptions::smoothness)
         .def_readonly("outlier_probability", &AdjustmentOptions::outlier_probability)
+        .def_readonly("scale_uncertainty", &AdjustmentOptions::scale_uncertainty)
         .def_readonly("full_covariance", &AdjustmentOptions::full_covariance)
-        .def_readonly("plausible", &AdjustmentOptions::plausible);
+        .def_readonly("plausible", &AdjustmentOptions::plausible)
+        .def_readonly("reliability", &AdjustmentOptions::reliability);
 }
 
 void bind_result(py::module_& m) {
@@ -172,20 +184,31 @@ void bind_result(py::module_& m) {
             "False: fitted as badly as the outlier of this number, and no other reading tells which of them is "
             "wrong; the other was left out because the error functions are smoother without it.");
 
-    py::class_<FitReason>(m, "FitReason", "Why a fit is not accepted.")
+    py::class_<FitReason>(m, "FitReason", "Why a fit is not accepted, or what its residuals have in common.")
         .def_property_readonly(
             "finding", [](const FitReason& r) { return name(r.finding); },
-            "\"no_redundancy\"; \"noise_factor\": root of the variance factor; \"misfit\", \"no_misfit\": probability "
-            "of "
-            "one so large, or so small; \"uneven_misfit\": noise factor of one line or channel, and as the limit that "
-            "of "
-            "the others; \"prior\": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2).")
+            "\"no_redundancy\"; \"noise_factor\", \"misfit\", \"no_misfit\": root of the variance factor, not "
+            "credible, or larger or smaller than chance explains; \"uneven_misfit\": noise factor of one group of "
+            "readings, and as the limit that of the others; \"trend\": what residuals of one channel run by, from the "
+            "first reading to the last (mm or rad); "
+            "\"prior\": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); \"scaled\": what the "
+            "uncertainties were multiplied by.")
         .def_readonly("value", &FitReason::value)
         .def_readonly("limit", &FitReason::limit)
-        .def_readonly("line", &FitReason::line, "Of an uneven misfit or a prior; else empty.")
+        .def_readonly("standard_uncertainty", &FitReason::standard_uncertainty,
+                      "Of the value of a misfit, no_misfit, trend, scaled; else 0.")
+        .def_readonly("line", &FitReason::line, "Of an uneven misfit, a trend or a prior; empty: all.")
         .def_readonly("channel", &FitReason::channel,
-                      "Of an uneven misfit; of a prior the set-up quantity; else empty.")
-        .def_readonly("component", &FitReason::component, "Of a prior: as of SetupEstimate.");
+                      "Of an uneven misfit or a trend; empty: all. Of a prior the set-up quantity.")
+        .def_readonly("component", &FitReason::component, "Of a prior: as of SetupEstimate.")
+        .def_readonly("run", &FitReason::run, "Of an uneven misfit: the run; -1: all.")
+        .def_property_readonly(
+            "aspect", [](const FitReason& r) { return name(r.aspect); },
+            "Of an uneven misfit \"second_half\" of the run or \"far_half\" of the lines; of a trend what it runs "
+            "with: \"time\" (the order of the rows, where there is no time), \"position\" along the line, "
+            "\"time_or_position\", which are alike in this run; else empty.")
+        .def_readonly("alternative", &FitReason::alternative,
+                      "Of a trend: it is there instead of the one before; the readings do not tell which.");
     py::class_<Verdict>(
         m, "Verdict",
         "Whether the readings of an adjustment agree with each other, with their uncertainties and with "
@@ -211,6 +234,37 @@ void bind_result(py::module_& m) {
         .def_readonly("line", &KnownCombination::line, "Of a set-up; empty for slopes.")
         .def_readonly("value", &KnownCombination::value, "rad; of slopes mm/mm.")
         .def_readonly("standard_uncertainty", &KnownCombination::standard_uncertainty);
+
+    const auto by_family = [](double FaultControl::Effect::* effect) {
+        return [effect](const FaultControl& c) {
+            return std::map<std::string, double>{{"positioning", c.positioning.*effect},
+                                                 {"straightness", c.straightness.*effect},
+                                                 {"angle", c.angle.*effect},
+                                                 {"squareness", c.squareness.*effect}};
+        };
+    };
+    py::class_<FaultControl>(
+        m, "FaultControl",
+        "Which faults of one kind the readings control (reliability, W. Baarda 1968). One is found "
+        "with a probability of 99 % where it is 7.6 times as large as the standard uncertainty of "
+        "its size, and told from another one where that makes chi-square larger by 25. Twins are "
+        "not told apart at any size: their effects have a correlation of 0.999 and more, but the calibration differs.")
+        .def_property_readonly(
+            "kind", [](const FaultControl& c) { return name(c.kind); },
+            "\"reading\", or \"slip\": an offset of its channel from a reading on.")
+        .def_readonly("channel", &FaultControl::channel, "\"distance\", \"tilt\" or \"spot\".")
+        .def_readonly("count", &FaultControl::count, "Of controlled faults, one a place (of long runs: evenly spaced).")
+        .def_readonly("uncontrolled", &FaultControl::uncontrolled, "More of them, which no other reading controls.")
+        .def_readonly("twins", &FaultControl::twins, "Those of `count` that have a twin.")
+        .def_readonly("found_from", &FaultControl::found_from, "All of `count` are found from here on; mm or rad.")
+        .def_readonly("told_from", &FaultControl::told_from,
+                      "Those without a twin are told from all others from here on; mm or rad.")
+        .def_property_readonly("hidden", by_family(&FaultControl::Effect::hidden),
+                               "Kind of parameter -> largest effect of a fault just not found, mm or rad; infinite: of "
+                               "one that nothing controls.")
+        .def_property_readonly("shared", by_family(&FaultControl::Effect::shared),
+                               "Kind of parameter -> by how much it differs, by the size of a fault, if its twin was "
+                               "it; in mm or rad each.");
 
     using Result = AdjustmentOfRun;
     py::class_<Result>(m, "Adjustment", "What an adjustment found: calibration, set-ups, and how the readings fit.")
@@ -256,6 +310,8 @@ void bind_result(py::module_& m) {
                                    });
                                    return list;
                                })
+        .def_property_readonly(
+            "reliability", [](const Result& r) { return r.adjustment.reliability; }, "If it was asked for.")
         .def_property_readonly("verdict", [](const Result& r) { return r.adjustment.verdict; })
         .def_property_readonly("weighted_square_sum", [](const Result& r) { return r.adjustment.weighted_square_sum; })
         .def_property_readonly("variance_factor", [](const Result& r) { return r.adjustment.variance_factor(); })
@@ -291,15 +347,27 @@ AdjustmentOfRun adjust_run(const Measurement& measurement, const Plan& plan, con
         return adjust(measurement, plan, kinematics, offset, heads, options);
     };
     AdjustmentOfRun of_run{result(), measurement.stations()};
-    of_run.adjustment.calibration = worded(std::move(of_run.adjustment.calibration));
+    of_run.adjustment.calibration = worded(of_run.adjustment);
     return of_run;
 }
 
 }  // namespace
 
+Calibration worded(const Adjustment& adjustment) {
+    Calibration calibration = worded(adjustment.calibration);
+    calibration.fit_reasons = reason_wording()(adjustment.verdict.reasons).cast<std::vector<std::string>>();
+    return calibration;
+}
+
 void bind_adjustment(py::module_& m) {
     bind_options(m);
     bind_result(m);
+    m.def(
+        "word_reasons_with",
+        [](const py::typing::Callable<std::vector<std::string>(const std::vector<FitReason>&)>& words) {
+            reason_wording() = words;
+        },
+        py::arg("words"), "Sets the function that makes sentences of the reasons of a verdict; the package does so.");
     m.def("adjust", &adjust_run, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
           py::arg("tool") = zeros(3), py::arg("options") = std::nullopt,
           "The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. "

@@ -140,8 +140,10 @@ void bind_batch(py::module_& m) {
             "pattern: a run whose readings are there; lost ones are not used in any set. method: \"conventional\", "
             "\"enhanced\", \"adjustment\" (each set converged to 1e-4 of its values' standard uncertainties, without a "
             "search for outliers) or \"one_step\" (the pattern's values plus gain times what differs: off by terms of "
-            "second order). The options are AdjustmentOptions, or its fields by name; linear methods take the "
-            "uncertainty alone. Raises InvalidArgument.")
+            "second order). The options are AdjustmentOptions, or its fields by name: full_covariance and plausible "
+            "concern "
+            "the pattern alone, an outlier_probability other than 0 or the default and scale_uncertainty are refused; "
+            "linear methods take the uncertainty alone. Raises InvalidArgument.")
         .def_property_readonly(
             "entries", [](const Evaluator& e) { return e.evaluator.entries(); },
             "The values that a set of readings gives: functions EXX ... ECZ, nodes ascending, then squarenesses.")

@@ -12,6 +12,7 @@ using Table = std::tuple<ArrayLike, ArrayLike, ArrayLike>;  // position, value, 
 using Tables = std::map<std::string, Table>;
 using Arrays = std::map<std::string, ArrayLike>;
 using Names = std::vector<std::string>;
+using Texts = std::map<std::string, std::string>;
 
 std::vector<double> to_values(const ArrayLike& array, const std::string& name) {
     const Eigen::VectorXd vector = to_vector(array, name.c_str());
@@ -61,7 +62,8 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
                              const std::optional<ArrayLike>& covariance, const Tables& reversal,
                              const Arrays& reversal_negative_uncertainty, const Names& undetermined_reversal_constants,
                              const std::string& date, const std::optional<std::string>& fit,
-                             const std::optional<double>& variance_factor) {
+                             const std::optional<double>& variance_factor, const Names& fit_reasons,
+                             const std::optional<double>& uncertainty_scaled, const Texts& provenance) {
     Calibration calibration{method, to_chain(chain), to_vector3(volume, "volume"), to_vector3(tool, "tool"), {}, {},
                             {},     undetermined};
     for (const auto& [name, table] : functions)
@@ -92,6 +94,9 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
     calibration.date = date;
     if (fit) calibration.fit = fit_of({{"fit", *fit}}, "calibration");
     calibration.variance_factor = variance_factor;
+    calibration.fit_reasons = fit_reasons;
+    calibration.uncertainty_scaled = uncertainty_scaled;
+    calibration.provenance = provenance;
     check(calibration);
     return calibration;
 }
@@ -114,6 +119,8 @@ void bind_calibration(py::module_& m) {
              py::arg("covariance") = std::nullopt, py::arg("reversal") = Tables{},
              py::arg("reversal_negative_uncertainty") = Arrays{}, py::arg("undetermined_reversal_constants") = Names{},
              py::arg("date") = "", py::arg("fit") = std::nullopt, py::arg("variance_factor") = std::nullopt,
+             py::arg("fit_reasons") = Names{}, py::arg("uncertainty_scaled") = std::nullopt,
+             py::arg("provenance") = Texts{},
              "A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: "
              "name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises "
              "InvalidArgument naming the parameter for what is none: nodes that do not "
@@ -125,6 +132,14 @@ void bind_calibration(py::module_& m) {
             "controls the readings); None where it is not known.")
         .def_readonly("variance_factor", &Calibration::variance_factor,
                       "Of the fit: 1 is expected; None where nothing controls the readings, or it is not known.")
+        .def_readonly("fit_reasons", &Calibration::fit_reasons, "Why that verdict, a sentence each.")
+        .def_readonly("uncertainty_scaled", &Calibration::uncertainty_scaled,
+                      "What all uncertainties were multiplied by, beyond what follows from those of the readings "
+                      "(scale_uncertainty); None: by nothing.")
+        .def_readonly("provenance", &Calibration::provenance,
+                      "What it was made from, as far as it is known: program and version, SHA-256 of the run, the "
+                      "scenario and the descriptions of heads, options that are not the default ones. Keys: program, "
+                      "run_sha256, scenario_sha256, heads_sha256, options.")
         .def_property_readonly(
             "straightness_reference", [](const Calibration& c) { return straightness_reference(c.chain, c.tool); },
             "One line: to which point the straightnesses refer, and what they are at the functional point.")
@@ -135,7 +150,30 @@ void bind_calibration(py::module_& m) {
                 check(c);
                 return c;
             },
-            py::arg("date"), "The same calibration with this date. Raises InvalidArgument for more than one line.");
+            py::arg("date"), "The same calibration with this date. Raises InvalidArgument for more than one line.")
+        .def(
+            "judged",
+            [](Calibration c, const std::string& fit, const Names& reasons) {
+                c.fit = fit_of({{"fit", fit}}, "calibration");
+                c.fit_reasons = reasons;
+                check(c);
+                return c;
+            },
+            py::arg("fit"), py::arg("fit_reasons") = Names{},
+            "The same calibration with this verdict of its fit. Raises InvalidArgument for another word.")
+        .def_static(
+            "provenance_keys", [] { return Names(provenance_keys.begin(), provenance_keys.end()); },
+            "The keys that a provenance may have.")
+        .def(
+            "with_provenance",
+            [](Calibration c, const Texts& provenance) {
+                c.provenance = provenance;
+                check(c);
+                return c;
+            },
+            py::arg("provenance"),
+            "The same calibration with this provenance, by the keys of the property. Raises InvalidArgument for other "
+            "keys, and for texts that are empty or of more than one line.");
 }
 
 }  // namespace stepdiag::bindings

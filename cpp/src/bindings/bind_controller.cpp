@@ -40,6 +40,13 @@ Choice one_of(const char* argument, const std::string& name, const std::vector<s
 
 Position to_position(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
+void warn_of_fit(const Compensator& compensator) {
+    const std::string& fit = compensator.fit();
+    if (fit.empty() || fit == "accepted") return;
+    const std::string text = "the compensation's table has a fit that is " + fit;
+    if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) < 0) throw py::error_already_set();
+}
+
 Compensator make_compensator(const TableLike& table, const ChainLike& chain, const ArrayLike& origin,
                              const std::string& outside, double margin, double largest_correction,
                              const std::string& approach, double largest_tool, bool accept_rejected) {
@@ -56,10 +63,16 @@ Compensator make_compensator(const TableLike& table, const ChainLike& chain, con
     options.largest_tool = largest_tool;
     options.accept_rejected = accept_rejected;
     const std::string name = to_chain(chain).name();
-    if (py::isinstance<Calibration>(table))
-        return Compensator(to_parameter_table(table.cast<Calibration>()), "calibration", name, options);
-    if (py::isinstance<ErrorMap>(table)) return Compensator(table.cast<ErrorMap>().table(), "error map", name, options);
-    return Compensator::load(to_path(py::reinterpret_borrow<PathLike>(table)), name, options);
+    const auto made = [&] {
+        if (py::isinstance<Calibration>(table))
+            return Compensator(to_parameter_table(table.cast<Calibration>()), "calibration", name, options);
+        if (py::isinstance<ErrorMap>(table))
+            return Compensator(table.cast<ErrorMap>().table(), "error map", name, options);
+        return Compensator::load(to_path(py::reinterpret_borrow<PathLike>(table)), name, options);
+    };
+    Compensator compensator = made();
+    warn_of_fit(compensator);
+    return compensator;
 }
 
 Position tool_of(const Compensator& compensator, const std::optional<ArrayLike>& tool) {
@@ -114,8 +127,9 @@ void bind_controller(py::module_& m) {
              "controller's. origin: home in the controller's coordinates. outside the calibrated volume: \"hold\" the "
              "error of its nearest point, go on \"linear\" up to `margin`, or \"refuse\". largest_correction: command "
              "and forward shorten a longer error to this length. approach: \"mean\", \"positive\" or \"negative\", of "
-             "a table with reversal. accept_rejected: take a table whose fit was rejected. Raises InvalidArgument for "
-             "a table or options that a controller should not use.")
+             "a table with reversal. accept_rejected: take a table whose fit was rejected. Warns (UserWarning) of "
+             "a fit that is not accepted. Raises InvalidArgument for a table or options that a controller should not "
+             "use.")
         .def(
             "error",
             [](const Compensator& c, const ArrayLike& positions, const std::optional<ArrayLike>& tool) {

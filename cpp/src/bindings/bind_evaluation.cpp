@@ -37,17 +37,19 @@ Calibration evaluate(const Measurement& measurement, const Plan& plan, const Hea
     const Eigen::Vector3d offset = to_vector3(tool, "tool");
     const Chain kinematics = to_chain(chain);
     const HeadCalibrations heads = to_heads(head, plan).calibration();
-    const auto calibration = [&] {
+    const auto without_lock = [](auto&& evaluation) {
         const py::gil_scoped_release release;
-        if (evaluator)
-            return evaluator(measurement, plan, kinematics, offset, heads, {uncertainty, full_covariance, plausible});
-        AdjustmentOptions options;
-        options.uncertainty = uncertainty;
-        options.full_covariance = full_covariance;
-        options.plausible = plausible;
-        return adjust(measurement, plan, kinematics, offset, heads, options).calibration;
+        return evaluation();
     };
-    return worded(calibration());
+    if (evaluator)
+        return worded(without_lock([&] {
+            return evaluator(measurement, plan, kinematics, offset, heads, {uncertainty, full_covariance, plausible});
+        }));
+    AdjustmentOptions options;
+    options.uncertainty = uncertainty;
+    options.full_covariance = full_covariance;
+    options.plausible = plausible;
+    return worded(without_lock([&] { return adjust(measurement, plan, kinematics, offset, heads, options); }));
 }
 
 void bind_undetermined(py::module_& m) {

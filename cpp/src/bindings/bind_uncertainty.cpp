@@ -346,9 +346,8 @@ static void bind_virtual_calibration(py::module_& m) {
              py::arg("adjustment") = std::nullopt,
              "simulation: SimulationOptions as of simulate(); of their noise nothing is used, it is among the inputs. "
              "calibration_heads: what the evaluation knows the heads as (none: the heads). method: \"conventional\", "
-             "\"enhanced\", \"adjustment\" or \"one_step\". adjustment: AdjustmentOptions as of adjust(); linear "
-             "methods "
-             "take the uncertainty alone. The fields of both may be given by name instead. verified_share: of the "
+             "\"enhanced\", \"adjustment\" or \"one_step\". adjustment: AdjustmentOptions as of BatchEvaluator. "
+             "The fields of both may be given by name instead. verified_share: of the "
              "samples, in each of which one reading of every line is traced again. derived: as derived_at_point gives "
              "them, or (name, unit, coefficients of the values of the tables). Raises InvalidArgument.")
         .def_property_readonly("nominal", &VirtualCalibrations::nominal,

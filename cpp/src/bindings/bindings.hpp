@@ -73,7 +73,8 @@ DoubleArray to_numpy_vector(const Eigen::VectorXd& vector);
 
 // The function of the package that makes a sentence of a finding: all sentences are worded in Python.
 py::object& wording();
-Calibration worded(Calibration calibration);  // with its findings in words; needs the interpreter lock
+Calibration worded(Calibration calibration);       // with its findings in words; needs the interpreter lock
+Calibration worded(const Adjustment& adjustment);  // its calibration, also with the reasons of its verdict
 
 template <class Records>
 py::typing::Tuple<typename Records::value_type, py::ellipsis> to_tuple(const Records& records) {

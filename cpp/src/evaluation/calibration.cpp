@@ -1,6 +1,7 @@
 #include "stepdiag/evaluation/calibration.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -21,6 +22,18 @@ bool is_uncertainty(double u) { return std::isnan(u) || (std::isfinite(u) && u >
 void check_one_line(const std::string& text, const char* what) {
     if (text.find_first_of("\r\n") != std::string::npos)
         throw InvalidArgument(std::string(what) + ": expected one line of text, got a line break");
+}
+
+void check_provenance(const std::map<std::string, std::string>& provenance) {
+    for (const auto& [key, text] : provenance) {
+        if (std::find(provenance_keys.begin(), provenance_keys.end(), key) == provenance_keys.end()) {
+            std::string known;
+            for (const char* one : provenance_keys) known += (known.empty() ? "" : ", ") + std::string(one);
+            throw InvalidArgument("provenance: expected the keys " + known + ", got \"" + key + "\"");
+        }
+        if (text.empty()) throw InvalidArgument("provenance, " + key + ": expected a text, got an empty one");
+        check_one_line(text, ("provenance, " + key).c_str());
+    }
 }
 
 void check_sizes(const std::string& name, std::size_t nodes, std::initializer_list<std::size_t> others) {
@@ -91,6 +104,14 @@ void check_covariance(const Eigen::MatrixXd& covariance, const Uncertainties& va
         }
 }
 
+// What the leading lines say about the fit in numbers.
+template <class AnyCalibration>
+auto factors(AnyCalibration& calibration) {
+    using Entry = std::pair<const char*, decltype((calibration.variance_factor))>;
+    return std::array<Entry, 2>{Entry{"variance_factor", calibration.variance_factor},
+                                Entry{"uncertainty_scaled", calibration.uncertainty_scaled}};
+}
+
 }  // namespace
 
 void check(const Calibration& calibration) {
@@ -99,9 +120,12 @@ void check(const Calibration& calibration) {
     if (!calibration.tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
     check_one_line(calibration.method, "method");
     check_one_line(calibration.date, "date");
-    if (const auto& factor = calibration.variance_factor; factor && !(std::isfinite(*factor) && *factor >= 0.0))
-        throw InvalidArgument("variance_factor: expected a finite number of at least 0");
+    for (const auto& [key, factor] : factors(calibration))
+        if (factor && !(std::isfinite(*factor) && *factor >= 0.0))
+            throw InvalidArgument(std::string(key) + ": expected a finite number of at least 0");
+    check_provenance(calibration.provenance);
     for (const std::string& sentence : calibration.undetermined) check_one_line(sentence, "undetermined");
+    for (const std::string& sentence : calibration.fit_reasons) check_one_line(sentence, "fit_reasons");
     for (int i = 0; i < function_count; ++i) {
         const std::string name = FunctionId::at(i).name();
         if (const auto& f = calibration.functions[i])
@@ -220,8 +244,13 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
                     {"tool_mm", format_lengths(calibration.tool)}};
     table.header["straightness_reference"] = straightness_reference(calibration.chain, calibration.tool);
     if (!calibration.date.empty()) table.header["date"] = calibration.date;
+    table.header.insert(calibration.provenance.begin(), calibration.provenance.end());
     if (calibration.fit) table.header["fit"] = name(*calibration.fit);
-    if (calibration.variance_factor) table.header["variance_factor"] = format_decimal(*calibration.variance_factor, 0);
+    for (const auto& [key, factor] : factors(calibration))
+        if (factor) table.header[key] = format_decimal(*factor, 0);
+    if (!calibration.fit_reasons.empty()) table.header["fit_reasons"] = join(calibration.fit_reasons, sentence_break);
+    if (calibration.method == "conventional" || calibration.method == "enhanced")
+        table.header["uncertainties"] = "of the noise of the readings alone";
     if (!slopes.empty()) table.header["undetermined_slopes"] = join(slopes, " ");
     if (!constants.empty()) table.header["undetermined_reversal_constants"] = join(constants, " ");
     std::vector<std::string> undetermined = calibration.undetermined;
@@ -248,12 +277,17 @@ Calibration read_calibration(const std::string& path) {
                             {},
                             {}};
     calibration.undetermined = split(optional_value("undetermined"), sentence_break);
+    calibration.fit_reasons = split(optional_value("fit_reasons"), sentence_break);
     calibration.date = optional_value("date");
+    for (const char* key : provenance_keys)
+        if (std::string text = optional_value(key); !text.empty()) calibration.provenance[key] = std::move(text);
     calibration.fit = fit_of(table.header, path);
-    if (const std::string factor = optional_value("variance_factor"); !factor.empty()) {
-        calibration.variance_factor = parse_decimal(factor, 0);
-        if (!calibration.variance_factor || *calibration.variance_factor < 0.0)
-            throw InvalidArgument(path + ": variance_factor: expected a number of at least 0, got \"" + factor + "\"");
+    for (auto& [key, factor] : factors(calibration)) {
+        const std::string given = optional_value(key);
+        if (given.empty()) continue;
+        factor = parse_decimal(given, 0);
+        if (!factor || *factor < 0.0)
+            throw InvalidArgument(path + ": " + key + ": expected a number of at least 0, got \"" + given + "\"");
     }
     const auto slopes = functions_listed(table, "undetermined_slopes", path);
     const auto constants = functions_listed(table, "undetermined_reversal_constants", path);

@@ -24,7 +24,7 @@ Calibration evaluate_conventional(const Measurement& measurement, const Plan& pl
     const ConventionalMap map(passes, plan, usable);
     Calibration calibration{"conventional", chain, plan.volume(), tool, {}, {}};
     evaluate_linear(map, passes, plan, options.full_covariance, calibration);
-    calibration.fit = Fit::unchecked;
+    test_fit(map, passes, calibration);
     for (const Axis axis : all_axes)
         if (auto gap = map.lengths(axis).gap) {
             gap->reason = OpenReason::few_diagonals;

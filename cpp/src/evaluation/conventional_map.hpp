@@ -55,6 +55,15 @@ public:
         return out;
     }
 
+    // Sums of readings that are noise, were nothing else the matter: where a step was read on more lines than needed.
+    template <class Number>
+    std::vector<Number> contradictions(const ReadingRows<Number>& readings, Thinning& thinning) const {
+        std::vector<Number> out;
+        for (const Axis axis : all_axes)
+            add_contradictions<Number>(systems_[index(axis)], readings.values, {0}, passes_, thinning, out);
+        return out;
+    }
+
 private:
     const std::vector<Pass>& passes_;
     Eigen::Vector3d volume_;

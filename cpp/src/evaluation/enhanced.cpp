@@ -59,7 +59,7 @@ Calibration evaluate_enhanced(const Measurement& measurement, const Plan& plan, 
     const EnhancedMap map(passes, plan, chain, tool);
     Calibration calibration{"enhanced", chain, plan.volume(), tool, {}, {}, findings_of(map, plan)};
     evaluate_linear(map, passes, plan, options.full_covariance, calibration);
-    calibration.fit = Fit::unchecked;
+    test_fit(map, passes, calibration);
     if (!is_anything_determined(calibration)) throw NothingDetermined("enhanced evaluation", calibration.findings);
     refuse_implausible(calibration, measurement, plan, options.plausible);
     return calibration;

@@ -49,6 +49,24 @@ public:
         return out;
     }
 
+    // Sums of readings that are noise, were nothing else the matter: where there are more tilts, lengths and trends
+    // than needed. Those of the lengths and of the trends depend on each other.
+    template <class Number>
+    std::vector<Number> contradictions(const ReadingRows<Number>& readings, Thinning& thinning) const {
+        std::vector<Number> out, angles(layout_.size(), Number::Zero());
+        for (const Axis axis : all_axes)
+            add_contradictions<Number>(angles_[index(axis)], readings.values, {1, 2}, passes_, thinning, out);
+        if (readings.has_tilts) solve_angles(readings, angles);
+        std::vector<Number> lengths = corrected_lengths(readings, angles);
+        slopes_.add_contradictions<Number>(lengths, thinning, out);
+        slopes_.correct_for_laser_angles<Number>(slopes_.solve<Number>(lengths), passes_, lengths);
+        std::vector<Number> corrected(readings.values.size(), Number::Zero());
+        for (std::size_t i = 0; i < lengths.size(); ++i) corrected[values_per_reading * i] = lengths[i];
+        for (const Axis axis : all_axes)
+            add_contradictions<Number>(lengths_[index(axis)], corrected, {0}, passes_, thinning, out);
+        return out;
+    }
+
 private:
     // theta of a node times `coefficient` moves a reading's length.
     struct AngularContribution {

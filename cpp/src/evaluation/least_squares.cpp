@@ -30,6 +30,8 @@ LeastSquares solve_least_squares(const Eigen::MatrixXd& equations, const Eigen::
     result.rank = int(decomposition.rank());
     const Eigen::VectorXd projector = inverse.cwiseProduct(scaled.transpose()).rowwise().sum();
     for (Eigen::Index j = 0; j < unknowns; ++j) result.determined[j] = projector[j] > 1.0 - in_row_space;
+    const Eigen::MatrixXd rotation = decomposition.householderQ();
+    result.contradictions = rotation.rightCols(rotation.cols() - result.rank).transpose() * weight.asDiagonal();
     result.pseudoinverse = scale.asDiagonal() * inverse * weight.asDiagonal();
     return result;
 }

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "evaluation/fit_test.hpp"
 #include "evaluation/step_systems.hpp"
 #include "stepdiag/core/error.hpp"
 
@@ -185,6 +186,79 @@ void add_up_steps(const AxisSystem& system, const std::vector<Number>& lengths, 
         out[1][i + 1] = y;
         out[2][i + 1] = z;
     }
+}
+
+// Takes one of so many contradictions: others are not worked out.
+class Thinning {
+public:
+    explicit Thinning(std::size_t one_of) : one_of_(one_of) {}
+    bool takes() { return seen_++ % one_of_ == 0; }
+
+private:
+    std::size_t one_of_, seen_ = 0;
+};
+
+// Sums of `right_sides`, a row of coefficients each.
+template <class Number>
+void add_contradictions(const Eigen::MatrixXd& contradictions, const std::vector<Number>& right_sides,
+                        Thinning& thinning, std::vector<Number>& out) {
+    for (Eigen::Index i = 0; i < contradictions.rows(); ++i) {
+        if (!thinning.takes()) continue;
+        Number sum = Number::Zero();
+        for (std::size_t j = 0; j < right_sides.size(); ++j) sum += contradictions(i, Eigen::Index(j)) * right_sides[j];
+        out.push_back(sum);
+    }
+}
+
+// What the steps of one axis say twice: `channels` of the readings, one equation of a step each.
+template <class Number>
+void add_contradictions(const AxisSystem& system, const std::vector<Number>& readings, const std::vector<int>& channels,
+                        const std::vector<Pass>& passes, Thinning& thinning, std::vector<Number>& out) {
+    for (const StepSystem& interval : system.intervals) {
+        std::vector<Number> increments;
+        for (const Step& step : interval.steps)
+            for (const int c : channels) {
+                const std::size_t from = values_per_reading * (passes[step.pass].first_reading + step.point) + c;
+                increments.push_back(step.sign * (readings[from + values_per_reading] - readings[from]));
+            }
+        add_contradictions<Number>(interval.solution->contradictions, increments, thinning, out);
+    }
+}
+
+// A map's contradictions in place of its parameters: one of so many.
+template <class Map>
+struct Contradictions {
+    const Map& map;
+    std::size_t one_of = 1;
+
+    template <class Number>
+    std::vector<Number> apply(const ReadingRows<Number>& readings) const {
+        Thinning thinning(one_of);
+        return map.template contradictions<Number>(readings, thinning);
+    }
+};
+
+// Tests whether the readings contradict each other: t^T Cov(t)^-1 t of the map's contradictions t is chi-square, its
+// freedom the rank of Cov(t). Sets fit and variance factor of the calibration. Neighbouring steps share readings, which
+// Cov(t) counts. Of very many contradictions some hundreds, evenly spaced, are taken.
+template <class Map>
+void test_fit(const Map& map, const std::vector<Pass>& passes, Calibration& calibration) {
+    constexpr int width = 8;
+    constexpr std::size_t most = 400;
+    const ReadingRows<Row<1>> readings{readings_of(passes), -1, true};
+    Contradictions<Map> contradictions{map};
+    const std::size_t count = contradictions.template apply<Row<1>>(readings).size();
+    contradictions.one_of = std::max<std::size_t>(1, (count + most - 1) / most);
+    const auto found = contradictions.template apply<Row<1>>(readings);
+    Eigen::VectorXd values(found.size());
+    for (std::size_t i = 0; i < found.size(); ++i) values[Eigen::Index(i)] = found[i][0];
+    ShareSum covariance(values.size());
+    for_each_share<width>(contradictions, passes, [&](const std::vector<Row<width>>& block, int columns) {
+        for (int c = 0; c < columns; ++c) covariance.add([&](std::size_t i) { return block[i][c]; });
+    });
+    const ChiSquare test = chi_square(values, covariance.matrix());
+    calibration.fit = fit_of_noise(test.square_sum, test.freedom);
+    if (test.freedom > 0) calibration.variance_factor = test.square_sum / test.freedom;
 }
 
 }  // namespace stepdiag

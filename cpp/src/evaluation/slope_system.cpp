@@ -96,6 +96,7 @@ SlopeSystem make_slope_system(const std::vector<Pass>& passes, const Plan& plan,
     const LeastSquares solution = solve_least_squares(
         matrix, Eigen::Map<const Eigen::VectorXd>(uncertainty.data(), Eigen::Index(uncertainty.size())));
     system.inverse_ = solution.pseudoinverse;
+    system.contradictions_ = solution.contradictions;
     system.determined_ = solution.determined;
     const Eigen::MatrixXd projector = Eigen::MatrixXd::Identity(unknowns, unknowns) - solution.pseudoinverse * matrix;
     const auto open = std::count(solution.determined.begin(), solution.determined.end(), false);

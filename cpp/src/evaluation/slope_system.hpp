@@ -27,16 +27,16 @@ public:
 
     template <class Number>
     std::vector<Number> solve(const std::vector<Number>& lengths) const {
-        std::vector<Number> sums;
-        for (const auto& terms : sums_) {
-            Number sum = Number::Zero();
-            for (const auto& [reading, coefficient] : terms) sum += coefficient * lengths[reading];
-            sums.push_back(sum);
-        }
+        const std::vector<Number> sums = right_sides(lengths);
         std::vector<Number> slopes(inverse_.rows(), Number::Zero());
         for (Eigen::Index j = 0; j < inverse_.rows(); ++j)
             for (Eigen::Index i = 0; i < inverse_.cols(); ++i) slopes[j] += inverse_(j, i) * sums[i];
         return slopes;
+    }
+
+    template <class Number>
+    void add_contradictions(const std::vector<Number>& lengths, Thinning& thinning, std::vector<Number>& out) const {
+        stepdiag::add_contradictions<Number>(contradictions_, right_sides(lengths), thinning, out);
     }
 
     template <class Number>
@@ -58,8 +58,19 @@ private:
         int reading;
         double coefficient;
     };
+    template <class Number>
+    std::vector<Number> right_sides(const std::vector<Number>& lengths) const {
+        std::vector<Number> sums;
+        for (const auto& terms : sums_) {
+            Number sum = Number::Zero();
+            for (const auto& [reading, coefficient] : terms) sum += coefficient * lengths[reading];
+            sums.push_back(sum);
+        }
+        return sums;
+    }
+
     std::vector<std::vector<Term>> sums_;  // an equation each: a sum of lengths
-    Eigen::MatrixXd inverse_;
+    Eigen::MatrixXd inverse_, contradictions_;
     Eigen::MatrixXd null_space_;
     std::vector<bool> determined_;
 };

@@ -110,6 +110,9 @@ def compare_calibrations(a: Calibration, b: Calibration, *, limit: float = 0.05)
     if not 0.0 < limit < 1.0:
         raise InvalidArgument(f"limit: expected a probability between 0 and 1, got {limit}")
     notes = _check_machines(a, b)
+    run = a.provenance.get("run_sha256")
+    if run is not None and run == b.provenance.get("run_sha256"):
+        notes.append("A and B are evaluations of the same run: they are not independent")
     tables_a, tables_b = TableValues(a), TableValues(b)
     shapes = {*a.undetermined_slopes, *b.undetermined_slopes}
     constants = {*a.undetermined_reversal_constants, *b.undetermined_reversal_constants}

@@ -2,7 +2,7 @@
 fit (`FitReason`; docs/conventions.md, "Verdict of a fit"), and where an error map breaks the frame choice. All
 sentences about them are here."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
 from stepdiag._core import Adjustment, Calibration, ErrorMap, FitReason, KnownCombination, Undetermined
@@ -49,6 +49,14 @@ REMEDIES: Final = {
     "fixed": "take it as fixed",
     "scales": "make the scales known",
 }
+# By Calibration.provenance_keys().
+PROVENANCE: Final = {
+    "program": "made by",
+    "run_sha256": "run, SHA-256",
+    "scenario_sha256": "scenario, SHA-256",
+    "heads_sha256": "heads, SHA-256",
+    "options": "options",
+}
 # Unknowns of a set-up, by component.
 SETUP: Final = {
     "reflector": ("reflector tilt about local x", "reflector tilt about local y"),
@@ -65,10 +73,22 @@ SETUP: Final = {
 # Of a calibration whose reasons are not at hand.
 MEANING: Final = {
     "accepted": "the readings agree with each other and with the scenario",
-    "doubtful": "the readings scatter more, or less, than their stated uncertainties allow",
+    "doubtful": "the readings scatter more, less or otherwise than their stated uncertainties allow",
     "rejected": "the readings contradict each other or the scenario; do not use this calibration",
     "unchecked": "nothing controls the readings",
 }
+
+# The better first.
+FITS: Final = ("accepted", "unchecked", "doubtful", "rejected")
+# Of calibrations by linear methods, whose uncertainties know of nothing else.
+NOISE_ALONE: Final = {
+    "conventional": "note: uncertainties are of noise alone: what rotations, laser and mirror do to distances is "
+    "neither in them nor corrected",
+    "enhanced": "note: uncertainties are of noise alone: what laser and mirror angles do at second order is "
+    "neither in them nor corrected",
+}
+# Of what is accepted.
+NOT_SEEN: Final = "note: no fit shows a wrong wavelength, temperature, chain or tool offset: the parameters absorb them"
 
 
 def undetermined_text(finding: Undetermined) -> str:
@@ -148,26 +168,50 @@ def fit_row(calibration: Calibration) -> str:
     return f"fit: {_shown(calibration.fit)}: {MEANING[calibration.fit]}{figures}"
 
 
+def fit_rows(calibration: Calibration) -> Iterator[str]:
+    """The same with its reasons, and what no verdict tells."""
+    yield fit_row(calibration)
+    yield from (f"{calibration.fit} because {reason}" for reason in calibration.fit_reasons)
+    if calibration.uncertainty_scaled is not None:
+        yield f"note: all standard uncertainties were multiplied by {calibration.uncertainty_scaled:.3g}"
+    if calibration.method in NOISE_ALONE:
+        yield NOISE_ALONE[calibration.method]
+    if calibration.fit == "accepted":
+        yield NOT_SEEN
+
+
+def provenance_rows(calibration: Calibration) -> list[str]:
+    """What a calibration was made from, as far as its file says."""
+    made = calibration.provenance
+    return [f"{words}: {made[key]}" for key, words in PROVENANCE.items() if key in made]
+
+
 def verdict_rows(adjustment: Adjustment) -> Iterator[str]:
     """The verdict of an adjustment with its reasons, and what no verdict tells."""
     verdict = adjustment.verdict
     if verdict.fit == "unchecked":
         yield "fit: unchecked: there are no more readings than unknowns, so that nothing controls them"
         return
-    said = MEANING[verdict.fit] if verdict.fit != "doubtful" else next(map(reason_text, verdict.reasons))
+    reasons = reason_texts(verdict.reasons)
+    said = reasons.pop(0) if verdict.fit == "doubtful" else MEANING[verdict.fit]
     yield (
         f"fit: {_shown(verdict.fit)}: {said} (variance factor {adjustment.variance_factor:.3g} with "
-        f"{adjustment.degrees_of_freedom} degrees of freedom, probability {adjustment.chi_square_probability:.2g})"
+        f"{adjustment.degrees_of_freedom} degrees of freedom, {_probability(adjustment.chi_square_probability)})"
     )
-    if verdict.fit == "rejected":
-        yield from (f"rejected because {reason_text(reason)}" for reason in verdict.reasons)
+    yield from (f"{verdict.fit} because {reason}" for reason in reasons)
+    if [reason.finding for reason in verdict.reasons] == ["misfit"]:
+        yield (
+            "remedy: no line, channel, time or position scatters unlike the others; if the noise is what it is, "
+            "[adjustment] scale_uncertainty = true multiplies all uncertainties by "
+            f"{verdict.reasons[0].value:.3g}"
+        )
     if verdict.fit == "accepted":
-        yield "note: no fit shows a wrong wavelength, temperature, chain or tool offset: the parameters absorb them"
+        yield NOT_SEEN
 
 
 def reason_text(reason: FitReason) -> str:
     """One reason, without a full stop."""
-    place = f"line {reason.line}" if reason.line else f"channel {reason.channel}"
+    noise = f"{reason.value:.3g} ± {reason.standard_uncertainty:.1g} times"
     match reason.finding:
         case "noise_factor":
             return (
@@ -176,21 +220,76 @@ def reason_text(reason: FitReason) -> str:
             )
         case "uneven_misfit":
             return (
-                f"the readings do not fit, and not evenly: {place} scatters {reason.value:.3g} times as much as its "
-                f"stated uncertainties, the others {reason.limit:.3g} times"
+                f"the readings do not scatter evenly: {_group(reason)} {reason.value:.3g} times as much as stated, the "
+                f"others {reason.limit:.3g} times"
             )
+        case "trend":
+            return _trend(reason)
         case "prior":
             name = f"{reason.channel.replace('_', ' ')}{_component(reason)}"
             return (
-                f"{name} of {place} is {reason.value:.3g} standard uncertainties from what [adjustment] takes it for "
-                f"(at most {reason.limit:g} is credible)"
+                f"{name} of line {reason.line} is {reason.value:.3g} standard uncertainties from what [adjustment] "
+                f"takes it for (at most {reason.limit:g} is credible)"
             )
-        case "misfit":
-            return f"the readings scatter more than their stated uncertainties say: chance {reason.value:.2g}"
-        case "no_misfit":
-            return f"the readings scatter less than their stated uncertainties say: chance {reason.value:.2g}"
+        case "misfit" | "no_misfit":
+            return f"the noise is about {noise} what is stated"
+        case "scaled":
+            return (
+                f"all uncertainties were multiplied by {noise.removesuffix(' times')}, which the readings' scatter says"
+            )
         case _:
             return "nothing controls the readings"
+
+
+def reason_texts(reasons: Sequence[FitReason]) -> list[str]:
+    """The reasons of a verdict, a sentence each; trends that the readings do not tell apart share one."""
+    texts: list[str] = []
+    alternatives: dict[int, list[str]] = {}  # by the text that they belong to
+    for reason in reasons:
+        if reason.alternative and texts:
+            size, unit = _size(reason, reason.value)
+            alternatives.setdefault(len(texts) - 1, []).append(f"{_signal(reason)} ({size:+.3g} {unit})")
+        else:
+            texts.append(reason_text(reason))
+    for place, others in alternatives.items():
+        shown, more = others[:4], len(others) - 4
+        texts[place] += f"; it may be {', '.join(shown)}{f' or one of {more} more' if more > 0 else ''} instead"
+    return texts
+
+
+def _group(reason: FitReason) -> str:
+    """The readings that scatter unlike the others, with their verb."""
+    match reason.aspect, reason.run >= 0:
+        case "second_half", _:
+            return "the second half of the run does"
+        case "far_half", _:
+            return "the far halves of the lines do"
+        case _, True:
+            return f"run {reason.run} does"
+    channel = f"channel {reason.channel}" if reason.channel else ""
+    return f"{' of '.join(filter(None, (channel, reason.line and f'line {reason.line}')))} does"
+
+
+def _signal(reason: FitReason) -> str:
+    return f"{reason.channel} on {f'line {reason.line}' if reason.line else 'all lines'}"
+
+
+def _size(reason: FitReason, size: float) -> tuple[float, str]:
+    return report_value("rad" if reason.channel in ("alpha", "beta") else "mm", size)
+
+
+def _trend(reason: FitReason) -> str:
+    size, unit = _size(reason, reason.value)
+    uncertainty, _ = _size(reason, reason.standard_uncertainty)
+    return (
+        f"{_signal(reason)} runs with {reason.aspect.replace('_', ' ')} by {size:+.3g} ± {uncertainty:.2g} {unit} from "
+        "its first reading to its last, beyond what set-up and machine explain"
+    )
+
+
+def _probability(probability: float) -> str:
+    least = 1e-12
+    return f"probability {probability:.2g}" if probability >= least else f"probability below {least:g}"
 
 
 def _component(reason: FitReason) -> str:

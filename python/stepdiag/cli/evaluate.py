@@ -5,7 +5,7 @@ from typing import Literal
 
 import click
 
-from stepdiag._core import Calibration, InvalidArgument
+from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import PATH, Writes, out_file, tell_fit
 from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
 
@@ -22,6 +22,7 @@ from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
     help="Method of evaluation; see above.",
 )
 @click.option("--covariance", is_flag=True, help="Also write the covariance of all values (netCDF only).")
+@click.option("--reliability", is_flag=True, help="Also report which faults of the readings would have been found.")
 @out_file("Calibration to write, CSV or netCDF (.nc, with set-ups and residuals).", CALIBRATION)
 @click.pass_context
 def evaluate(
@@ -30,6 +31,7 @@ def evaluate(
     run: Path,
     method: Literal["adjustment", "enhanced", "conventional"],
     covariance: bool,
+    reliability: bool,
     output: OutputFile,
 ) -> None:
     """Evaluate the measurement RUN (CSV or netCDF) that was made with SCENARIO's plan and head.
@@ -40,8 +42,9 @@ def evaluate(
 
     The first line of the report is the verdict of the fit, which is also stored in the calibration.
     If the fit is rejected, the command ends with a warning and exit code 3; the calibration is
-    written, but must not be used. A result that no machine can have ([plausible] in the scenario)
-    is an error, and nothing is written.
+    written, but must not be used. For the linear methods it is the worse of two verdicts: that of
+    their own test, and that of the adjustment of the same readings. A result that no machine can
+    have ([plausible] in the scenario) is an error, and nothing is written.
 
     \b
     adjustment    all readings at once and exactly: the machine's errors, and how head and mirror were set up
@@ -52,25 +55,39 @@ def evaluate(
     from stepdiag.io.data_files import is_netcdf, read_measurement, write_calibration
     from stepdiag.io.whole_files import check_input
     from stepdiag.report.evaluation import evaluation_report
-    from stepdiag.scenario.description import adjust_scenario, evaluate_scenario, read_scenario
+    from stepdiag.scenario.description import (
+        JudgedEvaluation,
+        adjust_scenario,
+        evaluate_beside_adjustment,
+        read_scenario,
+    )
+    from stepdiag.scenario.provenance import provenance_of
 
     check_input(run)
     if covariance and not is_netcdf(output.path):
         raise InvalidArgument(f"--covariance: expected an output named .nc (CSV has no covariance), got {output.path}")
+    if reliability and method != "adjustment":
+        raise InvalidArgument(f"--reliability: expected the method adjustment, got {method}")
     described = read_scenario(scenario)
     path = output.claim(scenario, run, error_map=described.truth.error_map)
     known = described.known
     measurement = read_measurement(run)
+    provenance = provenance_of(known, run, method=method)
     with located(str(run)):
         result = (
-            adjust_scenario(known, measurement, full_covariance=covariance)
+            adjust_scenario(known, measurement, full_covariance=covariance, reliability=reliability)
             if method == "adjustment"
-            else evaluate_scenario(known, measurement, method=method, full_covariance=covariance)
+            else evaluate_beside_adjustment(known, measurement, method=method, full_covariance=covariance)
         )
-    write_calibration(result, path, measurement=measurement)
+    write_calibration(
+        result.calibration if isinstance(result, JudgedEvaluation) else result,
+        path,
+        measurement=measurement,
+        provenance=provenance,
+    )
     for line in evaluation_report(result, measurement, known):
         click.echo(line)
-    tell_fit(context, path, (result if isinstance(result, Calibration) else result.calibration).fit)
+    tell_fit(context, path, result.calibration.fit)
 
 
 def _step_counts(context: click.Context, option: click.Parameter, text: str | None) -> tuple[int, ...] | None:
@@ -102,10 +119,13 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
 
     Adjusts an error-free run with the scenario's uncertainties and unknowns. Reports which of the
     21 parameters and of the set-up's unknowns the readings determine, their standard uncertainties,
-    what is missing for the others, and how the largest uncertainties grow with the number of steps.
+    what is missing for the others, which faults of single readings and slips of a counter would be
+    found and told apart, and how the largest uncertainties grow with the number of steps.
     """
     from stepdiag.io.whole_files import write_whole
+    from stepdiag.planning.fault_control import extensions
     from stepdiag.planning.observation import USUAL_STEPS, observe, prospects
+    from stepdiag.report.fault_control import control_rows, extension_rows
     from stepdiag.report.observation import observation_report, prospect_csv, prospect_rows
     from stepdiag.scenario.description import read_scenario
 
@@ -114,6 +134,8 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
     known = described.known
     run, found = observe(known)
     for line in observation_report(found, run, known):
+        click.echo(line)
+    for line in [*control_rows(found.reliability), *extension_rows(found.reliability, extensions(known))]:
         click.echo(line)
     table = prospects(known, [*(steps or USUAL_STEPS), known.plan.steps])
     click.echo("largest standard uncertainties by the number of steps, and the mirror that they take:")

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from stepdiag.cli.options import PATH, Writes, tell, tell_fit
+from stepdiag.cli.options import PATH, Writes, tell_fit
 from stepdiag.io.outputs import COMP_FILE, COMP_LINES, GRID, ISG_TABLE, KINEMATICS_TABLE, OutputFile, claim_folder
 
 # Those of stepdiag.export.write.FORMATS, which is slow to import; a test compares them.
@@ -92,6 +92,4 @@ def export(context: click.Context, /, calibration: Path, to: str, output: Output
     check_fit(read, f"{calibration}", options["accept_rejected"])
     for line in export_calibration(read, to, path, ExportOptions(**options)):
         click.echo(line)
-    if read.fit == "unchecked":
-        tell("warning", f"{calibration}: the fit is unchecked: nothing controlled the readings of this calibration")
     tell_fit(context, calibration, read.fit)

@@ -62,3 +62,5 @@ def tell_fit(context: click.Context, path: Path, fit: str | None) -> None:
         context.exit(NOT_TO_BE_TRUSTED)
     if fit == "doubtful":
         tell("warning", f"{path}: the fit is doubtful: do not rely on the stated uncertainties")
+    if fit == "unchecked":
+        tell("warning", f"{path}: the fit is unchecked: nothing controlled the readings of this calibration")

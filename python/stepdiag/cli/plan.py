@@ -70,8 +70,8 @@ def plan(
     certain, because it is a sum over more steps.
     """
     from stepdiag.io.whole_files import write_whole
-    from stepdiag.planning.plan_by_time import choose, outcomes, own_spacing
-    from stepdiag.report.plan_by_time import advice, left_out_rows, plan_csv, plan_rows
+    from stepdiag.planning.plan_by_time import choose, outcomes, own_spacing, telling
+    from stepdiag.report.plan_by_time import advice, fault_advice, left_out_rows, plan_csv, plan_rows
     from stepdiag.scenario.description import read_scenario
 
     described = read_scenario(scenario)
@@ -91,6 +91,9 @@ def plan(
         click.echo(line)
     for line in [*left_out_rows(found), *advice(found, available, near, family)]:
         click.echo(line)
+    if choice.taken is not None:
+        for line in fault_advice(*telling(described, found, choice.taken, family)):
+            click.echo(line)
     suffix = "" if path is None else path.suffix.lower().lstrip(".")
     if path is not None and suffix == "csv":
         write_whole(path, plan_csv(found))

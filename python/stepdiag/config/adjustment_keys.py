@@ -78,6 +78,13 @@ class AdjustmentSection(AdjustmentKeys):
         "Readings that do not fit are left out at this probability of any false alarm in a run; 0: none is.",
         0.01,
     )
+    scale_uncertainty: bool = key(
+        "true or false",
+        "Where the readings scatter more than stated (variance factor above 1), all stated uncertainties are "
+        "multiplied by the root of the variance factor, and the fit is doubtful at best. For noise that is larger by "
+        "one factor throughout.",
+        False,
+    )
     by_line: dict[str, AdjustmentKeys] = tables("LINE")
 
 

@@ -47,7 +47,8 @@ class PlanByTimeSection(Section):
     line_sets: tuple[Annotated[tuple[str, ...], Field(min_length=1)], ...] | None = key(
         'a list of sets of lines such as ["ppp", "npp", "pnp", "p00"]',
         "Sets of lines to choose from, beside that of the scenario; single axes in them are scale lines. By default "
-        "three or four body diagonals, six face diagonals, and both, with two, three or no scale lines.",
+        "three or four body diagonals, six face diagonals, and both (with four also three face diagonals), with two, "
+        "three or no scale lines.",
         None,
         [["ppp", "npp", "pnp", "nnp", "p00", "0p0"], ["pp0", "np0", "p0p", "n0p", "0pp", "0np"]],
     )

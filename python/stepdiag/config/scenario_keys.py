@@ -109,7 +109,9 @@ class PlanSection(Section):
 
     lines: tuple[str, ...] = key(
         'a list of lines such as "ppp" (three of p, n, 0)',
-        'Measured lines: body diagonals such as "npp", face diagonals such as "pp0", single axes such as "p00".',
+        'Measured lines: body diagonals such as "npp", face diagonals such as "pp0", single axes such as "p00". Four '
+        "body diagonals do not tell on which of them a distance was wrong or the counter slipped; with face diagonals "
+        "in the three planes, or `repeats = 2`, they do (`stepdiag observe`).",
         example=["ppp", "npp", "pnp", "nnp"],
     )
     steps: Annotated[int, Field(ge=1, le=LARGEST_STEPS)] = key(

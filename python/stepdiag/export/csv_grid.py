@@ -65,6 +65,7 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
         "interpolation_loss_um": f"{loss * 1e3:.4g}",
         "not_compensated": "; ".join(missing),
         "calibrated": calibration.date,
+        **calibration.provenance,
     }
     text = csv_text(_header(bool(options.orientation)), [], leading) + "".join(_rows(axes, origin, values))
     return Export({output: text}, [fit_row(calibration), *_report(leading, axes, error, loss, place, missing)])

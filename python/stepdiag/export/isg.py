@@ -21,7 +21,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, Chain, ErrorMap, InvalidArgument, Machine
-from stepdiag.calibration.finding_text import fit_row
+from stepdiag.calibration.finding_text import fit_row, provenance_rows
 from stepdiag.export.common import (
     Export,
     ExportOptions,
@@ -71,6 +71,7 @@ def isg(calibration: Calibration, output: Path, options: ExportOptions) -> Expor
     where = "as parameters" if apart else "in the straightnesses: EXY - C0Y y, EXZ + B0Z z, EYZ - A0Z z"
     lines = [
         fit_row(calibration),
+        *provenance_rows(calibration),
         UNTRIED,
         f"chain {calibration.chain}, volume {words(calibration.volume)} mm, home at {words(origin)} mm in the "
         f"controller's coordinates, direction of approach {kind}",

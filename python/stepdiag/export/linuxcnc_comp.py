@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
-from stepdiag.calibration.finding_text import fit_row
+from stepdiag.calibration.finding_text import fit_row, provenance_rows
 from stepdiag.export.common import (
     Export,
     ExportOptions,
@@ -130,6 +130,7 @@ def _what_the_files_are(
 ) -> list[str]:
     return [
         fit_row(calibration),
+        *provenance_rows(calibration),
         f"chain {calibration.chain}, volume {words(calibration.volume)} mm, home at {words(origin)} mm in the "
         "controller's coordinates",
         f"corrected: the positioning error of each axis along its line through {words(at)} mm from home, for a tool "

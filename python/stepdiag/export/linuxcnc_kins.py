@@ -4,6 +4,7 @@ It is the calibration's CSV, with chain, volume and tool.
 """
 
 import tempfile
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -19,14 +20,16 @@ def linuxcnc_kins(calibration: Calibration, output: Path, options: ExportOptions
     missing = require(calibration, [*FUNCTIONS, *SQUARENESSES], options)
     tool, origin = tool_of(calibration, options), origin_of(options)
     table = _with_tool(calibration, tool)
-    # Reports here what the module would refuse.
-    loaded = Compensator(
-        table,
-        calibration.chain,
-        origin=origin,
-        approach=options.approach or "mean",
-        accept_rejected=options.accept_rejected,
-    )
+    # Reports here what the module would refuse. Of its fit the export itself warns.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        loaded = Compensator(
+            table,
+            calibration.chain,
+            origin=origin,
+            approach=options.approach or "mean",
+            accept_rejected=options.accept_rejected,
+        )
     # INI files do not pass on quotes; the module derives the primes from the place of the bed.
     arguments = f"table={output.absolute()} chain={''.join(c for c in calibration.chain.name if c.isalpha())}"
     if origin.any():
@@ -76,4 +79,7 @@ def _with_tool(calibration: Calibration, tool: FloatArray) -> Calibration:
         date=calibration.date,
         fit=calibration.fit,
         variance_factor=calibration.variance_factor,
+        fit_reasons=calibration.fit_reasons,
+        uncertainty_scaled=calibration.uncertainty_scaled,
+        provenance=calibration.provenance,
     )

@@ -54,6 +54,8 @@ def read_what_is_exported(path: Path) -> Calibration:
         date=calibration.date,
         fit=calibration.fit,
         variance_factor=calibration.variance_factor,
+        fit_reasons=calibration.fit_reasons,
+        uncertainty_scaled=calibration.uncertainty_scaled,
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from stepdiag._core import Adjustment, Measurement, Outlier, SetupEstimate
-from stepdiag.calibration.finding_text import combination_text, reason_text
+from stepdiag.calibration.finding_text import combination_text
 from stepdiag.io.labelled_tables import calibration_table, channel_units
 from stepdiag.setup_quantities import SETUP_QUANTITIES
 
@@ -16,7 +16,7 @@ def adjustment_table(adjustment: Adjustment, measurement: Measurement | None = N
 
     Along `reading`, the rows of the measurement, lie CHANNEL_residual, CHANNEL_redundancy, CHANNEL_normalised_residual
     and CHANNEL_used; given the measurement, reading_run, reading_line, reading_point and reading_direction label them.
-    Test values are scalars; combinations, reasons of the fit's verdict and the smoothness in force are attributes."""
+    Test values are scalars; combinations and the smoothness in force are attributes."""
     table = calibration_table(adjustment.calibration)
     for name, deviation in adjustment.smoothness.items():
         if name in table:
@@ -28,10 +28,7 @@ def adjustment_table(adjustment: Adjustment, measurement: Measurement | None = N
         variables |= _setup(adjustment.setup)
     if adjustment.outliers:
         variables |= _outliers(adjustment.outliers)
-    return table.assign(variables).assign_attrs(
-        combinations="\n".join(map(combination_text, adjustment.combinations)),
-        fit_reasons="\n".join(map(reason_text, adjustment.verdict.reasons)),
-    )
+    return table.assign(variables).assign_attrs(combinations="\n".join(map(combination_text, adjustment.combinations)))
 
 
 def _test_values(adjustment: Adjustment) -> dict[str, Any]:
@@ -45,7 +42,8 @@ def _test_values(adjustment: Adjustment) -> dict[str, Any]:
             {
                 "units": "1",
                 "long_name": f"{square_sum}, by the degrees of freedom",
-                "comment": "1 is expected; the standard uncertainties of this file are not multiplied by its root",
+                "comment": "1 is expected; the standard uncertainties of this file are multiplied by its root only "
+                "where the attribute uncertainty_scaled says so",
             },
         ),
         "chi_square_probability": (

@@ -1,6 +1,7 @@
 """Measurements and calibrations as CSV or netCDF files; the ending of the name decides."""
 
 import os
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
@@ -51,7 +52,11 @@ def write_measurement(measurement: Measurement, path: str | PathLike[str]) -> No
 
 
 def write_calibration(
-    result: Calibration | Adjustment, path: str | PathLike[str], *, measurement: Measurement | None = None
+    result: Calibration | Adjustment,
+    path: str | PathLike[str],
+    *,
+    measurement: Measurement | None = None,
+    provenance: Mapping[str, str] | None = None,
 ) -> None:
     """Write a calibration, CSV or netCDF (.nc). Reading it returns the same bits.
 
@@ -63,18 +68,21 @@ def write_calibration(
         path: the file to write.
         measurement: labels the residuals of an adjustment with run, line, point and direction
             (netCDF).
+        provenance: replaces that of the calibration; `provenance_of` makes it.
 
     Raises:
-        InvalidArgument: the file cannot be written; names the file.
+        InvalidArgument: the file cannot be written, or the provenance has other keys; names either.
     """
     calibration = result if isinstance(result, Calibration) else result.calibration
+    if provenance is not None:
+        calibration = calibration.with_provenance(provenance)
     date = calibration.date or date_of_today()
     if not is_netcdf(path):
         calibration.dated(date).write(path)
         return
     from stepdiag.io.netcdf_write import write_calibration_netcdf
 
-    write_calibration_netcdf(result, Path(path), date, measurement)
+    write_calibration_netcdf(result, Path(path), {"date": date} | calibration.provenance, measurement)
 
 
 def date_of_today() -> str:

@@ -121,10 +121,14 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
         verdict["fit"] = calibration.fit
     if calibration.variance_factor is not None:
         verdict["variance_factor"] = calibration.variance_factor
+    if calibration.uncertainty_scaled is not None:
+        verdict["uncertainty_scaled"] = calibration.uncertainty_scaled
+    verdict["fit_reasons"] = "\n".join(calibration.fit_reasons)
     return xr.Dataset(
         variables,
         coordinates,
         verdict
+        | calibration.provenance
         | {
             "title": "calibration of a three-axis machine",
             "method": calibration.method,

@@ -83,8 +83,11 @@ def read_calibration_netcdf(path: Path) -> Calibration:
                 name for name, variable in reversals.items() if not _flag(file, variable, "constant_determined")
             ],
             "date": file.text("date", ""),
+            "provenance": {key: text for key in Calibration.provenance_keys() if (text := file.text(key, ""))},
             "fit": file.text("fit", "") or None,
             "variance_factor": file.number("variance_factor"),
+            "fit_reasons": list(filter(None, file.text("fit_reasons", "").split("\n"))),
+            "uncertainty_scaled": file.number("uncertainty_scaled"),
         }
         with located(str(path)):
             calibration = Calibration(**parts)

@@ -1,5 +1,6 @@
 """Self-describing netCDF files of measurements, calibrations and adjustments."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
@@ -54,12 +55,12 @@ def write_measurement_netcdf(measurement: Measurement, path: Path, date: str) ->
 
 
 def write_calibration_netcdf(
-    result: Calibration | Adjustment, path: Path, date: str, measurement: Measurement | None = None
+    result: Calibration | Adjustment, path: Path, made: Mapping[str, str], measurement: Measurement | None = None
 ) -> None:
-    """Write a calibration, or an adjustment with all its results.
+    """Write a calibration, or an adjustment with all its results. `made`: attributes that say when and from what.
 
     Raises InvalidArgument if the file cannot be written."""
-    attributes = _OF_CALIBRATION | {"date": date}
+    attributes = _OF_CALIBRATION | dict(made)
     if isinstance(result, Calibration):
         table = calibration_table(result)
     else:

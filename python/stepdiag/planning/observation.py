@@ -36,11 +36,12 @@ class Prospect:
 
 
 def observe(scenario: Scenario | Known) -> tuple[_core.Measurement, Adjustment]:
-    """The error-free run of a scenario, and what is found in it. Raises InvalidArgument where nothing is."""
+    """The error-free run of a scenario, and what is found in it, with the faults that its readings control. Raises
+    InvalidArgument where nothing is."""
     known = not_measured(scenario.known)
     run = simulate_scenario(Scenario(known, Truth()))
     with located(str(known.path)):
-        return run, adjust_scenario(known, run)
+        return run, adjust_scenario(known, run, reliability=True)
 
 
 def prospects(known: Known, steps: Sequence[int]) -> list[Prospect]:

@@ -13,6 +13,7 @@ from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.config.scenario_keys import MachineErrorsKeys, RandomSection, TruthKeys
 from stepdiag.config.toml_text import located
 from stepdiag.parameters import KINDS, Kind, kind_of
+from stepdiag.planning.fault_control import tells_all
 from stepdiag.planning.measuring_time import measuring_time, times_of
 from stepdiag.planning.observation import extents, not_measured
 from stepdiag.scenario.description import Scenario, adjust_scenario, simulate_scenario
@@ -39,6 +40,7 @@ _USUAL_SETS: Final = (
     (*_DIAGONALS, *_SCALES[:2]),
     _DIAGONALS,
     (*_DIAGONALS[:3], *_SCALES),
+    (*_DIAGONALS, *_FACES[::2], *_SCALES),
     _FACES,
     (*_FACES, *_SCALES),
     (*_DIAGONALS, *_FACES),
@@ -146,20 +148,60 @@ def outcome(scenario: Scenario, candidate: Candidate) -> Outcome:
     determined: frozenset[str] = frozenset()
     trouble = ""
     try:
-        changes = {
-            "lines": candidate.lines,
-            "scale_lines": candidate.scale_lines,
-            "steps": candidate.steps,
-            "repeats": candidate.repeats,
-            "seconds_per_reading": between or None,
-        }
-        planned = not_measured(known, changes)
-        usual = Scenario(planned, _usual_truth(scenario.truth, planned))
+        usual = _usual(scenario, candidate, between)
         calibration, largest = _propagated(usual) if _says_more(known) else _adjusted(usual)
         determined = frozenset(extents(calibration, plan)[0])
     except InvalidArgument as error:
         trouble = str(error)
     return Outcome(candidate, seconds, spacing, (float(width), float(height)), largest, determined, trouble)
+
+
+def _usual(scenario: Scenario, candidate: Candidate, between: float) -> Scenario:
+    """A plan's run of a usual machine, with so many seconds from a reading to the next one."""
+    changes = {
+        "lines": candidate.lines,
+        "scale_lines": candidate.scale_lines,
+        "steps": candidate.steps,
+        "repeats": candidate.repeats,
+        "seconds_per_reading": between or None,
+    }
+    planned = not_measured(scenario.known, changes)
+    return Scenario(planned, _usual_truth(scenario.truth, planned))
+
+
+def controls(scenario: Scenario, candidate: Candidate) -> Sequence[_core.FaultControl]:
+    """The faults of its readings that a plan controls; none where it determines nothing."""
+    try:
+        usual = _usual(scenario, candidate, scenario.known.keys.plan.seconds_per_reading or 0.0)
+        return adjust_scenario(usual.known, simulate_scenario(usual), reliability=True).reliability
+    except InvalidArgument:
+        return ()
+
+
+@dataclass(frozen=True)
+class Controlled:
+    """A plan that is taken, or one that tells all faults apart, and the faults that it controls."""
+
+    plan: Outcome
+    faults: Sequence[_core.FaultControl]
+
+
+def telling(
+    scenario: Scenario, found: Sequence[Outcome], taken: Outcome, family: Family = "length"
+) -> tuple[Controlled, Controlled | None]:
+    """The plan that is taken, and the fastest one with as many steps and hardly larger uncertainties that tells all
+    faults apart; None where none does."""
+    own = Controlled(taken, controls(scenario, taken.candidate))
+    if own.faults and tells_all(own.faults):
+        return own, own
+    limit = (1.0 + ALIKE) * taken.worst(family)
+    for one in sorted(complete(found), key=_seconds):
+        if one.candidate.steps != taken.candidate.steps or one is taken or one.worst(family) > limit:
+            continue
+        faults = controls(scenario, one.candidate)
+        if faults and tells_all(faults):
+            return own, Controlled(one, faults)
+    return own, None
 
 
 def _usual_truth(truth: Truth, planned: Known) -> Truth:

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration
-from stepdiag.calibration.finding_text import fit_row
+from stepdiag.calibration.finding_text import fit_rows, provenance_rows
 from stepdiag.calibration.functional_point import functional_point_straightness
 from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
@@ -17,10 +17,11 @@ FUNCTIONAL_POINT_FORMAT: Final = "stepdiag functional point 1"
 
 
 def calibration_report(calibration: Calibration) -> Iterator[str]:
-    """Verdict of the fit, method, machine, the largest values and uncertainties of each kind, and to which point
-    straightness refers."""
-    yield fit_row(calibration)
+    """Verdict of the fit, method, provenance, machine, the largest values and uncertainties of each kind, and to which
+    point straightness refers."""
+    yield from fit_rows(calibration)
     yield f"method: {calibration.method or 'not known'}, date: {calibration.date or 'not known'}"
+    yield from provenance_rows(calibration) or ["made from: not known"]
     volume, tool = (
         " x ".join(f"{edge:g}" for edge in calibration.volume),
         " ".join(f"{t:g}" for t in calibration.tool),
@@ -80,6 +81,7 @@ def functional_point_csv(calibration: Calibration) -> str:
         "tool_mm": lengths(calibration.tool),
         "method": calibration.method,
         "date": calibration.date,
+        **calibration.provenance,
         "straightness_reference": calibration.straightness_reference,
         "covariance": "counted" if counted else "not known: straightness and rotations are taken as independent",
     }

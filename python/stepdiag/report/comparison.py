@@ -101,7 +101,7 @@ def comparison_csv(comparison: Comparison) -> str:
         "format": COMPARISON_FORMAT,
         "chain": a.chain.name,
         "volume_mm": lengths(a.volume),
-        **{f"{key}_{which}": getattr(c, key) for which, c in (("a", a), ("b", b)) for key in ("method", "date")},
+        **_made(a, b),
         "limit": str(comparison.limit),
         "values": str(comparison.count),
     }
@@ -119,6 +119,12 @@ def comparison_csv(comparison: Comparison) -> str:
             fields = [difference.parameter, decimal(position), decimal(value, shift), unit, decimal(u, shift)]
             rows.append([*fields, decimal(normalised), str(difference.shape_only).lower()])
     return csv_text(columns.split(","), rows, leading)
+
+
+def _made(a: Calibration, b: Calibration) -> dict[str, str]:
+    """How and from what both calibrations were made."""
+    facts = {which: {"method": c.method, "date": c.date} | c.provenance for which, c in (("a", a), ("b", b))}
+    return {f"{key}_{which}": text for which, own in facts.items() for key, text in own.items()}
 
 
 def decimal(value: float, shift: int = 0) -> str:
@@ -163,7 +169,7 @@ def comparison_table(comparison: Comparison) -> "xr.Dataset":
         coordinates,
         {
             "title": "difference of two calibrations, B - A",
-            **{f"{key}_{which}": getattr(c, key) for which, c in (("a", a), ("b", b)) for key in ("method", "date")},
+            **_made(a, b),
             "chain": a.chain.name,
             "volume_mm": a.volume,
             "limit": comparison.limit,

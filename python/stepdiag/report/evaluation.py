@@ -6,26 +6,36 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from stepdiag._core import Adjustment, Calibration, Measurement, Outlier, straightness_reference
-from stepdiag.calibration.finding_text import combination_text, verdict_rows
+from stepdiag.calibration.finding_text import NOISE_ALONE, combination_text, fit_rows, verdict_rows
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
+from stepdiag.report.fault_control import control_rows
 from stepdiag.report.prior_effects import cosine_rows, drift_rows
 from stepdiag.report.setup_table import setup_rows
+from stepdiag.scenario.description import JudgedEvaluation
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
 from stepdiag.units import MICRO
 
 
-def evaluation_report(result: Calibration | Adjustment, measurement: Measurement, known: Known) -> Iterator[str]:
+def evaluation_report(result: JudgedEvaluation | Adjustment, measurement: Measurement, known: Known) -> Iterator[str]:
     """The verdict of the fit, lost readings, largest standard uncertainties and what is not determined; of an
     adjustment also which readings were left out, and how head and mirror were set up."""
-    if isinstance(result, Calibration):
+    if isinstance(result, JudgedEvaluation):
         return _published(result, measurement, known)
     return _adjusted(result, measurement, known)
 
 
-def _published(calibration: Calibration, measurement: Measurement, known: Known) -> Iterator[str]:
-    yield f"fit: unchecked: the method {calibration.method} does not test it; -m adjustment does"
+def _published(judged: JudgedEvaluation, measurement: Measurement, known: Known) -> Iterator[str]:
+    calibration = judged.calibration
+    first, *rest = fit_rows(calibration)
+    yield first
+    adjusted = "none" if judged.adjustment is None else judged.adjustment.verdict.fit
+    yield (
+        f"that is the worse of the method's own test ({judged.own}) and of the adjustment of the same readings "
+        f"({adjusted})"
+    )
+    yield from rest
     yield from _what_was_done(calibration, measurement, known)
     yield from uncertainty_rows(calibration)
     yield from undetermined_rows(calibration)
@@ -50,6 +60,8 @@ def _adjusted(adjustment: Adjustment, measurement: Measurement, known: Known) ->
     yield from cosine_rows(measurement, known)
     yield from drift_rows(measurement, known)
     yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
+    if adjustment.reliability:
+        yield from control_rows(adjustment.reliability)
 
 
 def _what_was_done(calibration: Calibration, measurement: Measurement, known: Known) -> Iterator[str]:
@@ -118,6 +130,6 @@ def reversal_rows(calibration: Calibration) -> Iterator[str]:
 
 def uncertainty_rows(calibration: Calibration) -> Iterator[str]:
     """The largest standard uncertainty of each kind, and where it is."""
-    yield "largest standard uncertainties:"
+    yield f"largest standard uncertainties{', of noise alone' if calibration.method in NOISE_ALONE else ''}:"
     for kind, (uncertainty, where) in largest_uncertainties(calibration).items():
         yield f"  {kind:<13}{in_report_units(kind, uncertainty):9.3g} {REPORT_UNIT[kind]:<5} ({where})"

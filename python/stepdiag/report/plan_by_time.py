@@ -5,7 +5,8 @@ from typing import Final
 
 from stepdiag.io.csv_text import csv_text
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units
-from stepdiag.planning.plan_by_time import Choice, Family, Outcome, choose, complete, front
+from stepdiag.planning.plan_by_time import Choice, Controlled, Family, Outcome, choose, complete, front
+from stepdiag.report.fault_control import name, told_apart
 
 FAR: Final = 2.0  # times the time that there is: how far the table goes on
 
@@ -55,6 +56,23 @@ def advice(found: Sequence[Outcome], minutes: float, spacing: float, family: Fam
     better = choice.next_better
     if better is not None:
         yield f"next better with nodes as near: {_named(better)}, in {better.minutes:.1f} minutes: {_said(better)}"
+
+
+def fault_advice(taken: Controlled, telling: Controlled | None) -> Iterator[str]:
+    """Whether faults of the readings are told apart in the plan to take, and which plan would."""
+    yield f"faults told apart in the plan to take: {_told(taken)}"
+    if telling is None:
+        yield "no plan of as many steps that is as certain tells all faults apart"
+    elif telling is not taken:
+        more = telling.plan.minutes - taken.plan.minutes
+        yield (
+            f"all faults told apart: {_named(telling.plan)}, in {telling.plan.minutes:.1f} minutes ({more:+.1f}): "
+            f"{_told(telling)}"
+        )
+
+
+def _told(one: Controlled) -> str:
+    return "; ".join(f"{name(c)} {told_apart(c)}" for c in one.faults) or "none"
 
 
 def _named(one: Outcome) -> str:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
+from stepdiag.calibration.finding_text import FITS, MEANING
 from stepdiag.config.key_errors import models_of, suggest
 from stepdiag.config.key_types import narrowed
 from stepdiag.config.scenario_keys import SECTIONS_BY_LINE, TABLES_BY_NAME, KnownKeys, ScenarioKeys, TruthKeys
@@ -81,11 +82,54 @@ def evaluate_scenario(
     )
 
 
+@dataclass(frozen=True)
+class JudgedEvaluation:
+    """An evaluation by a linear method beside the adjustment of the same readings, which sees set-up and rotations that
+    the method leaves out.
+
+    `calibration` carries the worse of both verdicts; `own` is the method's test of its contradictions. Where the
+    readings cannot be adjusted, `adjustment` is None, and `refusal` says why."""
+
+    calibration: _core.Calibration
+    own: str
+    adjustment: _core.Adjustment | None
+    refusal: str = ""
+
+
+def evaluate_beside_adjustment(
+    scenario: Scenario | Known,
+    measurement: _core.Measurement,
+    *,
+    method: Literal["conventional", "enhanced"],
+    full_covariance: bool = False,
+) -> JudgedEvaluation:
+    """Evaluates a run by a linear method, and adjusts it for its verdict."""
+    calibration = evaluate_scenario(scenario, measurement, method=method, full_covariance=full_covariance)
+    own = calibration.fit or "unchecked"
+    adjustment, refusal = None, ""
+    try:
+        adjustment = adjust_scenario(scenario, measurement)
+    except InvalidArgument as error:
+        refusal = str(error)
+    other = adjustment.verdict.fit if adjustment is not None else "unchecked"
+    reasons = [] if own == "accepted" else [f"the method {method} by itself: {MEANING[own]}"]
+    if refusal:
+        reasons.append(f"adjustment of the same readings: {' '.join(refusal.split())}")
+    if adjustment is not None:
+        reasons += [f"adjustment of the same readings: {reason}" for reason in adjustment.calibration.fit_reasons]
+    return JudgedEvaluation(calibration.judged(max(own, other, key=FITS.index), reasons), own, adjustment, refusal)
+
+
 def adjust_scenario(
-    scenario: Scenario | Known, measurement: _core.Measurement, *, full_covariance: bool = False
+    scenario: Scenario | Known,
+    measurement: _core.Measurement,
+    *,
+    full_covariance: bool = False,
+    reliability: bool = False,
 ) -> _core.Adjustment:
     """The exact adjustment of a run, with the unknowns that the scenario's [adjustment] and [smoothness] name: the
-    calibration, and with it the set-up that was found, residuals, outliers and how well it all fits."""
+    calibration, and with it the set-up that was found, residuals, outliers and how well it all fits. `reliability`:
+    also which faults the readings control."""
     known = scenario.known
     return _core.adjust(
         only(measurement, known.signals),
@@ -93,7 +137,7 @@ def adjust_scenario(
         of_run(known.heads),
         known.chain,
         known.tool,
-        adjustment_options(known, full_covariance=full_covariance),
+        adjustment_options(known, full_covariance=full_covariance, reliability=reliability),
     )
 
 
@@ -112,8 +156,11 @@ def simulation_options(scenario: Scenario) -> _core.SimulationOptions:
     )
 
 
-def adjustment_options(known: Known, *, full_covariance: bool = False) -> _core.AdjustmentOptions:
-    """What an adjustment of the scenario's runs takes for known and unknown."""
+def adjustment_options(
+    known: Known, *, full_covariance: bool = False, of_samples: bool = False, reliability: bool = False
+) -> _core.AdjustmentOptions:
+    """What an adjustment of the scenario's runs takes for known and unknown. `of_samples`: of many simulated runs,
+    whose noise is what is stated: none of their readings is left out, no uncertainty is scaled."""
     keys = known.keys.adjustment
     return _core.AdjustmentOptions(
         uncertainty=known.uncertainty,
@@ -123,9 +170,11 @@ def adjustment_options(known: Known, *, full_covariance: bool = False) -> _core.
         reversal=keys.reversal,
         rotations=keys.angles == "free",
         smoothness=known.smoothness,
-        outlier_probability=keys.outlier_probability,
+        outlier_probability=0.0 if of_samples else keys.outlier_probability,
+        scale_uncertainty=keys.scale_uncertainty and not of_samples,
         full_covariance=full_covariance,
         plausible=known.plausible,
+        reliability=reliability,
     )
 
 

@@ -39,7 +39,7 @@ def virtual_calibrations(
             seed=seed,
             derived=list(derived),
             simulation=simulation_options(replace(scenario, truth=truth)),
-            adjustment=adjustment_options(known),
+            adjustment=adjustment_options(known, of_samples=True),
         )
 
 

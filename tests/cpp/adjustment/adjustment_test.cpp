@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "stepdiag/simulation/simulate.hpp"
 #include "support/refuses.hpp"
@@ -232,6 +233,38 @@ TEST(Adjustment, RefusesWhatMakesNoSense) {
     options = {};
     options.smoothness = stepdiag::Smoothness{-1.0, 0.0, false};
     refused(options, "smoothness");
+}
+
+// The square sum is a narrow bent valley there: a laser's angle acts on distances by its square.
+TEST(Adjustment, BeamsWithLasersFromTheirPriorsAndSeveralRunsConvergeFromZero) {
+    Workshop shop;
+    shop.head.layout = stepdiag::HeadLayout::multi_beam;
+    shop.head.beam_offsets = {{50.0, 0.0}, {-25.0, 43.3}, {-25.0, -43.3}};
+    shop.head.aperture = 1000.0, shop.head.mirror = {1000.0, 1000.0};
+    AdjustmentOptions options;
+    options.uncertainty.distance = 1e-4;
+    options.outlier_probability = 0.0;
+    for (int seed = 1; seed <= 12; ++seed) {
+        std::mt19937 generator(seed);
+        std::normal_distribution<double> normal;
+        stepdiag::SimulationOptions simulation;
+        simulation.noise = {1e-4, 0.0, 0.0, std::uint64_t(seed)};
+        simulation.repeats = 1 + seed % 3;
+        for (const Line& line : shop.lines) {
+            auto& setup = simulation.misalignment[line.name()];
+            if (seed % 2 == 0) {
+                setup.reflector = {100 * micro, -100 * micro};
+                continue;
+            }
+            setup.reflector = {2e-3 * normal(generator), 2e-3 * normal(generator)};
+            setup.laser = {2e-3 * normal(generator), 2e-3 * normal(generator)};
+            setup.distance_constant = normal(generator);
+        }
+        const Measurement run = simulate(shop.machine(), shop.plan(), shop.head, simulation);
+        const Adjustment found = shop.adjust(run, options);
+        // One sound run in a million has more.
+        EXPECT_GT(found.chi_square_probability, 1e-6) << seed;
+    }
 }
 
 }  // namespace

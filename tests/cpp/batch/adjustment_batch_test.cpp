@@ -50,6 +50,14 @@ TEST(BatchAdjustment, SetUpsFarFromThePatternsTakeFullSteps) {
     }
 }
 
+TEST(BatchAdjustment, BeamsWhoseLasersStandAsTheirPriorsSayComeOutAsAlone) {
+    Workshop shop = with_beams();
+    shop.head.beam_offsets = {{50.0, 0.0}, {-25.0, 43.3}, {-25.0, -43.3}};
+    shop.head.aperture = 1000.0, shop.head.mirror = {1000.0, 1000.0};
+    shop.angle = 2e-3;
+    expect_same(shop, int(lane_group));
+}
+
 TEST(BatchAdjustment, PriorsCountAsAlone) {
     Workshop shop;
     shop.options.setup[static_cast<int>(stepdiag::SetupQuantity::laser)] = 5e-4;

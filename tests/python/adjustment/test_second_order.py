@@ -41,7 +41,7 @@ def adjusted(run: sd.Measurement, plan: sd.Plan, head: sd.Head | None = None, **
 
 
 def scale_of(adjustment: sd.Adjustment, seed: int, axis: str) -> tuple[float, float]:
-    """Error of the positioning error at the end of travel, and its standard uncertainty, both as parts of the travel."""
+    """Error of the positioning error at the end of travel, and its standard uncertainty, by the travel."""
     position, value, u = adjustment.calibration.functions[f"E{axis}{axis}"]
     error = value[-1] - truth(seed).errors.function(f"E{axis}{axis}", position)[-1]
     return error / position[-1], u[-1] / position[-1]
@@ -63,8 +63,8 @@ HEADS = {
     [(ASIDE, 0.0, 1.5), (-ASIDE, 0.0, 1.5), (0.0, ASIDE, 1.0), (ASIDE, ASIDE, -0.5), (2 * ASIDE, 0.0, 6.0)],
 )
 def test_tilts_correct_the_length_of_a_scale_line(layout: str, laser: float, mirror: float, too_long: float) -> None:
-    """Error-free: distances read travel (3/2 D^2 - m^2/2) too much, D = mirror - laser. D is measured, and taken for the
-    mirror's: the laser stands along the axis to 500 urad. Nothing else tells the scale of X here."""
+    """Error-free: distances read travel (3/2 D^2 - m^2/2) too much, D = mirror - laser. D is measured, and taken for
+    the mirror's: the laser stands along the axis to 500 urad. Nothing else tells the scale of X here."""
     head, told = HEADS[layout]
     plan = sd.Plan(VOLUME, DIAGONALS, STEPS, scale_lines=["p00"])
     line = {"p00": sd.Misalignment(laser=(0.0, laser), reflector=(0.0, mirror))}

@@ -59,6 +59,7 @@ def same_calibration(one: sd.Calibration, other: sd.Calibration) -> bool:
     """Whether two calibrations say the same, to the last bit; their dates do not matter."""
     return (
         (one.method, one.chain, one.undetermined) == (other.method, other.chain, other.undetermined)
+        and one.provenance == other.provenance
         and one.undetermined_slopes == other.undetermined_slopes
         and one.undetermined_reversal_constants == other.undetermined_reversal_constants
         and same_bits(one.volume, other.volume)
@@ -107,4 +108,5 @@ def parts_of(calibration: sd.Calibration) -> dict[str, Any]:
         },
         "undetermined_reversal_constants": calibration.undetermined_reversal_constants,
         "date": calibration.date,
+        "provenance": calibration.provenance,
     }

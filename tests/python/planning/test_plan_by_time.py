@@ -14,8 +14,18 @@ from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.cli import main
 from stepdiag.figures.plan_by_time import draw_plans
 from stepdiag.planning.measuring_time import Times, measuring_time, times_of
-from stepdiag.planning.plan_by_time import Candidate, Outcome, candidates, choose, complete, front, outcome, outcomes
-from stepdiag.report.plan_by_time import advice, left_out_rows, plan_csv, plan_rows
+from stepdiag.planning.plan_by_time import (
+    Candidate,
+    Outcome,
+    candidates,
+    choose,
+    complete,
+    front,
+    outcome,
+    outcomes,
+    telling,
+)
+from stepdiag.report.plan_by_time import advice, fault_advice, left_out_rows, plan_csv, plan_rows
 from stepdiag.scenario.description import parse_scenario
 
 FEW = """
@@ -199,6 +209,23 @@ def test_same_plans_give_the_same_table_and_picture() -> None:
     assert sum(row["on_front"] == "1" for row in table) == len(front(found))
 
 
+def test_plan_that_tells_faults_apart_is_named_with_its_minutes() -> None:
+    scenario = parse_scenario(SCENARIO + FEW)
+    lines = (("ppp", "npp", "pnp", "nnp"), ("p00", "0p0", "00p"))
+    once, twice = (outcome(scenario, Candidate(*lines, 10, repeats)) for repeats in (1, 2))
+    taken, telling_all = telling(scenario, [once, twice], once)
+    assert any(c.twins for c in taken.faults)
+    assert telling_all is not None
+    assert telling_all.plan is twice
+    assert not any(c.twins or c.uncontrolled for c in telling_all.faults)
+    said = list(fault_advice(taken, telling_all))
+    assert said[0].startswith("faults told apart in the plan to take: wrong distance none; slip of distances none; ")
+    assert f"(+{twice.minutes - once.minutes:.1f})" in said[1]
+    assert len(list(fault_advice(telling_all, telling_all))) == 1
+    assert telling(scenario, [once], once)[1] is None
+    assert "no plan of as many steps" in list(fault_advice(taken, None))[1]
+
+
 # --- the command -----------------------------------------------------------------------------------------------------
 @pytest.fixture
 def scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
@@ -214,6 +241,7 @@ def test_command_says_which_plan_to_take(scenario: str, capsys: pytest.CaptureFi
     assert Path("plan.png").read_bytes().startswith(b"\x89PNG")
     (row,) = [line for line in said.splitlines() if line.startswith(" *")]
     assert float(row.split()[1]) <= 20.0
+    assert "\nfaults told apart in the plan to take: " in said
 
 
 @pytest.mark.slow

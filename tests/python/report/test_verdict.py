@@ -1,6 +1,7 @@
 """The verdict of a fit and its consequences: report, files, exit status, and who refuses a rejected calibration."""
 
 import re
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,11 @@ import stepdiag as sd
 from stepdiag.cli import main
 
 SOUND = SCENARIO.replace("steps = 5", "steps = 20").replace("seed = 3", "tilt_urad = 1.0\nseed = 3")
+# Three distances for three unknowns of each step.
+THREE_DISTANCES = (
+    SOUND.replace(', "nnp"]', "]").replace('scale_lines = ["p00", "0p0", "00p"]', "").replace("tilt_urad = 1.0\n", "")
+    + '[adjustment]\nangles = "fixed"\n'
+).replace('layout = "ideal"', 'layout = "ideal"\ntilts = false')
 Change = Callable[[dict[str, np.ndarray], np.ndarray], None]
 
 
@@ -133,13 +139,40 @@ def test_a_set_up_far_from_its_prior_is_rejected(folder: Path, capsys: pytest.Ca
         assert reason.value == pytest.approx(abs(value.value) / known)
 
 
-def test_without_redundancy_or_test_a_fit_is_unchecked(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    write_run()
-    for method in ("enhanced", "conventional"):
-        assert evaluate("-m", method) == 0
-        assert capsys.readouterr().out.startswith("fit: unchecked: ")
-        calibration = sd.read_calibration("calibration.csv")
-        assert (calibration.fit, calibration.variance_factor) == ("unchecked", None)
+def test_without_redundancy_a_fit_is_unchecked(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_run(THREE_DISTANCES)
+    assert evaluate() == 0
+    said = capsys.readouterr()
+    assert said.out.startswith("fit: unchecked: ")
+    assert said.err.startswith("warning: calibration.csv: the fit is unchecked")
+    calibration = sd.read_calibration("calibration.csv")
+    assert (calibration.fit, calibration.variance_factor) == ("unchecked", None)
+
+
+def test_reports_of_files_word_the_reasons(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_run(change=exchange_tilts)
+    for name in ("calibration.csv", "calibration.nc"):
+        assert main(["evaluate", "scenario.toml", "run.csv", "-o", name]) == 3
+        reasons = [line for line in capsys.readouterr().out.splitlines() if line.startswith("rejected because ")]
+        assert reasons
+        assert main(["report", name]) == 3
+        assert [r for r in capsys.readouterr().out.splitlines() if r.startswith("rejected because ")] == reasons
+
+
+def test_scaled_uncertainties_are_said_in_reports_and_files(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_run(SOUND + "[adjustment]\nscale_uncertainty = true\n", noisy(1.5))
+    for name in ("calibration.csv", "calibration.nc"):
+        assert main(["evaluate", "scenario.toml", "run.csv", "-o", name]) == 0
+        said = capsys.readouterr()
+        assert said.out.startswith("fit: doubtful: the noise is about 1.4")
+        assert "doubtful because all uncertainties were multiplied by 1.4" in said.out
+        assert "the fit is doubtful" in said.err
+        calibration = sd.read_calibration(name)
+        assert calibration.fit == "doubtful"
+        assert calibration.variance_factor is not None
+        assert calibration.uncertainty_scaled == np.sqrt(calibration.variance_factor)
+        assert main(["report", name]) == 0
+        assert "all standard uncertainties were multiplied by 1.4" in capsys.readouterr().out
 
 
 def test_false_alarms_are_as_rare_as_the_limits_say(folder: Path) -> None:
@@ -201,13 +234,20 @@ def test_export_refuses_a_rejected_calibration_unless_told(
     assert any("reject" in file.read_text().lower() for file in files)
 
 
-def test_export_warns_of_doubtful_and_unchecked_calibrations(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    write_run(change=noisy(1.5))
-    for options, word in (((), "doubtful"), (("-m", "enhanced"), "unchecked")):
-        assert evaluate(*options) == 0
-        capsys.readouterr()
+def test_loading_warns_of_a_fit_that_is_not_accepted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_run()
+    assert evaluate() == 0
+    sound = sd.read_calibration("calibration.csv")
+    for fit in ("doubtful", "unchecked"):
+        sd.write_calibration(sound.judged(fit), "calibration.csv")
         assert main(["export", "calibration.csv", "--to", "csv-grid", "-o", "grid.csv"]) == 0
-        assert f"warning: calibration.csv: the fit is {word}" in capsys.readouterr().err
+        assert f"warning: calibration.csv: the fit is {fit}" in capsys.readouterr().err
+        for table in ("calibration.csv", sound.judged(fit)):
+            with pytest.warns(UserWarning, match=f"a fit that is {fit}"):
+                assert sd.Compensator(table, "[w X' b Y Z t]").fit == fit
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sd.Compensator(sound, "[w X' b Y Z t]")
 
 
 def test_a_compensator_refuses_a_rejected_calibration_unless_told(rejected: Path) -> None:
@@ -215,7 +255,8 @@ def test_a_compensator_refuses_a_rejected_calibration_unless_told(rejected: Path
     calibration = sd.read_calibration(rejected)
     for table, name in ((rejected, str(rejected)), (calibration, "calibration")):
         refused(sd.Compensator, table, chain, names=f"{name}: fit=rejected")
-        assert sd.Compensator(table, chain, accept_rejected=True).fit == "rejected"
+        with pytest.warns(UserWarning, match="a fit that is rejected"):
+            assert sd.Compensator(table, chain, accept_rejected=True).fit == "rejected"
 
 
 def test_an_error_map_has_no_verdict_and_loads(folder: Path) -> None:

@@ -89,6 +89,8 @@ def test_switches_reach_the_core() -> None:
     switches = (
         '[adjustment]\nangles = "fixed"\none_setup_per_line = true\nreversal = false\noutlier_probability = 0.0\n'
     )
+    scaled = adjustment_options(parse_scenario(SCENARIO + "[adjustment]\nscale_uncertainty = true\n").known)
+    assert (usual.scale_uncertainty, scaled.scale_uncertainty) == (False, True)
     other = adjustment_options(parse_scenario(SCENARIO + switches).known)
     assert [getattr(other, name) for name in names] == [True, False, False, 0.0, None, False]
 

@@ -55,8 +55,13 @@ struct AdjustmentOptions {
     // Readings that do not fit are left out, the worst first, at this probability of any false alarm in a run; 0: none
     // is. No more than one in fifty, or ten: where more do not fit, it is the model that does not, and all stay.
     double outlier_probability = 0.01;
+    // Where the variance factor is above 1, all stated uncertainties (functions, reversal, squarenesses, set-ups, known
+    // combinations, covariance) are multiplied by its root. The fit is then doubtful at best: such readings no longer
+    // test what was stated of their noise. Sound only for noise that is larger by one factor throughout.
+    bool scale_uncertainty = false;
     bool full_covariance = false;
     PlausibleLimits plausible = {};
+    bool reliability = false;  // also say which faults the readings control: Adjustment::reliability
 };
 
 // One set-up unknown, as it was found.
@@ -85,24 +90,46 @@ struct ReadingResidual {
     bool used() const { return outlier == 0; }
 };
 
-// Why a fit is not accepted.
+// What may be wrong with the readings of one channel in one set-up. A slip is an offset of all of them from a point on,
+// in the order in which they were made: a fringe counter that lost count, a head that was knocked.
+enum class FaultKind { reading, slip };
+std::string name(FaultKind kind);  // "reading", "slip"
+
+// Why a fit is not accepted, or what its residuals have in common.
 enum class FitFinding {
     no_redundancy,  // nothing controls the readings
-    noise_factor,   // root of the variance factor: the misfit in terms of the stated uncertainties
-    misfit,         // probability of a misfit as large as this one
-    no_misfit,      // probability of a misfit as small as this one
-    uneven_misfit,  // root of the variance factor of one line or one channel, where it differs from that of the others
+    noise_factor,   // root of the variance factor, beyond what is credible
+    misfit,         // root of the variance factor: the readings scatter by it more than stated
+    no_misfit,      // root of the variance factor: the readings scatter by it less than stated
+    uneven_misfit,  // root of the variance factor of one group of readings, where it differs from that of the others
+    trend,          // residuals of one channel run with time or position: from the first reading to the last
     prior,          // distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2)
+    scaled,         // root of the variance factor, by which the uncertainties were multiplied (scale_uncertainty)
 };
 std::string name(FitFinding finding);  // "no_redundancy", ...
 
+// Which readings scatter unevenly, or what a trend runs with.
+enum class FitAspect {
+    whole,
+    second_half,       // of the run, in the order of time (of the rows, where there is no time)
+    far_half,          // of the lines
+    time,              // as second_half counts it
+    position,          // along the line
+    time_or_position,  // which are alike in this run
+};
+std::string name(FitAspect aspect);  // "" of the whole, "second_half", ...
+
 struct FitReason {
     FitFinding finding;
-    double value;
-    double limit;
-    std::string line = {};     // of an uneven misfit or a prior
-    std::string channel = {};  // of an uneven misfit: "distance", ...; of a prior: the set-up quantity
+    double value;              // of a trend mm or rad
+    double limit;              // of an uneven misfit that of the other readings; of noise and trends what is expected
+    std::string line = {};     // of an uneven misfit, a trend or a prior; empty: all
+    std::string channel = {};  // of an uneven misfit or a trend: "distance", ..., empty: all; of a prior: the quantity
     int component = 0;         // of a prior
+    double standard_uncertainty = 0.0;  // of the value of a misfit, no_misfit, trend, scaled
+    int run = -1;                       // of an uneven misfit: this run alone; -1: all
+    FitAspect aspect = FitAspect::whole;
+    bool alternative = false;  // of a trend: instead of the one before; the readings do not tell which
 };
 
 // Whether the readings of an adjustment agree with each other, with their uncertainties and with the priors. It does
@@ -127,6 +154,28 @@ struct KnownCombination {
     double standard_uncertainty = 0.0;
 };
 
+// Which faults of one kind the readings control (reliability, W. Baarda 1968), to first order. A test finds a fault
+// with a probability of 99 % where it is 7.6 times as large as the standard uncertainty of its size; it is told from
+// another one where chi-square with that one would be larger by 25. Two faults are twins, which no size tells apart,
+// where their effects on the readings have a correlation of 0.999 and more and those on the calibration differ. Of long
+// runs the faults of evenly spaced places stand for all.
+struct FaultControl {
+    FaultKind kind;
+    std::string channel;      // "distance" (of all beams), "tilt" or "spot"
+    int count = 0;            // of controlled faults, one a place
+    int uncontrolled = 0;     // more of them, which no other reading controls
+    int twins = 0;            // those of `count` that have a twin
+    double found_from = 0.0;  // all of `count` are found from this size on; mm or rad
+    double told_from = 0.0;   // those without a twin are told from all others from this size on
+
+    // Largest of the calibrated values of one kind (mm or rad).
+    struct Effect {
+        double hidden = 0.0;  // of faults just not found; infinite: of what nothing controls
+        double shared = 0.0;  // by the size of a fault, where its twin may have been it; in mm or rad each
+    };
+    Effect positioning = {}, straightness = {}, angle = {}, squareness = {};
+};
+
 struct Adjustment {
     Calibration calibration;  // carries fit and variance factor
     std::vector<SetupEstimate> setup;
@@ -138,6 +187,7 @@ struct Adjustment {
     std::vector<KnownCombination> combinations;
     std::array<double, function_count> smoothness = {};  // deviations of second differences in force; 0: none
     Verdict verdict = {};
+    std::vector<FaultControl> reliability = {};  // if it was asked for
 
     double variance_factor() const;             // weighted_square_sum/degrees_of_freedom; 1 without freedom
     std::vector<std::size_t> outliers() const;  // into `residuals`, by their number

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -43,6 +44,11 @@ struct CalibratedSquareness {
     double standard_uncertainty;  // rad
 };
 
+// What a calibration was made from, and with what: the keys of Calibration::provenance, and of leading lines of its
+// file. Fingerprints are SHA-256 in hexadecimal digits, of the bytes of the run, the scenario and the heads'
+// descriptions.
+inline constexpr std::array provenance_keys = {"program", "run_sha256", "scenario_sha256", "heads_sha256", "options"};
+
 struct Calibration {
     std::string method;
     Chain chain;
@@ -65,6 +71,12 @@ struct Calibration {
     // Verdict of the fit; none where it is not known, as in files of earlier versions.
     std::optional<Fit> fit = {};
     std::optional<double> variance_factor = {};  // of that fit; none where nothing controls the readings
+    // Why that verdict, in words, one sentence each, as files hold them; an evaluation leaves the words to its caller.
+    std::vector<std::string> fit_reasons = {};
+    // What all uncertainties were multiplied by beyond what follows from those of the readings; none: by nothing.
+    std::optional<double> uncertainty_scaled = {};
+
+    std::map<std::string, std::string> provenance = {};  // by provenance_keys, as far as it is known
 };
 
 // A value of a calibration's tables (order of Calibration::covariance).
@@ -79,7 +91,8 @@ Eigen::VectorXd calibration_values(const Calibration& calibration);
 
 // Throws InvalidArgument naming the parameter where a calibration put together by hand is none: a volume that is not
 // positive, nodes that do not ascend, values that are not finite, uncertainties below 0, a covariance that is no matrix
-// of these values (its size, symmetry, |c_ij| <= u_i u_j, c_ii = u_i^2), sentences of more than one line.
+// of these values (its size, symmetry, |c_ij| <= u_i u_j, c_ii = u_i^2), sentences of more than one line, a provenance
+// of other keys or empty.
 void check(const Calibration& calibration);
 
 // One line that says to which point the straightnesses of a calibration refer, and what they are at the functional
@@ -91,9 +104,10 @@ bool is_anything_determined(const Calibration& calibration);
 // - direction. A reversal error without its function has no place in a table.
 ParameterTable to_parameter_table(const Calibration& calibration);
 
-// CSV with format, chain, volume_mm, tool_mm, method, date, fit, variance_factor, straightness_reference,
-// undetermined_slopes, undetermined_reversal_constants and undetermined in the leading lines; not kept are the
-// covariance and the uncertainty of a reversal error, which is not that of its two tables. Reading throws
+// CSV with format, chain, volume_mm, tool_mm, method, date, fit, variance_factor, uncertainty_scaled, fit_reasons,
+// straightness_reference, provenance_keys, undetermined_slopes, undetermined_reversal_constants and undetermined in the
+// leading lines; not kept are the covariance and the uncertainty of a reversal error, which is not that of its two
+// tables. Reading throws
 // InvalidArgument naming file and line, also where chain, volume or tool is missing.
 void write_calibration(const Calibration& calibration, const std::string& path);
 Calibration read_calibration(const std::string& path);

@@ -10,7 +10,8 @@
 namespace stepdiag {
 
 // Throws InvalidArgument for fewer than three body diagonals, readings that do not belong to the plan, or a result that
-// is not plausible. Nothing tests the fit: it is unchecked.
+// is not plausible. The verdict of the fit is what its contradictions say: four
+// diagonals for three translations of each step.
 // Rotations are absent from the result. Scale lines and other lines are not used.
 Calibration evaluate_conventional(const Measurement& measurement, const Plan& plan, const Chain& chain,
                                   const Eigen::Vector3d& tool, const HeadCalibrations& heads,

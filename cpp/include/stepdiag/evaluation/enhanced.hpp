@@ -20,7 +20,8 @@
 namespace stepdiag {
 
 // Throws InvalidArgument for readings that do not belong to the plan, where nothing at all can be determined, or for a
-// result that is not plausible. Nothing tests the fit: it is unchecked.
+// result that is not plausible. The verdict of the fit is what its contradictions say: eight
+// tilts of a step for three rotations, four lengths for three translations, 15 trends for 14 slopes and laser angles.
 Calibration evaluate_enhanced(const Measurement& measurement, const Plan& plan, const Chain& chain,
                               const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                               const EvaluationOptions& options = {});

@@ -13,6 +13,9 @@ struct LeastSquares {
     int rank;
     // Unknown j is determined where e_j lies in the row space of A: no solution of A x = 0 has a part in it.
     std::vector<bool> determined;
+    // A row for each equation more than the rank: sums of equations whose left sides cancel, so that those of the right
+    // sides are noise.
+    Eigen::MatrixXd contradictions = {};
 };
 
 // `standard_uncertainty`: one positive value an equation. Rank is decided on the weighted equations with columns scaled

@@ -1,0 +1,111 @@
+// Tests for faults of the readings, at the solution of an adjustment and without another one. Internal: not installed.
+// A fault of size f adds f to some readings: f c to the weighted residuals w, c being 1/u at each of these. To first
+// order an adjustment with f as one more unknown finds
+//   f = s/q, u(f) = 1/sqrt(q), s = c.w, q = c.c - (J^T c)^T N^-1 (J^T c), N = J^T J + P,
+// and chi-square becomes less by s^2/q, the square of W. Baarda's test (1968) where c is a single reading. Two faults
+// are told apart as far as their correlation differs from 1, rho = c^T R d/sqrt(q_c q_d), R = I - J N^-1 J^T.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "adjustment/normal_equations.hpp"
+
+namespace stepdiag {
+
+// The readings of one channel in one set-up, in the order in which they were made: into AdjustmentProblem::readings().
+struct ReadingSequence {
+    int setup;
+    int channel;
+    std::vector<int> readings;
+};
+
+struct FaultHypothesis {
+    FaultKind kind;
+    int sequence;
+    int first;  // into its sequence: the reading, or that from which on the channel slipped
+
+    bool operator==(const FaultHypothesis& other) const {
+        return kind == other.kind && sequence == other.sequence && first == other.first;
+    }
+};
+
+// Every fault that is tested for, each once. Where an unknown of the set-up takes up a constant of the channel, the
+// slip before the last reading is that reading's fault, the one after the first reading the opposite of that reading's,
+// and of two readings there is only one fault. Readings that are left out take no part: make it anew after leaving one
+// out.
+class FaultHypotheses {
+public:
+    explicit FaultHypotheses(const AdjustmentProblem& problem);
+
+    // Of all readings, left out or not, so that the numbers of sequences and places in them stay.
+    const std::vector<ReadingSequence>& sequences() const { return sequences_; }
+    const std::vector<FaultHypothesis>& all() const { return all_; }
+
+    struct Readings {
+        const int *first, *last;
+
+        const int* begin() const { return first; }
+        const int* end() const { return last; }
+    };
+    Readings readings(const FaultHypothesis& hypothesis) const;
+
+private:
+    std::vector<ReadingSequence> sequences_;
+    std::vector<FaultHypothesis> all_;
+};
+
+struct FaultScore {
+    double size = 0.0;                  // mm or rad
+    double standard_uncertainty = 0.0;  // of the size; infinite where nothing controls it
+    double gain = 0.0;                  // in chi-square; 0 where nothing controls it
+};
+
+// Of readings scores cost nothing, because the inverse is there; of slips a solution each. Where a run has more slips
+// than `most_solutions`, q is computed at evenly spaced ones of each sequence and interpolated between them, for each
+// axis that moves by itself (along a line it changes slowly so), and then computed where the gain so found is above a
+// quarter of what counts, at the `most_solutions` largest. So a long run takes at most about twice as many solutions.
+class FaultTests {
+public:
+    static constexpr double significant = 28.0;  // gain in chi-square
+    static constexpr int usual_most_solutions = 1000;
+
+    // At the equations' last linearisation. `factor` and `inverse`: of N there. All must outlive this.
+    FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const BorderedBand& inverse,
+               const FaultHypotheses& hypotheses, int most_solutions = usual_most_solutions)
+        : FaultTests(equations, factor, inverse, hypotheses, equations.residuals(), most_solutions) {}
+    // The same somewhere else than at the minimum. `residuals`: weighted, at the minimum of that linear problem.
+    FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const BorderedBand& inverse,
+               const FaultHypotheses& hypotheses, const Eigen::VectorXd& residuals,
+               int most_solutions = usual_most_solutions);
+
+    const FaultHypotheses& hypotheses() const { return *hypotheses_; }
+    const std::vector<FaultScore>& scores() const { return scores_; }  // by hypothesis
+    void refine(int hypothesis);                                       // to the exact score, where it is not that
+
+    double square(int hypothesis) const;  // c.c
+    // What a fault of size 1 that is not accounted for does to all unknowns: N^-1 J^T c.
+    Eigen::VectorXd effect(int hypothesis) const;
+    // Of one hypothesis with each, from one solution; 0 where nothing controls one of the two. (Where q of the other
+    // one is interpolated, this is as good as that.)
+    std::vector<double> correlations(int hypothesis) const { return correlations(hypothesis, effect(hypothesis)); }
+    std::vector<double> correlations(int hypothesis, const Eigen::VectorXd& effect) const;  // that has this effect
+    double correlation(int h, int k) const { return correlations(h)[k]; }
+
+private:
+    Eigen::VectorXd gradient(const FaultHypothesis& hypothesis) const;  // J^T c
+    double controlled(int hypothesis, const Eigen::VectorXd& effect) const;
+    void test_slips(int most_solutions);
+    void set(int hypothesis, double c_r_c);
+
+    const NormalEquations* equations_;
+    const BorderedFactor* factor_;
+    const FaultHypotheses* hypotheses_;
+    Eigen::VectorXd residuals_;
+    Eigen::VectorXd weight_;     // by reading: 1/u, 0 where it is left out
+    std::vector<double> c_r_c_;  // q, by hypothesis; 0 where nothing controls it
+    std::vector<FaultScore> scores_;
+    std::vector<bool> exact_;
+};
+
+}  // namespace stepdiag

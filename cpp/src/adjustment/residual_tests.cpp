@@ -1,0 +1,279 @@
+#include "adjustment/residual_tests.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <set>
+#include <tuple>
+#include <unsupported/Eigen/SpecialFunctions>
+
+namespace stepdiag {
+namespace {
+
+constexpr double fewest_freedom = 1.0;  // on either side of a comparison
+
+struct Share {
+    double square_sum = 0.0;
+    double freedom = 0.0;  // sum of redundancies
+
+    void add(const Share& other) {
+        square_sum += other.square_sum;
+        freedom += other.freedom;
+    }
+};
+
+// Probability that F of these degrees of freedom lies as far from 1 as this one, on its side, or on the other.
+double two_sided_probability(double f, double freedom, double freedom_of_others) {
+    const double x = freedom * f / (freedom * f + freedom_of_others);
+    const double below = Eigen::numext::betainc(0.5 * freedom, 0.5 * freedom_of_others, x);
+    const double above = Eigen::numext::betainc(0.5 * freedom_of_others, 0.5 * freedom, 1.0 - x);
+    return 2.0 * std::min(below, above);
+}
+
+// That chance makes the square of one standard normal number as large as this, the others' mean square being 1 of this
+// freedom: F(1, freedom).
+double score_probability(double square, double freedom) {
+    return Eigen::numext::betainc(0.5 * freedom, 0.5, freedom / (freedom + square));
+}
+
+// When each row was read, from 0 at the first to 1 at the last: by its time, or by the order of the rows.
+std::vector<double> progress(const Measurement& measurement) {
+    std::vector<double> when(measurement.size());
+    const Channel* time = measurement.find("time");
+    const bool timed = time && std::all_of(time->value.begin(), time->value.end(), [](const auto& t) { return !!t; });
+    for (std::size_t row = 0; row < when.size(); ++row) when[row] = timed ? *time->value[row] : double(row);
+    if (when.empty()) return when;
+    const auto [first, last] = std::minmax_element(when.begin(), when.end());
+    const double start = *first, span = *last - *first;
+    for (double& t : when) t = span > 0.0 ? (t - start) / span : 0.0;
+    return when;
+}
+
+// --- scatter ---
+
+struct Group {
+    std::string line, channel;
+    int run = -1;
+    FitAspect aspect = FitAspect::whole;
+
+    bool operator<(const Group& o) const {
+        return std::tie(line, channel, run, aspect) < std::tie(o.line, o.channel, o.run, o.aspect);
+    }
+};
+
+// A group and its complement make the same comparison: of the halves one is enough.
+std::map<Group, Share> shares_of_groups(const Adjustment& adjustment, const Measurement& measurement, Share& all) {
+    const std::vector<double> when = progress(measurement);
+    std::map<std::string, int> last_point;
+    std::set<int> runs;
+    for (const Station& station : measurement.stations()) {
+        int& last = last_point[station.line.name()];
+        last = std::max(last, station.point);
+        runs.insert(station.run);
+    }
+    std::map<Group, Share> groups;
+    for (const ReadingResidual& r : adjustment.residuals) {
+        if (!r.used() || r.redundancy == 0.0) continue;
+        const Station& station = measurement.stations()[r.row];
+        const std::string line = station.line.name();
+        const Share share{r.normalised * r.normalised * r.redundancy, r.redundancy};
+        all.add(share);
+        groups[{line, ""}].add(share);
+        groups[{"", r.channel}].add(share);
+        groups[{line, r.channel}].add(share);
+        if (runs.size() > 1) groups[{"", "", station.run}].add(share);
+        if (when[r.row] > 0.5) groups[{"", "", -1, FitAspect::second_half}].add(share);
+        if (2 * station.point > last_point[line]) groups[{"", "", -1, FitAspect::far_half}].add(share);
+    }
+    return groups;
+}
+
+std::vector<ResidualPattern> scatter_of_groups(const std::map<Group, Share>& groups, const Share& all) {
+    std::vector<ResidualPattern> patterns;
+    for (const auto& [group, share] : groups) {
+        const double others = all.freedom - share.freedom, rest = all.square_sum - share.square_sum;
+        if (share.freedom < fewest_freedom || others < fewest_freedom || !(rest > 0.0)) continue;
+        const double factor = share.square_sum / share.freedom;
+        FitReason reason{FitFinding::uneven_misfit, std::sqrt(factor), std::sqrt(rest / others), group.line,
+                         group.channel};
+        reason.run = group.run;
+        reason.aspect = group.aspect;
+        patterns.push_back({reason, two_sided_probability(factor * others / rest, share.freedom, others)});
+    }
+    return patterns;
+}
+
+// --- trends ---
+
+// The readings of one channel, on one line or on all, and how far along each of them was made, from 0 to 1.
+struct Trend {
+    std::string line, channel;
+    FitAspect aspect;
+    std::vector<int> readings;
+    std::vector<double> along;
+    std::vector<int> setup;
+};
+
+class TrendTests {
+public:
+    TrendTests(const Measurement& measurement, const NormalEquations& equations, const BorderedFactor& factor)
+        : problem_(equations.problem()), equations_(equations), factor_(factor) {
+        collect(progress(measurement));
+    }
+
+    const std::vector<Trend>& trends() const { return trends_; }
+
+    struct Score {
+        double size = 0.0, standard_uncertainty = 0.0, square = 0.0;  // square: 0 where nothing controls it
+    };
+    Score score(const Trend& trend) const {
+        constexpr double controlled = 1e-6;  // of c . c; below it is what rounding and second order leave
+        Eigen::VectorXd image = Eigen::VectorXd::Zero(problem_.size());
+        double s = 0.0, squares = 0.0;
+        for (std::size_t k = 0; k < trend.readings.size(); ++k) {
+            const int r = trend.readings[k];
+            const double c = trend.along[k] / problem_.readings()[r].standard_uncertainty;
+            s += c * equations_.residuals()[r];
+            squares += c * c;
+            const auto row = equations_.row(*point_of_[r], r);
+            for (int i = 0; i < row.size; ++i)
+                if (row.unknown[i] != no_unknown) image[row.unknown[i]] += c * row.derivative[i];
+        }
+        Eigen::VectorXd effect = image;
+        factor_.solve(effect);
+        const double q = squares - image.dot(effect);
+        if (!(q > controlled * squares)) return {};
+        return {s / q, 1.0 / std::sqrt(q), s * s / q};
+    }
+
+private:
+    void collect(const std::vector<double>& when) {
+        point_of_.assign(problem_.readings().size(), nullptr);
+        std::map<std::pair<std::string, std::string>, std::array<Trend, 2>> found;  // with time, with position
+        double longest = 0.0;
+        for (const AdjustedPoint& point : problem_.points()) longest = std::max(longest, std::abs(point.place.travel));
+        for (const AdjustedPoint& point : problem_.points())
+            for (int r = point.first_reading; r < point.end_reading; ++r) {
+                const AdjustedReading& reading = problem_.readings()[r];
+                point_of_[r] = &point;
+                if (!reading.used()) continue;
+                const std::string channel = problem_.channel_name(reading);
+                for (const std::string& line : {problem_.setups()[point.setup].line.name(), std::string()}) {
+                    auto& [time, position] = found[{line, channel}];
+                    for (Trend* trend : {&time, &position}) {
+                        trend->line = line;
+                        trend->channel = channel;
+                        trend->readings.push_back(r);
+                        trend->setup.push_back(point.setup);
+                    }
+                    time.along.push_back(when[reading.row]);
+                    position.along.push_back(longest > 0.0 ? point.place.travel / longest : 0.0);
+                }
+            }
+        for (auto& entry : found) {
+            auto& [time, position] = entry.second;
+            time.aspect = FitAspect::time;
+            position.aspect = FitAspect::position;
+            // On one line each set-up counts from its own mean: the constants of set-ups are another matter.
+            for (Trend* trend : {&time, &position}) centre(*trend, !entry.first.first.empty());
+            if (alike(time, position)) position.aspect = FitAspect::time_or_position;
+            else trends_.push_back(time);
+            trends_.push_back(position);
+        }
+    }
+
+    static void centre(Trend& trend, bool each_setup) {
+        std::map<int, std::pair<double, int>> sums;
+        double least = INFINITY, most = -INFINITY;
+        for (std::size_t k = 0; k < trend.along.size(); ++k) {
+            auto& [sum, count] = sums[each_setup ? trend.setup[k] : 0];
+            sum += trend.along[k];
+            ++count;
+        }
+        for (std::size_t k = 0; k < trend.along.size(); ++k) {
+            const auto& [sum, count] = sums[each_setup ? trend.setup[k] : 0];
+            trend.along[k] -= sum / count;
+            least = std::min(least, trend.along[k]);
+            most = std::max(most, trend.along[k]);
+        }
+        if (most > least)  // sizes are from the first to the last
+            for (double& a : trend.along) a /= most - least;
+    }
+
+    static bool alike(const Trend& a, const Trend& b) {
+        double ab = 0.0, aa = 0.0, bb = 0.0;
+        for (std::size_t k = 0; k < a.along.size(); ++k) {
+            ab += a.along[k] * b.along[k];
+            aa += a.along[k] * a.along[k];
+            bb += b.along[k] * b.along[k];
+        }
+        return ab * ab > 0.99 * aa * bb;
+    }
+
+    const AdjustmentProblem& problem_;
+    const NormalEquations& equations_;
+    const BorderedFactor& factor_;
+    std::vector<const AdjustedPoint*> point_of_;  // by reading
+    std::vector<Trend> trends_;
+};
+
+std::vector<ResidualPattern> trends_of_readings(const Adjustment& adjustment, const TrendTests& tests) {
+    const double freedom = adjustment.degrees_of_freedom - 1.0;
+    std::vector<ResidualPattern> patterns;
+    if (freedom < fewest_freedom) return patterns;
+    for (const Trend& trend : tests.trends()) {
+        const TrendTests::Score score = tests.score(trend);
+        if (score.square == 0.0) continue;
+        // Where all readings scatter more than was said, it is measured against that.
+        const double others = std::max(1.0, (adjustment.weighted_square_sum - score.square) / freedom);
+        FitReason reason{FitFinding::trend, score.size, 0.0, trend.line, trend.channel};
+        reason.standard_uncertainty = score.standard_uncertainty * std::sqrt(others);
+        reason.aspect = trend.aspect;
+        patterns.push_back({reason, score_probability(score.square / others, freedom)});
+    }
+    return patterns;
+}
+
+double chi_square(const FitReason& trend) { return std::pow(trend.value / trend.standard_uncertainty, 2); }
+
+// The best, and those that the readings do not tell from it.
+void keep_the_best(std::vector<ResidualPattern>& patterns) {
+    constexpr double told_apart = 25.0, least_share = 0.5;  // of the best one's chi-square
+    if (patterns.empty()) return;
+    std::stable_sort(patterns.begin(), patterns.end(),
+                     [](const auto& a, const auto& b) { return a.probability < b.probability; });
+    const double best = chi_square(patterns.front().reason), alike = patterns.front().probability;
+    std::size_t kept = 1;
+    while (kept < patterns.size() &&
+           chi_square(patterns[kept].reason) > std::max(best - told_apart, least_share * best))
+        ++kept;
+    patterns.resize(kept);
+    for (std::size_t k = 1; k < patterns.size(); ++k) {
+        patterns[k].probability = alike;
+        patterns[k].reason.alternative = true;
+    }
+}
+
+}  // namespace
+
+std::vector<ResidualPattern> residual_patterns(const Adjustment& adjustment, const Measurement& measurement,
+                                               const NormalEquations& equations, const BorderedFactor& factor) {
+    Share all;
+    const auto groups = shares_of_groups(adjustment, measurement, all);
+    std::vector<ResidualPattern> scatter = scatter_of_groups(groups, all);
+    std::vector<ResidualPattern> trends = trends_of_readings(adjustment, TrendTests(measurement, equations, factor));
+    const double tests = double(scatter.size() + trends.size());
+    if (scatter.size() > 1) {
+        std::iter_swap(scatter.begin(),
+                       std::min_element(scatter.begin(), scatter.end(),
+                                        [](const auto& a, const auto& b) { return a.probability < b.probability; }));
+        scatter.resize(1);
+    }
+    keep_the_best(trends);
+    scatter.insert(scatter.end(), trends.begin(), trends.end());
+    for (ResidualPattern& pattern : scatter) pattern.probability = std::min(1.0, tests * pattern.probability);
+    return scatter;
+}
+
+}  // namespace stepdiag

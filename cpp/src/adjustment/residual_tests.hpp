@@ -1,0 +1,36 @@
+// What the residuals of an adjustment have in common: lines, channels or times that scatter more than the others, and
+// trends with time or position. Internal: not installed.
+//
+// Scatter. The readings of a group have the square sum Q = sum w^2 of weighted residuals and the freedom f = sum of
+// their redundancies, which is the mean of Q. Q is a sum of eigenvalue times chi-square(1), with eigenvalues of at most
+// 1 that add up to f, and so has tails no longer than chi-square(f): Q/f against that of all other readings is tested
+// as F, on both sides, which errs on the safe side. A factor that all uncertainties share cancels.
+//
+// Trends. Were the readings off by size times c, then the weighted residuals w have
+//   s = c . w,  q = c . c - (J^T c)^T N^-1 (J^T c),  size = s/q, known to 1/sqrt(q),
+// a score test, exact under the model: correlations of residuals and unequal redundancies are in q. Where the unknowns
+// absorb the trend (a drift linear in time of a line that is measured once, a scale), q is 0: no test, nothing is said.
+#pragma once
+
+#include <vector>
+
+#include "adjustment/bordered_band.hpp"
+#include "adjustment/normal_equations.hpp"
+#include "stepdiag/adjustment/adjustment.hpp"
+
+namespace stepdiag {
+
+struct ResidualPattern {
+    FitReason reason;
+    // That chance alone makes the most conspicuous of all patterns as conspicuous as this one: its own probability
+    // times the number of tests (Bonferroni).
+    double probability;
+};
+
+// The group that scatters most conspicuously, then the trends that explain most: the best, and those whose chi-square
+// is less than 25 and less than half of it behind, since the readings do not tell those apart. The equations are
+// linearised, and factorised, at the solution.
+std::vector<ResidualPattern> residual_patterns(const Adjustment& adjustment, const Measurement& measurement,
+                                               const NormalEquations& equations, const BorderedFactor& factor);
+
+}  // namespace stepdiag

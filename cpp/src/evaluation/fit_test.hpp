@@ -1,0 +1,45 @@
+// The chi-square test of a fit, and what it says by itself (docs/conventions.md, "Verdict of a fit"). Internal.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "stepdiag/machine/fit.hpp"
+
+namespace stepdiag {
+
+inline constexpr double largest_noise_factor = 3.0;  // root of the variance factor
+inline constexpr double doubtful_below = 1e-2;       // probability of a misfit as large
+inline constexpr double doubtful_above = 1.0 - 1e-3;
+
+// Of a square sum larger than this one.
+double chi_square_probability(double square_sum, int freedom);
+
+// Where nothing but noise is tested: whether by one factor it is larger or smaller than stated.
+Fit fit_of_noise(double square_sum, int freedom);
+
+struct ChiSquare {
+    double square_sum;
+    int freedom;
+};
+// values^T covariance^-1 values, over the rank of the covariance.
+ChiSquare chi_square(const Eigen::VectorXd& values, const Eigen::MatrixXd& covariance);
+
+// Sum of share share^T, in blocks.
+class ShareSum {
+public:
+    explicit ShareSum(Eigen::Index size);
+    template <class Share>
+    void add(const Share& share) {
+        for (Eigen::Index i = 0; i < shares_.rows(); ++i) shares_(i, count_) = share(std::size_t(i));
+        if (++count_ == shares_.cols()) flush();
+    }
+    const Eigen::MatrixXd& matrix();
+
+private:
+    void flush();
+
+    Eigen::MatrixXd sum_, shares_;
+    Eigen::Index count_ = 0;
+};
+
+}  // namespace stepdiag

@@ -1,0 +1,86 @@
+"""Which faults of the readings a plan or a run controls, as lines of text."""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final
+
+from stepdiag._core import FaultControl
+from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units
+from stepdiag.planning.fault_control import Extension, tells_all
+from stepdiag.units import report_value
+
+NAMES: Final = {
+    ("reading", "distance"): "wrong distance",
+    ("slip", "distance"): "slip of distances",
+    ("reading", "tilt"): "wrong tilt",
+    ("slip", "tilt"): "slip of tilts",
+    ("reading", "spot"): "wrong spot",
+    ("slip", "spot"): "slip of spots",
+}
+_UNITS: Final = {"distance": "mm", "tilt": "rad", "spot": "mm"}
+
+ROUNDING: Final = 1e-6  # µm or µrad for each µm or µrad of a fault
+
+
+def control_rows(controls: Sequence[FaultControl]) -> Iterator[str]:
+    """Each kind of fault: from which size on one is found, what it may do up to there, and whether it is told from
+    others."""
+    yield "faults that the readings control, one at a time: found (99 %) from which size on, the largest effect of a"
+    yield "fault just not found, and from which size on it is told from all others:"
+    yield f"  {'':<18}{'found from':>14}" + "".join(f"{kind:>14}" for kind in KINDS) + "  told apart"
+    yield f"  {'':<18}{'':>14}" + "".join(f"{REPORT_UNIT[kind]:>14}" for kind in KINDS)
+    for c in controls:
+        cells = "".join(f"{_hidden(c, kind):>14}" for kind in KINDS)
+        yield f"  {name(c):<18}{_size(c, c.found_from):>14}{cells}  {told_apart(c)}"
+    for c in controls:
+        if c.uncontrolled:
+            yield f"  {name(c)}: {c.uncontrolled} of {c.count + c.uncontrolled} that no other reading controls"
+    for c in controls:
+        if c.twins:
+            yield f"  {name(c)} not told from a twin: by {_unit(c)} of it {_shared(c)}"
+
+
+def extension_rows(own: Sequence[FaultControl], tried: Iterable[Extension]) -> Iterator[str]:
+    """What would tell apart or control what the plan does not; nothing where it does."""
+    if tells_all(own):
+        return
+    for extension in tried:
+        if extension.trouble:
+            yield f"  {extension.name}: {extension.trouble}"
+            continue
+        said = "; ".join(f"{name(c)} {told_apart(c)}" for c in extension.controls)
+        yield f"  {extension.name} ({extension.minutes:+.1f} minutes), told apart: {said}"
+
+
+def name(control: FaultControl) -> str:
+    """What happened, in words."""
+    return NAMES[control.kind, control.channel]
+
+
+def told_apart(control: FaultControl) -> str:
+    """Which of the faults are, and from which size on."""
+    if control.count == 0 or control.twins == control.count:
+        return "none"
+    share = "all" if control.twins == 0 else f"{100 * (control.count - control.twins) // control.count} %"
+    return f"{share} from {_size(control, control.told_from)}"
+
+
+def _size(control: FaultControl, size: float) -> str:
+    value, unit = report_value(_UNITS[control.channel], size)
+    return f"{value:.3g} {unit}" if control.count else "-"
+
+
+def _unit(control: FaultControl) -> str:
+    return report_value(_UNITS[control.channel], 1.0)[1]
+
+
+def _hidden(control: FaultControl, kind: Kind) -> str:
+    value = control.hidden[kind]
+    return "any" if math.isinf(value) else f"{in_report_units(kind, value):.3g}"
+
+
+def _shared(control: FaultControl) -> str:
+    scale = report_value(_UNITS[control.channel], 1.0)[0]
+    shares = [(kind, in_report_units(kind, control.shared[kind]) / scale) for kind in KINDS]
+    said = [f"{kind} {share:.2g} {REPORT_UNIT[kind]}" for kind, share in shares if share > ROUNDING]
+    return ", ".join(said) or "nothing"
