@@ -2,12 +2,12 @@
 
     ./run python benchmarks/convergence.py [--runs 1000] [--first 0] [--case NAME]... [--workers N]
 
-A run is drawn from its number alone: volume, chain, machine, noise, 1 to 10 repeats, three body or face diagonals
-more. Mirror and laser stand at angles uniform within ±5 mrad; all else of a set-up comes from the default priors of
-the adjustment. In the cases "prior" the laser's angles come from its prior of 2 mrad, which is what the adjustment
-takes them for where beams have constants. A run is refused where no solution is found. It is at a wrong place where
-the square sum is above what a sound run may have (`SQUARES` standard deviations of chi-square: the truth itself fits
-better), or a value is `FAR` standard uncertainties from the truth. The exit code is 1 if any run is either.
+A run is drawn from its number alone: volume, chain, machine, noise, 1 to 10 repeats. Mirror and laser stand at angles
+uniform within ±5 mrad; all else of a set-up comes from the default priors of the adjustment. In the cases "prior" the
+laser's angles come from its prior of 2 mrad, which is what the adjustment takes them for where beams have constants. A
+run is refused where no solution is found. It is at a wrong place where the square sum is `SQUARES` standard deviations
+of chi-square above its expectation, or a value is `FAR` standard uncertainties from the truth. The exit code is 1 if
+any run is either.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@
 #include "adjustment/setup_priors.hpp"
 #include "evaluation/measurement_rows.hpp"
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/measurement/reading.hpp"
 
 namespace stepdiag {
 namespace {
@@ -46,8 +47,60 @@ double usable(const RawValue& raw, const Measurement& measurement, std::size_t r
     return raw.value;
 }
 
-bool has_tilts(const Measurement& measurement) {
-    return measurement.find("alpha") != nullptr || measurement.find("spot_x") != nullptr;
+// By the line's first row, to 500 urad, so that noise and the machine's angles have no part in a prior. A spot tells it
+// by its change, which has no zero offset.
+double usual_tilt(const Measurement& measurement, const std::vector<std::size_t>& rows, const HeadCalibration& head) {
+    constexpr double step = 500e-6;
+    const auto value = [&](const char* channel, std::size_t row) {
+        const Channel* found = measurement.find(channel);
+        return found && found->value[row] ? *found->value[row] : 0.0;
+    };
+    const std::size_t first = rows.front(), last = rows.back();
+    double x = 0.0, y = 0.0;
+    if (const int beams = measurement.beam_count(); beams > 0) {
+        Eigen::VectorXd distances(beams);
+        for (int i = 0; i < beams; ++i) {
+            const auto& read = measurement.find("d" + std::to_string(i + 1))->value[first];
+            if (!read) return 0.0;
+            distances[i] = *read;
+        }
+        if (const auto reduced = reduce_beams(distances, head.beam_offsets)) {
+            x = reduced->reading.alpha;
+            y = reduced->reading.beta;
+        }
+    } else if (measurement.find("spot_x")) {
+        const double path = 2.0 * std::abs(value("distance", last) - value("distance", first));
+        if (path > 0.0) {
+            x = (value("spot_x", last) - value("spot_x", first)) / path;
+            y = (value("spot_y", last) - value("spot_y", first)) / path;
+        }
+    } else {
+        x = value("alpha", first);
+        y = value("beta", first);
+    }
+    return std::min(1.0, step * std::round(std::hypot(x, y) / step));
+}
+
+// On all of the line's runs.
+LineReadings line_readings(const Measurement& measurement, const Line& line, const Plan& plan,
+                           const HeadCalibration& head) {
+    const Channel* time = measurement.find("time");
+    std::vector<const Channel*> tilts;
+    for (const char* name : {"alpha", "beta", "spot_x", "spot_y"})
+        if (const Channel* channel = measurement.find(name)) tilts.push_back(channel);
+    LineReadings readings{measurement.beam_count() > 0, time != nullptr, {}};
+    std::vector<std::size_t> rows;
+    for (std::size_t row = 0; row < measurement.size(); ++row) {
+        if (!(measurement.stations()[row].line == line)) continue;
+        rows.push_back(row);
+        for (const Channel* tilt : tilts) readings.tilts = readings.tilts || tilt->value[row].has_value();
+        readings.times = readings.times && time->value[row].has_value();
+    }
+    if (plan.is_scale_line(line)) readings.tilt = usual_tilt(measurement, rows, head);
+    const LateralExcursion beside = plan.lateral_excursion(line);
+    const double rounding = 1e-12 * plan.volume().norm();
+    for (int c = 0; c < 2; ++c) readings.beside[c] = beside.highest[c] - beside.lowest[c] > rounding;
+    return readings;
 }
 
 }  // namespace
@@ -76,6 +129,7 @@ AdjustmentProblem::AdjustmentProblem(const Measurement& measurement, const Plan&
 void AdjustmentProblem::collect_setups(const Measurement& measurement, const AdjustmentOptions& options) {
     setup_of_row_.resize(measurement.size());
     std::map<std::string, int> current;  // set-up by line
+    std::map<std::string, LineReadings> told;
     for (const auto& entry : rows_by_pass(measurement)) {
         const std::vector<std::size_t>& rows = entry.second;
         const Line line = measurement.stations()[rows.front()].line;
@@ -88,8 +142,10 @@ void AdjustmentProblem::collect_setups(const Measurement& measurement, const Adj
             const bool scale = plan_.is_scale_line(line);
             const Eigen::Vector3d origin = planned.front().commanded + tool_ - head.standoff * frame.col(2);
             LineSetup setup{entry.first.first, line, scale, ChannelModel(kind_, head, frame, origin), {}, {}, {}};
-            setup.prior = setup_priors(options, line.name(), scale, line.moved_axes() == 1,
-                                       kind_ == HeadLayout::multi_beam || has_tilts(measurement), setup.model);
+            auto readings = told.find(line.name());
+            if (readings == told.end())
+                readings = told.emplace(line.name(), line_readings(measurement, line, plan_, head)).first;
+            setup.prior = setup_priors(options, line.name(), scale, readings->second, setup.model);
             setup.unknown.assign(setup.prior.size(), no_unknown);
             current[line.name()] = int(setups_.size());
             setups_.push_back(std::move(setup));
@@ -129,11 +185,8 @@ void AdjustmentProblem::collect_points(const Measurement& measurement, const Adj
         check_station(measurement, row, line);
 
         const LineSetup& setup = setups_[setup_of_row_[row]];
-        // Without a reflector angle of their own the tilts of a scale line would be taken for the machine's.
-        const bool distance_only =
-            setup.is_scale_line && kind_ != HeadLayout::multi_beam && setup.prior[setup::reflector] == fixed_unknown;
         AdjustedPoint point{setup_of_row_[row], {no_unknown, no_unknown, no_unknown}, {}, int(readings_.size()), 0};
-        for (int c = 0; c < int(names.size()) && !(distance_only && c > 0); ++c)
+        for (int c = 0; c < int(names.size()); ++c)
             if (const auto raw =
                     raw_value(measurement.find(names[c]), row, usual_uncertainty(options.uncertainty, names[c])))
                 readings_.push_back({row, c, usable(*raw, measurement, row, names[c]), raw->standard_uncertainty});

@@ -12,7 +12,8 @@ namespace stepdiag {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double alternative = 25.0;  // in chi-square: what is less behind the best may be it
+constexpr double alternative = 25.0;    // in chi-square: what is less behind the best may be it
+constexpr double gross_scatter = 25.0;  // of the square sum a reading
 constexpr std::size_t most_exact = 20;
 constexpr std::size_t most_members = 40;  // which are near enough to what is behind them
 
@@ -54,7 +55,6 @@ FaultSearch::FaultSearch(const AdjustmentProblem& problem, const AdjustmentOptio
 }
 
 FaultSearch::SolutionPointer FaultSearch::run() {
-    constexpr double gross_scatter = 25.0;  // of the square sum a reading
     const bool corrects = options_.outlier_probability > 0.0;
     SolutionPointer plain = solution_of(handled()), solution;
     if (!plain->solve_from_zero()) plain.reset();
@@ -164,7 +164,8 @@ FaultSearch::SolutionPointer FaultSearch::without_gross(const SolutionPointer& p
     for (int pass = 0; pass < 2; ++pass) {
         const std::vector<Found> before = std::exchange(found_, {});
         SolutionPointer next = find_linearly(solution) ? solution_of(handled()) : nullptr;
-        if (next && !next->solve_from_zero()) next.reset();
+        // Where that leaves as much, it is no faults of readings.
+        if (next && !(next->solve_from_zero() && next->scatter() <= gross_scatter)) next.reset();
         if (next && next->square_sum() < (solution ? solution : plain ? plain : next)->square_sum() * 1.01) {
             solution = next;
             continue;

@@ -1,6 +1,7 @@
 // How the set-up unknowns of a line are taken, defaults included. Internal: not installed.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -9,12 +10,23 @@
 
 namespace stepdiag {
 
-// Standard uncertainty of each column (setup::Column) of a line's set-up. A measured line of a single axis, or without
-// tilts, has a cosine error, too, as far as neither its laser nor, with tilts, its reflector is known: there the laser
-// acts at second order only. It makes distances read too little by their travel: the column scale_factor. Throws
-// InvalidArgument for a negative one, and for a free laser on a scale line.
+// What the readings of a line can tell of its set-up.
+struct LineReadings {
+    bool tilts;                  // the run has tilts, spots or beams on this line
+    bool times;                  // of every reading
+    std::array<bool, 2> beside;  // whether points stand beside the line, along local x and y
+    double tilt = 0.0;           // of a scale line: about that of the mirror against the beam, rad
+};
+
+// Standard uncertainty of each column (setup::Column) of a line's set-up. With D = mirror - laser, the angle that a
+// tilt reads, and m, the mirror's angle to the line, distances read travel (3/2 D^2 - m^2/2) too much, in each of the
+// two directions across the line. Tilts tell D; points beside the line tell m. Where they do not, the adjustment
+// linearises at what the priors say of them, and the column scale_factor takes what is left: the root mean square of
+// the second order of what remains unknown. A free mirror on a scale line takes D, and the laser's angles are fixed
+// there: what they do to first order, D times their uncertainty, is in the scale_factor too. (As unknowns, whose
+// squares act on lengths, they would let a wrong length bend the solution.) Throws InvalidArgument for a negative
+// prior, and for a free laser on a scale line.
 std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, const std::string& line,
-                                           bool is_scale_line, bool is_single_axis, bool has_tilts,
-                                           const ChannelModel& model);
+                                           bool is_scale_line, const LineReadings& readings, const ChannelModel& model);
 
 }  // namespace stepdiag

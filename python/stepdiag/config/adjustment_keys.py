@@ -45,7 +45,9 @@ class AdjustmentKeys(Section):
     lateral_mm: Choice | None = _prior("lateral")
     roll_urad: Choice | None = _prior("roll")
     gain: Choice | None = _prior("gain")
-    drift_um_per_h: Choice | None = _prior("drift", ". It takes the column `time_s` of the measurement")
+    drift_um_per_h: Choice | None = _prior(
+        "drift", ", but fixed where a reading of the line has no time (column `time_s`)"
+    )
 
 
 class AdjustmentSection(AdjustmentKeys):
@@ -53,11 +55,11 @@ class AdjustmentSection(AdjustmentKeys):
 
     That is "free", "fixed" at 0, or a number: the standard uncertainty with which it is known to be 0. (Lateral
     offset, roll and gain act on tilts only; "free" is for them 1 m, 1 rad and 1.)
-    `[adjustment.LINE]` replaces, for one line, the keys it names. Scale lines take only `distance_constant_mm` and
-    `lateral_mm` from here. Of the others they have, unless a table of their own names them, `reflector_urad` (their
-    tilts then are not used), `roll_urad`, `gain` and drift fixed and beams with a constant each; their laser stands
-    along the axis, and `laser_urad` (by default 500, never "free") says how well: the length reads short as a cosine
-    does. So it does on lines without tilts and on measured single axes, with a `laser_urad` of at most 2000."""
+    `[adjustment.LINE]` replaces, for one line, the keys it names. Scale lines take `reflector_urad` and `laser_urad`
+    from a table of their own only: by default their mirror is free, and their laser stands along the axis to 500 (never
+    "free"). Tilts tell the difference of both; what they leave open acts by its square, as an error of the distances by
+    their travel, which is in the uncertainties. So it does on single axes, on faces, where distances alone are read and
+    where beams have constants; there an angle that is "free" counts as known to 2000."""
 
     angles: Literal["free", "fixed"] = key(
         '"free" or "fixed"', "Rotations of the machine's axes; fixed: it has none.", "free"

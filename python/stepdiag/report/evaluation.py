@@ -10,8 +10,8 @@ from stepdiag.calibration.finding_text import NOISE_ALONE, combination_text, fau
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.fault_control import control_rows
+from stepdiag.report.prior_effects import cosine_rows, drift_rows
 from stepdiag.report.setup_table import setup_rows
-from stepdiag.scenario.adjustment import scale_line_angle
 from stepdiag.scenario.description import JudgedEvaluation
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
@@ -57,7 +57,8 @@ def _adjusted(adjustment: Adjustment, measurement: Measurement, known: Known) ->
         yield from rows
     yield from undetermined_rows(calibration, map(combination_text, adjustment.combinations))
     yield from smoothness_rows(adjustment.smoothness)
-    yield from cosine_rows(known)
+    yield from cosine_rows(measurement, known)
+    yield from drift_rows(measurement, known)
     yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
     if adjustment.reliability:
         yield from control_rows(adjustment.reliability)
@@ -89,27 +90,6 @@ def smoothness_rows(deviations: Mapping[str, float]) -> Iterator[str]:
             for name, d in deviations.items()
         )
         yield f"smoothed, standard deviation of second differences: {', '.join(said)}"
-
-
-def cosine_rows(known: Known) -> Iterator[str]:
-    """What angles that no reading tells may do to lengths, in words."""
-    if known.signals == ("distance",):
-        yield (
-            "lines without tilts: a laser at an angle to its line reads wrong by the square of it; laser_urad in "
-            "[adjustment] says how well it stands (2000 at most), and that is in the uncertainties"
-        )
-    lines: dict[float, list[str]] = {}
-    for line in known.plan.scale_lines:
-        angle = scale_line_angle(known.keys.adjustment, line)
-        if angle > 0.0:
-            lines.setdefault(angle, []).append(line)
-    for angle, names in lines.items():
-        # (a^2 + b^2)/2 of two normal angles: angle^2 on average.
-        yield (
-            f"scale lines {', '.join(names)}: a laser that stands along the axis to {angle * MICRO:g} µrad reads too "
-            f"short, never too long, by {angle**2 * MICRO:.2g} µm/m on average; that is in the uncertainties, "
-            "not corrected"
-        )
 
 
 def reversal_rows(calibration: Calibration) -> Iterator[str]:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from stepdiag._core import FaultControl
-from stepdiag.parameters import KINDS, REPORT_UNIT, in_report_units
+from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units
 from stepdiag.planning.fault_control import Extension, tells_all
 from stepdiag.units import report_value
 
@@ -74,13 +74,13 @@ def _unit(control: FaultControl) -> str:
     return report_value(_UNITS[control.channel], 1.0)[1]
 
 
-def _hidden(control: FaultControl, kind: str) -> str:
+def _hidden(control: FaultControl, kind: Kind) -> str:
     value = control.hidden[kind]
     return "any" if math.isinf(value) else f"{in_report_units(kind, value):.3g}"
 
 
 def _shared(control: FaultControl) -> str:
     scale = report_value(_UNITS[control.channel], 1.0)[0]
-    shares = {kind: in_report_units(kind, control.shared[kind]) / scale for kind in KINDS}
-    said = [f"{kind} {share:.2g} {REPORT_UNIT[kind]}" for kind, share in shares.items() if share > ROUNDING]
+    shares = [(kind, in_report_units(kind, control.shared[kind]) / scale) for kind in KINDS]
+    said = [f"{kind} {share:.2g} {REPORT_UNIT[kind]}" for kind, share in shares if share > ROUNDING]
     return ", ".join(said) or "nothing"

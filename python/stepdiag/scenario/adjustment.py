@@ -1,5 +1,6 @@
 """A scenario's `[adjustment]` and `[smoothness]` in native units (mm, rad, s): what an adjustment takes for unknown."""
 
+import math
 from pathlib import Path
 from typing import Final
 
@@ -67,9 +68,12 @@ def plausible_limits(keys: PlausibleSection) -> _core.PlausibleLimits:
     )
 
 
-def scale_line_angle(keys: AdjustmentSection, line: str) -> float:
-    """The standard uncertainty of each of the laser's angles on a scale line, rad; 0: fixed."""
-    own = keys.by_line[line].laser_urad if line in keys.by_line else None
-    if own is None:
-        return SETUP_QUANTITIES["laser"].scale_line_prior
-    return 0.0 if isinstance(own, str) else own * MICRORADIAN
+def scale_line_angle(keys: AdjustmentSection, line: str, quantity: str) -> float:
+    """The standard uncertainty of each angle of the laser or the reflector of a scale line, rad; 0: fixed."""
+    own = keys.by_line.get(line)
+    choice = None if own is None else getattr(own, SETUP_QUANTITIES[quantity].key)
+    if choice is None:
+        return SETUP_QUANTITIES[quantity].scale_line_prior
+    if isinstance(choice, str):
+        return math.inf if choice == "free" else 0.0
+    return float(choice) * MICRORADIAN

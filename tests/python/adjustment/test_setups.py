@@ -133,7 +133,7 @@ def reversed_run(
 
 # Constants of straightnesses are not determined (of EXY and EYX only X EXY + Y EYX): what they are taken to be instead,
 # some 10 um, is seen in second order, by 2 mrad and less. mm, rad
-OPEN_CONSTANTS = (3e-5, 5e-8)
+OPEN_CONSTANTS = (2e-4, 5e-8)
 
 
 def assert_reversal(
@@ -147,9 +147,9 @@ def assert_reversal(
         truth = np.array(table.functions[name][1]) - np.array(table.negative[name][1])
         expected = truth[k] - (truth[0] if name in calibration.undetermined_reversal_constants else 0.0)
         assert abs(value[at] - expected) <= limit[name[1] in "ABC"], (name, k, value[at], expected)
-        # What is not determined is held in another way there, and is seen in second order.
+        # What is not determined is held in another way there, and is seen in second order: 0.1 mm, times 100 urad.
         expected_deviation = dense.standard_uncertainty(weights)
-        assert u[at] == pytest.approx(expected_deviation, rel=5e-3, abs=1e-15), (name, k)
+        assert u[at] == pytest.approx(expected_deviation, rel=2e-2, abs=1e-15), (name, k)
     return len(calibration.reversal)
 
 
@@ -175,6 +175,7 @@ def test_reversal_of_every_function_is_recovered(layout: str) -> None:
         (DIAGONALS, []),
         (DIAGONALS[:3], ["p00", "0p0"]),
         (["ppp"], ["p00"]),
+        (["ppp"], []),
         (["p00", "0p0", "00p"], []),
     ],
 )
@@ -183,7 +184,7 @@ def test_reversal_is_claimed_where_the_rank_allows(lines: list[str], scale_lines
     dense = DenseAdjustment(run, scenario)
     assert dense.gap[1] < 1e-12 < 1e-6 < dense.gap[0]
     dense.solve()
-    if lines == ["ppp"]:
+    if [*lines, *scale_lines] == ["ppp"]:
         with pytest.raises(sd.InvalidArgument, match="nothing can be determined"):
             adjust(run, scenario)
         return assert_nothing_is_determined(dense)
@@ -227,7 +228,8 @@ def test_cosine_error_of_a_scale_line_is_in_the_uncertainty(deviation: Any) -> N
     """A beam that is out of true by (a, b) reads travel (a^2 + b^2)/2 short: known to sqrt(2) s^2 of the travel."""
     rng = np.random.default_rng(50)
     scenario = random_scenario(rng, steps=4, scale_lines=["p00"], tool=(0.0, 0.0, 0.0))
-    table = random_table(rng, scenario.volume, 4)
+    # Without angles of the machine: they turn the mirror, and what they do depends on the laser to first order.
+    table = random_table(rng, scenario.volume, 4, rotation=0.0)
     run = measured(reference.simulate(scenario, table))
     u = 1e-5
     knowledge = Knowledge(
@@ -239,7 +241,7 @@ def test_cosine_error_of_a_scale_line_is_in_the_uncertainty(deviation: Any) -> N
     _, _, found = adjust(run, scenario, knowledge).calibration.functions["EXX"]
     # Start and end are read once each, and nothing else sees the scale of X: no lever, no beam beside its place.
     expected = np.hypot(np.sqrt(2) * s * s * travel, np.sqrt(2) * u)
-    assert found[-1] == pytest.approx(expected, rel=1e-3)  # second order of the machine's angles
+    assert found[-1] == pytest.approx(expected, rel=1e-3)
 
 
 def test_cosine_error_reads_short() -> None:

@@ -36,8 +36,8 @@ class Knowledge:
     rotations: bool = True  # False: the machine has no angular errors
 
     def given(self, line: str, quantity: str, is_scale: bool) -> Prior | None:
-        """Scale lines are aligned by themselves: of them, what is said of all lines counts in three cases only."""
-        of_all = not is_scale or quantity in ("distance_constant", "lateral", "drift")
+        """Scale lines are aligned by themselves: what is said of the angles of all lines is not said of theirs."""
+        of_all = not is_scale or quantity not in ("reflector", "laser")
         return self.setup.get((line, quantity), self.setup.get(quantity) if of_all else None)
 
 
@@ -45,9 +45,9 @@ def default(scenario: reference.Scenario, knowledge: Knowledge, line: str, quant
     is_scale = line in scenario.scale_lines
     if quantity == "laser" and scenario.layout == "multi_beam" and not is_scale:
         return "free" if deviation(scenario, knowledge, line, "beam_constants") == 0 else 2e-3
-    if is_scale and quantity in ("reflector", "roll", "gain"):
-        return "fixed"
-    return {"lateral": 1.0, "roll": 0.02, "gain": 0.01, "drift": "fixed"}.get(quantity, "free")
+    if is_scale and quantity == "laser":
+        return 500e-6
+    return {"lateral": 1.0, "roll": 0.02, "gain": 0.01, "drift": 5e-3 / 3600}.get(quantity, "free")
 
 
 def deviation(scenario: reference.Scenario, knowledge: Knowledge, line: str, quantity: str) -> float:
@@ -58,6 +58,10 @@ def deviation(scenario: reference.Scenario, knowledge: Knowledge, line: str, qua
     if isinstance(prior, str):
         return 0.0 if prior == "fixed" else FREE.get(quantity, np.inf)
     return prior
+
+
+def knowledge_says_nothing(knowledge: Knowledge, line: str, quantity: str) -> bool:
+    return knowledge.given(line, quantity, False) is None
 
 
 class DenseAdjustment:
@@ -76,7 +80,7 @@ class DenseAdjustment:
         self.model = DenseModel(scenario, self.stations(), self.channels, reversal)
         self.read = np.array([run.channels[name] for name in self.channels])
         self.u = np.array([self.uncertainty(name) for name in self.channels])
-        self.used = np.isfinite(self.read) & np.array([self.channel_is_used(name) for name in self.channels])
+        self.used = np.isfinite(self.read)
         self.priors = np.array([self.prior(unknown) for unknown in self.model.unknowns])
         self.active = np.flatnonzero(self.priors > 0)
         self.unknowns: list[Unknown] = [self.model.unknowns[i] for i in self.active]
@@ -117,17 +121,6 @@ class DenseAdjustment:
         given = self.run.standard_uncertainty.get(channel, default)
         return np.where(np.isfinite(given), given, default)
 
-    def channel_is_used(self, channel: str) -> Array:
-        """Tilts and spots of a scale line say nothing while its reflector is taken to be aligned."""
-        if channel == "distance" or channel.startswith("d"):
-            return np.ones(len(self.run), bool)
-        return np.array(
-            [
-                not (self.is_scale(line) and deviation(self.scenario, self.knowledge, line, "reflector") == 0)
-                for line in self.run.line
-            ]
-        )
-
     def is_scale(self, line: str) -> bool:
         return line in self.scenario.scale_lines
 
@@ -138,36 +131,61 @@ class DenseAdjustment:
         line, quantity = unknown.line, unknown.quantity
         if quantity == "psd_zero" and self.scenario.layout != "psd":
             return 0.0
-        if self.is_scale(line) and quantity == "laser":
-            return 0.0  # known as a cosine error
         if quantity == "cosine":
             return self.cosine_prior(line)
+        if quantity == "drift" and knowledge_says_nothing(self.knowledge, line, quantity) and not self.has_times(line):
+            return 0.0
+        if self.is_scale(line) and quantity == "laser" and self.mirror_is_free(line):
+            return 0.0  # what it does is a cosine error
+        if self.is_scale(line) and not self.tilts_tell(line):
+            if quantity in ("reflector", "laser", "psd_zero"):
+                return 0.0  # square to each other; what the laser's angle does is a cosine error
+            if quantity in ("roll", "gain") and not self.has_tilts(line):
+                return 0.0
         return deviation(self.scenario, self.knowledge, line, quantity)
 
+    def rows_of(self, line: str) -> Array:
+        return np.array([other == line for other in self.run.line])
+
+    def has_times(self, line: str) -> bool:
+        time = np.asarray(self.run.channels.get("time", np.full(len(self.run), np.nan)))
+        return bool(np.all(np.isfinite(time[self.rows_of(line)])))
+
+    def has_tilts(self, line: str) -> bool:
+        tilts = [np.asarray(self.run.channels[name]) for name in self.channels if name != "distance"]
+        return any(np.any(np.isfinite(tilt[self.rows_of(line)])) for tilt in tilts)
+
+    def tilts_tell(self, line: str) -> bool:
+        beams = deviation(self.scenario, self.knowledge, line, "beam_constants")
+        return self.has_tilts(line) and not (self.scenario.layout == "multi_beam" and beams > 0)
+
+    def mirror_is_free(self, line: str) -> bool:
+        return bool(np.isinf(deviation(self.scenario, self.knowledge, line, "reflector")))
+
     def cosine_prior(self, line: str) -> float:
-        """How well it is known that a line whose laser's angles no tilt tells does not read short, by travel.
+        """Root mean square of what the squares of unknown angles do to a distance, by travel.
 
-        (a^2 + b^2)/2 of two angles of standard deviation s is sqrt(2) s^2 in the mean square, with a mirror square to
-        the beam; a laser that turns alone reads long by three times that."""
+        A mirror and a laser that turn together by e read -e^2/2 too much; a laser that turns alone, 3/2 e^2. Of a
+        normal e of variance v, E[e^4] is 3 v^2; of two directions across the line the errors add."""
 
-        def error(angle: float) -> float:
-            return float(np.sqrt(2) * angle * angle)
-
-        if self.is_scale(line):
-            s = self.knowledge.given(line, "laser", True)
-            return error(500e-6 if s is None else 0.0 if s == "fixed" else float(s))
-        has_tilts = self.scenario.layout == "multi_beam" or any(
-            np.any(np.isfinite(self.run.channels[name])) for name in self.channels if name != "distance"
-        )
-        if has_tilts and line.count("0") < 2:
-            return 0.0
+        def error(variance: float, directions: int, factor: float) -> float:
+            return factor / 2 * variance * float(np.sqrt(3 * directions + directions * (directions - 1)))
 
         def prior(quantity: str) -> float:
             return deviation(self.scenario, self.knowledge, line, quantity)
 
-        laser = min(prior("laser"), 2e-3)
-        beams_unknown = self.scenario.layout == "multi_beam" and prior("beam_constants") > 0
-        return error(min(laser, prior("reflector"))) if has_tilts and not beams_unknown else 3 * error(laser)
+        laser, mirror, usual = prior("laser"), prior("reflector"), 2e-3
+        if self.is_scale(line) and not self.tilts_tell(line):
+            return error(laser**2, 2, 1.0)
+        if not self.tilts_tell(line):
+            return error((usual if np.isinf(laser) else laser) ** 2, 2, 3.0)
+        if np.isinf(laser) and np.isinf(mirror):
+            laser = mirror = usual
+        # A tilt has told their difference: what is left is in both.
+        left = laser if np.isinf(mirror) else mirror if np.isinf(laser) else 0.0
+        if not left and laser and mirror:
+            left = laser * mirror / float(np.hypot(laser, mirror))
+        return error(left**2, line.count("0"), 1.0)
 
     # --- what is known beside the readings, as rows of the scaled problem with 0 on the right ---
 

@@ -77,11 +77,13 @@ def test_seconds_per_mm_stand_in_place_of_the_feed() -> None:
 # --- plans -----------------------------------------------------------------------------------------------------------
 def test_plan_of_the_scenario_has_the_uncertainties_of_its_run() -> None:
     scenario = parse_scenario(SCENARIO)
-    noiseless = parse_scenario(SCENARIO.replace("distance_um = 0.1", "distance_um = 0.0"))
     plan = scenario.known.plan
+    # A plan knows the time of each reading, and so what is known of drift counts.
+    _, between = measuring_time(plan, times_of(scenario.known.keys.plan_by_time, ""))
+    timed = SCENARIO.replace("distance_um = 0.1", "distance_um = 0.0")
+    noiseless = parse_scenario(timed.replace("[plan]", f"[plan]\nseconds_per_reading = {between!r}"))
     found = outcome(scenario, Candidate(tuple(plan.lines), tuple(plan.scale_lines), plan.steps, 1))
     expected = largest_uncertainties(sd.evaluate_scenario(scenario, sd.simulate_scenario(noiseless)))
-    # A time for each reading has no part in it: the drift is fixed.
     assert found.largest == {kind: value for kind, (value, _) in expected.items()}
     assert len(found.determined) == 21
     assert found.spacing == 16.0
@@ -91,6 +93,7 @@ def test_uncertainties_are_those_of_a_machine_with_errors() -> None:
     faces = Candidate(("pp0", "np0", "p0p", "n0p", "0pp", "0np"), (), 10, 1)
     large = SCENARIO.replace("x_mm = 80.0", "x_mm = 800.0").replace("y_mm = 60.0", "y_mm = 600.0")
     text = large.replace("z_mm = 50.0", "z_mm = 500.0").split("[misalignment]")[0] + "[noise]\ndistance_um = 0.1\n"
+    text += '[adjustment]\nlaser_urad = 100.0\ndrift_um_per_h = "fixed"\n'
     perfect = "translation_um = 0.0\nrotation_urad = 0.0\nsquareness_urad = 0.0\n"
     usual, none = (
         outcome(parse_scenario(text.replace("[plan]", f"{errors}[plan]")), faces).largest["positioning"]

@@ -1,5 +1,6 @@
 """What `stepdiag evaluate` says of an adjustment: fit, outliers, set-up, and the method's own notes."""
 
+import math
 import re
 from pathlib import Path
 
@@ -99,9 +100,31 @@ def test_outlier_that_may_be_another_is_said_to_be_so(tmp_path: Path, capsys: py
 
 def test_scale_lines_have_a_word_on_their_cosine_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = simulated(tmp_path, NOISY)
-    said = report(tmp_path, capsys, NOISY + "[adjustment.p00]\nlaser_urad = 1000.0\n", run)
-    assert "scale lines p00: a laser that stands along the axis to 1000 µrad reads too short, never too long" in said
-    assert "scale lines 0p0, 00p: a laser that stands along the axis to 500 µrad" in said
+    own = "[adjustment.p00]\nlaser_urad = 1000.0\n[adjustment.0p0]\nreflector_urad = 500.0\n"
+    said = report(tmp_path, capsys, NOISY + own, run)
+    assert (
+        "scale lines p00: a laser that stands along the axis to 1000 µrad reads too short, never too long, by 1" in said
+    )
+    assert "scale lines 00p: a laser that stands along the axis to 500 µrad" in said
+    # Both known to 500 urad: a tilt leaves half of the variance.
+    assert "0p0: a laser that stands along the axis to 500 µrad, the mirror square to it to 500 µrad" in said
+    assert "beyond what their tilts tell it reads too short, never too long, by 0.12 µm/m" in said
+
+
+def test_drift_has_a_word_on_squareness(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Four lines of length D that drift by themselves: rate x duration x D/(2 A B), the largest of 60 x 50 mm: A0Z."""
+    run = simulated(tmp_path, NOISY)
+    untimed = NOISY.replace("[plan]", "[plan]\nseconds_per_reading = 10.0")
+    points = run.line.count("ppp")
+    size = 5e-3 / 3600 * 10.0 * (points - 1) * math.hypot(80.0, 60.0, 50.0) / (2 * 60.0 * 50.0) * 1e6
+    words = f"5 µm/h of each line's distances would be about {size:.2g} µrad of A0Z"
+    assert words in report(tmp_path, capsys, untimed, run)
+    assert "drift:" not in report(tmp_path, capsys, NOISY, run)
+    timed = simulated(tmp_path, untimed)
+    said = report(tmp_path, capsys, untimed, timed)
+    assert f"are in the uncertainties: about {size:.2g} µrad of A0Z" in said
+    fixed = untimed + '[adjustment]\ndrift_um_per_h = "fixed"\n'
+    assert words in report(tmp_path, capsys, fixed, timed)
 
 
 def test_smoothness_in_force_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

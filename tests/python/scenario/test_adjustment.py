@@ -54,15 +54,14 @@ def test_every_key_reaches_the_core() -> None:
         (BEAMS + '[adjustment]\nbeam_constants_um = "fixed"', "ppp",
          {"reflector": math.inf, "laser": math.inf, "distance_constant": math.inf, "lateral": 1.0, "roll": 0.02,
           "gain": 0.01}),
-        (PSD, "p00", {"distance_constant": math.inf, "psd_zero": math.inf, "lateral": 1.0}),
+        (PSD, "p00", {"reflector": math.inf, "distance_constant": math.inf, "psd_zero": math.inf,
+                      "lateral": 1.0, "roll": 0.02, "gain": 0.01}),
+        (BEAMS, "p00", {"distance_constant": math.inf, "beam_constants": math.inf, "lateral": 1.0, "roll": 0.02,
+                        "gain": 0.01}),
     ],
 )  # fmt: skip
 def test_defaults_are_the_documented_ones(text: str, line: str, expected: dict[str, float]) -> None:
-    found = priors(text, line)
-    if line == "p00":
-        found.pop("psd_zero", None)  # its spots are not used
-        expected = {name: prior for name, prior in expected.items() if name != "psd_zero"}
-    assert found == expected
+    assert priors(text, line) == expected
 
 
 def test_stated_default_of_scale_lines_is_that_of_the_core() -> None:

@@ -19,14 +19,18 @@
 namespace stepdiag {
 
 // By SetupQuantity (measurement/setup_quantity.hpp); none: the table's default, but a laser on a measured line is known
-// to 2000 urad where the constants of the layout's beams are not fixed. A lateral offset, roll or gain acts by the
-// tilts only, which are 0 on a perfect machine: free means known to 1 m, 1 rad, 1, and one whose uncertainty stays
-// above half of that is not determined. Where no tilt tells the laser's angles from the mirror's (lines of a single
-// axis, distances alone) they act at second order only, and the distances get a cosine error of theirs. On scale lines
-// a fixed reflector means that tilts and spots are not used. The laser's angles are fixed at 0 there, and what is given
-// as their standard uncertainty makes the cosine error travel (a^2 + b^2)/2 by which, with a mirror that is square to
-// the beam, their distances read short. What is said of all lines reaches scale lines for distance_constant and lateral
-// only; the rest of a scale line's set-up is said by its own name.
+// to 2000 urad where the constants of the layout's beams are not fixed, and a drift is fixed where a reading of its
+// line has no time. A lateral offset, roll or gain acts by the tilts only, which are 0 on a perfect machine: free means
+// known to 1 m, 1 rad, 1, and one whose uncertainty stays above half of that is not determined. What is said of all
+// lines reaches scale lines but for the angles of reflector and laser, which are said by their own names.
+//
+// With D = reflector - laser, the angle that a tilt reads, and m, the reflector's angle to the line, distances read
+// travel (3/2 D^2 - m^2/2) too much, in each direction across the line. Where no point stands beside the line in that
+// direction (single axes, faces, scale lines), m is known by the priors and by D only, and acts at second order. The
+// adjustment linearises at its best value; the root mean square of what is left beyond is the uncertainty of an error
+// by travel, as if it went both ways. With D known it is one of reading short, travel u^2(m)/2 on average. The same
+// holds for D where distances alone or beams with unknown constants are read. A scale line without tilts is taken to
+// have its mirror square to the beam.
 using SetupPriors = std::array<std::optional<PriorUncertainty>, adjusted_quantity_count>;
 
 // Standard deviation with which the second difference of neighbouring nodes is known to be 0: real axes are smooth.
@@ -229,9 +233,9 @@ struct Adjustment {
     std::vector<std::size_t> outliers() const;  // readings that were left out: into `residuals`, by their number
 };
 
-// Throws InvalidArgument for readings that do not belong to the plan, channels that do not fit the head, a free drift
-// without times, options that make no sense, where nothing at all can be determined, or for a result that is not
-// plausible.
+// Throws InvalidArgument for readings that do not belong to the plan, channels that do not fit the head, a drift that
+// is not fixed without times, options that make no sense, where nothing at all can be determined, or for a result that
+// is not plausible.
 Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
                   const HeadCalibrations& heads, const AdjustmentOptions& options = {});
 

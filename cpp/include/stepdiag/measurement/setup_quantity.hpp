@@ -17,6 +17,7 @@ namespace stepdiag {
 using PriorUncertainty = double;
 inline constexpr PriorUncertainty free_unknown = std::numeric_limits<double>::infinity();
 inline constexpr PriorUncertainty fixed_unknown = 0.0;
+inline constexpr PriorUncertainty usual_drift = 5e-3 / 3600.0;  // mm/s: 5 um/h
 
 enum class SetupQuantity {
     reflector,          // (a, b): mirror normal R_tool F Exp(a, b, 0) z
@@ -43,7 +44,8 @@ struct SetupQuantityRecord {
     std::string_view unit;         // of the library
     std::string_view report_unit;  // as in keys
     std::string_view meaning;
-    // What an adjustment takes it for by default, on measured lines and on scale lines.
+    // What an adjustment takes it for by default, on measured lines and on scale lines. A drift is fixed where readings
+    // of the line have no time; the angles are fixed on a scale line that has no tilts.
     PriorUncertainty prior, scale_line_prior;
     std::string_view components = {};       // a letter each; empty: a single one without a letter
     std::optional<HeadLayout> layout = {};  // the only one that has it
@@ -56,7 +58,7 @@ struct SetupQuantityRecord {
 // clang-format off
 inline constexpr std::array<SetupQuantityRecord, setup_quantity_count> setup_quantities = {{
     {"reflector", "reflector_urad", "reflector", "reflector", "rad", "urad",
-     "tilt (a, b) of the mirror about local x and y", free_unknown, fixed_unknown, "ab", {}, false, free_unknown, 2e-3},
+     "tilt (a, b) of the mirror about local x and y", free_unknown, free_unknown, "ab", {}, false, free_unknown, 2e-3},
     {"laser", "laser_urad", "laser", "laser", "rad", "urad",
      "tilt (a, b) of the beam and the sensor's axes", free_unknown, 500e-6, "ab", {}, false, free_unknown, 2e-3},
     {"distance_constant", "distance_constant_mm", "distance constant", "constant", "mm", "um",
@@ -68,11 +70,11 @@ inline constexpr std::array<SetupQuantityRecord, setup_quantity_count> setup_qua
     {"lateral", "lateral_mm", "lateral", "lateral", "mm", "mm",
      "the beam's origin beside its nominal place, along local x and y", 1.0, 1.0, "xy", {}, false, 1e3},
     {"roll", "roll_urad", "roll", "roll", "rad", "urad",
-     "roll of the head about its beam", 20e-3, fixed_unknown, "", {}, false, 1.0},
+     "roll of the head about its beam", 20e-3, 20e-3, "", {}, false, 1.0},
     {"gain", "gain", "gain", "gain", "1", "ppm",
-     "tilts (spots; the beams' offsets) read 1 + gain times themselves", 0.01, fixed_unknown, "", {}, false, 1.0},
+     "tilts (spots; the beams' offsets) read 1 + gain times themselves", 0.01, 0.01, "", {}, false, 1.0},
     {"drift", "drift_um_per_h", "drift", "drift", "mm s-1", "um_per_h",
-     "what distances read too much for every hour since the set-up's first reading", fixed_unknown, fixed_unknown},
+     "what distances read too much for every hour since the set-up's first reading", usual_drift, usual_drift},
     {"scale_length", "scale_um", "scale length", "scale length", "mm", "um",
      "what the distances of the line's last point read too much", fixed_unknown, fixed_unknown},
     {"scale_factor", "scale_ppm", "scale factor", "scale factor", "1", "ppm",

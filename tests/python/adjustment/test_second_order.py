@@ -1,0 +1,196 @@
+"""Angles that act by their squares, and drift: what tilts tell of them is corrected, what they do not is in the
+uncertainty. Truth is known; figures for more runs are in docs/method.md."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+from usual import CHAIN, DIAGONALS, FACES, SCALE_LINES, VOLUME
+
+import stepdiag as sd
+
+STEPS = 10
+FACTOR = 1.959963984540054
+UNCERTAINTY = sd.ReadingUncertainty(distance=1e-4, tilt=1e-6, spot=2e-3)
+PER_HOUR = 1e-3 / 3600.0  # um/h in mm/s
+ASIDE = 1e-3
+
+STANDARD = sd.Plan(VOLUME, DIAGONALS, STEPS, scale_lines=SCALE_LINES)
+SIX_FACES = sd.Plan(VOLUME, FACES, STEPS)
+
+Draw = Callable[[np.random.Generator], Mapping[str, sd.Misalignment]]
+
+
+def truth(seed: int) -> sd.Machine:
+    return sd.Machine(CHAIN, sd.random_error_map(VOLUME, seed=seed, intervals=STEPS))
+
+
+def run_of(
+    seed: int, plan: sd.Plan, misalignment: Mapping[str, sd.Misalignment], *, noise: float = 1.0, **given: Any
+) -> sd.Measurement:
+    deviations = sd.Noise(distance=noise * 1e-4, tilt=noise * 1e-6, spot=noise * 2e-3, seed=seed)
+    head = given.pop("head", sd.Head())
+    return sd.simulate(truth(seed), plan, head, misalignment=misalignment, noise=deviations, **given)
+
+
+def adjusted(run: sd.Measurement, plan: sd.Plan, head: sd.Head | None = None, **told: Any) -> sd.Adjustment:
+    return sd.adjust(run, plan, head or sd.Head(), CHAIN, uncertainty=UNCERTAINTY, **told)
+
+
+def scale_of(adjustment: sd.Adjustment, seed: int, axis: str) -> tuple[float, float]:
+    """Error of the positioning error at the end of travel, and its standard uncertainty, by the travel."""
+    position, value, u = adjustment.calibration.functions[f"E{axis}{axis}"]
+    error = value[-1] - truth(seed).errors.function(f"E{axis}{axis}", position)[-1]
+    return error / position[-1], u[-1] / position[-1]
+
+
+HEADS = {
+    "ideal": (sd.Head(), {}),
+    "psd": (sd.Head("psd", psd_distance=50.0), {}),
+    "multi_beam": (
+        sd.Head("multi_beam", beam_offsets=[[0.0, 0.0], [20.0, 0.0], [0.0, 20.0]]),
+        {"setup": sd.SetupPriors(beam_constants="fixed")},
+    ),
+}
+
+
+@pytest.mark.parametrize("layout", HEADS)
+@pytest.mark.parametrize(
+    ("laser", "mirror", "too_long"),
+    [(ASIDE, 0.0, 1.5), (-ASIDE, 0.0, 1.5), (0.0, ASIDE, 1.0), (ASIDE, ASIDE, -0.5), (2 * ASIDE, 0.0, 6.0)],
+)
+def test_tilts_correct_the_length_of_a_scale_line(layout: str, laser: float, mirror: float, too_long: float) -> None:
+    """Error-free: distances read travel (3/2 D^2 - m^2/2) too much, D = mirror - laser. D is measured, and taken for
+    the mirror's: the laser stands along the axis to 500 urad. Nothing else tells the scale of X here."""
+    head, told = HEADS[layout]
+    plan = sd.Plan(VOLUME, DIAGONALS, STEPS, scale_lines=["p00"])
+    line = {"p00": sd.Misalignment(laser=(0.0, laser), reflector=(0.0, mirror))}
+    run = sd.simulate(sd.Machine(CHAIN), plan, head, misalignment=line)
+    adjustment = adjusted(run, plan, head, outlier_probability=0.0, **told)
+    position, value, u = adjustment.calibration.functions["EXX"]
+    found = value[-1] / position[-1]
+    tilt = mirror - laser
+    assert found == pytest.approx(too_long * ASIDE**2 - tilt**2, abs=1e-9)
+    # What is known of it: the mirror's angle times that of the laser, and the second order of the latter.
+    expected = np.hypot(tilt * 500e-6, np.sqrt(2) * 500e-6**2)
+    # Three beams read a distance better than one.
+    assert u[-1] / position[-1] == pytest.approx(np.hypot(expected, np.sqrt(2) * 1e-4 / VOLUME[0]), rel=0.1)
+    assert abs(found) <= 2.0 * u[-1] / position[-1]
+
+
+def test_a_laser_aside_of_a_scale_line_costs_no_reading_and_is_within_the_uncertainty() -> None:
+    for seed in range(5):
+        aside = {line: sd.Misalignment(laser=(0.0, 2 * ASIDE)) for line in SCALE_LINES}
+        adjustment = adjusted(run_of(seed, STANDARD, aside), STANDARD, outlier_probability=1e-4)
+        assert adjustment.outliers == []
+        assert adjustment.verdict.fit != "rejected"
+        for axis in "XYZ":
+            error, u = scale_of(adjustment, seed, axis)
+            assert abs(error) <= 3.0 * u
+
+
+def without_tilts_of_scale_lines(run: sd.Measurement) -> sd.Measurement:
+    scale = np.isin(run.line, SCALE_LINES)
+    channels = {
+        name: np.where(scale & (name in ("alpha", "beta")), np.nan, value) for name, value in run.channels.items()
+    }
+    return sd.Measurement(run.line, run.point, run.position, channels, run=run.run, direction=run.direction)
+
+
+def test_without_tilts_the_mirror_of_a_scale_line_is_taken_to_be_square_to_the_beam() -> None:
+    plan = sd.Plan(VOLUME, DIAGONALS, STEPS, scale_lines=["p00"])
+    run = without_tilts_of_scale_lines(run_of(1, plan, {}))
+    adjustment = adjusted(run, plan)
+    assert not {s.quantity for s in adjustment.setup if s.line in SCALE_LINES} & {"reflector", "laser", "roll", "gain"}
+    _, u = scale_of(adjustment, 1, "X")
+    assert u == pytest.approx(np.hypot(np.sqrt(2) * 500e-6**2, 1e-4 * np.sqrt(2) / VOLUME[0]), rel=0.05)
+
+
+def test_tilts_of_aligned_scale_lines_narrow_what_they_tell_and_no_more() -> None:
+    run = run_of(2, STANDARD, {})
+    told, untold = adjusted(run, STANDARD), adjusted(without_tilts_of_scale_lines(run), STANDARD)
+    for name, (_, _, u) in told.calibration.functions.items():
+        assert np.all(u <= untold.calibration.functions[name][2] * (1 + 1e-9))
+
+
+def scale_lasers_aside(rng: np.random.Generator) -> dict[str, sd.Misalignment]:
+    return {line: sd.Misalignment(laser=rng.uniform(-ASIDE, ASIDE, 2)) for line in SCALE_LINES}
+
+
+def faces_out_of_true(size: float) -> Draw:
+    return lambda rng: {
+        line: sd.Misalignment(laser=size * rng.normal(size=2), reflector=size * rng.normal(size=2)) for line in FACES
+    }
+
+
+def drifting(pace: float) -> Draw:
+    def draw(rng: np.random.Generator) -> dict[str, sd.Misalignment]:
+        of_machine = rng.normal(0.0, pace * PER_HOUR, 3)
+        lines = [*DIAGONALS, *SCALE_LINES]
+        return {line: sd.Misalignment(drift=float(STANDARD.frame(line)[:, 2] @ of_machine)) for line in lines}
+
+    return draw
+
+
+def angles_known_to(size: float) -> dict[str, Any]:
+    return {"setup": sd.SetupPriors(laser=size, reflector=size)}
+
+
+@pytest.mark.parametrize(
+    ("plan", "draw", "told", "seconds"),
+    [
+        (STANDARD, scale_lasers_aside, {}, None),
+        (SIX_FACES, faces_out_of_true(2e-3), angles_known_to(2e-3), None),
+        (SIX_FACES, faces_out_of_true(3e-3), angles_known_to(3e-3), None),
+        (STANDARD, drifting(5.0), {}, 3.0),
+        (STANDARD, drifting(20.0), {"setup": sd.SetupPriors(drift=20.0 * PER_HOUR)}, 3.0),
+    ],
+    ids=["scale lasers", "faces 2 mrad", "faces 3 mrad", "drift 5", "drift 20, told"],
+)
+def test_intervals_cover_the_truth(plan: sd.Plan, draw: Draw, told: dict[str, Any], seconds: float | None) -> None:
+    covered: dict[str, list[bool]] = {"slopes": [], "angles": []}
+    runs = 150
+    for seed in range(runs):
+        run = run_of(seed, plan, draw(np.random.default_rng([14, seed])), seconds_per_reading=seconds)
+        calibration = adjusted(run, plan, outlier_probability=0.0, **told).calibration
+        errors = truth(seed).errors
+        for name, (position, value, u) in calibration.functions.items():
+            if name[1] == name[2]:
+                covered["slopes"].append(abs(value[-1] - errors.function(name, position)[-1]) <= FACTOR * u[-1])
+            elif name[1] in "ABC":
+                covered["angles"].append(abs(value[-1] - errors.function(name, position)[-1]) <= FACTOR * u[-1])
+        for name, (value, u) in calibration.squareness.items():
+            covered["slopes"].append(abs(value - errors.squareness[name]) <= FACTOR * u)
+    for family, found in covered.items():
+        # Six to nine values a run, correlated: as if two of them were independent, four binomial deviations. Priors
+        # wider than the truth make more.
+        assert np.mean(found) >= 0.95 - 4.0 * np.sqrt(0.95 * 0.05 / (2 * runs)), family
+
+
+def test_drift_has_a_prior_where_every_reading_of_a_line_has_a_time() -> None:
+    timed = run_of(3, STANDARD, {}, seconds_per_reading=3.0)
+    assert {s.line for s in adjusted(timed, STANDARD).setup if s.quantity == "drift"} == {*DIAGONALS, *SCALE_LINES}
+    (prior,) = {s.prior for s in adjusted(timed, STANDARD).setup if s.quantity == "drift"}
+    assert prior == pytest.approx(5.0 * PER_HOUR, rel=1e-15)
+    channels = dict(timed.channels)
+    row = timed.line.index("npp")
+    channels["time"] = np.where(np.arange(len(timed)) == row, np.nan, channels["time"])
+    partly = sd.Measurement(timed.line, timed.point, timed.position, channels)
+    found = {s.line for s in adjusted(partly, STANDARD).setup if s.quantity == "drift"}
+    assert found == {*DIAGONALS, *SCALE_LINES} - {"npp"}
+
+
+def test_drift_that_is_there_is_in_the_uncertainty_of_squarenesses() -> None:
+    """A body diagonal sees a squareness by A B/length; each drifts by itself, over its own duration."""
+    timed = run_of(4, STANDARD, {}, seconds_per_reading=30.0)
+    plain = adjusted(timed, STANDARD, setup=sd.SetupPriors(drift="fixed")).calibration.squareness
+    known = adjusted(timed, STANDARD).calibration.squareness
+    length, duration = float(np.linalg.norm(VOLUME)), 30.0 * 3 * STEPS
+    for name, (a, b) in {"C0Y": (0, 1), "B0Z": (0, 2), "A0Z": (1, 2)}.items():
+        added = np.sqrt(known[name][1] ** 2 - plain[name][1] ** 2)
+        expected = 5.0 * PER_HOUR * duration * length / (2 * VOLUME[a] * VOLUME[b])
+        # Positioning shares some of it: lines are longer by the drift of all.
+        assert 0.7 * expected <= added <= 1.2 * expected, name
