@@ -228,14 +228,14 @@ TEST(FaultTests, HaveEachFaultOnce) {
     const Workshop shop;
     const Solved solved(shop, shop.run());
     // Four diagonals of 13 points and three channels, with constants that are free: 13 readings and 10 slips in between
-    // (from the third to the last but one). Three scale lines of two points: a fault each.
-    EXPECT_EQ(solved.hypotheses.all().size(), std::size_t(4 * 3 * (13 + 10) + 3));
-    EXPECT_EQ(solved.hypotheses.sequences().size(), std::size_t(4 * 3 + 3));
+    // (from the third to the last but one). Three scale lines of two points: a fault each channel.
+    EXPECT_EQ(solved.hypotheses.all().size(), std::size_t(4 * 3 * (13 + 10) + 3 * 3));
+    EXPECT_EQ(solved.hypotheses.sequences().size(), std::size_t(4 * 3 + 3 * 3));
     // With a constant that is known the whole channel may be off, and each end by itself.
     Workshop known = shop;
     known.options.setup[int(stepdiag::SetupQuantity::distance_constant)] = stepdiag::fixed_unknown;
     EXPECT_EQ(Solved(known, known.run()).hypotheses.all().size(),
-              std::size_t(4 * (3 * 13 + 2 * 10 + 12) + 3 * (2 + 1)));
+              std::size_t(4 * (3 * 13 + 2 * 10 + 12) + 3 * (2 + 1 + 2)));
 }
 
 TEST(FaultTests, OrderReadingsByTimeThroughBothDirections) {
@@ -246,7 +246,7 @@ TEST(FaultTests, OrderReadingsByTimeThroughBothDirections) {
         for (std::size_t i = 1; i < sequence.readings.size(); ++i)
             EXPECT_LT(solved.problem.readings()[sequence.readings[i - 1]].row,
                       solved.problem.readings()[sequence.readings[i]].row);
-    EXPECT_EQ(solved.hypotheses.sequences().size(), std::size_t(4 * 3 + 3));  // a set-up serves both directions
+    EXPECT_EQ(solved.hypotheses.sequences().size(), std::size_t(4 * 3 + 3 * 3));  // a set-up serves both directions
 }
 
 // The parabola through three adjustments is what an adjustment with the fault as an unknown finds.
