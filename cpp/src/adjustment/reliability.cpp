@@ -12,7 +12,7 @@ namespace {
 constexpr double power_of_99_percent = 7.6;  // square root of the noncentrality: sqrt(28) + 2.3
 constexpr double told_apart = 25.0;          // difference of chi-square
 constexpr double twin = 0.999;               // correlation
-constexpr double similar = 0.8;              // the same, where the one of interpolated scores may be that of a twin
+constexpr double similar = 0.5;              // where the correlation of interpolated scores may be that of a twin
 constexpr double most_numbers = 4e6;         // of effects kept
 constexpr std::size_t fewest_places = 200;
 
