@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'FaultControl', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'uncertain_quantities', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Fault', 'FaultClass', 'FaultControl', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'uncertain_quantities', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -1092,9 +1092,9 @@ class Smoothness:
         ...
 class AdjustmentOptions:
     """
-    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of any false alarm in a run; 0: no reading is left out. scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best. plausible: what a machine can be. reliability: also which faults the readings control.
+    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of a false alarm among a thousand tests for faults; 0: they are named and not corrected. slips: "report" rejects a run with a slip, "estimate" makes it an unknown and accepts that. scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best. plausible: what a machine can be. reliability: also which faults the readings control.
     """
-    def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.01, scale_uncertainty: bool = False, full_covariance: bool = False, plausible: PlausibleLimits = ..., reliability: bool = False) -> None:
+    def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.00012, slips: str = 'report', scale_uncertainty: bool = False, full_covariance: bool = False, plausible: PlausibleLimits = ..., reliability: bool = False) -> None:
         """
         adjust() checks them.
         """
@@ -1127,6 +1127,9 @@ class AdjustmentOptions:
         ...
     @property
     def setup_by_line(self) -> dict[str, SetupPriors]:
+        ...
+    @property
+    def slips(self) -> str:
         ...
     @property
     def smoothness(self) -> Smoothness | None:
@@ -1167,16 +1170,11 @@ class SetupEstimate:
         """
 class Outlier:
     """
-    A reading that did not fit.
+    A reading that was left out.
     """
     @property
     def channel(self) -> str:
         ...
-    @property
-    def left_out(self) -> bool:
-        """
-        False: fitted as badly as the outlier of this number, and no other reading tells which of them is wrong; the other was left out because the error functions are smoother without it.
-        """
     @property
     def line(self) -> str:
         ...
@@ -1188,7 +1186,7 @@ class Outlier:
     @property
     def number(self) -> int:
         """
-        Counted from 1, the worst first.
+        Of its class in Adjustment.faults, from 1.
         """
     @property
     def point(self) -> int:
@@ -1204,6 +1202,82 @@ class Outlier:
     @property
     def run(self) -> int:
         ...
+class Fault:
+    """
+    A fault that explains the readings, if it is the one.
+    """
+    @property
+    def channel(self) -> str:
+        ...
+    @property
+    def chi_square_gain(self) -> float:
+        """
+        What it takes off chi-square.
+        """
+    @property
+    def kind(self) -> str:
+        """
+        "reading", or "slip": an offset of its channel from this reading on.
+        """
+    @property
+    def line(self) -> str:
+        ...
+    @property
+    def point(self) -> int:
+        ...
+    @property
+    def row(self) -> int:
+        ...
+    @property
+    def run(self) -> int:
+        ...
+    @property
+    def size(self) -> float:
+        """
+        What was read too much, mm or rad.
+        """
+    @property
+    def standard_uncertainty(self) -> float:
+        """
+        Of the size.
+        """
+class FaultClass:
+    """
+    Faults of which the readings do not tell which one happened.
+    """
+    @property
+    def corrected(self) -> bool:
+        """
+        Whether the verdict is that of the fit after its treatment.
+        """
+    @property
+    def members(self) -> list[Fault]:
+        """
+        The best first.
+        """
+    @property
+    def plausible(self) -> float:
+        """
+        The plausible limit of that parameter.
+        """
+    @property
+    def spread(self) -> float:
+        """
+        By how much they differ in it, mm or rad.
+        """
+    @property
+    def told_apart(self) -> bool:
+        ...
+    @property
+    def treatment(self) -> str:
+        """
+        "left_out": all readings that may be the wrong one; "estimated": their sizes are unknowns, which share the fault between them, so that the spread of the alternatives is in the uncertainties; "none".
+        """
+    @property
+    def widest(self) -> str:
+        """
+        The parameter that estimated alternatives differ in most; empty where there are none.
+        """
 class FitReason:
     """
     Why a fit is not accepted, or what its residuals have in common.
@@ -1229,9 +1303,14 @@ class FitReason:
         Of a prior: as of SetupEstimate.
         """
     @property
+    def fault(self) -> int:
+        """
+        Of a fault or alternatives: its class, from 1; else 0.
+        """
+    @property
     def finding(self) -> str:
         """
-        "no_redundancy"; "noise_factor", "misfit", "no_misfit": root of the variance factor, not credible, or larger or smaller than chance explains; "uneven_misfit": noise factor of one group of readings, and as the limit that of the others; "trend": what residuals of one channel run by, from the first reading to the last (mm or rad); "prior": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); "scaled": what the uncertainties were multiplied by.
+        "no_redundancy"; "noise_factor", "misfit", "no_misfit": root of the variance factor, not credible, or larger or smaller than chance explains; "uneven_misfit": noise factor of one group of readings, and as the limit that of the others; "trend": what residuals of one channel run by, from the first reading to the last (mm or rad); "prior": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); "fault": what a fault that was not corrected takes off chi-square; "alternatives": by how much alternative faults differ in `parameter`; "scaled": what the uncertainties were multiplied by.
         """
     @property
     def limit(self) -> float:
@@ -1240,6 +1319,11 @@ class FitReason:
     def line(self) -> str:
         """
         Of an uneven misfit, a trend or a prior; empty: all.
+        """
+    @property
+    def parameter(self) -> str:
+        """
+        Of alternatives; else empty.
         """
     @property
     def run(self) -> int:
@@ -1367,6 +1451,11 @@ class Adjustment:
     @property
     def degrees_of_freedom(self) -> int:
         ...
+    @property
+    def faults(self) -> list[FaultClass]:
+        """
+        Classes of faults that were found, and what was done about them.
+        """
     @property
     def iterations(self) -> int:
         ...

@@ -25,6 +25,7 @@ ADJUSTMENT: dict[str, Any] = {
     "setup_by_line": {"ppp": sd.SetupPriors(reflector="fixed")},
     "rotations": False,
     "outlier_probability": 0.0,
+    "slips": "estimate",
     "full_covariance": True,
 }
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "adjustment/adjustment_result.hpp"
-#include "adjustment/outlier_search.hpp"
+#include "adjustment/fault_search.hpp"
 #include "adjustment/reliability.hpp"
 #include "adjustment/smoothness.hpp"
 #include "adjustment/verdict.hpp"
@@ -43,6 +43,16 @@ std::vector<KnownCombination> known_combinations(const Observability& observabil
     return known;
 }
 
+std::shared_ptr<Solution> find_faults(FaultSearch& faults, const Measurement& measurement, const Plan& plan) {
+    try {
+        return faults.run();
+    } catch (const InvalidArgument&) {
+        const std::string far = far_reading(measurement, plan);
+        if (far.empty()) throw;
+        throw InvalidArgument("adjustment: " + far);
+    }
+}
+
 }  // namespace
 
 double Adjustment::variance_factor() const {
@@ -62,47 +72,40 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
                   const HeadCalibrations& heads, const AdjustmentOptions& options) {
     check_options(options, plan);
     check(options.plausible);
-    AdjustmentProblem problem(measurement, plan, chain, tool, heads, options);
-    if (problem.readings().empty())
+    const AdjustmentProblem of_all(measurement, plan, chain, tool, heads, options);
+    if (of_all.readings().empty())
         throw InvalidArgument("adjustment: nothing can be determined: the run has no readings that count");
     refuse_foreign_distances(measurement, plan);
-    GaussNewton solver(problem, smoothness_at_start(options));
-    AdjustmentTables tables(problem);
-    const Observability observability(solver, tables);
-    const CalibratedForms forms = choose_forms(tables);
-    solver.assume_usual(observability.determined());
 
-    Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
+    FaultSearch faults(of_all, options, smoothness_at_start(options));
+    const auto solution = find_faults(faults, measurement, plan);
+    const AdjustmentProblem& problem = solution->problem();
+    const Observability& observability = solution->observability();
+    GaussNewton& solver = solution->solver();
     Adjustment result{{"", chain, {}, {}, {}, {}}, {}, {}, 0.0, 0, 1.0, 0, {}, smoothness_at_start(options)};
-    OutlierSearch outliers(problem, solver, options);
-    try {
-        result.iterations = outliers.solve_without_gross(observability.determined(), x);
-    } catch (const InvalidArgument& error) {
-        const std::string far = far_reading(measurement, plan);
-        if (far.empty()) throw;
-        throw InvalidArgument("adjustment: " + far);
-    }
-    if (options.outlier_probability > 0.0) outliers.run(observability.determined(), x);
+    result.iterations = solution->iterations();
     if (options.smoothness && options.smoothness->cross_validated) {
-        result.smoothness = cross_validate(solver, x, options);
-        solver.solve(x);
+        result.smoothness = cross_validate(solver, solution->x(), options);
+        solution->solve_again();
     }
 
-    outliers.look(x);
-    const BorderedBand& inverse = outliers.inverse();
-    result.calibration = make_calibration(problem, tables, forms, x, inverse);
+    const Eigen::VectorXd& x = solution->x();
+    const BorderedBand& inverse = solution->inverse();
+    const CalibratedForms forms = choose_forms(solution->tables());
+    result.calibration = make_calibration(problem, solution->tables(), forms, x, inverse);
     const std::vector<bool> known = known_unknowns(problem, observability.determined(), inverse);
     result.calibration.findings = observability.findings(known);
     if (!is_anything_determined(result.calibration)) throw NothingDetermined("adjustment", result.calibration.findings);
+    result.faults = faults.classes(*solution, forms, measurement);
     refuse_implausible(result.calibration, measurement, plan, options.plausible);
     if (options.full_covariance) result.calibration.covariance = full_covariance(problem, forms, solver.factor());
     result.setup = setup_estimates(problem, known, x, inverse);
-    result.residuals = outliers.residuals();
+    result.residuals = reading_residuals(solver.equations(), inverse);
     std::stable_sort(result.residuals.begin(), result.residuals.end(),
                      [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
     result.combinations = known_combinations(observability, x, inverse);
     result.weighted_square_sum = solver.equations().square_sum(x);
-    result.degrees_of_freedom = degrees_of_freedom(solver);
+    result.degrees_of_freedom = solution->degrees_of_freedom();
     if (result.degrees_of_freedom > 0)
         result.chi_square_probability = chi_square_probability(result.weighted_square_sum, result.degrees_of_freedom);
     result.verdict = judge(result, residual_patterns(result, measurement, solver.equations(), solver.factor()));

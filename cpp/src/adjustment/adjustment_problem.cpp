@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <tuple>
 
 #include "adjustment/setup_priors.hpp"
@@ -348,7 +349,28 @@ int AdjustmentProblem::informative_priors() const {
     int count = 0;
     for (const LineSetup& setup : setups_)
         for (const int c : setup.active) count += setup.prior[c] < record(setup::component(c).quantity).broadest;
+    std::set<int> groups;
+    for (const EstimatedFault& fault : faults_)
+        if (std::isfinite(fault.prior)) count += !groups.insert(fault.group).second;
     return count;
+}
+
+void AdjustmentProblem::estimate(std::vector<EstimatedFault> faults) {
+    constexpr double metre = 1e3;  // mm
+    border_ -= int(faults_.size());
+    for (auto* list : {&prior_, &usual_, &change_scale_}) list->resize(size());
+    for (EstimatedFault& fault : faults) {
+        fault.unknown = size();
+        ++border_;
+        prior_.push_back(fault.prior);
+        usual_.push_back(fault.usual);
+        change_scale_.push_back(is_length(readings_[fault.readings.front()]) ? 1.0 / metre : 1.0);
+    }
+    faults_ = std::move(faults);
+}
+
+bool AdjustmentProblem::is_length(const AdjustedReading& reading) const {
+    return kind_ != HeadLayout::ideal || reading.channel == 0;
 }
 
 // In the order of the band, so that who goes through the points goes through the matrix once.

@@ -47,9 +47,18 @@ struct AdjustedReading {
     int channel;  // of the head: a row of the model
     double value;
     double standard_uncertainty;
-    int outlier = 0, suspect = 0;  // as in ReadingResidual
+    int outlier = 0;  // as in ReadingResidual
 
     bool used() const { return outlier == 0; }
+};
+
+// A fault whose size is an unknown: what some readings read too much.
+struct EstimatedFault {
+    std::vector<int> readings;
+    PriorUncertainty prior;  // of the size
+    double usual;            // size that it may have where nothing tells it
+    int group;  // of alternatives, of which one is the fault: together they are one thing that was not known
+    int unknown = no_unknown;
 };
 
 // One point of one pass, and its readings: readings[first_reading .. end_reading).
@@ -79,10 +88,14 @@ public:
     bool tells_reversal() const { return reversal_; }
     bool has_rotations() const { return rotations_; }
     std::string channel_name(const AdjustedReading& reading) const;
+    bool is_length(const AdjustedReading& reading) const;  // mm rather than rad
 
     const std::vector<int>& reach() const { return reach_; }  // of the band's block columns
     int blocks() const { return int(reach_.size()); }
     int border() const { return border_; }
+    const std::vector<EstimatedFault>& faults() const { return faults_; }
+    // Instead of those that there were; their unknowns are the last ones.
+    void estimate(std::vector<EstimatedFault> faults);
     int size() const { return 6 * blocks() + border_; }
     int unknowns() const { return size() - (has_rotations() ? 0 : 3 * blocks()); }  // the band has places without one
 
@@ -90,9 +103,10 @@ public:
     // The errors of the three axes at a point, for the unknowns' values `x`.
     MachineErrors errors(const AdjustedPoint& point, const Eigen::VectorXd& x) const;
     Eigen::VectorXd setup_values(const LineSetup& setup, const Eigen::VectorXd& x) const;
-    // Of an unknown of the set-ups: its prior's standard uncertainty; infinite elsewhere.
+    // Of an unknown of the set-ups or a fault: its prior's standard uncertainty; infinite elsewhere.
     const std::vector<double>& prior() const { return prior_; }
-    int informative_priors() const;  // those that are no limits of what is called free
+    // Those that are no limits of what is called free; of alternatives, that all but one are no fault.
+    int informative_priors() const;
     // How far from 0 each unknown usually is.
     const std::vector<double>& usual() const { return usual_; }
     // What makes changes of unknowns comparable: 1 for angles (rad), 1/metre for lengths (mm).
@@ -120,6 +134,7 @@ private:
     std::vector<AdjustedReading> readings_;
     std::vector<int> reach_;
     int border_ = 0;
+    std::vector<EstimatedFault> faults_;
     std::vector<double> prior_, usual_, change_scale_;
 };
 

@@ -147,6 +147,14 @@ std::vector<SetupEstimate> setup_estimates(const AdjustmentProblem& problem, con
     return estimates;
 }
 
+int degrees_of_freedom(const GaussNewton& solver) {
+    const AdjustmentProblem& problem = solver.equations().problem();
+    int count = int(solver.equations().smooth_rows().size()) - problem.unknowns() + int(solver.dependent().size());
+    for (const AdjustedReading& reading : problem.readings()) count += reading.used();
+    count += problem.informative_priors();
+    return count;
+}
+
 std::vector<ReadingResidual> reading_residuals(const NormalEquations& equations, const BorderedBand& inverse) {
     const AdjustmentProblem& problem = equations.problem();
     std::vector<ReadingResidual> residuals;
@@ -155,13 +163,9 @@ std::vector<ReadingResidual> reading_residuals(const NormalEquations& equations,
     for (std::size_t r = 0; r < problem.readings().size(); ++r) {
         const AdjustedReading& reading = problem.readings()[r];
         const double share = variances[r], weighted = equations.residuals()[r];
-        ReadingResidual residual{reading.row,
-                                 problem.channel_name(reading),
-                                 weighted * reading.standard_uncertainty,
-                                 0.0,
-                                 0.0,
-                                 reading.outlier,
-                                 reading.suspect};
+        ReadingResidual residual{
+            reading.row,    problem.channel_name(reading), weighted * reading.standard_uncertainty, 0.0, 0.0,
+            reading.outlier};
         residual.redundancy = reading.used() ? std::max(0.0, 1.0 - share) : 1.0 / (1.0 + share);
         if (reading.used() && residual.redundancy < controlled_share) residual.redundancy = 0.0;
         else if (reading.used()) residual.normalised = weighted / std::sqrt(residual.redundancy);

@@ -39,6 +39,10 @@ NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&p
     std::size_t weights = 0;
     first_weight_.resize(problem.readings().size());
     point_of_reading_.resize(problem.readings().size());
+    std::vector<std::vector<const EstimatedFault*>> faults(problem.readings().size());
+    for (const EstimatedFault& fault : problem.faults())
+        for (const int r : fault.readings) faults[r].push_back(&fault);
+    std::vector<std::pair<std::size_t, double>> of_faults;  // into derivatives_: they are the same everywhere
     for (std::size_t p = 0; p < problem.points().size(); ++p) {
         const AdjustedPoint& point = problem.points()[p];
         first_unknown_.push_back(int(unknowns_.size()));
@@ -47,14 +51,30 @@ NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&p
                 unknowns_.push_back(node == no_unknown ? no_unknown : problem.nodes()[node].unknown[c]);
         const LineSetup& setup = problem.setups()[point.setup];
         for (const int c : setup.active) unknowns_.push_back(setup.unknown[c]);
+        const std::size_t known = 18 + setup.active.size();
+        std::size_t count = known;
+        for (int r = point.first_reading; r < point.end_reading; ++r)
+            for (const EstimatedFault* fault : faults[r]) {
+                const auto begin = unknowns_.end() - std::ptrdiff_t(count - known);
+                if (std::find(begin, unknowns_.end(), fault->unknown) != unknowns_.end()) continue;
+                unknowns_.push_back(fault->unknown);
+                ++count;
+            }
         for (int r = point.first_reading; r < point.end_reading; ++r) {
             first_weight_[r] = weights;
             point_of_reading_[r] = int(p);
-            weights += 18 + setup.active.size();
+            for (const EstimatedFault* fault : faults[r]) {
+                const auto begin = unknowns_.end() - std::ptrdiff_t(count - known);
+                const auto place = std::find(begin, unknowns_.end(), fault->unknown) - begin;
+                of_faults.emplace_back(weights + known + std::size_t(place),
+                                       1.0 / problem.readings()[r].standard_uncertainty);
+            }
+            weights += count;
         }
     }
     first_unknown_.push_back(int(unknowns_.size()));
-    derivatives_.resize(weights);
+    derivatives_.assign(weights, 0.0);
+    for (const auto& [place, derivative] : of_faults) derivatives_[place] = derivative;
     residuals_.setZero(Eigen::Index(problem.readings().size()));
     prior_weight_.resize(problem.size());
     for (int j = 0; j < problem.size(); ++j) prior_weight_[j] = std::pow(problem.prior()[j], -2);
@@ -115,9 +135,12 @@ void NormalEquations::linearise(const Eigen::VectorXd& x, bool derivatives) {
             const AdjustedReading& reading = problem.readings()[r];
             const double weight = 1.0 / reading.standard_uncertainty;
             residuals_[r] = weight * (reading.value - value[reading.channel]);
-            if (!derivatives) continue;
+            const int p = point_of_reading_[r];
             double* row = derivatives_.data() + first_weight_[r];
-            const int* unknown = unknowns_.data() + first_unknown_[point_of_reading_[r]];
+            const int* unknown = unknowns_.data() + first_unknown_[p];
+            for (int c = 18 + int(setup.active.size()); c < first_unknown_[p + 1] - first_unknown_[p]; ++c)
+                residuals_[r] -= row[c] * x[unknown[c]];
+            if (!derivatives) continue;
             for (int c = 0; c < 18; ++c)
                 row[c] = unknown[c] == no_unknown ? 0.0 : weight * derivative(reading.channel, c);
             for (std::size_t c = 0; c < setup.active.size(); ++c)
@@ -150,10 +173,12 @@ NormalEquations::Row NormalEquations::row(const AdjustedPoint& point, int readin
             first_unknown_[p + 1] - first_unknown_[p]};
 }
 
-double NormalEquations::square_sum(const Eigen::VectorXd& x) const {
+double NormalEquations::square_sum(const Eigen::VectorXd& x) const { return square_sum(residuals_, x); }
+
+double NormalEquations::square_sum(const Eigen::VectorXd& residuals, const Eigen::VectorXd& x) const {
     double sum = 0.0;
-    for (Eigen::Index r = 0; r < residuals_.size(); ++r)
-        if (problem_->readings()[r].used()) sum += residuals_[r] * residuals_[r];
+    for (Eigen::Index r = 0; r < residuals.size(); ++r)
+        if (problem_->readings()[r].used()) sum += residuals[r] * residuals[r];
     for (int j = 0; j < x.size(); ++j)
         if (std::isfinite(problem_->prior()[j])) sum += std::pow(x[j] / problem_->prior()[j], 2);
     for (const SmoothRow& row : smooth_) sum += std::pow(row.value(x), 2);
@@ -323,11 +348,13 @@ Eigen::VectorXd NormalEquations::transposed(const Eigen::VectorXd& w, const Eige
     return gradient;
 }
 
-Eigen::VectorXd NormalEquations::product(const Eigen::VectorXd& v) const {
+Eigen::VectorXd NormalEquations::image(const Eigen::VectorXd& v) const {
     Eigen::VectorXd image(residuals_.size());
     for (const AdjustedPoint& point : problem_->points())
         for (int r = point.first_reading; r < point.end_reading; ++r) image[r] = row(point, r).product(v);
-    return -transposed(-image, v);
+    return image;
 }
+
+Eigen::VectorXd NormalEquations::product(const Eigen::VectorXd& v) const { return -transposed(-image(v), v); }
 
 }  // namespace stepdiag

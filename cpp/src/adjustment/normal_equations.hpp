@@ -57,12 +57,14 @@ public:
     // Weighted residual of each reading, used or not, at the last linearise.
     const Eigen::VectorXd& residuals() const { return residuals_; }
     double square_sum(const Eigen::VectorXd& x) const;  // of residuals, priors and smoothness, not of what is usual
+    double square_sum(const Eigen::VectorXd& residuals, const Eigen::VectorXd& x) const;  // of these residuals
 
     BorderedBand matrix() const;
     void assemble(BorderedBand& matrix) const;  // J^T J + P
     // Adds what the readings' second derivatives by the set-ups make of the residuals at x, the last linearise.
     void add_curvature(const Eigen::VectorXd& x, BorderedBand& matrix);
     Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;  // J^T w - P x
+    Eigen::VectorXd image(const Eigen::VectorXd& v) const;     // J v, of all readings
     Eigen::VectorXd product(const Eigen::VectorXd& v) const;   // (J^T J + P) v
 
     // The derivative of a reading, weighted: unknowns of its point (no_unknown where there is none), and its row.

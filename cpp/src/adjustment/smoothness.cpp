@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "adjustment/adjustment_result.hpp"
-#include "adjustment/outlier_search.hpp"
 
 namespace stepdiag {
 namespace {

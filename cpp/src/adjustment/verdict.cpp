@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "adjustment/fault_tests.hpp"
 #include "evaluation/fit_test.hpp"
 
 namespace stepdiag {
@@ -48,6 +49,22 @@ void compare_with_priors(const Adjustment& adjustment, std::vector<FitReason>& r
     }
 }
 
+void judge_faults(const Adjustment& adjustment, std::vector<FitReason>& reasons) {
+    for (std::size_t k = 0; k < adjustment.faults.size(); ++k) {
+        const FaultClass& found = adjustment.faults[k];
+        const Fault& best = found.members.front();
+        FitReason reason{FitFinding::fault, best.chi_square_gain, FaultTests::significant, best.line, best.channel};
+        reason.fault = int(k) + 1;
+        if (!found.corrected) reasons.push_back(reason);
+        if (!(found.spread > found.plausible)) continue;
+        reason.finding = FitFinding::alternatives;
+        reason.parameter = found.widest;
+        reason.value = found.spread;
+        reason.limit = found.plausible;
+        reasons.push_back(reason);
+    }
+}
+
 }  // namespace
 
 std::string name(FitFinding finding) {
@@ -59,6 +76,8 @@ std::string name(FitFinding finding) {
         case FitFinding::uneven_misfit: return "uneven_misfit";
         case FitFinding::trend: return "trend";
         case FitFinding::prior: return "prior";
+        case FitFinding::fault: return "fault";
+        case FitFinding::alternatives: return "alternatives";
         case FitFinding::scaled: return "scaled";
     }
     return "";
@@ -77,9 +96,11 @@ std::string name(FitAspect aspect) {
 }
 
 Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& patterns) {
-    if (adjustment.degrees_of_freedom <= 0) return {Fit::unchecked, {{FitFinding::no_redundancy, 0.0, 1.0}}};
-    const double probability = adjustment.chi_square_probability;
     std::vector<FitReason> reasons;
+    judge_faults(adjustment, reasons);
+    if (reasons.empty() && adjustment.degrees_of_freedom <= 0)
+        return {Fit::unchecked, {{FitFinding::no_redundancy, 0.0, 1.0}}};
+    const double probability = adjustment.chi_square_probability;
     compare_with_stated_noise(adjustment, reasons);
     if (!(probability >= rejected_below)) take_patterns(patterns, pattern_below, reasons);
     compare_with_priors(adjustment, reasons);

@@ -34,7 +34,6 @@ struct Outlier {
     double residual;
     double normalised;
     int number;
-    bool left_out;
 };
 
 // What Python sees: an adjustment, and the run's rows that it belongs to.
@@ -59,6 +58,12 @@ struct AdjustmentOfRun {
 };
 
 using ChannelArrays = py::typing::Dict<py::str, DoubleArray>;
+
+Slips to_slips(const std::string& slips) {
+    for (const Slips choice : {Slips::report, Slips::estimate})
+        if (slips == name(choice)) return choice;
+    throw InvalidArgument("adjustment slips: expected \"report\" or \"estimate\", got \"" + slips + "\"");
+}
 
 // The function of the package that makes sentences of a verdict's reasons.
 py::object& reason_wording() {
@@ -115,18 +120,30 @@ void bind_options(py::module_& m) {
         "What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all "
         "lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its "
         "set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has "
-        "no angular errors. outlier_probability: of any false alarm in a run; 0: no reading is left out. "
+        "no angular errors. outlier_probability: of a false alarm among a thousand tests for faults; 0: they are named "
+        "and not corrected. slips: \"report\" rejects a run with a slip, \"estimate\" makes it an unknown and accepts "
+        "that. "
         "scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and "
         "the fit is doubtful at best. plausible: what a machine can be. reliability: also which faults the readings "
         "control.")
         .def(py::init([](const ReadingUncertainty& uncertainty, const Priors& setup,
                          const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
                          bool rotations, const std::optional<Smoothness>& smoothness, double outlier_probability,
-                         bool scale_uncertainty, bool full_covariance, const PlausibleLimits& plausible,
-                         bool reliability) {
-                 AdjustmentOptions options{uncertainty,       setup.value,     {},         one_setup_per_line,
-                                           reversal,          rotations,       smoothness, outlier_probability,
-                                           scale_uncertainty, full_covariance, plausible,  reliability};
+                         const std::string& slips, bool scale_uncertainty, bool full_covariance,
+                         const PlausibleLimits& plausible, bool reliability) {
+                 AdjustmentOptions options{uncertainty,
+                                           setup.value,
+                                           {},
+                                           one_setup_per_line,
+                                           reversal,
+                                           rotations,
+                                           smoothness,
+                                           outlier_probability,
+                                           to_slips(slips),
+                                           scale_uncertainty,
+                                           full_covariance,
+                                           plausible,
+                                           reliability};
                  for (const auto& [line, priors] : setup_by_line) options.setup_by_line[line] = priors.value;
                  return options;
              }),
@@ -134,7 +151,7 @@ void bind_options(py::module_& m) {
              py::arg("setup_by_line") = std::map<std::string, Priors>{},
              py::arg("one_setup_per_line") = usual.one_setup_per_line, py::arg("reversal") = usual.reversal,
              py::arg("rotations") = usual.rotations, py::arg("smoothness") = std::nullopt,
-             py::arg("outlier_probability") = usual.outlier_probability,
+             py::arg("outlier_probability") = usual.outlier_probability, py::arg("slips") = name(usual.slips),
              py::arg("scale_uncertainty") = usual.scale_uncertainty, py::arg("full_covariance") = usual.full_covariance,
              py::arg("plausible") = usual.plausible, py::arg("reliability") = usual.reliability,
              "adjust() checks them.")
@@ -151,6 +168,7 @@ void bind_options(py::module_& m) {
         .def_readonly("rotations", &AdjustmentOptions::rotations)
         .def_readonly("smoothness", &AdjustmentOptions::smoothness)
         .def_readonly("outlier_probability", &AdjustmentOptions::outlier_probability)
+        .def_property_readonly("slips", [](const AdjustmentOptions& o) { return name(o.slips); })
         .def_readonly("scale_uncertainty", &AdjustmentOptions::scale_uncertainty)
         .def_readonly("full_covariance", &AdjustmentOptions::full_covariance)
         .def_readonly("plausible", &AdjustmentOptions::plausible)
@@ -170,7 +188,7 @@ void bind_result(py::module_& m) {
             "Standard uncertainty of its prior; infinite where it is free (1 m, 1 rad, 1 for a free lateral offset, "
             "roll, gain).");
 
-    py::class_<Outlier>(m, "Outlier", "A reading that did not fit.")
+    py::class_<Outlier>(m, "Outlier", "A reading that was left out.")
         .def_readonly("row", &Outlier::row)
         .def_readonly("run", &Outlier::run)
         .def_readonly("line", &Outlier::line)
@@ -178,11 +196,34 @@ void bind_result(py::module_& m) {
         .def_readonly("channel", &Outlier::channel)
         .def_readonly("residual", &Outlier::residual, "mm or rad")
         .def_readonly("normalised", &Outlier::normalised, "In its standard uncertainties.")
-        .def_readonly("number", &Outlier::number, "Counted from 1, the worst first.")
-        .def_readonly(
-            "left_out", &Outlier::left_out,
-            "False: fitted as badly as the outlier of this number, and no other reading tells which of them is "
-            "wrong; the other was left out because the error functions are smoother without it.");
+        .def_readonly("number", &Outlier::number, "Of its class in Adjustment.faults, from 1.");
+
+    py::class_<Fault>(m, "Fault", "A fault that explains the readings, if it is the one.")
+        .def_property_readonly(
+            "kind", [](const Fault& f) { return name(f.kind); },
+            "\"reading\", or \"slip\": an offset of its channel from this reading on.")
+        .def_readonly("row", &Fault::row)
+        .def_readonly("run", &Fault::run)
+        .def_readonly("line", &Fault::line)
+        .def_readonly("point", &Fault::point)
+        .def_readonly("channel", &Fault::channel)
+        .def_readonly("size", &Fault::size, "What was read too much, mm or rad.")
+        .def_readonly("standard_uncertainty", &Fault::standard_uncertainty, "Of the size.")
+        .def_readonly("chi_square_gain", &Fault::chi_square_gain, "What it takes off chi-square.");
+    py::class_<FaultClass>(m, "FaultClass", "Faults of which the readings do not tell which one happened.")
+        .def_readonly("members", &FaultClass::members, "The best first.")
+        .def_property_readonly(
+            "treatment", [](const FaultClass& c) { return name(c.treatment); },
+            "\"left_out\": all readings that may be the wrong one; \"estimated\": their sizes are unknowns, which "
+            "share "
+            "the fault between them, so that the spread of the alternatives is in the uncertainties; \"none\".")
+        .def_readonly("corrected", &FaultClass::corrected,
+                      "Whether the verdict is that of the fit after its treatment.")
+        .def_property_readonly("told_apart", &FaultClass::told_apart)
+        .def_readonly("widest", &FaultClass::widest,
+                      "The parameter that estimated alternatives differ in most; empty where there are none.")
+        .def_readonly("spread", &FaultClass::spread, "By how much they differ in it, mm or rad.")
+        .def_readonly("plausible", &FaultClass::plausible, "The plausible limit of that parameter.");
 
     py::class_<FitReason>(m, "FitReason", "Why a fit is not accepted, or what its residuals have in common.")
         .def_property_readonly(
@@ -191,8 +232,9 @@ void bind_result(py::module_& m) {
             "credible, or larger or smaller than chance explains; \"uneven_misfit\": noise factor of one group of "
             "readings, and as the limit that of the others; \"trend\": what residuals of one channel run by, from the "
             "first reading to the last (mm or rad); "
-            "\"prior\": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); \"scaled\": what the "
-            "uncertainties were multiplied by.")
+            "\"prior\": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); \"fault\": what "
+            "a fault that was not corrected takes off chi-square; \"alternatives\": by how much alternative faults "
+            "differ in `parameter`; \"scaled\": what the uncertainties were multiplied by.")
         .def_readonly("value", &FitReason::value)
         .def_readonly("limit", &FitReason::limit)
         .def_readonly("standard_uncertainty", &FitReason::standard_uncertainty,
@@ -201,6 +243,8 @@ void bind_result(py::module_& m) {
         .def_readonly("channel", &FitReason::channel,
                       "Of an uneven misfit or a trend; empty: all. Of a prior the set-up quantity.")
         .def_readonly("component", &FitReason::component, "Of a prior: as of SetupEstimate.")
+        .def_readonly("fault", &FitReason::fault, "Of a fault or alternatives: its class, from 1; else 0.")
+        .def_readonly("parameter", &FitReason::parameter, "Of alternatives; else empty.")
         .def_readonly("run", &FitReason::run, "Of an uneven misfit: the run; -1: all.")
         .def_property_readonly(
             "aspect", [](const FitReason& r) { return name(r.aspect); },
@@ -300,16 +344,19 @@ void bind_result(py::module_& m) {
                                [](const Result& r) {
                                    std::vector<Outlier> list;
                                    for (const ReadingResidual& x : r.adjustment.residuals) {
-                                       if (x.used() && x.suspect == 0) continue;
+                                       if (x.used()) continue;
                                        const Station& s = r.stations[x.row];
                                        list.push_back({x.row, s.run, s.line.name(), s.point, x.channel, x.residual,
-                                                       x.normalised, x.used() ? x.suspect : x.outlier, !x.used()});
+                                                       x.normalised, x.outlier});
                                    }
                                    std::stable_sort(list.begin(), list.end(), [](const Outlier& a, const Outlier& b) {
-                                       return std::pair(a.number, b.left_out) < std::pair(b.number, a.left_out);
+                                       return a.number < b.number;
                                    });
                                    return list;
                                })
+        .def_property_readonly(
+            "faults", [](const Result& r) { return r.adjustment.faults; },
+            "Classes of faults that were found, and what was done about them.")
         .def_property_readonly(
             "reliability", [](const Result& r) { return r.adjustment.reliability; }, "If it was asked for.")
         .def_property_readonly("verdict", [](const Result& r) { return r.adjustment.verdict; })

@@ -1,11 +1,20 @@
 """The core's findings in words: what the readings leave open (`Undetermined`, `KnownCombination`) and the verdict of a
-fit (`FitReason`; docs/conventions.md, "Verdict of a fit"), and where an error map breaks the frame choice. All
-sentences about them are here."""
+fit (`FitReason`; docs/conventions.md, "Verdict of a fit"), faults of readings (`FaultClass`), and where an error map
+breaks the frame choice. All sentences about them are here."""
 
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
-from stepdiag._core import Adjustment, Calibration, ErrorMap, FitReason, KnownCombination, Undetermined
+from stepdiag._core import (
+    Adjustment,
+    Calibration,
+    ErrorMap,
+    Fault,
+    FaultClass,
+    FitReason,
+    KnownCombination,
+    Undetermined,
+)
 from stepdiag.parameters import kind_of, units_of
 from stepdiag.setup_quantities import SETUP_QUANTITIES, component_name
 from stepdiag.units import MICRO, report_value
@@ -205,6 +214,8 @@ def verdict_rows(adjustment: Adjustment) -> Iterator[str]:
             "[adjustment] scale_uncertainty = true multiplies all uncertainties by "
             f"{verdict.reasons[0].value:.3g}"
         )
+    if any(found.treatment == "estimated" for found in adjustment.faults) and verdict.fit == "rejected":
+        yield "note: the values come from a fit in which the faults named below are unknowns; they rest on that"
     if verdict.fit == "accepted":
         yield NOT_SEEN
 
@@ -237,8 +248,79 @@ def reason_text(reason: FitReason) -> str:
             return (
                 f"all uncertainties were multiplied by {noise.removesuffix(' times')}, which the readings' scatter says"
             )
+        case "fault":
+            return (
+                f"fault {reason.fault} ({reason.channel} on line {reason.line}) was found and not corrected "
+                f"(it takes {reason.value:.3g} off chi-square; {reason.limit:g} and more is none by chance)"
+            )
+        case "alternatives":
+            value, unit = report_value(units_of(reason.parameter), reason.value)
+            limit, _ = report_value(units_of(reason.parameter), reason.limit)
+            return (
+                f"what fault {reason.fault} may be, and no reading tells, makes a difference of {value:.3g} {unit} in "
+                f"{reason.parameter} ({limit:g} {unit} is plausible)"
+            )
         case _:
             return "nothing controls the readings"
+
+
+def fault_rows(faults: Sequence[FaultClass]) -> Iterator[str]:
+    """Each class of faults, and what was done about it."""
+    for number, found in enumerate(faults, 1):
+        yield f"fault {number}: {fault_text(found)}"
+
+
+def fault_text(found: FaultClass) -> str:
+    """What may have happened, what was done about it, and what would tell; without a full stop."""
+    shown = 4
+    best, *others = found.members
+    texts = [_fault(best), *map(_alternative, others[: shown - 1])]
+    if len(others) >= shown:
+        texts.append(f"one of {len(others) - shown + 1} more")
+    return "; ".join(filter(None, (", or ".join(texts), _doubt(found), _treatment(found))))
+
+
+def _fault(fault: Fault) -> str:
+    is_angle = fault.channel in ("alpha", "beta")
+    factor, unit = (MICRO, "µrad") if is_angle else (1e3, "µm")
+    size = (
+        f"{abs(fault.size) * factor:.4g} ± {fault.standard_uncertainty * factor:.2g} {unit} "
+        f"too {'much' if fault.size > 0 else 'little'}"
+    )
+    run = f" (run {fault.run})" if fault.run else ""
+    if fault.kind == "slip":
+        name = "an offset" if is_angle or fault.channel.startswith("spot") else "a slip of the fringe counter"
+        return f"{name}: {fault.channel} on {fault.line}{run} reads {size} from point {fault.point} on"
+    return f"a wrong reading: {fault.channel} of {fault.line} point {fault.point}{run} is {size}"
+
+
+def _alternative(fault: Fault) -> str:
+    is_angle = fault.channel in ("alpha", "beta")
+    size = f"{fault.size * (MICRO if is_angle else 1e3):+.4g} {'µrad' if is_angle else 'µm'}"
+    run = f" (run {fault.run})" if fault.run else ""
+    since = " from point {} on" if fault.kind == "slip" else " point {}"
+    return f"{fault.channel} of {fault.line}{since.format(fault.point)}{run} ({size})"
+
+
+def _doubt(found: FaultClass) -> str:
+    if found.told_apart:
+        return ""
+    doubt = "the readings do not tell which"
+    if len({fault.line for fault in found.members}) == 1:
+        return doubt
+    return f"{doubt}; three face diagonals, or everything measured twice, would tell"
+
+
+def _treatment(found: FaultClass) -> str:
+    match found.treatment:
+        case "left_out":
+            return "left out" if found.told_apart else "all of these readings are left out"
+        case "estimated" if found.told_apart:
+            return "its size is an unknown of the adjustment"
+        case "estimated":
+            return "the size is shared, and the spread of the alternatives is in the uncertainty"
+        case _:
+            return "nothing was done about it"
 
 
 def reason_texts(reasons: Sequence[FitReason]) -> list[str]:

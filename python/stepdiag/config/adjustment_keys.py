@@ -75,8 +75,15 @@ class AdjustmentSection(AdjustmentKeys):
     )
     outlier_probability: Annotated[float, Field(ge=0.0, le=0.5)] = key(
         "a probability from 0 to 0.5",
-        "Readings that do not fit are left out at this probability of any false alarm in a run; 0: none is.",
-        0.01,
+        "Faults of readings are found and corrected at this probability of a false alarm among a thousand tests, which "
+        "is what a run of 20 steps has; 0: they are found and named, not corrected.",
+        1.2e-4,
+    )
+    slips: Literal["report", "estimate"] = key(
+        '"report" or "estimate"',
+        "What becomes of slips: offsets of a channel from a point of a line on. Their sizes are unknowns in any case; "
+        "report: the fit is rejected; estimate: it is judged with them.",
+        "report",
     )
     scale_uncertainty: bool = key(
         "true or false",

@@ -5,14 +5,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stepdiag._core import Adjustment, Measurement, Outlier, SetupEstimate
+from stepdiag._core import Adjustment, FaultClass, Measurement, Outlier, SetupEstimate
 from stepdiag.calibration.finding_text import combination_text
 from stepdiag.io.labelled_tables import calibration_table, channel_units
 from stepdiag.setup_quantities import SETUP_QUANTITIES
 
 
 def adjustment_table(adjustment: Adjustment, measurement: Measurement | None = None) -> xr.Dataset:
-    """The table of the calibration, with unknowns of the set-up along `setup` and outliers along `outlier`.
+    """The table of the calibration, with unknowns of the set-up along `setup`, readings left out along
+    `outlier` and all that may be a fault along `fault`.
 
     Along `reading`, the rows of the measurement, lie CHANNEL_residual, CHANNEL_redundancy, CHANNEL_normalised_residual
     and CHANNEL_used; given the measurement, reading_run, reading_line, reading_point and reading_direction label them.
@@ -28,6 +29,8 @@ def adjustment_table(adjustment: Adjustment, measurement: Measurement | None = N
         variables |= _setup(adjustment.setup)
     if adjustment.outliers:
         variables |= _outliers(adjustment.outliers)
+    if adjustment.faults:
+        variables |= _faults(adjustment.faults)
     return table.assign(variables).assign_attrs(combinations="\n".join(map(combination_text, adjustment.combinations)))
 
 
@@ -154,16 +157,7 @@ def _outliers(outliers: list[Outlier]) -> dict[str, Any]:
         "outlier_number": (
             "outlier",
             [outlier.number for outlier in outliers],
-            {"long_name": "number of the outlier", "comment": "from 1, the worst first"},
-        ),
-        "outlier_left_out": (
-            "outlier",
-            np.array([outlier.left_out for outlier in outliers], dtype=np.int8),
-            {
-                "long_name": "whether the reading was left out",
-                "comment": "0: fitted as badly as the one of the same number that was left out, and no other reading "
-                "tells which of them is wrong; without that one the error functions are smoother",
-            },
+            {"long_name": "number of its class of faults", "comment": "from 1"},
         ),
         "outlier_run": ("outlier", [outlier.run for outlier in outliers], {"long_name": "run"}),
         "outlier_line": ("outlier", np.array([outlier.line for outlier in outliers]), {"long_name": "line"}),
@@ -178,5 +172,48 @@ def _outliers(outliers: list[Outlier]) -> dict[str, Any]:
             "outlier",
             np.array([outlier.normalised for outlier in outliers]),
             {"units": "1", "long_name": "residual by its own standard uncertainty"},
+        ),
+    }
+
+
+def _faults(faults: list[FaultClass]) -> dict[str, Any]:
+    number, treatment, members = zip(
+        *((k, found.treatment, fault) for k, found in enumerate(faults, 1) for fault in found.members), strict=True
+    )
+    own_units = "mm or rad, as the channel"
+    return {
+        "fault_class": (
+            "fault",
+            list(number),
+            {
+                "long_name": "number of its class",
+                "comment": "from 1; the readings do not tell which of a class happened",
+            },
+        ),
+        "fault_treatment": ("fault", np.array(treatment), {"long_name": "what was done about its class"}),
+        "fault_kind": (
+            "fault",
+            np.array([fault.kind for fault in members]),
+            {"long_name": "kind", "comment": "slip: an offset of the channel from this reading of the line on"},
+        ),
+        "fault_row": ("fault", [fault.row for fault in members], {"long_name": "row of the measurement, from 0"}),
+        "fault_run": ("fault", [fault.run for fault in members], {"long_name": "run"}),
+        "fault_line": ("fault", np.array([fault.line for fault in members]), {"long_name": "line"}),
+        "fault_point": ("fault", [fault.point for fault in members], {"long_name": "point on its line"}),
+        "fault_channel": ("fault", np.array([fault.channel for fault in members]), {"long_name": "channel"}),
+        "fault_size": (
+            "fault",
+            np.array([fault.size for fault in members]),
+            {"long_name": "what was read too much, were it this one", "comment": own_units},
+        ),
+        "fault_u": (
+            "fault",
+            np.array([fault.standard_uncertainty for fault in members]),
+            {"long_name": "standard uncertainty of the size", "comment": own_units},
+        ),
+        "fault_chi_square_gain": (
+            "fault",
+            np.array([fault.chi_square_gain for fault in members]),
+            {"units": "1", "long_name": "what it takes off chi-square"},
         ),
     }

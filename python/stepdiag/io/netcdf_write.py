@@ -45,7 +45,8 @@ _OF_REVERSAL: Final = {
 _OF_ADJUSTMENT: Final = {
     "adjustment": "Least squares over all readings. Along setup lie the unknowns of each line's set-up; along reading, "
     "the rows of the measurement, residuals, redundancy numbers (0: nothing controls the reading), residuals by their "
-    "own standard uncertainties and whether a reading was used; along outlier the readings that were left out.",
+    "own standard uncertainties and whether a reading was used; along outlier the readings that were left out, along "
+    "fault all that may have been wrong with them.",
 }
 
 

@@ -1,12 +1,12 @@
 """What the commands tell about their results, as lines of text."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from stepdiag._core import Adjustment, Calibration, Measurement, Outlier, straightness_reference
-from stepdiag.calibration.finding_text import NOISE_ALONE, combination_text, fit_rows, verdict_rows
+from stepdiag._core import Adjustment, Calibration, Measurement, straightness_reference
+from stepdiag.calibration.finding_text import NOISE_ALONE, combination_text, fault_rows, fit_rows, verdict_rows
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.fault_control import control_rows
@@ -20,7 +20,7 @@ from stepdiag.units import MICRO
 
 def evaluation_report(result: JudgedEvaluation | Adjustment, measurement: Measurement, known: Known) -> Iterator[str]:
     """The verdict of the fit, lost readings, largest standard uncertainties and what is not determined; of an
-    adjustment also which readings were left out, and how head and mirror were set up."""
+    adjustment also the faults of the readings, and how head and mirror were set up."""
     if isinstance(result, JudgedEvaluation):
         return _published(result, measurement, known)
     return _adjusted(result, measurement, known)
@@ -48,7 +48,7 @@ def _adjusted(adjustment: Adjustment, measurement: Measurement, known: Known) ->
     calibration = adjustment.calibration
     yield from verdict_rows(adjustment)
     yield from _what_was_done(calibration, measurement, known)
-    yield from _left_out(adjustment.outliers)
+    yield from fault_rows(adjustment.faults)
     yield from uncertainty_rows(calibration)
     yield from reversal_rows(calibration)
     rows = list(setup_rows(adjustment.setup, [*known.plan.lines, *known.plan.scale_lines]))
@@ -70,24 +70,6 @@ def _what_was_done(calibration: Calibration, measurement: Measurement, known: Kn
     incomplete, missing = lost_readings(measurement, known.plan, known.signals)
     if incomplete or missing:
         yield f"lost: {incomplete} rows without a complete reading, {missing} points of the plan without a row"
-
-
-def _left_out(outliers: Sequence[Outlier]) -> Iterator[str]:
-    for outlier in outliers:
-        if not outlier.left_out:
-            continue
-        is_angle = outlier.channel in ("alpha", "beta")
-        size = outlier.residual * (MICRO if is_angle else 1e3)
-        alike = [_place(other) for other in outliers if other.number == outlier.number and not other.left_out]
-        doubt = f"; it may be {' or '.join(alike)} instead: no other reading tells" if alike else ""
-        yield (
-            f"left out: {_place(outlier)}: off by {size:.3g} {'µrad' if is_angle else 'µm'}, "
-            f"{abs(outlier.normalised):.1f} standard uncertainties{doubt}"
-        )
-
-
-def _place(outlier: Outlier) -> str:
-    return f"run {outlier.run}, line {outlier.line}, point {outlier.point}, {outlier.channel}"
 
 
 def undetermined_rows(calibration: Calibration, combinations: Iterable[str] = ()) -> Iterator[str]:

@@ -128,7 +128,7 @@ def adjust_scenario(
     reliability: bool = False,
 ) -> _core.Adjustment:
     """The exact adjustment of a run, with the unknowns that the scenario's [adjustment] and [smoothness] name: the
-    calibration, and with it the set-up that was found, residuals, outliers and how well it all fits. `reliability`:
+    calibration, and with it the set-up that was found, residuals, faults and how well it all fits. `reliability`:
     also which faults the readings control."""
     known = scenario.known
     return _core.adjust(
@@ -171,6 +171,7 @@ def adjustment_options(
         rotations=keys.angles == "free",
         smoothness=known.smoothness,
         outlier_probability=0.0 if of_samples else keys.outlier_probability,
+        slips=keys.slips,
         scale_uncertainty=keys.scale_uncertainty and not of_samples,
         full_covariance=full_covariance,
         plausible=known.plausible,

@@ -152,18 +152,22 @@ TEST(Adjustment, FindsAndNamesReadingsThatDoNotFit) {
     auto options = shop.simulation();
     options.noise = {0.1e-3, 1e-6, 0.0, 5};
     const Measurement run = simulate(shop.machine(), shop.plan(), shop.head, options);
-    const Measurement spoilt = changed(changed(run, "distance", 30, 2e-3), "beta", 61, -20e-6);
+    const Measurement spoilt = changed(changed(run, "distance", 30, 20e-3), "beta", 61, -60e-6);
     const Adjustment result = shop.adjust(spoilt);
-    std::vector<std::pair<std::size_t, std::string>> found;
-    for (const std::size_t i : result.outliers())
-        found.emplace_back(result.residuals[i].row, result.residuals[i].channel);
-    std::sort(found.begin(), found.end());
-    ASSERT_EQ(found.size(), 2u);
-    EXPECT_EQ(found[0], std::pair(std::size_t(30), std::string("distance")));
-    EXPECT_EQ(found[1], std::pair(std::size_t(61), std::string("beta")));
-    // The distance of the same point on another line fits as badly.
-    EXPECT_TRUE(std::any_of(result.residuals.begin(), result.residuals.end(),
-                            [](const auto& residual) { return residual.suspect > 0; }));
+    const auto is_left_out = [&](std::size_t row, const char* channel) {
+        return std::any_of(result.residuals.begin(), result.residuals.end(), [&](const auto& residual) {
+            return residual.row == row && residual.channel == channel && !residual.used();
+        });
+    };
+    EXPECT_TRUE(is_left_out(30, "distance"));
+    EXPECT_TRUE(is_left_out(61, "beta"));
+    ASSERT_EQ(result.faults.size(), 2u);
+    for (const stepdiag::FaultClass& found : result.faults) {
+        EXPECT_EQ(found.treatment, stepdiag::FaultTreatment::left_out);
+        // The distance of the same point on another line fits as badly.
+        EXPECT_EQ(found.members.size(), found.members.front().channel == "distance" ? 2u : 1u);
+    }
+    EXPECT_EQ(result.verdict.fit, stepdiag::Fit::accepted);
     EXPECT_GT(result.chi_square_probability, 1e-3);
     AdjustmentOptions keep;
     keep.outlier_probability = 0.0;

@@ -183,14 +183,14 @@ class WithOutliers:
 
 def test_outliers_are_in_the_file(adjustment: tuple[sd.Adjustment, sd.Measurement], tmp_path: Path) -> None:
     worst = SimpleNamespace(
-        row=20, run=1, line="npp", point=4, channel="distance", residual=0.01, normalised=38.7, number=1, left_out=True
+        row=20, run=1, line="npp", point=4, channel="distance", residual=0.01, normalised=38.7, number=1
     )
     other = SimpleNamespace(
-        row=3, run=0, line="ppp", point=3, channel="alpha", residual=-1e-4, normalised=-21.5, number=1, left_out=False
+        row=3, run=0, line="ppp", point=3, channel="alpha", residual=-1e-4, normalised=-21.5, number=2
     )
     sd.write_calibration(cast(Any, WithOutliers(adjustment[0], [worst, other])), tmp_path / "calibration.nc")
     with xr.open_dataset(tmp_path / "calibration.nc") as table:
-        for name in ("row", "run", "line", "point", "channel", "residual", "number", "left_out"):
+        for name in ("row", "run", "line", "point", "channel", "residual", "number"):
             assert table[f"outlier_{name}"].values.tolist() == [getattr(worst, name), getattr(other, name)]
         assert table["outlier_normalised_residual"].values.tolist() == [38.7, -21.5]
 

@@ -83,16 +83,17 @@ def test_table_for_a_line_replaces_only_the_keys_it_names() -> None:
 
 # --- what an adjustment is told beside them --------------------------------------------------------------------------
 def test_switches_reach_the_core() -> None:
-    names = ("one_setup_per_line", "reversal", "rotations", "outlier_probability", "smoothness", "full_covariance")
+    names = ("one_setup_per_line", "reversal", "rotations", "outlier_probability", "slips", "smoothness")
     usual = adjustment_options(parse_scenario(SCENARIO).known)
-    assert [getattr(usual, name) for name in names] == [False, True, True, 0.01, None, False]
+    assert [getattr(usual, name) for name in names] == [False, True, True, 1.2e-4, "report", None]
     switches = (
         '[adjustment]\nangles = "fixed"\none_setup_per_line = true\nreversal = false\noutlier_probability = 0.0\n'
+        'slips = "estimate"\n'
     )
     scaled = adjustment_options(parse_scenario(SCENARIO + "[adjustment]\nscale_uncertainty = true\n").known)
     assert (usual.scale_uncertainty, scaled.scale_uncertainty) == (False, True)
     other = adjustment_options(parse_scenario(SCENARIO + switches).known)
-    assert [getattr(other, name) for name in names] == [True, False, False, 0.0, None, False]
+    assert [getattr(other, name) for name in names] == [True, False, False, 0.0, "estimate", None]
 
 
 def test_smoothness_becomes_native_units() -> None:

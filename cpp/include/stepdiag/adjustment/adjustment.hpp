@@ -42,6 +42,11 @@ struct Smoothness {
     bool cross_validated = false;
 };
 
+// What becomes of slips (FaultKind::slip) that are found. They are unknowns of the adjustment in any case, so that they
+// do not spoil its values; report: and the fit is rejected; estimate: that counts as a correction.
+enum class Slips { report, estimate };
+std::string name(Slips slips);  // "report", "estimate"
+
 struct AdjustmentOptions {
     ReadingUncertainty uncertainty;
     SetupPriors setup = {};
@@ -52,9 +57,10 @@ struct AdjustmentOptions {
     bool reversal = true;   // where there are backward runs: tables of their own for nodes approached in - direction
     bool rotations = true;  // false: the machine is taken to have no angular errors
     std::optional<Smoothness> smoothness = {};
-    // Readings that do not fit are left out, the worst first, at this probability of any false alarm in a run; 0: none
-    // is. No more than one in fifty, or ten: where more do not fit, it is the model that does not, and all stay.
-    double outlier_probability = 0.01;
+    // Probability of a false alarm among a thousand tests for faults, which is what a run of 20 steps has: the usual
+    // one makes it a gain of 28 in chi-square. 0: faults are looked for at that limit, named and not corrected.
+    double outlier_probability = 1.2e-4;
+    Slips slips = Slips::report;
     // Where the variance factor is above 1, all stated uncertainties (functions, reversal, squarenesses, set-ups, known
     // combinations, covariance) are multiplied by its root. The fit is then doubtful at best: such readings no longer
     // test what was stated of their noise. Sound only for noise that is larger by one factor throughout.
@@ -82,10 +88,7 @@ struct ReadingResidual {
     double residual;    // read - model, native units
     double redundancy;  // 0: nothing controls this reading; 1: all others know it better
     double normalised;  // residual/(u sqrt(redundancy)); 0 where nothing controls it
-    int outlier = 0;    // n: left out as the n-th outlier; redundancy and normalised are those of a control reading
-    // n: fitted as badly as the n-th outlier, and no other reading tells which of them is wrong (distances of one point
-    // number on four body diagonals come in such pairs). The one was left out that made the error functions smoother.
-    int suspect = 0;
+    int outlier = 0;    // n: left out with the n-th class of faults; redundancy and normalised: of a control reading
 
     bool used() const { return outlier == 0; }
 };
@@ -94,6 +97,38 @@ struct ReadingResidual {
 // in the order in which they were made: a fringe counter that lost count, a head that was knocked.
 enum class FaultKind { reading, slip };
 std::string name(FaultKind kind);  // "reading", "slip"
+// One fault that explains the readings, if it is the one.
+struct Fault {
+    FaultKind kind;
+    std::size_t row;  // of the reading, or of the first one that slipped
+    int run;
+    std::string line;
+    int point;
+    std::string channel;
+    double size;                  // what was read too much, mm or rad
+    double standard_uncertainty;  // of the size
+    double chi_square_gain;       // what it takes off chi-square
+};
+
+// What was done about a fault. left_out: all readings that may be the wrong one, so that what only they determined is
+// not. estimated: the sizes of all alternatives are unknowns; a single one is free, of several each is known to be 0 to
+// what it would be alone, so that the spread of the alternatives is in the uncertainties.
+enum class FaultTreatment { none, left_out, estimated };
+std::string name(FaultTreatment treatment);  // "none", ...
+
+// Faults of which the readings do not tell which one happened: the gains of all others are behind by 25 and more.
+struct FaultClass {
+    std::vector<Fault> members;  // the best first
+    FaultTreatment treatment = FaultTreatment::none;
+    bool corrected = false;  // so that the verdict is that of the fit after it
+    // Of several that are estimated: the parameter that their solutions differ in most, how much, and the plausible
+    // limit of that, all mm or rad.
+    std::string widest = {};
+    double spread = 0.0;
+    double plausible = 0.0;
+
+    bool told_apart() const { return members.size() == 1; }
+};
 
 // Why a fit is not accepted, or what its residuals have in common.
 enum class FitFinding {
@@ -104,6 +139,8 @@ enum class FitFinding {
     uneven_misfit,  // root of the variance factor of one group of readings, where it differs from that of the others
     trend,          // residuals of one channel run with time or position: from the first reading to the last
     prior,          // distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2)
+    fault,          // gain in chi-square of a fault that was found and not corrected
+    alternatives,   // what alternative faults make of one parameter differs by this much, mm or rad
     scaled,         // root of the variance factor, by which the uncertainties were multiplied (scale_uncertainty)
 };
 std::string name(FitFinding finding);  // "no_redundancy", ...
@@ -129,7 +166,9 @@ struct FitReason {
     double standard_uncertainty = 0.0;  // of the value of a misfit, no_misfit, trend, scaled
     int run = -1;                       // of an uneven misfit: this run alone; -1: all
     FitAspect aspect = FitAspect::whole;
-    bool alternative = false;  // of a trend: instead of the one before; the readings do not tell which
+    bool alternative = false;    // of a trend: instead of the one before; the readings do not tell which
+    int fault = 0;               // of a fault and of alternatives: number of the class, from 1
+    std::string parameter = {};  // of alternatives: "EXX", ...
 };
 
 // Whether the readings of an adjustment agree with each other, with their uncertainties and with the priors. It does
@@ -186,11 +225,12 @@ struct Adjustment {
     int iterations;                 // steps from zero
     std::vector<KnownCombination> combinations;
     std::array<double, function_count> smoothness = {};  // deviations of second differences in force; 0: none
+    std::vector<FaultClass> faults = {};
     Verdict verdict = {};
     std::vector<FaultControl> reliability = {};  // if it was asked for
 
     double variance_factor() const;             // weighted_square_sum/degrees_of_freedom; 1 without freedom
-    std::vector<std::size_t> outliers() const;  // into `residuals`, by their number
+    std::vector<std::size_t> outliers() const;  // readings that were left out: into `residuals`, by their number
 };
 
 // Throws InvalidArgument for readings that do not belong to the plan, channels that do not fit the head, a drift that

@@ -1,0 +1,61 @@
+#include "adjustment/solution.hpp"
+
+#include <optional>
+#include <utility>
+
+#include "adjustment/adjustment_result.hpp"
+#include "adjustment/solve_from_zero.hpp"
+
+namespace stepdiag {
+Solution::Solution(AdjustmentProblem problem, const std::array<double, function_count>& smoothness)
+    : problem_(std::move(problem)),
+      solver_(problem_, smoothness),
+      tables_(problem_),
+      observability_(solver_, tables_),
+      x_(Eigen::VectorXd::Zero(problem_.size())),
+      inverse_(solver_.equations().matrix()) {
+    solver_.assume_usual(observability_.determined());
+}
+
+bool Solution::solve_from_zero() {
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(problem_.size());
+    const std::optional<int> count = stepdiag::solve_from_zero(solver_, observability_.determined(), x);
+    if (!count) return false;
+    iterations_ = *count;
+    x_ = x;
+    look();
+    return true;
+}
+
+bool Solution::solve_from(const Eigen::VectorXd& start) {
+    if (!solver_.dependent().empty()) solver_.equations().assume_usual(observability_.determined(), start);
+    Eigen::VectorXd x = start;
+    constexpr int most_steps = 20;  // what is near takes five
+    const std::optional<int> count = solver_.try_solve(x, most_steps);
+    if (!count) return false;
+    iterations_ = *count;
+    x_ = x;
+    look();
+    return true;
+}
+
+void Solution::solve_again() {
+    solver_.solve(x_);
+    look();
+}
+
+void Solution::linearise(const Eigen::VectorXd& x) {
+    if (!solver_.dependent().empty()) solver_.equations().assume_usual(observability_.determined(), x);
+    if (!x.isZero(0.0)) solver_.factorize(x);
+    solver_.factor().selected_inverse(inverse_);
+}
+
+void Solution::look() {
+    solver_.refresh(x_);
+    square_sum_ = solver_.equations().square_sum(x_);
+    solver_.factor().selected_inverse(inverse_);
+}
+
+int Solution::degrees_of_freedom() const { return stepdiag::degrees_of_freedom(solver_); }
+
+}  // namespace stepdiag
