@@ -31,7 +31,7 @@ FACE = ("pp0", "np0", "p0p", "n0p", "0pp", "0np")
 SCALE = ("p00", "0p0", "00p")
 THREE = ("XYZ", "YZX", "ZXY")
 
-LASER = 500.0  # µrad; how well it stands along a line on which no tilts tell
+LASER = 500.0  # µrad; how well it stands along a line where no tilts, or no points beside the line, tell
 
 # Name: lines, scale lines, orders of the steps, whether tilts are read, whether the machine has angles.
 VARIANTS = {
@@ -59,7 +59,7 @@ def row(
             orders=quoted(orders),
             tilts=str(tilts).lower(),
             angles="free" if angles else "fixed",
-            laser='"free"' if tilts else LASER,
+            laser='"free"' if tilts and lines != FACE else LASER,
         )
     )
     calibration = sd.observe(scenario)[1].calibration

@@ -15,7 +15,6 @@ from stepdiag.report.setup_table import setup_rows
 from stepdiag.scenario.description import JudgedEvaluation
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
-from stepdiag.units import MICRO
 
 
 def evaluation_report(result: JudgedEvaluation | Adjustment, measurement: Measurement, known: Known) -> Iterator[str]:

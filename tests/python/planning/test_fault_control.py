@@ -36,7 +36,7 @@ def faults(run: sd.Measurement) -> list[tuple[str, str, np.ndarray]]:
         for line in dict.fromkeys(run.line):
             rows = np.flatnonzero((lines == line) & (run.run == number))
             if len(rows) == 2:
-                found.append(("reading", "distance", rows[1:]))
+                found += [("reading", channel, rows[1:]) for channel in ("distance", "alpha", "beta")]
                 continue
             for channel in ("distance", "alpha", "beta"):
                 found += [("reading", channel, rows[i : i + 1]) for i in range(len(rows))]
@@ -150,8 +150,9 @@ def test_faults_must_be_larger_where_all_noise_is() -> None:
     assert one.variance_factor < 1.0
     assert other.variance_factor**0.5 == pytest.approx(4.0, rel=0.15)
     for a, b in zip(one.reliability, other.reliability, strict=True):
-        # A beam that is known to stand in its place to 1 mm weighs by the angles that are found: 0.3 %.
-        assert b.found_from == pytest.approx(a.found_from * other.variance_factor**0.5, rel=1e-2)
+        # A beam that is known to stand in its place to 1 mm weighs by the angles that are found, and so do roll and
+        # gain of the two readings of a scale line: 3 %.
+        assert b.found_from == pytest.approx(a.found_from * other.variance_factor**0.5, rel=5e-2)
 
 
 @pytest.fixture
