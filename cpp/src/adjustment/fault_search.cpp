@@ -469,6 +469,14 @@ std::vector<FaultClass> FaultSearch::classes(const Solution& solution, const Cal
             }
         }
     }
+    // Several slips that are not told apart may be other pairs than these: no class says so.
+    const auto is_doubtful = [](const FaultClass& entry) {
+        return !entry.told_apart() && std::none_of(entry.members.begin(), entry.members.end(),
+                                                   [](const Fault& fault) { return fault.kind == FaultKind::reading; });
+    };
+    if (std::count_if(classes.begin(), classes.end(), is_doubtful) > 1)
+        for (FaultClass& entry : classes)
+            if (is_doubtful(entry)) entry.corrected = false;
     if (left_) add(*left_, FaultTreatment::none);
     return classes;
 }
