@@ -84,10 +84,10 @@ def test_a_trend_has_the_size_that_it_has_as_an_unknown_and_then_leaves_none() -
         return np.where(on(run, "ppp") & (name == "distance"), 1e-6 * run.channels["time"], 0.0)
 
     run = noisy(TWICE, offset=drift)
-    known = adjust(run, one_setup_per_line=True)
+    known = adjust(run, one_setup_per_line=True, setup=sd.SetupPriors(drift="fixed"))
     free = adjust(run, one_setup_per_line=True, setup_by_line={"ppp": sd.SetupPriors(drift="free")})
     trend, *others = (r for r in known.verdict.reasons if r.finding == "trend")
-    (rate,) = (e for e in free.setup if e.quantity == "drift")
+    (rate,) = (e for e in free.setup if e.quantity == "drift" and e.line == "ppp")
     span = np.ptp(run.channels["time"][on(run, "ppp")])
     assert known.verdict.fit != "accepted"
     assert (trend.line, trend.channel, trend.aspect, trend.alternative) == ("ppp", "distance", "time", False)

@@ -104,6 +104,7 @@ def calibrations_of(
     method: str = "enhanced",
     air: Air | None = None,
     seed: int = SEED,
+    **options: Any,
 ) -> Any:
     environment = None
     if air is not None:
@@ -122,6 +123,7 @@ def calibrations_of(
         seed=seed,
         misalignment=misalignment,
         environment=environment,
+        **options,
         repeats=scenario.repeats,
         backward=scenario.backward,
         seconds_per_reading=scenario.seconds_per_reading,

@@ -134,11 +134,15 @@ def test_outputs_are_those_of_an_evaluation_of_the_readings(layout: str, method:
     angles = 5e-5 if method == "enhanced" else 4e-4
     known = [one for one in all_inputs(scenario, False, angles) if one.quantity not in unknown]
     inputs = _core.UncertainInputs(known, all_noise(channels))
-    calibrations = calibrations_of(scenario, table, inputs, method=method)
+    options: dict[str, Any] = {}
+    if method == "adjustment":
+        # By the tilts of a scale line its laser's angle has more or less effect. A batch takes those of the nominal run.
+        known_lasers = {line: sd.SetupPriors(laser="fixed") for line in scenario.scale_lines}
+        options = {"outlier_probability": 0.0, "setup_by_line": known_lasers}
+    calibrations = calibrations_of(scenario, table, inputs, method=method, **options)
     block = np.asarray(calibrations.evaluate(0, 32))
     names = [(one.name, one.position) for one in calibrations.outputs]
     assert block.shape == (len(names), 32)
-    options = {"outlier_probability": 0.0} if method == "adjustment" else {}
     for sample in (0, 17, 31):
         rows = Sample(scenario, table, inputs, drawn(inputs, SEED, [sample])[:, 0], noise_of=(SEED, sample)).rows()
         told = (measured(rows), plan_of(scenario), head_of(scenario), sd.Chain(scenario.chain), scenario.tool)
@@ -153,5 +157,7 @@ def test_outputs_are_those_of_an_evaluation_of_the_readings(layout: str, method:
                 nodes, values, uncertainties = calibration.functions[name]
                 k = int(np.argmin(np.abs(nodes - position)))
                 expected, u = values[k], uncertainties[k]
-            # Little of its own uncertainty: weights change by a thousandth, what is weighed by several u.
-            assert abs(value - expected) <= 5e-3 * u + 1e-12, (name, position, value, expected, u)
+            # Little of its own uncertainty: weights change by a thousandth, what is weighed by several u; those of the
+            # angles of a scale line, whose derivatives are those angles, by more.
+            part = 5e-3 if method == "enhanced" else 5e-2
+            assert abs(value - expected) <= part * u + 1e-12, (name, position, value, expected, u)
