@@ -71,7 +71,7 @@ def test_one_absurd_reading_is_named(
     status = main(["evaluate", "scenario.toml", "run.csv", "-m", method, "-o", "calibration.csv"])
     said = capsys.readouterr()
     if method == "adjustment" and status == 0:  # its solver may still find the others' solution, by the roundings
-        assert "distance of ppp 30" in said.out
+        assert "distance of ppp point 30" in said.out
         return
     assert status == 2
     assert "data row 31 (run 0, line ppp, point 30): the distance" in said.err
