@@ -157,7 +157,8 @@ def test_outputs_are_those_of_an_evaluation_of_the_readings(layout: str, method:
                 nodes, values, uncertainties = calibration.functions[name]
                 k = int(np.argmin(np.abs(nodes - position)))
                 expected, u = values[k], uncertainties[k]
-            # Little of its own uncertainty: weights change by a thousandth, what is weighed by several u; those of the
-            # angles of a scale line, whose derivatives are those angles, by more.
-            part = 5e-3 if method == "enhanced" else 0.1
+            # Little of its own uncertainty: weights change by a thousandth, what is weighed by several u. An adjustment's
+            # derivatives are the nominal run's, and these readings miss its model by five times what is stated: what
+            # drift and scale lines' angles share then moves by more.
+            part = 5e-3 if method == "enhanced" else 0.2
             assert abs(value - expected) <= part * u + 1e-12, (name, position, value, expected, u)
