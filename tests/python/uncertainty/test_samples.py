@@ -136,7 +136,7 @@ def test_outputs_are_those_of_an_evaluation_of_the_readings(layout: str, method:
     inputs = _core.UncertainInputs(known, all_noise(channels))
     options: dict[str, Any] = {}
     if method == "adjustment":
-        # By the tilts of a scale line its laser's angle has more or less effect. A batch takes those of the nominal run.
+        # By the tilts of a scale line its laser has more or less effect; a batch takes those of the nominal run.
         # These readings miss the model by five times what is stated: what a drift shares with scales would move.
         known_lasers = {line: sd.SetupPriors(laser="fixed") for line in scenario.scale_lines}
         options = {"outlier_probability": 0.0, "setup_by_line": known_lasers}
