@@ -38,7 +38,7 @@ ChiSquare chi_square(const Eigen::VectorXd& values, const Eigen::MatrixXd& covar
 ShareSum::ShareSum(Eigen::Index size) : sum_(Eigen::MatrixXd::Zero(size, size)), shares_(size, 64) {}
 
 void ShareSum::flush() {
-    if (count_ > 0) sum_.selfadjointView<Eigen::Lower>().rankUpdate(shares_.leftCols(count_));
+    if (count_ > 0 && sum_.size() > 0) sum_.selfadjointView<Eigen::Lower>().rankUpdate(shares_.leftCols(count_));
     count_ = 0;
 }
 
