@@ -305,10 +305,7 @@ def _alternative(fault: Fault) -> str:
 def _doubt(found: FaultClass) -> str:
     if found.told_apart:
         return ""
-    doubt = "the readings do not tell which"
-    if len({fault.line for fault in found.members}) == 1:
-        return doubt
-    return f"{doubt}; three face diagonals, or everything measured twice, would tell"
+    return "the readings do not tell which (stepdiag observe says which plan would)"
 
 
 def _treatment(found: FaultClass) -> str:

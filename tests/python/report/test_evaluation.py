@@ -94,7 +94,7 @@ def test_outlier_that_may_be_another_is_said_to_be_so(tmp_path: Path, capsys: py
     said = report(tmp_path, capsys, NOISY, spoilt(run, {"distance": (rows[7], 3e-3)}))
     (fault,) = [line for line in said.splitlines() if line.startswith("fault 1: ")]
     assert "distance of npp point 7" in fault
-    assert "; the readings do not tell which; three face diagonals" in fault
+    assert "; the readings do not tell which (stepdiag observe says which plan would)" in fault
     assert fault.endswith("all of these readings are left out")
 
 
