@@ -29,8 +29,9 @@ BELOW: dict[str, set[str]] = {
     "linuxcnc": set(),
     "figures": {"planning"},
     "report": {"figures", "acquisition"},
+    "objects": {"report"},
     "demo": {"report", "program", "export", "linuxcnc"},
-    "cli": {"demo"},
+    "cli": {"demo", "objects"},
 }
 MOST_OF_A_ROOM = 20  # modules beside __init__, of more than which nobody keeps count
 

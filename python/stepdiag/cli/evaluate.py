@@ -6,7 +6,7 @@ from typing import Literal
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, Writes, out_file, tell_fit
+from stepdiag.cli.options import PATH, Writes, fit_warnings, json_option, out_file, tell_fit
 from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
 
 
@@ -24,6 +24,7 @@ from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
 @click.option("--covariance", is_flag=True, help="Also write the covariance of all values (netCDF only).")
 @click.option("--reliability", is_flag=True, help="Also report which faults of the readings would have been found.")
 @out_file("Calibration to write, CSV or netCDF (.nc, with set-ups and residuals).", CALIBRATION)
+@json_option
 @click.pass_context
 def evaluate(
     context: click.Context,
@@ -33,6 +34,7 @@ def evaluate(
     covariance: bool,
     reliability: bool,
     output: OutputFile,
+    as_json: bool,
 ) -> None:
     """Evaluate the measurement RUN (CSV or netCDF) that was made with SCENARIO's plan and head.
 
@@ -79,15 +81,22 @@ def evaluate(
             if method == "adjustment"
             else evaluate_beside_adjustment(known, measurement, method=method, full_covariance=covariance)
         )
-    write_calibration(
+    written = write_calibration(
         result.calibration if isinstance(result, JudgedEvaluation) else result,
         path,
         measurement=measurement,
         provenance=provenance,
     )
-    for line in evaluation_report(result, measurement, known):
-        click.echo(line)
-    tell_fit(context, path, result.calibration.fit)
+    if as_json:
+        from stepdiag.objects.evaluation import evaluated_files, evaluation_object
+        from stepdiag.objects.writer import json_text
+
+        files, warnings = evaluated_files(scenario, run, path), fit_warnings(path, written.fit)
+        click.echo(json_text(evaluation_object(result, written, files, measurement, known, warnings)))
+    else:
+        for line in evaluation_report(result, measurement, known):
+            click.echo(line)
+    tell_fit(context, path, written.fit)
 
 
 def _step_counts(context: click.Context, option: click.Parameter, text: str | None) -> tuple[int, ...] | None:

@@ -53,14 +53,27 @@ def tell(what: str, message: str) -> None:
     click.echo(f"warning: {line}" if what == "warning" else f"stepdiag: {what}: {line}", err=True)
 
 
+def json_option(command: Command) -> Command:
+    """Add --json: the command prints the text of its object (room objects) instead of its report."""
+    option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the report.")
+    return option(command)
+
+
+def fit_warnings(path: Path, fit: str | None) -> list[str]:
+    """What to warn of if the fit of a calibration is not accepted."""
+    meaning = {
+        "rejected": "do not use this calibration",
+        "doubtful": "do not rely on the stated uncertainties",
+        "unchecked": "nothing controlled the readings of this calibration",
+    }
+    return [f"{path}: the fit is {fit}: {meaning[fit]}"] if fit in meaning else []
+
+
 def tell_fit(context: click.Context, path: Path, fit: str | None) -> None:
     """Warn if the fit of a calibration is not accepted.
 
     A rejected fit ends the command with code 3."""
+    for warning in fit_warnings(path, fit):
+        tell("warning", warning)
     if fit == "rejected":
-        tell("warning", f"{path}: the fit is rejected: do not use this calibration")
         context.exit(NOT_TO_BE_TRUSTED)
-    if fit == "doubtful":
-        tell("warning", f"{path}: the fit is doubtful: do not rely on the stated uncertainties")
-    if fit == "unchecked":
-        tell("warning", f"{path}: the fit is unchecked: nothing controlled the readings of this calibration")

@@ -57,8 +57,8 @@ def write_calibration(
     *,
     measurement: Measurement | None = None,
     provenance: Mapping[str, str] | None = None,
-) -> None:
-    """Write a calibration, CSV or netCDF (.nc). Reading it returns the same bits.
+) -> Calibration:
+    """Write a calibration, CSV or netCDF (.nc), and return it as written. Reading it returns the same bits.
 
     A calibration without a date gets the current one. CSV contains the calibration only. netCDF
     also contains the covariance and, for an Adjustment, set-ups, residuals and test values.
@@ -76,13 +76,14 @@ def write_calibration(
     calibration = result if isinstance(result, Calibration) else result.calibration
     if provenance is not None:
         calibration = calibration.with_provenance(provenance)
-    date = calibration.date or date_of_today()
+    dated = calibration.dated(calibration.date or date_of_today())
     if not is_netcdf(path):
-        calibration.dated(date).write(path)
-        return
+        dated.write(path)
+        return dated
     from stepdiag.io.netcdf_write import write_calibration_netcdf
 
-    write_calibration_netcdf(result, Path(path), {"date": date} | calibration.provenance, measurement)
+    write_calibration_netcdf(result, Path(path), {"date": dated.date} | dated.provenance, measurement)
+    return dated
 
 
 def date_of_today() -> str:

@@ -1,0 +1,224 @@
+"""Parts of objects that describe a calibration: its fit, its tables, and the largest values of each kind."""
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+from typing_extensions import TypedDict
+
+from stepdiag._core import Calibration, Undetermined
+from stepdiag.calibration.finding_text import NOISE_ALONE
+from stepdiag.objects.writer import measured, number
+from stepdiag.parameters import FUNCTIONS, KINDS, SQUARENESSES, Kind, kind_of, units_of
+
+Array = npt.NDArray[np.float64]
+Tables = tuple[Array, Array, Array]  # positions, values, standard uncertainties
+Verdict = Literal["accepted", "doubtful", "rejected", "unchecked"]
+
+
+class Fit(TypedDict):
+    """Whether the readings agree with each other and with the scenario."""
+
+    verdict: Verdict | None
+    """null: not known"""
+    reasons: list[str]
+    """Why that verdict, a sentence each."""
+    variance_factor: float | None
+    uncertainties_multiplied_by: float | None
+    """What all standard uncertainties were multiplied by; null: by nothing."""
+    noise_alone: bool
+    """Whether the standard uncertainties are of noise alone, as those of linear methods are."""
+
+
+class _Function(TypedDict):
+    parameter: str
+    slope_determined: bool
+    """false: the shape alone is known, and both ends are 0."""
+    position_mm: list[float]
+
+
+class LengthFunction(_Function):
+    value_um: list[float | None]
+    standard_uncertainty_um: list[float | None]
+
+
+class AngleFunction(_Function):
+    value_urad: list[float | None]
+    standard_uncertainty_urad: list[float | None]
+
+
+class _Reversal(TypedDict):
+    parameter: str
+    constant_determined: bool
+    """false: the change from home alone is known, and the value at home is 0."""
+    position_mm: list[float]
+
+
+class LengthReversal(_Reversal):
+    value_um: list[float | None]
+    standard_uncertainty_um: list[float | None]
+
+
+class AngleReversal(_Reversal):
+    value_urad: list[float | None]
+    standard_uncertainty_urad: list[float | None]
+
+
+class Squareness(TypedDict):
+    parameter: Literal["C0Y", "B0Z", "A0Z"]
+    value_urad: float | None
+    standard_uncertainty_urad: float | None
+
+
+class Setup(TypedDict):
+    run: int
+    line: str
+
+
+class OpenFinding(TypedDict):
+    """What the readings leave open."""
+
+    text: str
+    part: Literal["whole", "slope", "positions", "reversal", "reversal_at_home", "setup"]
+    parameters: list[str]
+    """Error parameters; of a set-up its quantity."""
+    component: int
+    """Of a set-up's quantity, from 0."""
+    positions_mm: list[float]
+    setups: list[Setup]
+    reason: str
+    remedies: list[str]
+    """The best first; any of them helps."""
+
+
+class CalibrationTables(TypedDict):
+    """The 21 parameters as far as they are determined."""
+
+    method: str
+    date: str
+    """ISO 8601, UTC; empty: not known"""
+    provenance: dict[str, str]
+    """By the keys of a calibration file: program, run_sha256, ..."""
+    chain: str
+    volume_mm: list[float]
+    tool_mm: list[float]
+    straightness_reference: str
+    functions: list[LengthFunction | AngleFunction]
+    """Values by node; approached in + direction if there are reversal errors."""
+    reversal_errors: list[LengthReversal | AngleReversal]
+    """Approached in + direction less in - direction."""
+    squarenesses: list[Squareness]
+    undetermined: list[str]
+    """What is not determined, a sentence each."""
+    findings: list[OpenFinding]
+    """The same as data; empty for a calibration that was read from a file."""
+
+
+class _Largest(TypedDict):
+    kind: Kind
+    parameter: str
+    position_mm: float | None
+    """null: a squareness"""
+
+
+class LargestLength(_Largest):
+    value_um: float
+
+
+class LargestAngle(_Largest):
+    value_urad: float
+
+
+def unit_key(parameter: str) -> str:
+    """The ending of keys with values of a parameter: um or urad."""
+    return "um" if units_of(parameter) == "mm" else "urad"
+
+
+def fit_of(calibration: Calibration) -> Fit:
+    """The verdict that a calibration carries."""
+    verdict: Any = calibration.fit
+    return {
+        "verdict": verdict,
+        "reasons": list(calibration.fit_reasons),
+        "variance_factor": number(calibration.variance_factor),
+        "uncertainties_multiplied_by": number(calibration.uncertainty_scaled),
+        "noise_alone": calibration.method in NOISE_ALONE,
+    }
+
+
+def tables_of(calibration: Calibration) -> CalibrationTables:
+    """All values of a calibration, but for its covariance."""
+    slopes, constants = calibration.undetermined_slopes, calibration.undetermined_reversal_constants
+    return {
+        "method": calibration.method,
+        "date": calibration.date,
+        "provenance": dict(calibration.provenance),
+        "chain": calibration.chain.name,
+        "volume_mm": calibration.volume.tolist(),
+        "tool_mm": calibration.tool.tolist(),
+        "straightness_reference": calibration.straightness_reference,
+        "functions": _by_node(calibration.functions, "slope_determined", slopes),
+        "reversal_errors": _by_node(calibration.reversal, "constant_determined", constants),
+        "squarenesses": _squarenesses(calibration.squareness),
+        "undetermined": list(calibration.undetermined),
+        "findings": findings_of(calibration.findings, calibration.undetermined),
+    }
+
+
+def _by_node(tables: Mapping[str, Tables], known: str, unknown: Collection[str]) -> list[Any]:
+    return [
+        {
+            "parameter": name,
+            known: name not in unknown,
+            "position_mm": tables[name][0].tolist(),
+            **measured(unit_key(name), value=tables[name][1], standard_uncertainty=tables[name][2]),
+        }
+        for name in FUNCTIONS
+        if name in tables
+    ]
+
+
+def _squarenesses(squareness: Mapping[str, tuple[float, float]]) -> list[Any]:
+    return [
+        {"parameter": name, **measured("urad", value=squareness[name][0], standard_uncertainty=squareness[name][1])}
+        for name in SQUARENESSES
+        if name in squareness
+    ]
+
+
+def findings_of(findings: Sequence[Undetermined], texts: Sequence[str]) -> list[OpenFinding]:
+    """Findings with their sentences; none where there are sentences alone."""
+    found: list[Any] = [
+        {
+            "text": text,
+            "part": finding.part,
+            "parameters": list(finding.parameters),
+            "component": finding.component,
+            "positions_mm": list(finding.positions),
+            "setups": [{"run": run, "line": line} for run, line in finding.setups],
+            "reason": finding.reason,
+            "remedies": list(finding.remedies),
+        }
+        for finding, text in zip(findings, texts, strict=False)
+    ]
+    return found
+
+
+def largest_of(calibration: Calibration, *, uncertainty: bool = False) -> list[Any]:
+    """`LargestLength` or `LargestAngle` for each kind that has values; of values or of standard uncertainties."""
+    largest: dict[Kind, tuple[float, str, float | None]] = {}
+    entries = [
+        (name, p, (u if uncertainty else value))
+        for name, (position, values, uncertainties) in calibration.functions.items()
+        for p, value, u in zip(position.tolist(), values.tolist(), uncertainties.tolist(), strict=True)
+    ]
+    entries += [(name, None, pair[uncertainty]) for name, pair in calibration.squareness.items()]
+    for name, position, size in entries:
+        kind = kind_of(name)
+        if np.isfinite(size) and (kind not in largest or abs(size) > abs(largest[kind][0])):
+            largest[kind] = size, name, position
+    return [
+        {"kind": kind, "parameter": name, "position_mm": position, **measured(unit_key(name), value=size)}
+        for kind, (size, name, position) in sorted(largest.items(), key=lambda item: KINDS.index(item[0]))
+    ]

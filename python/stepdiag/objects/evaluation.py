@@ -1,0 +1,394 @@
+"""The object of `stepdiag evaluate --json`."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from typing_extensions import TypedDict
+
+from stepdiag._core import (
+    Adjustment,
+    Calibration,
+    Fault,
+    FaultClass,
+    FaultControl,
+    KnownCombination,
+    Measurement,
+    SetupEstimate,
+    __version__,
+)
+from stepdiag.calibration.finding_text import combination_text, fault_text
+from stepdiag.objects.calibration import (
+    CalibrationTables,
+    Fit,
+    LargestAngle,
+    LargestLength,
+    Verdict,
+    fit_of,
+    largest_of,
+    tables_of,
+    unit_key,
+)
+from stepdiag.objects.writer import in_unit, measured, number
+from stepdiag.report.prior_effects import cosine_rows, drift_rows
+from stepdiag.scenario.description import JudgedEvaluation
+from stepdiag.scenario.known import Known
+from stepdiag.scenario.planned_readings import lost_readings
+from stepdiag.setup_quantities import SETUP_QUANTITIES
+
+
+class EvaluatedFiles(TypedDict):
+    scenario: str
+    run: str
+    calibration: str
+    """The file that was written."""
+
+
+class Readings(TypedDict):
+    points: int
+    lines: int
+    incomplete_rows: int
+    """Rows without a complete reading."""
+    missing_points: int
+    """Points of the plan without a row."""
+
+
+class _SetupUnknown(TypedDict):
+    run: int
+    """The first run that has this set-up."""
+    line: str
+    quantity: str
+    component: int
+    """From 0: about or along local x and y, or the beams d2, d3, ..."""
+
+
+class SetupLength(_SetupUnknown):
+    value_um: float | None
+    """null: not determined"""
+    standard_uncertainty_um: float | None
+    prior_um: float | None
+    """Standard uncertainty before the run; null: free."""
+
+
+class SetupOffset(_SetupUnknown):
+    value_mm: float | None
+    standard_uncertainty_mm: float | None
+    prior_mm: float | None
+
+
+class SetupAngle(_SetupUnknown):
+    value_urad: float | None
+    standard_uncertainty_urad: float | None
+    prior_urad: float | None
+
+
+class SetupShare(_SetupUnknown):
+    value_ppm: float | None
+    standard_uncertainty_ppm: float | None
+    prior_ppm: float | None
+
+
+class SetupRate(_SetupUnknown):
+    value_um_per_h: float | None
+    standard_uncertainty_um_per_h: float | None
+    prior_um_per_h: float | None
+
+
+class _Fault(TypedDict):
+    kind: Literal["reading", "slip"]
+    channel: str
+    run: int
+    line: str
+    point: int
+    row: int
+    """Of the measurement, from 0."""
+    chi_square_gain: float | None
+
+
+class LengthFault(_Fault):
+    size_um: float | None
+    standard_uncertainty_um: float | None
+
+
+class AngleFault(_Fault):
+    size_urad: float | None
+    standard_uncertainty_urad: float | None
+
+
+class Faults(TypedDict):
+    """Faults of which the readings do not tell which one happened."""
+
+    text: str
+    treatment: Literal["left_out", "estimated", "none"]
+    told_apart: bool
+    members: list[LengthFault | AngleFault]
+    """The most likely first."""
+
+
+class CombinedTerm(TypedDict):
+    weight: float
+    name: str
+    """An error parameter, whose slope is meant, or a quantity of a set-up."""
+
+
+class _Combination(TypedDict):
+    text: str
+    terms: list[CombinedTerm]
+
+
+class SlopeCombination(_Combination):
+    value_um_per_m: float | None
+    standard_uncertainty_um_per_m: float | None
+
+
+class SetupCombination(_Combination):
+    run: int
+    line: str
+    component: int
+    value_urad: float | None
+    standard_uncertainty_urad: float | None
+
+
+class SmoothLength(TypedDict):
+    parameter: str
+    second_difference_um: float | None
+    """Standard deviation of second differences."""
+
+
+class SmoothAngle(TypedDict):
+    parameter: str
+    second_difference_urad: float | None
+
+
+class ByKind(TypedDict):
+    positioning_um: float | None
+    straightness_um: float | None
+    angle_urad: float | None
+    squareness_urad: float | None
+
+
+class _Control(TypedDict):
+    fault: Literal["reading", "slip"]
+    channel: Literal["distance", "tilt", "spot"]
+    controlled: int
+    uncontrolled: int
+    twins: int
+    """Of the controlled ones, those that are not told from another one at any size."""
+    hidden: ByKind
+    """Largest effect of a fault just not found; null: not limited."""
+
+
+class LengthControl(_Control):
+    found_from_um: float | None
+    told_from_um: float | None
+
+
+class AngleControl(_Control):
+    found_from_urad: float | None
+    told_from_urad: float | None
+
+
+class AdjustmentPart(TypedDict):
+    """What an adjustment finds beside the calibration."""
+
+    degrees_of_freedom: int
+    weighted_square_sum: float | None
+    chi_square_probability: float | None
+    iterations: int
+    setup: list[SetupLength | SetupOffset | SetupAngle | SetupShare | SetupRate]
+    faults: list[Faults]
+    combinations: list[SlopeCombination | SetupCombination]
+    """What is known of unknowns that are not determined one by one."""
+    smoothness: list[SmoothLength | SmoothAngle]
+    reliability: list[LengthControl | AngleControl]
+    """Which faults would have been found; empty without --reliability."""
+
+
+class LinearPart(TypedDict):
+    """Of a linear method: the two verdicts, of which the fit is the worse."""
+
+    own_verdict: Verdict
+    adjustment_verdict: Verdict | None
+    refusal: str | None
+    """Why the readings could not be adjusted."""
+
+
+class EvaluationObject(TypedDict):
+    """Result of `stepdiag evaluate`."""
+
+    stepdiag: str
+    format: Literal["stepdiag evaluation 1"]
+    fit: Fit
+    warnings: list[str]
+    files: EvaluatedFiles
+    readings: Readings
+    calibration: CalibrationTables
+    largest_standard_uncertainties: list[LargestLength | LargestAngle]
+    adjustment: AdjustmentPart | None
+    """null: a linear method"""
+    linear: LinearPart | None
+    """null: the adjustment"""
+    notes: list[str]
+    """Effects of angles and drifts that only priors know, a sentence each."""
+
+
+def evaluation_object(
+    result: JudgedEvaluation | Adjustment,
+    written: Calibration,
+    files: EvaluatedFiles,
+    measurement: Measurement,
+    known: Known,
+    warnings: Sequence[str],
+) -> EvaluationObject:
+    """What an evaluation found. `written`: its calibration with the date and provenance of its file."""
+    adjusted = isinstance(result, Adjustment)
+    return {
+        "stepdiag": __version__,
+        "format": "stepdiag evaluation 1",
+        "fit": fit_of(written),
+        "warnings": list(warnings),
+        "files": files,
+        "readings": readings_of(measurement, known),
+        "calibration": tables_of(written),
+        "largest_standard_uncertainties": largest_of(written, uncertainty=True),
+        "adjustment": _adjustment(result) if isinstance(result, Adjustment) else None,
+        "linear": _linear(result) if isinstance(result, JudgedEvaluation) else None,
+        "notes": [*cosine_rows(measurement, known), *drift_rows(measurement, known)] if adjusted else [],
+    }
+
+
+def evaluated_files(scenario: Path, run: Path, calibration: Path) -> EvaluatedFiles:
+    """The files of an evaluation, as they were named."""
+    return {"scenario": str(scenario), "run": str(run), "calibration": str(calibration)}
+
+
+def readings_of(measurement: Measurement, known: Known) -> Readings:
+    """How much was read."""
+    incomplete, missing = lost_readings(measurement, known.plan, known.signals)
+    return {
+        "points": len(measurement),
+        "lines": len(set(measurement.line)),
+        "incomplete_rows": incomplete,
+        "missing_points": missing,
+    }
+
+
+def setup_of(estimates: Iterable[SetupEstimate]) -> list[Any]:
+    """The unknowns of set-ups, those that a scenario fixes left out."""
+    return [
+        {
+            "run": unknown.run,
+            "line": unknown.line,
+            "quantity": unknown.quantity,
+            "component": unknown.component,
+            **measured(
+                SETUP_QUANTITIES[unknown.quantity].report_unit,
+                value=unknown.value,
+                standard_uncertainty=None if unknown.value is None else unknown.standard_uncertainty,
+                prior=unknown.prior,
+            ),
+        }
+        for unknown in estimates
+        if unknown.prior > 0.0
+    ]
+
+
+def combinations_of(combinations: Iterable[KnownCombination], *, value: bool = True) -> list[Any]:
+    """Known combinations; without `value` the text has the standard uncertainty alone."""
+    return [
+        {
+            "text": combination_text(known, value=value),
+            "terms": [{"weight": weight, "name": name} for weight, name in known.terms],
+            **({"run": known.run, "line": known.line, "component": known.component} if known.line else {}),
+            **measured(
+                "urad" if known.line else "um_per_m",
+                value=known.value,
+                standard_uncertainty=known.standard_uncertainty,
+            ),
+        }
+        for known in combinations
+    ]
+
+
+def reliability_of(controls: Iterable[FaultControl]) -> list[Any]:
+    """Which faults the readings control."""
+    return [
+        {
+            "fault": control.kind,
+            "channel": control.channel,
+            "controlled": control.count,
+            "uncontrolled": control.uncontrolled,
+            "twins": control.twins,
+            "hidden": by_kind(control.hidden),
+            **measured(
+                "urad" if control.channel == "tilt" else "um",
+                found_from=control.found_from if control.count else None,
+                told_from=control.told_from if control.count > control.twins else None,
+            ),
+        }
+        for control in controls
+    ]
+
+
+def by_kind(native: Mapping[Any, float]) -> ByKind:
+    """One number for each kind of parameter; None where there is none or it is not finite."""
+    return {
+        "positioning_um": in_unit("um", native.get("positioning")),
+        "straightness_um": in_unit("um", native.get("straightness")),
+        "angle_urad": in_unit("urad", native.get("angle")),
+        "squareness_urad": in_unit("urad", native.get("squareness")),
+    }
+
+
+def _adjustment(found: Adjustment) -> AdjustmentPart:
+    return {
+        "degrees_of_freedom": found.degrees_of_freedom,
+        "weighted_square_sum": number(found.weighted_square_sum),
+        "chi_square_probability": number(found.chi_square_probability),
+        "iterations": found.iterations,
+        "setup": setup_of(found.setup),
+        "faults": [_faults(one) for one in found.faults],
+        "combinations": combinations_of(found.combinations),
+        "smoothness": _smoothness(found.smoothness),
+        "reliability": reliability_of(found.reliability),
+    }
+
+
+def _smoothness(deviations: Mapping[str, float]) -> list[Any]:
+    return [
+        {"parameter": name, **measured(unit_key(name), second_difference=deviation)}
+        for name, deviation in deviations.items()
+    ]
+
+
+def _faults(found: FaultClass) -> Faults:
+    treatment: Any = found.treatment
+    return {
+        "text": fault_text(found),
+        "treatment": treatment,
+        "told_apart": found.told_apart,
+        "members": [_fault(fault) for fault in found.members],
+    }
+
+
+def _fault(fault: Fault) -> Any:
+    return {
+        "kind": fault.kind,
+        "channel": fault.channel,
+        "run": fault.run,
+        "line": fault.line,
+        "point": fault.point,
+        "row": fault.row,
+        "chi_square_gain": number(fault.chi_square_gain),
+        **measured(
+            "urad" if fault.channel in ("alpha", "beta") else "um",
+            size=fault.size,
+            standard_uncertainty=fault.standard_uncertainty,
+        ),
+    }
+
+
+def _linear(judged: JudgedEvaluation) -> LinearPart:
+    own: Any = judged.own
+    other: Any = None if judged.adjustment is None else judged.adjustment.verdict.fit
+    return {"own_verdict": own, "adjustment_verdict": other, "refusal": judged.refusal or None}
