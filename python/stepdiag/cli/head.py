@@ -9,7 +9,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import InOrder, out_file
-from stepdiag.io.outputs import PNG, SVG, OutputFile
+from stepdiag.io.outputs import FIGURE, OutputFile
 
 if TYPE_CHECKING:
     from stepdiag import _core
@@ -54,7 +54,7 @@ def list_heads() -> None:
 
 @head.command(short_help="Draw a head.", epilog="\b\nExample: stepdiag head show beam_and_psd -o head.png")
 @HEAD
-@out_file("Figure to write, .png or .svg.", PNG, SVG)
+@out_file("Figure to write (.png, .svg, .pdf).", *FIGURE)
 @click.option("--distance", type=float, metavar="MM", help=f"Distance of the mirror.  [default: {DISTANCES[1]:g}]")
 @MIRROR
 def show(name: str, output: OutputFile, distance: float | None, mirror: tuple[float, float] | None) -> None:

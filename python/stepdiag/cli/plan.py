@@ -8,7 +8,7 @@ from typing import Any, Literal
 import click
 
 from stepdiag.cli.options import PATH, Writes
-from stepdiag.io.outputs import PLANS, PNG, SVG, OutputFile
+from stepdiag.io.outputs import FIGURE, PLANS, OutputFile
 
 Family = Literal["length", "angle", "squareness"]
 
@@ -51,9 +51,9 @@ _POSITIVE = _Positive(min=0.0, min_open=True, max=1e9)
 @click.option(
     "-o",
     "output",
-    type=Writes(PNG, SVG, PLANS),
+    type=Writes(*FIGURE, PLANS),
     metavar="FILE",
-    help="Also draw the curve (.png, .svg) or write all plans (.csv).",
+    help="Also draw the curve (.png, .svg, .pdf) or write all plans (.csv).",
 )
 def plan(
     scenario: Path, minutes: float | None, spacing: float | None, family: Family, output: OutputFile | None

@@ -11,13 +11,11 @@ from matplotlib.lines import Line2D
 
 from stepdiag._core import ErrorMap
 from stepdiag.demo.paper_cases import POSITIONING, Result
-from stepdiag.style import own_style, save
+from stepdiag.style import COLOUR, own_style, save
 
 FloatArray = npt.NDArray[np.float64]
 
-# One colour per axis, after Okabe and Ito: told apart with any colour vision. One line style per method; the
-# adjustment, which lies on the truth, is black on its colour.
-COLOUR = {"X": "#0072B2", "Y": "#D55E00", "Z": "#009E73"}
+# One colour per axis and one line style per method; the adjustment, which lies on the truth, is black on its colour.
 TRUTH: Mapping[str, Any] = {"linewidth": 4.0, "alpha": 0.32, "solid_capstyle": "butt"}
 ENHANCED: Mapping[str, Any] = {"linewidth": 1.0}
 CONVENTIONAL: Mapping[str, Any] = {"linewidth": 1.0, "linestyle": (0, (4, 1.6))}

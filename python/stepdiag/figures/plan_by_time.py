@@ -10,11 +10,8 @@ from matplotlib.ticker import FuncFormatter
 
 from stepdiag.parameters import REPORT_UNIT, in_report_units
 from stepdiag.planning.plan_by_time import FAMILIES, Family, Outcome, complete
-from stepdiag.style import own_style, save
+from stepdiag.style import own_style, save, series
 
-# Colours by Okabe and Ito, safe for colour-blind readers; repeated with another line style.
-COLOURS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-STYLES: Final = ("-", (0, (4, 1.6)), (0, (1, 1.4)))
 TITLES: Final[dict[Family, str]] = {
     "length": "positioning and straightness",
     "angle": "angles",
@@ -23,7 +20,7 @@ TITLES: Final[dict[Family, str]] = {
 
 
 def draw_plans(found: Sequence[Outcome], taken: Outcome | None, minutes: float, suffix: str) -> bytes:
-    """Draw the plans: content of a "png" or "svg" file, same bytes for same plans.
+    """Draw the plans: content of a "png", "svg" or "pdf" file, same bytes for same plans.
 
     `taken` is the plan to mark."""
     plans = [o for o in complete(found) if all(math.isfinite(o.worst(family)) for family in FAMILIES)]
@@ -46,7 +43,7 @@ def draw_plans(found: Sequence[Outcome], taken: Outcome | None, minutes: float, 
 def _draw_family(axes: Axes, plans: Sequence[Outcome], family: Family, minutes: float) -> None:
     """For each number of steps, a staircase: the best plan until the next one is affordable."""
     for index, steps in enumerate(sorted({o.candidate.steps for o in plans})):
-        colour, style = COLOURS[index % len(COLOURS)], STYLES[index // len(COLOURS) % len(STYLES)]
+        colour, style = series(index)
         own = sorted((o for o in plans if o.candidate.steps == steps), key=lambda o: o.seconds)
         x, y = [o.minutes for o in own], [_value(o, family) for o in own]
         axes.plot(x, y, ".", color=colour, markersize=4.0, alpha=0.4)

@@ -14,13 +14,11 @@ from matplotlib.patches import Patch
 
 from stepdiag import _core
 from stepdiag.head.trace import arrivals, detectors
-from stepdiag.style import own_style, save
+from stepdiag.style import own_style, plain, save, series
 
 FloatArray = npt.NDArray[np.float64]
 Box = tuple[FloatArray, FloatArray]  # corners with the lowest and highest coordinates
 
-# Colours of beams by Okabe and Ito, safe for colour-blind readers.
-COLOURS: Final = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 GLASS: Final = "#a9cbe3"
 DARK: Final = "#333333"
 WEAKEST: Final = 1e-6  # share of the power with the palest colour
@@ -46,7 +44,7 @@ VIEWS: Final = (View("x", 0), View("y", 1))
 def draw_head(head: _core.Head, distance: float, suffix: str) -> bytes:
     """Draw a head in front of an aligned mirror at a distance (mm).
 
-    Returns the content of a "png" or "svg" file."""
+    Returns the content of a "png", "svg" or "pdf" file."""
     design = head.design
     if design is None or head.mirror is None:
         raise ValueError("draw_head: expected a head with a design and a mirror")
@@ -74,7 +72,7 @@ def draw_head(head: _core.Head, distance: float, suffix: str) -> bytes:
             whole.set(xlim=(low[2], distance + 0.05 * (distance - low[2])))
             whole.set(ylim=(min(low[view.axis], -1.1 * half), max(high[view.axis], 1.1 * half)))
         for axes, title in zip(
-            panels[0], (f"{_plain(design.name)}: the head", f"the mirror at {distance:g} mm"), strict=True
+            panels[0], (f"{plain(design.name)}: the head", f"the mirror at {distance:g} mm"), strict=True
         ):
             axes.set_title(title)
         for axes in panels[1]:
@@ -153,13 +151,8 @@ def _draw_detectors(axes: Axes, view: View, design: _core.HeadDesign, outlines: 
             axes.add_collection(edges)
 
 
-def _plain(name: str) -> str:
-    """The name with its dollar signs escaped: Matplotlib reads formulas between them."""
-    return name.replace("$", r"\$")
-
-
 def _colour(beam: int) -> str:
-    return COLOURS[beam % len(COLOURS)]
+    return series(beam)[0]
 
 
 def _excess(design: _core.HeadDesign, beam: int) -> float:
@@ -184,7 +177,7 @@ def _name_components(axes: Axes, view: View, outlines: dict[str, list[FloatArray
         places = [p for p in (above, below) if _is_free((p, p + size), others)]
         places += [p for p in stacked if _is_free((p, p + size), taken)]
         taken.append((places[0], places[0] + size))
-        axes.text(float(places[0][0]), float(places[0][1]), _plain(name), size=7.5, va="bottom", zorder=7, bbox=LABEL)
+        axes.text(float(places[0][0]), float(places[0][1]), plain(name), size=7.5, va="bottom", zorder=7, bbox=LABEL)
 
 
 def _is_free(box: Box, others: Sequence[Box]) -> bool:
@@ -193,7 +186,7 @@ def _is_free(box: Box, others: Sequence[Box]) -> bool:
 
 def _legend(design: _core.HeadDesign) -> list[Any]:
     beams = [
-        Line2D([], [], color=_colour(k), linewidth=1.6, label=f"{_plain(beam.name)} ({beam.wavelength:g} nm)")
+        Line2D([], [], color=_colour(k), linewidth=1.6, label=f"{plain(beam.name)} ({beam.wavelength:g} nm)")
         for k, beam in enumerate(design.beams)
     ]
     return [

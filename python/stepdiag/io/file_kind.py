@@ -25,6 +25,7 @@ _BEGINNINGS: Final = {
     "checkpoint": CHECKPOINT_BEGINS,
     "PNG picture": "\ufffdPNG\r\n\x1a\n",
     "SVG picture": r"(?:<\?xml[^>]*>\s*)?(?:<!DOCTYPE svg[^>]*>\s*)?<svg\b",
+    "PDF document": "%PDF-",
     "measuring program": r"(?i:%\n)?\((?i:measuring program)\b",
     "ISG table": "// stepdiag export --to isg\n",
     "compensation.ini": "# stepdiag export --to linuxcnc-comp\n",

@@ -41,6 +41,8 @@ OBSERVATION: Final = FileKind("table of steps", (".csv",))
 PLANS: Final = FileKind("table of plans", (".csv",))
 PNG: Final = FileKind("PNG picture", (".png",))
 SVG: Final = FileKind("SVG picture", (".svg",))
+PDF: Final = FileKind("PDF document", (".pdf",))
+FIGURE: Final = (PNG, SVG, PDF)  # endings: style.FORMATS
 # Not .nc: a usual ending of programs, but in stepdiag it means netCDF.
 PROGRAM: Final = FileKind("measuring program", (".ngc", ".iso", ".cnc", ".tap", ".mpf", ".txt"))
 KINEMATICS_TABLE: Final = FileKind("calibration", (".csv",))

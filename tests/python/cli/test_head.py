@@ -247,7 +247,7 @@ MISTAKES: list[tuple[list[str], str]] = [
     (["head", "show", "beam_and_psd"], "Missing option '-o'"),
     (["head", "show", "four_beams", "-o", "h.png"], 'expected the name of a shipped head (beam_and_psd, three_beams) or the path of a TOML file, got "four_beams"'),
     (["head", "show", "no.toml", "-o", "h.png"], "no.toml: cannot be read"),
-    (["head", "show", "three_beams", "-o", "h.pdf"], "h.pdf: expected a name that ends in .png or .svg"),
+    (["head", "show", "three_beams", "-o", "h.jpg"], "h.jpg: expected a name that ends in .png, .svg or .pdf"),
     (["head", "show", "three_beams", "-o", "no/h.png"], "the folder no does not exist"),
     (["head", "show", "three_beams", "-o", "h.png", "--distance", "-3"], "--distance: expected more than the 15 mm that the head reaches to, got -3"),
     (["head", "show", "three_beams", "-o", "h.png", "--distance", "15"], "--distance: expected more than the 15 mm that the head reaches to, got 15"),

@@ -38,7 +38,7 @@ FILES: dict[tuple[str, str], list[tuple[list[str], tuple[str, ...]]]] = {
     ("simulate", "output"): [(["scenario.toml", "-o", OUT], (".csv", ".nc"))],
     ("evaluate", "output"): [(["scenario.toml", "run.csv", "-o", OUT], (".csv", ".nc"))],
     ("observe", "output"): [(["scenario.toml", "--steps", "2", "-o", OUT], (".csv",))],
-    ("plan", "output"): [(["scenario.toml", "-o", OUT], (".csv", ".png", ".svg"))],
+    ("plan", "output"): [(["scenario.toml", "-o", OUT], (".csv", ".png", ".svg", ".pdf"))],
     ("uncertainty", "output"): [(["scenario.toml", "-o", OUT], (".csv", ".nc"))],
     ("uncertainty", "checkpoint"): [(["scenario.toml", "-n", "1e4", "--checkpoint", OUT], (".checkpoint",))],
     ("study", "output"): [(["study.toml", "-o", OUT], (".nc",))],
@@ -61,7 +61,7 @@ FILES: dict[tuple[str, str], list[tuple[list[str], tuple[str, ...]]]] = {
         (["calibration.csv", "--to", "isg", "-o", OUT], (".csv",)),
         (["calibration.csv", "--to", "csv-grid", "--nodes", "2", "2", "2", "-o", OUT], (".csv",)),
     ],
-    ("head show", "output"): [(["three_beams.toml", "-o", OUT], (".png", ".svg"))],
+    ("head show", "output"): [(["three_beams.toml", "-o", OUT], (".png", ".svg", ".pdf"))],
 }
 # Every option that writes a folder: see the tests of these.
 FOLDERS = {("demo", "output"), ("init", "output"), ("export", "output")}

@@ -256,7 +256,7 @@ def test_page_has_the_table_of_the_example(capsys: pytest.CaptureFixture[str]) -
     [
         (["--minutes", "0"], "--minutes"),
         (["--minutes", "nan"], "--minutes"),
-        (["-o", "plan.pdf"], "expected a name that ends in .png, .svg or .csv"),
+        (["-o", "plan.jpg"], "expected a name that ends in .png, .svg, .pdf or .csv"),
         (["-o", "scenario.toml"], "is also an input"),
         (["-o", "no/plan.png"], "the folder no does not exist"),
         (["--for", "everything"], "'everything' is not one of"),
