@@ -117,6 +117,15 @@ if TYPE_CHECKING:
     from stepdiag.calibration.comparison import Comparison, Difference, compare_calibrations
     from stepdiag.calibration.functional_point import functional_point_straightness
     from stepdiag.calibration.largest_by_kind import Deviation, largest_deviations, largest_uncertainties
+    from stepdiag.calibration.volume import (
+        PointErrors,
+        VolumeContribution,
+        VolumeErrors,
+        VolumeFigure,
+        errors_at_points,
+        volume_errors,
+        volume_grid,
+    )
     from stepdiag.export.common import ExportOptions
     from stepdiag.export.write import export_calibration
     from stepdiag.head.description import parse_head_design, read_head_design, shipped_head
@@ -196,6 +205,7 @@ __all__ = [
     "Outlier",
     "Plan",
     "PlausibleLimits",
+    "PointErrors",
     "Propagation",
     "RangeModel",
     "ReadingNoise",
@@ -225,6 +235,9 @@ __all__ = [
     "Verdict",
     "VirtualCalibrations",
     "VirtualReadout",
+    "VolumeContribution",
+    "VolumeErrors",
+    "VolumeFigure",
     "VolumetricAccuracy",
     "__version__",
     "acquire",
@@ -239,6 +252,7 @@ __all__ = [
     "derived_on_diagonals",
     "diagonal_errors",
     "error_at_point",
+    "errors_at_points",
     "evaluate",
     "evaluate_scenario",
     "evaluate_uncertainty",
@@ -276,6 +290,8 @@ __all__ = [
     "study_table",
     "trace_beams",
     "uncertainty_table",
+    "volume_errors",
+    "volume_grid",
     "volumetric_accuracy",
     "with_covariance",
     "workers_of",
@@ -302,6 +318,15 @@ _LATER = {
         "Deviation",
         "largest_deviations",
         "largest_uncertainties",
+    ),
+    "calibration.volume": (
+        "PointErrors",
+        "VolumeContribution",
+        "VolumeErrors",
+        "VolumeFigure",
+        "errors_at_points",
+        "volume_errors",
+        "volume_grid",
     ),
     "export.common": ("ExportOptions",),
     "export.write": ("export_calibration",),

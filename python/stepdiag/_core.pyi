@@ -8,7 +8,7 @@ import numpy.typing
 import os
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Fault', 'FaultClass', 'FaultControl', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 't_quantile', 'trace_beams', 'uncertain_quantities', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Fault', 'FaultClass', 'FaultControl', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'trace_beams', 'uncertain_quantities', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -2146,6 +2146,50 @@ class RangeModel(SampleModel):
         """
         Raises InvalidArgument for a calibration without covariance.
         """
+class VolumeSummary:
+    """
+    Errors e of the functional point (mm) and tilts of the tool (rad) on a grid, by the exact pose, of axes that came in + direction.
+    """
+    @property
+    def components(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) e there, mm
+        """
+    @property
+    def highest(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) of e by component, mm
+        """
+    @property
+    def largest(self) -> float:
+        """
+        Largest |e|, mm.
+        """
+    @property
+    def largest_at(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) where, mm
+        """
+    @property
+    def lowest(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) of e by component, mm
+        """
+    @property
+    def rms(self) -> float:
+        """
+        Root of the mean of |e|^2 over the box, by the trapezoidal rule, mm.
+        """
+    @property
+    def tilt_highest(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) A, B, C, rad
+        """
+    @property
+    def tilt_lowest(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) A, B, C, rad
+        """
 class VirtualCalibrations(SampleModel):
     """
     Whole virtual calibrations: a run with drawn inputs and reading noise, traced by replay and evaluated with the unperturbed calibration. Outputs are the values of the calibration's tables, then those derived.
@@ -2424,6 +2468,14 @@ def error_at_point(calibration: Calibration, point: numpy.typing.ArrayLike, *, t
     """
     The error at a commanded point (mm) with a tool offset (mm; none: the calibration's), of axes that came in + direction: e = sum over axes of delta + theta x lever. Raises InvalidArgument for lengths that are not finite.
     """
+def error_uncertainties_at(calibration: Calibration, points: numpy.typing.ArrayLike, *, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Standard uncertainties of errors_at from the covariance of a calibration, (n, 6), mm and rad; NaN where a parameter is missing. Raises InvalidArgument without a covariance.
+    """
+def errors_at(machine: Machine, points: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Error of the functional point (mm) and rotation vector of the tool (rad) at commanded points (n, 3), mm: (n, 6), exact, of axes that came in + direction.
+    """
 def evaluate(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'adjustment', uncertainty: ReadingUncertainty = ..., full_covariance: bool = False, plausible: PlausibleLimits = ...) -> Calibration:
     """
     Calibration from a run. Of the head only its calibration is used, of the machine only chain and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan, and for a result that is not plausible.
@@ -2521,6 +2573,10 @@ def simulate(machine: Machine, plan: Plan, head: Head | collections.abc.Mapping[
 def straightness_reference(chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0)) -> str:
     """
     One line: to which point straightnesses refer, and what they are at the functional point.
+    """
+def summarise_volume(machine: Machine, x: numpy.typing.ArrayLike, y: numpy.typing.ArrayLike, z: numpy.typing.ArrayLike, *, without: collections.abc.Sequence[str] = []) -> VolumeSummary:
+    """
+    On the grid of all combinations of these ascending positions (mm). without: names of parameters to be set to 0. Raises InvalidArgument for positions that do not ascend and unknown names.
     """
 def t_quantile(probability: typing.SupportsFloat | typing.SupportsIndex, degrees_of_freedom: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """

@@ -250,6 +250,8 @@ void bind_volume(py::module_& m) {
 
 }  // namespace
 
+void bind_volume_errors(py::module_& m);  // bind_volume_errors.cpp
+
 static void bind_derived(py::module_& m) {
     py::class_<DerivedOutput>(m, "DerivedOutput",
                               "A linear combination of a calibration's entries, as an output of virtual calibrations.")
@@ -293,6 +295,7 @@ static void bind_derived(py::module_& m) {
         "The values of diagonal_errors as outputs of virtual calibrations, those that nothing is missing for.");
     bind_points(m);
     bind_volume(m);
+    bind_volume_errors(m);
 }
 
 // --- virtual calibration ---

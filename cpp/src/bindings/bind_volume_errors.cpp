@@ -1,0 +1,94 @@
+#include "bindings.hpp"
+#include "stepdiag/uncertainty/volume_errors.hpp"
+
+namespace stepdiag::bindings {
+namespace {
+
+GridPositions to_grid(const ArrayLike& x, const ArrayLike& y, const ArrayLike& z) {
+    GridPositions grid;
+    const std::array<std::pair<const ArrayLike*, const char*>, 3> axes = {{{&x, "x"}, {&y, "y"}, {&z, "z"}}};
+    for (std::size_t a = 0; a < 3; ++a) {
+        const Eigen::VectorXd positions = to_vector(*axes[a].first, axes[a].second);
+        grid[a].assign(positions.begin(), positions.end());
+    }
+    return grid;
+}
+
+int to_parameter(const std::string& name) {
+    if (const auto id = FunctionId::parse(name)) return id->index();
+    if (const auto id = parse_squareness(name)) return function_count + static_cast<int>(*id);
+    throw InvalidArgument("without: expected names EXX ... ECZ, C0Y, B0Z, A0Z, got \"" + name + "\"");
+}
+
+// Without a copy: of a million points it would take as long as their errors.
+DoubleArray to_rows(SixRows&& rows) {
+    auto* kept = new SixRows(std::move(rows));
+    const py::capsule owner(kept, [](void* matrix) { delete static_cast<SixRows*>(matrix); });
+    return DoubleArray({kept->rows(), Eigen::Index(6)}, kept->data(), owner);
+}
+
+}  // namespace
+
+void bind_volume_errors(py::module_& m) {
+    py::class_<VolumeSummary>(
+        m, "VolumeSummary",
+        "Errors e of the functional point (mm) and tilts of the tool (rad) on a grid, by the exact "
+        "pose, of axes that came in + direction.")
+        .def_readonly("largest", &VolumeSummary::largest, "Largest |e|, mm.")
+        .def_property_readonly(
+            "largest_at", [](const VolumeSummary& v) { return to_numpy_vector(v.largest_at); }, "(3,) where, mm")
+        .def_property_readonly(
+            "components", [](const VolumeSummary& v) { return to_numpy_vector(v.components); }, "(3,) e there, mm")
+        .def_readonly("rms", &VolumeSummary::rms,
+                      "Root of the mean of |e|^2 over the box, by the trapezoidal rule, mm.")
+        .def_property_readonly(
+            "lowest", [](const VolumeSummary& v) { return to_numpy_vector(v.lowest); }, "(3,) of e by component, mm")
+        .def_property_readonly(
+            "highest", [](const VolumeSummary& v) { return to_numpy_vector(v.highest); }, "(3,) of e by component, mm")
+        .def_property_readonly(
+            "tilt_lowest", [](const VolumeSummary& v) { return to_numpy_vector(v.tilt_lowest); }, "(3,) A, B, C, rad")
+        .def_property_readonly(
+            "tilt_highest", [](const VolumeSummary& v) { return to_numpy_vector(v.tilt_highest); },
+            "(3,) A, B, C, rad");
+    m.def(
+        "summarise_volume",
+        [](const Machine& machine, const ArrayLike& x, const ArrayLike& y, const ArrayLike& z,
+           const std::vector<std::string>& without) {
+            const GridPositions grid = to_grid(x, y, z);
+            std::vector<int> parameters;
+            for (const std::string& name : without) parameters.push_back(to_parameter(name));
+            py::gil_scoped_release release;
+            return summarise_volume(without_parameters(machine, parameters), grid);
+        },
+        py::arg("machine"), py::arg("x"), py::arg("y"), py::arg("z"), py::kw_only(),
+        py::arg("without") = std::vector<std::string>{},
+        "On the grid of all combinations of these ascending positions (mm). without: names of parameters to be set to "
+        "0. Raises InvalidArgument for positions that do not ascend and unknown names.");
+    m.def(
+        "errors_at",
+        [](const Machine& machine, const ArrayLike& points) {
+            const PointRows rows = to_points(points, "points");
+            py::gil_scoped_release release;
+            SixRows errors = errors_at(machine, rows);
+            py::gil_scoped_acquire acquire;
+            return to_rows(std::move(errors));
+        },
+        py::arg("machine"), py::arg("points"),
+        "Error of the functional point (mm) and rotation vector of the tool (rad) at commanded points (n, 3), mm: "
+        "(n, 6), exact, of axes that came in + direction.");
+    m.def(
+        "error_uncertainties_at",
+        [](const Calibration& calibration, const ArrayLike& points, const std::optional<ArrayLike>& tool) {
+            const PointRows rows = to_points(points, "points");
+            const Eigen::Vector3d offset = tool ? to_vector3(*tool, "tool") : calibration.tool;
+            py::gil_scoped_release release;
+            SixRows uncertainties = error_uncertainties_at(calibration, offset, rows);
+            py::gil_scoped_acquire acquire;
+            return to_rows(std::move(uncertainties));
+        },
+        py::arg("calibration"), py::arg("points"), py::kw_only(), py::arg("tool") = std::nullopt,
+        "Standard uncertainties of errors_at from the covariance of a calibration, (n, 6), mm and rad; NaN where a "
+        "parameter is missing. Raises InvalidArgument without a covariance.");
+}
+
+}  // namespace stepdiag::bindings

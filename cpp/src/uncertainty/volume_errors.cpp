@@ -1,0 +1,266 @@
+#include "stepdiag/uncertainty/volume_errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "machine/pose-inl.hpp"
+#include "stepdiag/core/error.hpp"
+#include "uncertainty/functional.hpp"
+#include "uncertainty/in_blocks.hpp"
+
+namespace stepdiag {
+namespace {
+
+using namespace STEPDIAG_NAMESPACE;
+using Eigen::Index;
+using Eigen::Matrix3Xd;
+using Eigen::Vector3d;
+using Motion = AxisMotion<double>;
+
+// Rotation vector of a matrix whose rotation is far below a quarter turn.
+Vector3<double> rotation_vector(double x, double y, double z) {
+    const double sine = std::sqrt(x * x + y * y + z * z);
+    const double factor = sine > 1e-6 ? std::asin(std::min(sine, 1.0)) / sine : 1.0 + sine * sine / 6.0;
+    return {factor * x, factor * y, factor * z};
+}
+
+Motion motion_of(const Chain& chain, Axis axis, double position, const Vector3d& delta, const Vector3d& theta) {
+    const Vector3d shift = position * Vector3d::Unit(index(axis)) + delta;
+    return {rotation_exp(broadcast3<double>(theta)), broadcast3<double>(shift), chain.carries_workpiece(axis)};
+}
+
+Vector3<double> tilt_of(const Matrix3<double>& one, const Matrix3<double>& rest) {
+    const Matrix3<double> r = one * rest;
+    return rotation_vector(0.5 * (r.row2.y - r.row1.z), 0.5 * (r.row0.z - r.row2.x), 0.5 * (r.row1.x - r.row0.y));
+}
+
+std::vector<double> trapezoidal_weights(const std::vector<double>& positions) {
+    const std::size_t n = positions.size();
+    const double length = positions.back() - positions.front();
+    if (n == 1) return {1.0};
+    std::vector<double> weights(n, 0.0);
+    for (std::size_t k = 0; k + 1 < n; ++k) {
+        const double half = (positions[k + 1] - positions[k]) / (2.0 * length);
+        weights[k] += half;
+        weights[k + 1] += half;
+    }
+    return weights;
+}
+
+// What one position of the axis nearest to the workpiece contributes.
+struct Slab {
+    double largest2 = -1.0, weighted2 = 0.0;
+    std::array<Index, 2> at{};  // positions of the other two axes
+    Vector3d components;
+    Vector3d lowest, highest, tilt_lowest, tilt_highest;
+};
+
+void widen(Vector3d& lowest, Vector3d& highest, const Vector3<double>& v) {
+    const double values[] = {v.x, v.y, v.z};
+    for (int c = 0; c < 3; ++c) {
+        lowest[c] = std::min(lowest[c], values[c]);
+        highest[c] = std::max(highest[c], values[c]);
+    }
+}
+
+// Linear functions of one axis at the nodes of any of them: delta without squarenesses, and theta.
+struct AxisFunctions {
+    std::vector<double> position;
+    std::vector<std::array<double, 6>> value;
+    std::array<double, 3> slope{};  // of delta, by squarenesses
+
+    AxisFunctions(const ErrorMap& errors, Axis axis) {
+        for (int c = 0; c < 6; ++c)
+            if (const auto& table = errors.table().functions[std::size_t(FunctionId{axis, Component(c)}.index())])
+                position.insert(position.end(), table->position.begin(), table->position.end());
+        if (position.empty()) position.push_back(0.0);
+        std::sort(position.begin(), position.end());
+        position.erase(std::unique(position.begin(), position.end()), position.end());
+        for (const double p : position) {
+            auto& at = value.emplace_back();
+            for (int c = 0; c < 6; ++c) at[std::size_t(c)] = errors.function({axis, Component(c)}, p);
+        }
+        for (const Squareness s : all_squarenesses)
+            if (const SquarenessTerm term = squareness_term(s); term.axis == axis)
+                slope[std::size_t(term.component)] += term.sign * errors.squareness(s);
+    }
+    Motion motion(const Chain& chain, Axis axis, double p) const {
+        const auto after = std::size_t(std::upper_bound(position.begin(), position.end(), p) - position.begin());
+        const std::size_t high = std::min(after, position.size() - 1), low = after > 0 ? after - 1 : 0;
+        const double t = high > low ? (p - position[low]) / (position[high] - position[low]) : 0.0;
+        std::array<double, 6> v;
+        for (std::size_t c = 0; c < 6; ++c) v[c] = value[low][c] + t * (value[high][c] - value[low][c]);
+        for (std::size_t c = 0; c < 3; ++c) v[c] += slope[c] * p;
+        return motion_of(chain, axis, p, {v[0], v[1], v[2]}, {v[3], v[4], v[5]});
+    }
+};
+
+}  // namespace
+
+Machine without_parameters(const Machine& machine, const std::vector<int>& parameters) {
+    ParameterTable table = machine.errors().table();
+    for (const int parameter : parameters) {
+        if (parameter < function_count) {
+            table.functions[std::size_t(parameter)].reset();
+            table.negative_functions[std::size_t(parameter)].reset();
+        } else {
+            table.squarenesses[std::size_t(parameter - function_count)].reset();
+        }
+    }
+    return {machine.chain(), ErrorMap(std::move(table)), machine.tool()};
+}
+
+VolumeSummary summarise_volume(const Machine& machine, const GridPositions& grid) {
+    for (const Axis axis : all_axes) {
+        const auto& positions = grid[std::size_t(index(axis))];
+        bool ascends = !positions.empty();
+        for (std::size_t k = 0; k < positions.size(); ++k)
+            ascends = ascends && std::isfinite(positions[k]) && (k == 0 || positions[k] > positions[k - 1]);
+        if (!ascends)
+            throw InvalidArgument(std::string("grid: expected finite, ascending positions of ") + letter(axis));
+    }
+    const auto order = machine.chain().order();
+    std::array<std::vector<Motion>, 3> motions;
+    std::array<const std::vector<double>*, 3> positions;
+    std::array<std::vector<double>, 3> weights;
+    for (std::size_t r = 0; r < 3; ++r) {
+        positions[r] = &grid[std::size_t(index(order[r]))];
+        weights[r] = trapezoidal_weights(*positions[r]);
+        for (const double p : *positions[r])
+            motions[r].push_back(motion_of(machine.chain(), order[r], p, machine.errors().delta(order[r], p),
+                                           machine.errors().theta(order[r], p)));
+    }
+    const Index n2 = Index(motions[1].size()), n3 = Index(motions[2].size());
+    // Functional point and orientation in the frame before the second axis.
+    std::vector<Vector3<double>> points(std::size_t(n2 * n3));
+    std::vector<Matrix3<double>> rotations(std::size_t(n2 * n3));
+    const Vector3<double> tool = broadcast3<double>(machine.tool());
+    for (Index k = 0; k < n3; ++k) {
+        const Motion& third = motions[2][std::size_t(k)];
+        const Vector3<double> carried = move_point(third, tool).point;
+        for (Index j = 0; j < n2; ++j) {
+            const Motion& second = motions[1][std::size_t(j)];
+            points[std::size_t(j * n3 + k)] = move_point(second, carried).point;
+            rotations[std::size_t(j * n3 + k)] = second.rotation * third.rotation;
+        }
+    }
+    constexpr double infinite = std::numeric_limits<double>::infinity();
+    std::vector<Slab> slabs(motions[0].size());
+    in_blocks(Index(slabs.size()), 1, [&](Index i, Index) {
+        Slab& slab = slabs[std::size_t(i)];
+        slab.lowest = slab.tilt_lowest = Vector3d::Constant(infinite);
+        slab.highest = slab.tilt_highest = Vector3d::Constant(-infinite);
+        Vector3d nominal = machine.tool();
+        nominal[index(order[0])] += (*positions[0])[std::size_t(i)];
+        const Motion& first = motions[0][std::size_t(i)];
+        for (Index j = 0; j < n2; ++j) {
+            nominal[index(order[1])] = machine.tool()[index(order[1])] + (*positions[1])[std::size_t(j)];
+            double along = 0.0;
+            for (Index k = 0; k < n3; ++k) {
+                nominal[index(order[2])] = machine.tool()[index(order[2])] + (*positions[2])[std::size_t(k)];
+                const std::size_t at = std::size_t(j * n3 + k);
+                const Vector3<double> actual = move_point(first, points[at]).point;
+                const Vector3<double> e = {actual.x - nominal[0], actual.y - nominal[1], actual.z - nominal[2]};
+                const double size2 = dot(e, e);
+                along += weights[2][std::size_t(k)] * size2;
+                widen(slab.lowest, slab.highest, e);
+                widen(slab.tilt_lowest, slab.tilt_highest, tilt_of(first.rotation, rotations[at]));
+                if (size2 > slab.largest2) {
+                    slab.largest2 = size2;
+                    slab.at = {j, k};
+                    slab.components = {e.x, e.y, e.z};
+                }
+            }
+            slab.weighted2 += weights[1][std::size_t(j)] * along;
+        }
+    });
+    VolumeSummary summary;
+    summary.lowest = summary.tilt_lowest = Vector3d::Constant(infinite);
+    summary.highest = summary.tilt_highest = Vector3d::Constant(-infinite);
+    double largest2 = -1.0, mean2 = 0.0;
+    for (std::size_t i = 0; i < slabs.size(); ++i) {
+        const Slab& slab = slabs[i];
+        mean2 += weights[0][i] * slab.weighted2;
+        summary.lowest = summary.lowest.cwiseMin(slab.lowest);
+        summary.highest = summary.highest.cwiseMax(slab.highest);
+        summary.tilt_lowest = summary.tilt_lowest.cwiseMin(slab.tilt_lowest);
+        summary.tilt_highest = summary.tilt_highest.cwiseMax(slab.tilt_highest);
+        if (!(slab.largest2 > largest2)) continue;
+        largest2 = slab.largest2;
+        summary.components = slab.components;
+        summary.largest_at[index(order[0])] = (*positions[0])[i];
+        for (std::size_t r : {1, 2}) summary.largest_at[index(order[r])] = (*positions[r])[std::size_t(slab.at[r - 1])];
+    }
+    summary.largest = std::sqrt(largest2);
+    summary.rms = std::sqrt(mean2);
+    return summary;
+}
+
+SixRows errors_at(const Machine& machine, const PointRows& points) {
+    if (!points.allFinite()) throw InvalidArgument("points: expected finite positions in mm");
+    const auto order = machine.chain().order();
+    const std::array functions = {AxisFunctions(machine.errors(), order[0]), AxisFunctions(machine.errors(), order[1]),
+                                  AxisFunctions(machine.errors(), order[2])};
+    const Vector3<double> tool = broadcast3<double>(machine.tool());
+    SixRows errors(points.rows(), 6);
+    in_blocks(points.rows(), 1024, [&](Index begin, Index end) {
+        for (Index i = begin; i < end; ++i) {
+            const auto motion = [&](std::size_t r) {
+                return functions[r].motion(machine.chain(), order[r], points(i, index(order[r])));
+            };
+            const Motion axes[3] = {motion(0), motion(1), motion(2)};
+            const Vector3<double> p = chain_pose(axes, tool).position;
+            const Vector3<double> tilt = tilt_of(axes[0].rotation, axes[1].rotation * axes[2].rotation);
+            errors.row(i) << p.x - points(i, 0) - tool.x, p.y - points(i, 1) - tool.y, p.z - points(i, 2) - tool.z,
+                tilt.x, tilt.y, tilt.z;
+        }
+    });
+    return errors;
+}
+
+SixRows error_uncertainties_at(const Calibration& calibration, const Vector3d& tool, const PointRows& points) {
+    if (!points.allFinite()) throw InvalidArgument("points: expected finite positions in mm");
+    if (calibration.covariance.size() == 0)
+        throw InvalidArgument("calibration: expected one evaluated with full covariance");
+    const EntryLayout layout(calibration);
+    const Eigen::MatrixXd& covariance = calibration.covariance;
+    // Where no lever is 0. What is missing nowhere need not be looked for at every point.
+    const auto somewhere = deviations_at(calibration.chain, tool, {0.37, 0.61, 0.83});
+    std::array<bool, 6> complete;
+    for (std::size_t c = 0; c < 6; ++c) complete[c] = layout.missing(somewhere[c]).empty();
+    SixRows uncertainties(points.rows(), 6);
+    in_blocks(points.rows(), 256, [&](Index begin, Index end) {
+        std::vector<EntryLayout::Weighted> entries;
+        for (Index i = begin; i < end; ++i) {
+            const auto deviations = deviations_at(calibration.chain, tool, points.row(i).transpose());
+            for (std::size_t c = 0; c < 6; ++c) {
+                if (!complete[c] && !layout.missing(deviations[c]).empty()) {
+                    uncertainties(i, Index(c)) = std::numeric_limits<double>::quiet_NaN();
+                    continue;
+                }
+                entries.clear();
+                for (const Term& term : deviations[c]) {
+                    if (!layout.has(term.parameter)) continue;
+                    if (term.parameter >= function_count)
+                        entries.push_back({layout.first(term.parameter), term.coefficient});
+                    else
+                        for (const auto& [entry, weight] : layout.interpolation(term.parameter, term.position))
+                            entries.push_back({entry, weight * term.coefficient});
+                }
+                double variance = 0.0;
+                for (std::size_t a = 0; a < entries.size(); ++a) {
+                    const double* column = covariance.col(entries[a].entry).data();
+                    double sum = 0.5 * entries[a].weight * column[entries[a].entry];
+                    for (std::size_t b = 0; b < a; ++b) sum += entries[b].weight * column[entries[b].entry];
+                    variance += 2.0 * entries[a].weight * sum;
+                }
+                uncertainties(i, Index(c)) = std::sqrt(std::max(variance, 0.0));
+            }
+        }
+    });
+    return uncertainties;
+}
+
+}  // namespace stepdiag
