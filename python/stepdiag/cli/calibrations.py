@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, Writes, tell_fit
+from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, fit_warnings, json_option, tell, tell_fit
 from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, OutputFile
 
 
@@ -18,8 +18,9 @@ from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, OutputFile
     metavar="FILE",
     help="Also write the straightness of the functional point and that of the table (CSV).",
 )
+@json_option
 @click.pass_context
-def report(context: click.Context, calibration: Path, output: OutputFile | None) -> None:
+def report(context: click.Context, calibration: Path, output: OutputFile | None, as_json: bool) -> None:
     """Summarise a CALIBRATION (CSV or netCDF).
 
     Reports the largest values and uncertainties, and the point to which straightness refers. The
@@ -35,8 +36,14 @@ def report(context: click.Context, calibration: Path, output: OutputFile | None)
     read = read_calibration(calibration)
     if path is not None:
         write_whole(path, functional_point_csv(read))
-    for line in calibration_report(read):
-        click.echo(line)
+    if as_json:
+        from stepdiag.objects.report import report_object
+        from stepdiag.objects.writer import json_text
+
+        click.echo(json_text(report_object(read, calibration, fit_warnings(calibration, read.fit))))
+    else:
+        for line in calibration_report(read):
+            click.echo(line)
     tell_fit(context, calibration, read.fit)
 
 
@@ -54,8 +61,9 @@ def report(context: click.Context, calibration: Path, output: OutputFile | None)
     metavar="P",
     help="A difference is significant if its probability by chance is smaller than this (for all values together).",
 )
+@json_option
 @click.pass_context
-def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None, limit: float) -> None:
+def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None, limit: float, as_json: bool) -> None:
     """Compare two calibrations A and B (CSV or netCDF).
 
     Reports for every parameter the largest difference B - A, its position, its standard uncertainty
@@ -82,7 +90,16 @@ def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None,
         from stepdiag.report.comparison import write_comparison
 
         write_comparison(comparison, written)
-    for line in comparison_report(comparison, str(a), str(b)):
-        click.echo(line)
-    for path, calibration in ((a, one), (b, other)):
-        tell_fit(context, path, calibration.fit)
+    warnings = [*fit_warnings(a, one.fit), *fit_warnings(b, other.fit)]
+    if as_json:
+        from stepdiag.objects.comparison import comparison_object
+        from stepdiag.objects.writer import json_text
+
+        click.echo(json_text(comparison_object(comparison, (a, b), warnings)))
+    else:
+        for line in comparison_report(comparison, str(a), str(b)):
+            click.echo(line)
+    for warning in warnings:
+        tell("warning", warning)
+    if "rejected" in (one.fit, other.fit):
+        context.exit(NOT_TO_BE_TRUSTED)

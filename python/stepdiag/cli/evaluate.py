@@ -123,7 +123,8 @@ def _step_counts(context: click.Context, option: click.Parameter, text: str | No
     help="Numbers of steps per axis in the table; the scenario's own is added.  [default: 5,10,20,50,100,200]",
 )
 @click.option("-o", "output", type=Writes(OBSERVATION), metavar="FILE", help="Also write the table (CSV).")
-def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | None) -> None:
+@json_option
+def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | None, as_json: bool) -> None:
     """Report what SCENARIO's plan and head can determine, and how well, before you measure.
 
     Adjusts an error-free run with the scenario's uncertainties and unknowns. Reports which of the
@@ -132,7 +133,7 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
     found and told apart, and how the largest uncertainties grow with the number of steps.
     """
     from stepdiag.io.whole_files import write_whole
-    from stepdiag.planning.fault_control import extensions
+    from stepdiag.planning.fault_control import extensions, tells_all
     from stepdiag.planning.observation import USUAL_STEPS, observe, prospects
     from stepdiag.report.fault_control import control_rows, extension_rows
     from stepdiag.report.observation import observation_report, prospect_csv, prospect_rows
@@ -142,13 +143,22 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
     path = None if output is None else output.claim(scenario, error_map=described.truth.error_map)
     known = described.known
     run, found = observe(known)
-    for line in observation_report(found, run, known):
-        click.echo(line)
-    for line in [*control_rows(found.reliability), *extension_rows(found.reliability, extensions(known))]:
-        click.echo(line)
+    if not as_json:
+        for line in [*observation_report(found, run, known), *control_rows(found.reliability)]:
+            click.echo(line)
+    tried = [] if tells_all(found.reliability) else list(extensions(known))
+    if not as_json:
+        for line in extension_rows(found.reliability, tried):
+            click.echo(line)
     table = prospects(known, [*(steps or USUAL_STEPS), known.plan.steps])
-    click.echo("largest standard uncertainties by the number of steps, and the mirror that they take:")
-    for line in prospect_rows(table):
-        click.echo(line)
+    if as_json:
+        from stepdiag.objects.observation import observation_object
+        from stepdiag.objects.writer import json_text
+
+        click.echo(json_text(observation_object(found, run, known, tried, table)))
+    else:
+        click.echo("largest standard uncertainties by the number of steps, and the mirror that they take:")
+        for line in prospect_rows(table):
+            click.echo(line)
     if path is not None:
         write_whole(path, prospect_csv(table))

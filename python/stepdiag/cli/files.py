@@ -1,18 +1,23 @@
 """Commands that create a user's first files, and that check files."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, tell
+from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, json_option, tell
 from stepdiag.io.outputs import OutputFile
+
+Result = TypeVar("Result")
 
 
 @click.command(epilog="\b\nExample: stepdiag check scenario.toml run.csv")
 @click.argument("files", nargs=-1, required=True, type=PATH, metavar="FILE...")
+@json_option
 @click.pass_context
-def check(context: click.Context, files: tuple[Path, ...]) -> None:
+def check(context: click.Context, files: tuple[Path, ...], as_json: bool) -> None:
     """Check each FILE: report its kind and whether it is valid.
 
     Accepts scenarios, heads and studies (TOML), measurements and calibrations (CSV or netCDF),
@@ -22,41 +27,59 @@ def check(context: click.Context, files: tuple[Path, ...]) -> None:
 
     Exit code 2 if a file is invalid or two do not belong together, 3 if a fit is rejected.
     """
-    from stepdiag.report.file_check import examine
+    from stepdiag.report.file_check import Finding, examine
+    from stepdiag.report.scenario_and_run import FoundTogether, adjust_run
 
-    sound, untrusted = True, False
-    found: dict[str, list[Path]] = {}
+    say = _silent if as_json else click.echo
+    found: list[tuple[Path, Finding | InvalidArgument]] = []
     for file in files:
-        try:
-            finding = examine(file)
-        except InvalidArgument as error:
-            sound = False
-            tell("error", str(error))
-            continue
-        click.echo(f"{file}: {finding.kind}: {finding.summary}")
-        for warning in finding.warnings:
-            click.echo(f"{file}: warning: {warning}")
-        found.setdefault(finding.kind, []).append(file)
-        untrusted = untrusted or finding.fit == "rejected"
-    if len(found.get("scenario", [])) == 1:
-        from stepdiag.report.scenario_and_run import adjust_run
+        finding = _found_or_refused(examine, file)
+        found.append((file, finding))
+        if isinstance(finding, Finding):
+            say(f"{file}: {finding.kind}: {finding.summary}")
+            for warning in finding.warnings:
+                say(f"{file}: warning: {warning}")
+    of_kind: dict[str, list[Path]] = {}
+    for file, finding in found:
+        if isinstance(finding, Finding):
+            of_kind.setdefault(finding.kind, []).append(file)
+    runs: list[tuple[Path, FoundTogether | InvalidArgument]] = []
+    scenario = of_kind["scenario"][0] if len(of_kind.get("scenario", [])) == 1 else None
+    if scenario is not None:
+        for run in of_kind.get("measurement", []):
+            together = _found_or_refused(adjust_run, scenario, run)
+            runs.append((run, together))
+            if isinstance(together, FoundTogether):
+                for line in together.text:
+                    say(f"{run} with {scenario}: {line}")
+    results = [result for _, result in (*found, *runs)]
+    sound = not any(isinstance(result, InvalidArgument) for result in results)
+    untrusted = any(isinstance(r, Finding | FoundTogether) and r.fit == "rejected" for r in results)
+    warnings = ["a fit is rejected: do not use results from it"] if sound and untrusted else []
+    if as_json:
+        from stepdiag.objects.check import check_object
+        from stepdiag.objects.writer import json_text
 
-        (scenario,) = found["scenario"]
-        for run in found.get("measurement", []):
-            try:
-                said, fit = adjust_run(scenario, run)
-            except InvalidArgument as error:
-                sound = False
-                tell("error", str(error))
-                continue
-            for line in said:
-                click.echo(f"{run} with {scenario}: {line}")
-            untrusted = untrusted or fit == "rejected"
+        click.echo(json_text(check_object(found, scenario, runs, warnings)))
+    for warning in warnings:
+        tell("warning", warning)
     if not sound:
         context.exit(2)
     if untrusted:
-        tell("warning", "a fit is rejected: do not use results from it")
         context.exit(NOT_TO_BE_TRUSTED)
+
+
+def _silent(line: str) -> None:
+    """Print nothing."""
+
+
+def _found_or_refused(function: Callable[..., Result], *files: Path) -> Result | InvalidArgument:
+    """What the function returns, or its refusal, which is told."""
+    try:
+        return function(*files)
+    except InvalidArgument as error:
+        tell("error", str(error))
+        return error
 
 
 @click.command(epilog="\b\nExample: stepdiag init -o machine")

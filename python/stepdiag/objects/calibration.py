@@ -130,6 +130,14 @@ class LargestAngle(_Largest):
     value_urad: float
 
 
+class LeastKnownLength(_Largest):
+    standard_uncertainty_um: float
+
+
+class LeastKnownAngle(_Largest):
+    standard_uncertainty_urad: float
+
+
 def unit_key(parameter: str) -> str:
     """The ending of keys with values of a parameter: um or urad."""
     return "um" if units_of(parameter) == "mm" else "urad"
@@ -206,7 +214,8 @@ def findings_of(findings: Sequence[Undetermined], texts: Sequence[str]) -> list[
 
 
 def largest_of(calibration: Calibration, *, uncertainty: bool = False) -> list[Any]:
-    """`LargestLength` or `LargestAngle` for each kind that has values; of values or of standard uncertainties."""
+    """The largest value of each kind that has values, or its largest standard uncertainty."""
+    what = "standard_uncertainty" if uncertainty else "value"
     largest: dict[Kind, tuple[float, str, float | None]] = {}
     entries = [
         (name, p, (u if uncertainty else value))
@@ -219,6 +228,6 @@ def largest_of(calibration: Calibration, *, uncertainty: bool = False) -> list[A
         if np.isfinite(size) and (kind not in largest or abs(size) > abs(largest[kind][0])):
             largest[kind] = size, name, position
     return [
-        {"kind": kind, "parameter": name, "position_mm": position, **measured(unit_key(name), value=size)}
+        {"kind": kind, "parameter": name, "position_mm": position, **measured(unit_key(name), **{what: size})}
         for kind, (size, name, position) in sorted(largest.items(), key=lambda item: KINDS.index(item[0]))
     ]

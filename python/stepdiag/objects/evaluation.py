@@ -21,8 +21,8 @@ from stepdiag.calibration.finding_text import combination_text, fault_text
 from stepdiag.objects.calibration import (
     CalibrationTables,
     Fit,
-    LargestAngle,
-    LargestLength,
+    LeastKnownAngle,
+    LeastKnownLength,
     Verdict,
     fit_of,
     largest_of,
@@ -223,7 +223,7 @@ class EvaluationObject(TypedDict):
     files: EvaluatedFiles
     readings: Readings
     calibration: CalibrationTables
-    largest_standard_uncertainties: list[LargestLength | LargestAngle]
+    largest_standard_uncertainties: list[LeastKnownLength | LeastKnownAngle]
     adjustment: AdjustmentPart | None
     """null: a linear method"""
     linear: LinearPart | None

@@ -14,7 +14,11 @@ from typing_extensions import is_typeddict
 
 # Name of the schema -> module and type.
 OBJECTS: Final = {
+    "check": ("stepdiag.objects.check", "CheckObject"),
+    "comparison": ("stepdiag.objects.comparison", "ComparisonObject"),
     "evaluation": ("stepdiag.objects.evaluation", "EvaluationObject"),
+    "observation": ("stepdiag.objects.observation", "ObservationObject"),
+    "report": ("stepdiag.objects.report", "ReportObject"),
 }
 
 

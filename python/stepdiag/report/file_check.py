@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from stepdiag import _core
-from stepdiag._core import InvalidArgument
+from stepdiag._core import Calibration, InvalidArgument
 from stepdiag.calibration.finding_text import frame_deviation_texts
 from stepdiag.io.data_files import is_netcdf, read_calibration, read_measurement
 from stepdiag.io.file_kind import NETCDF_BEGINS, head_of, kind_of_text
@@ -22,7 +22,12 @@ class Finding:
     kind: str
     summary: str
     warnings: tuple[str, ...] = ()
-    fit: str | None = None  # of a calibration
+    calibration: Calibration | None = None
+
+    @property
+    def fit(self) -> str | None:
+        """Verdict of a calibration."""
+        return None if self.calibration is None else self.calibration.fit
 
 
 def examine(path: Path) -> Finding:
@@ -131,7 +136,7 @@ def _calibration(path: Path) -> Finding:
     summary += f", slopes of {', '.join(slopes)} open" if slopes else " determined"
     if calibration.fit is not None:
         summary += f", fit {calibration.fit}"
-    return Finding("calibration", summary, tuple(calibration.undetermined), calibration.fit)
+    return Finding("calibration", summary, tuple(calibration.undetermined), calibration)
 
 
 def _warnings(errors: _core.ErrorMap) -> Iterator[str]:

@@ -1,12 +1,13 @@
 """Whether a scenario and a measurement belong together."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from stepdiag._core import Adjustment, InvalidArgument, Measurement
+from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement
 from stepdiag.calibration.finding_text import verdict_rows
 from stepdiag.io.data_files import read_measurement
 from stepdiag.scenario.description import adjust_scenario, read_scenario
@@ -16,19 +17,32 @@ from stepdiag.scenario.planned_readings import lost_readings
 SAME_POINT: Final = 1e-3  # mm, as in the evaluations: positions in files may have been rounded
 
 
-def adjust_run(scenario_file: Path, run_file: Path) -> tuple[list[str], str | None]:
-    """What is to say of the two, and the verdict of the adjustment: None of a sheet without readings.
+@dataclass(frozen=True)
+class FoundTogether:
+    """What a scenario and a measurement say together; no calibration of a sheet without readings."""
+
+    text: tuple[str, ...]
+    calibration: Calibration | None = None
+
+    @property
+    def fit(self) -> str | None:
+        """Verdict of the adjustment."""
+        return None if self.calibration is None else self.calibration.fit
+
+
+def adjust_run(scenario_file: Path, run_file: Path) -> FoundTogether:
+    """Adjusts a run with a scenario.
 
     Raises InvalidArgument naming both files where they do not belong together."""
     known, run = read_scenario(scenario_file).known, read_measurement(run_file)
     try:
         if any(np.isfinite(run.channels[name]).any() for name in known.signals if name in run.channels):
             adjustment = adjust_scenario(known, run)
-            return list(_said(known, run, adjustment)), adjustment.verdict.fit
+            return FoundTogether(tuple(_said(known, run, adjustment)), adjustment.calibration)
         _check_points(known, run)
     except InvalidArgument as error:
         raise InvalidArgument(f"{run_file}: does not belong to {scenario_file}: {error}") from None
-    return ["the points are those of the plan; there are no readings of this head yet"], None
+    return FoundTogether(("the points are those of the plan; there are no readings of this head yet",))
 
 
 def _said(known: Known, run: Measurement, adjustment: Adjustment) -> Iterator[str]:

@@ -12,11 +12,16 @@ from jsonschema import Draft202012Validator
 from stepdiag.objects.schemas import OBJECTS, schema_text
 
 SCHEMAS = Path(__file__).parents[3] / "docs" / "json"
-UNITS = ("um", "mm", "urad", "ppm", "um_per_h", "um_per_m")
+UNITS = ("um", "mm", "urad", "ppm", "um_per_h", "um_per_m", "minutes")
 # Numbers that have no unit.
 OF_UNIT_ONE = {
+    *("positioning", "straightness", "angle", "squareness"),  # exponents
     "chi_square_gain",
     "chi_square_probability",
+    "limit",
+    "normalised",
+    "probability",
+    "threshold",
     "uncertainties_multiplied_by",
     "variance_factor",
     "weight",

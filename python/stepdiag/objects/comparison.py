@@ -1,0 +1,126 @@
+"""The object of `stepdiag compare --json`."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from typing_extensions import TypedDict
+
+from stepdiag._core import Calibration, __version__
+from stepdiag.calibration.comparison import Comparison, Difference
+from stepdiag.objects.calibration import Fit, fit_of, unit_key
+from stepdiag.objects.writer import measured, number
+
+
+class ComparedCalibration(TypedDict):
+    file: str
+    fit: Fit
+    method: str
+    date: str
+    """ISO 8601, UTC; empty: not known"""
+    tool_mm: list[float]
+    provenance: dict[str, str]
+
+
+class _ParameterDifference(TypedDict):
+    parameter: str
+    """NAME_reversal: a reversal error"""
+    shape_only: bool
+    """true: the slope, or the constant of a reversal error, is not determined in both; it is taken off."""
+    interpolated: Literal["A", "B"] | None
+    """Which of the two has no nodes at these positions."""
+    significant: bool
+    probability: float | None
+    """That chance makes any of all values differ as much; null: uncertainties are not known."""
+    largest: int
+    """Index of the largest difference in the lists."""
+    most_significant: int | None
+    """Index of the largest normalised difference."""
+    position_mm: list[float | None]
+    """null: a squareness"""
+    normalised: list[float | None]
+    """Differences by their standard uncertainties."""
+
+
+class LengthDifference(_ParameterDifference):
+    difference_um: list[float | None]
+    """B - A"""
+    standard_uncertainty_um: list[float | None]
+
+
+class AngleDifference(_ParameterDifference):
+    difference_urad: list[float | None]
+    """B - A"""
+    standard_uncertainty_urad: list[float | None]
+
+
+class ComparisonObject(TypedDict):
+    """Result of `stepdiag compare`."""
+
+    stepdiag: str
+    format: Literal["stepdiag comparison 1"]
+    warnings: list[str]
+    a: ComparedCalibration
+    b: ComparedCalibration
+    chain: str
+    volume_mm: list[float]
+    limit: float
+    """A difference is significant up to this probability."""
+    values: int
+    """How many values are tested."""
+    threshold: float | None
+    """Normalised difference beyond which a value is significant; null: no value is tested."""
+    significant: list[str]
+    """Parameters that differ by more than chance explains."""
+    differences: list[LengthDifference | AngleDifference]
+    only_in_a: list[str]
+    only_in_b: list[str]
+    notes: list[str]
+
+
+def comparison_object(comparison: Comparison, files: tuple[Path, Path], warnings: Sequence[str]) -> ComparisonObject:
+    """How two calibrations differ."""
+    significant = filter(comparison.is_significant, comparison.differences)
+    return {
+        "stepdiag": __version__,
+        "format": "stepdiag comparison 1",
+        "warnings": list(warnings),
+        "a": _compared(comparison.a, files[0]),
+        "b": _compared(comparison.b, files[1]),
+        "chain": comparison.a.chain.name,
+        "volume_mm": comparison.a.volume.tolist(),
+        "limit": comparison.limit,
+        "values": comparison.count,
+        "threshold": comparison.threshold if comparison.count else None,
+        "significant": [difference.parameter for difference in significant],
+        "differences": [_difference(comparison, one) for one in comparison.differences],
+        "only_in_a": list(comparison.only_in_a),
+        "only_in_b": list(comparison.only_in_b),
+        "notes": list(comparison.notes),
+    }
+
+
+def _compared(calibration: Calibration, file: Path) -> ComparedCalibration:
+    return {
+        "file": str(file),
+        "fit": fit_of(calibration),
+        "method": calibration.method,
+        "date": calibration.date,
+        "tool_mm": calibration.tool.tolist(),
+        "provenance": dict(calibration.provenance),
+    }
+
+
+def _difference(comparison: Comparison, one: Difference) -> Any:
+    return {
+        "parameter": one.parameter,
+        "shape_only": one.shape_only,
+        "interpolated": one.interpolated or None,
+        "significant": comparison.is_significant(one),
+        "probability": comparison.probability(one),
+        "largest": one.largest,
+        "most_significant": one.most_significant,
+        "position_mm": list(map(number, one.position.tolist())),
+        "normalised": list(map(number, one.normalised.tolist())),
+        **measured(unit_key(one.parameter), difference=one.value, standard_uncertainty=one.standard_uncertainty),
+    }
