@@ -134,6 +134,10 @@ if TYPE_CHECKING:
     from stepdiag.linuxcnc.session import LinuxcncSession
     from stepdiag.parameters import in_report_units, kind_of
     from stepdiag.planning.observation import extents, observe
+    from stepdiag.positions.evaluation import MeasuredPositions, evaluate_positions
+    from stepdiag.positions.figures import PositionFigure
+    from stepdiag.positions.prediction import PredictedPositions, axis_line, diagonal_line, predict_positions
+    from stepdiag.positions.readings import PositionReadings, read_positions
     from stepdiag.scenario.description import (
         Scenario,
         adjust_scenario,
@@ -197,6 +201,7 @@ __all__ = [
     "LinuxcncError",
     "LinuxcncSession",
     "Machine",
+    "MeasuredPositions",
     "Measurement",
     "Misalignment",
     "ModelSource",
@@ -206,6 +211,9 @@ __all__ = [
     "Plan",
     "PlausibleLimits",
     "PointErrors",
+    "PositionFigure",
+    "PositionReadings",
+    "PredictedPositions",
     "Propagation",
     "RangeModel",
     "ReadingNoise",
@@ -243,6 +251,7 @@ __all__ = [
     "acquire",
     "adjust",
     "adjust_scenario",
+    "axis_line",
     "beam_radius",
     "compare",
     "compare_calibrations",
@@ -251,9 +260,11 @@ __all__ = [
     "derived_at_point",
     "derived_on_diagonals",
     "diagonal_errors",
+    "diagonal_line",
     "error_at_point",
     "errors_at_points",
     "evaluate",
+    "evaluate_positions",
     "evaluate_scenario",
     "evaluate_uncertainty",
     "export_calibration",
@@ -270,6 +281,7 @@ __all__ = [
     "parse_head_design",
     "parse_scenario",
     "power_inside",
+    "predict_positions",
     "propagate",
     "propagate_linear",
     "provenance_of",
@@ -280,6 +292,7 @@ __all__ = [
     "read_head",
     "read_head_design",
     "read_measurement",
+    "read_positions",
     "read_scenario",
     "read_study",
     "run_monte_carlo",
@@ -350,6 +363,21 @@ _LATER = {
     "planning.observation": (
         "extents",
         "observe",
+    ),
+    "positions.evaluation": (
+        "MeasuredPositions",
+        "evaluate_positions",
+    ),
+    "positions.figures": ("PositionFigure",),
+    "positions.prediction": (
+        "PredictedPositions",
+        "axis_line",
+        "diagonal_line",
+        "predict_positions",
+    ),
+    "positions.readings": (
+        "PositionReadings",
+        "read_positions",
     ),
     "scenario.description": (
         "Scenario",

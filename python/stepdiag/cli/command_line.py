@@ -18,6 +18,7 @@ from stepdiag.cli.head import head
 from stepdiag.cli.nc import nc
 from stepdiag.cli.options import InOrder, tell
 from stepdiag.cli.plan import plan
+from stepdiag.cli.positions import positions
 from stepdiag.cli.simulate import demo, simulate
 from stepdiag.cli.study import study
 from stepdiag.cli.uncertainty import uncertainty
@@ -48,6 +49,7 @@ COMMANDS = {
     evaluate: "Calibrate the machine from a run.",
     report: "Summarise a calibration.",
     compare: "Compare two calibrations.",
+    positions: "Evaluate or predict positioning tests (ISO 230-2, 230-6).",
     export: "Write a calibration for a controller.",
     check: "Check files, and whether a scenario and a run belong together.",
     head: "Draw and check descriptions of laser heads.",

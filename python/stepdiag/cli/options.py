@@ -1,5 +1,6 @@
 """Option types, messages and exit codes that the commands share."""
 
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -29,6 +30,23 @@ class Writes(click.ParamType):  # type: ignore[type-arg]  # click 8.1 takes none
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         return [CompletionItem(incomplete, type="file")]
+
+
+class PointInMm(click.ParamType):  # type: ignore[type-arg]
+    """Three lengths, X,Y,Z."""
+
+    name = "X,Y,Z"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if isinstance(value, tuple):
+            return value
+        try:
+            numbers = tuple(float(word) for word in value.split(","))
+        except ValueError:
+            numbers = ()
+        if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+            self.fail(f"expected X,Y,Z in mm, such as 400,300,250, got {value!r}", param, ctx)
+        return numbers
 
 
 def out_file(meaning: str, *kinds: FileKind) -> Callable[[Command], Command]:

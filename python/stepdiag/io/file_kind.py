@@ -67,6 +67,8 @@ def kind_of_text(text: str) -> str | None:
             return kind
     if {"parameter", "value"} & columns:
         return "calibration" if "method" in leading else "error map"
+    if "target_mm" in columns:
+        return "table of target readings"
     if header.startswith("{"):
         return "raw readings"
     if {"line", "point"} & columns:

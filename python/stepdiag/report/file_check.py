@@ -13,6 +13,7 @@ from stepdiag.calibration.finding_text import frame_deviation_texts
 from stepdiag.io.data_files import is_netcdf, read_calibration, read_measurement
 from stepdiag.io.file_kind import NETCDF_BEGINS, head_of, kind_of_text
 from stepdiag.io.whole_files import check_input, read_beginning
+from stepdiag.positions.readings import read_positions
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,7 @@ def examine(path: Path) -> Finding:
         "error map": _error_map,
         "raw readings": _raw,
         "measurement": _measurement,
+        "table of target readings": _positions,
         "TOML file": _toml,
     }
     kind = kind_of_text(text)
@@ -110,6 +112,12 @@ def _measurement(path: Path) -> Finding:
     lost = int(np.count_nonzero(np.any([np.isnan(values) for values in channels.values()], axis=0))) if channels else 0
     summary = f"{len(measurement)} points on {len(set(measurement.line))} lines, {', '.join(channels)}"
     return Finding("measurement", summary, (f"{lost} points lack a reading",) if lost else ())
+
+
+def _positions(path: Path) -> Finding:
+    readings = read_positions(path)
+    summary = f"{len(readings.deviations)} readings of {len(readings.targets)} targets, {readings.lost} lost"
+    return Finding("table of target readings", summary)
 
 
 def _raw(path: Path) -> Finding:

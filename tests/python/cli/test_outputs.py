@@ -70,7 +70,13 @@ INPUTS = {
     *{(name, "scenario") for name in ("simulate", "evaluate", "observe", "plan", "uncertainty", "nc")},
     *{("acquire", "scenario"), ("acquire", "from_raw"), ("twin", "scenario"), ("init", "scenario"), ("study", "file")},
     *{("evaluate", "run"), ("report", "calibration"), ("compare", "a"), ("compare", "b"), ("export", "calibration")},
-    *{("check", "files"), ("head show", "name"), ("head check", "name"), ("head sensitivity", "name")},
+    *{
+        ("positions", "file"),
+        ("check", "files"),
+        ("head show", "name"),
+        ("head check", "name"),
+        ("head sensitivity", "name"),
+    },
 }
 
 

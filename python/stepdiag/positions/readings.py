@@ -1,0 +1,134 @@
+"""Repeated readings of targets on an axis or a diagonal, and their CSV file (docs/positions.md)."""
+
+import csv
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Final
+
+from stepdiag._core import InvalidArgument
+from stepdiag.io.file_kind import head_of
+from stepdiag.io.whole_files import read_text
+from stepdiag.units import MICROMETRE
+
+_REQUIRED: Final = ("target_mm", "direction", "cycle")
+_VALUES: Final = ("deviation_um", "position_mm")
+# Targets that differ by less are one target, mm.
+_ROUNDING: Final = 1e-6
+
+
+@dataclass(frozen=True)
+class PositionReadings:
+    """Deviations, actual less target position (mm), of targets approached repeatedly on one line.
+
+    `deviations`: (target in mm, direction "+" or "-", cycle) -> deviation. A lost reading is absent. `targets`: of all
+    rows, ascending; also those without any reading. Raises InvalidArgument for fewer than two targets, and for
+    numbers that are not finite."""
+
+    targets: tuple[float, ...]
+    deviations: Mapping[tuple[float, str, int], float]
+    line: str = ""  # what was measured, in words
+    lost: int = field(default=0)  # rows whose reading is missing
+
+    def __post_init__(self) -> None:
+        if len(self.targets) < 2 or list(self.targets) != sorted(set(self.targets)):
+            raise InvalidArgument(f"targets: expected two or more different ones, ascending, got {self.targets}")
+        for (target, direction, cycle), deviation in self.deviations.items():
+            if target not in self.targets or direction not in ("+", "-") or not math.isfinite(deviation):
+                raise InvalidArgument(
+                    "deviations: expected a finite deviation at one of the targets, in direction + or -, "
+                    f"got {deviation} at {target}, direction {direction!r}, cycle {cycle}"
+                )
+
+    def at(self, target: float, direction: str) -> list[float]:
+        """The deviations of a target in one direction, by cycle."""
+        return [
+            self.deviations[key] for key in sorted(key for key in self.deviations if key[:2] == (target, direction))
+        ]
+
+    @property
+    def cycles(self) -> tuple[int, ...]:
+        """Numbers of the cycles that have a reading."""
+        return tuple(sorted({cycle for _, _, cycle in self.deviations}))
+
+    @property
+    def directions(self) -> tuple[str, ...]:
+        """Directions that have a reading: "+", "-"."""
+        return tuple(sorted({direction for _, direction, _ in self.deviations}))
+
+
+def read_positions(path: str | PathLike[str]) -> PositionReadings:
+    """Read repeated readings of targets (CSV).
+
+    Columns, in any order: target_mm, direction (+ or -), cycle (integer), and either deviation_um (actual less target)
+    or position_mm (actual). An empty last field is a lost reading. Raises InvalidArgument naming file and line."""
+    text = read_text(Path(path))
+    comments, _ = head_of(text)
+    leading = dict(re.findall(r"(?m)^#\s*(\w+)\s*=\s*(.*?)\s*$", "\n".join(comments)))
+    rows = _rows(text, str(path))
+    at_line, header = next(rows, (0, []))
+    if not header:
+        raise InvalidArgument(f"{path}: the file has no rows")
+    columns = [name.strip() for name in header]
+    value_column = _value_column(columns, f"{path}, line {at_line}")
+    targets: list[float] = []
+    deviations: dict[tuple[float, str, int], float] = {}
+    keys: set[tuple[float, str, int]] = set()
+    for at_line, fields in rows:
+        where = f"{path}, line {at_line}"
+        if len(fields) != len(columns):
+            raise InvalidArgument(f"{where}: expected {len(columns)} fields, got {len(fields)}")
+        row = {name: field.strip() for name, field in zip(columns, fields, strict=True)}
+        target = _number(row["target_mm"], f"{where}: target_mm")
+        target = next((known for known in targets if abs(known - target) < _ROUNDING), target)
+        if row["direction"] not in ("+", "-"):
+            raise InvalidArgument(f"{where}: direction: expected + or -, got {row['direction']!r}")
+        if not re.fullmatch(r"\d{1,9}", row["cycle"]):
+            raise InvalidArgument(f"{where}: cycle: expected a whole number, got {row['cycle']!r}")
+        key = target, row["direction"], int(row["cycle"])
+        if key in keys:
+            raise InvalidArgument(f"{where}: target {target:g} mm, direction {key[1]}, cycle {key[2]} is given twice")
+        keys.add(key)
+        if target not in targets:
+            targets.append(target)
+        if row[value_column]:
+            value = _number(row[value_column], f"{where}: {value_column}")
+            deviations[key] = value * MICROMETRE if value_column == "deviation_um" else value - target
+    try:
+        return PositionReadings(
+            tuple(sorted(targets)), deviations, leading.get("line", ""), len(keys) - len(deviations)
+        )
+    except InvalidArgument as error:
+        raise InvalidArgument(f"{path}: {error}") from None
+
+
+def _rows(text: str, path: str) -> Iterator[tuple[int, list[str]]]:
+    """Line numbers and fields; comments and empty lines left out."""
+    try:
+        for line, words in enumerate(csv.reader(text.splitlines(), strict=True), start=1):
+            if words and not words[0].lstrip().startswith("#"):
+                yield line, words
+    except csv.Error as error:
+        raise InvalidArgument(f"{path}: expected CSV: {error}") from None
+
+
+def _value_column(columns: list[str], where: str) -> str:
+    """The column that holds the readings; raises InvalidArgument for columns other than those of the format."""
+    expected = f"expected the columns {', '.join(_REQUIRED)} and one of {' and '.join(_VALUES)}"
+    values: list[str] = [name for name in _VALUES if name in columns]
+    if len(values) != 1 or sorted(columns) != sorted([*_REQUIRED, *values]):
+        raise InvalidArgument(f"{where}: {expected}, got {', '.join(columns)}")
+    return values[0]
+
+
+def _number(text: str, where: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InvalidArgument(f"{where}: expected a number, got {text!r}")
+    return value
