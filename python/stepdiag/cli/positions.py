@@ -6,7 +6,7 @@ from typing import Final
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, PointInMm, tell, tell_fit
+from stepdiag.cli.options import PATH, PointInMm, fit_warnings, json_option, tell, tell_fit
 
 Point = tuple[float, float, float]
 HOME: Final = (0.0, 0.0, 0.0)
@@ -29,6 +29,7 @@ Examples:
 @click.option("--to", "end", type=PointInMm(), help="... to this one.")
 @click.option("--points", type=int, metavar="N", help="Targets of a line.  [default: nodes of the axis with the most]")
 @click.option("--tool", type=PointInMm(), help="Tool offset, mm.  [default: the calibration's]")
+@json_option
 @click.pass_context
 def positions(
     context: click.Context,
@@ -40,6 +41,7 @@ def positions(
     end: Point | None,
     points: int | None,
     tool: Point | None,
+    as_json: bool,
 ) -> None:
     """Evaluate repeated readings of targets, or predict what they would show.
 
@@ -63,7 +65,7 @@ def positions(
         for option, value in given.items():
             if value is not None:
                 raise InvalidArgument(f"--{option}: goes with a calibration, and {file} is not one")
-        _evaluate(file)
+        _evaluate(file, as_json)
         return
     if (start is None) != (end is None):
         raise InvalidArgument("--from and --to: go together")
@@ -82,12 +84,18 @@ def positions(
         lines = {name: axis_line(calibration, name) for name in "XYZ"}
         lines |= {name: diagonal_line(calibration, name) for name in BODY_DIAGONALS}
     predicted = {name: predict_positions(calibration, *ends, points=points, tool=tool) for name, ends in lines.items()}
-    for text in predicted_report(calibration, predicted):
-        click.echo(text)
+    if as_json:
+        from stepdiag.objects.positions import predicted_object
+        from stepdiag.objects.writer import json_text
+
+        click.echo(json_text(predicted_object(calibration, predicted, file, fit_warnings(file, calibration.fit))))
+    else:
+        for text in predicted_report(calibration, predicted):
+            click.echo(text)
     tell_fit(context, file, calibration.fit)
 
 
-def _evaluate(file: Path) -> None:
+def _evaluate(file: Path, as_json: bool) -> None:
     from stepdiag.positions.evaluation import evaluate_positions
     from stepdiag.positions.readings import read_positions
     from stepdiag.report.positions import measured_report, measured_warnings
@@ -97,7 +105,14 @@ def _evaluate(file: Path) -> None:
         result = evaluate_positions(readings)
     except InvalidArgument as error:
         raise InvalidArgument(f"{file}: {error}") from None
-    for text in measured_report(result):
-        click.echo(text)
-    for warning in measured_warnings(result):
-        tell("warning", f"{file}: {warning}")
+    warnings = [f"{file}: {warning}" for warning in measured_warnings(result)]
+    if as_json:
+        from stepdiag.objects.positions import measured_object
+        from stepdiag.objects.writer import json_text
+
+        click.echo(json_text(measured_object(result, file, warnings)))
+    else:
+        for text in measured_report(result):
+            click.echo(text)
+    for warning in warnings:
+        tell("warning", warning)

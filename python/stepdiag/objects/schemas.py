@@ -18,6 +18,7 @@ OBJECTS: Final = {
     "comparison": ("stepdiag.objects.comparison", "ComparisonObject"),
     "evaluation": ("stepdiag.objects.evaluation", "EvaluationObject"),
     "observation": ("stepdiag.objects.observation", "ObservationObject"),
+    "positions": ("stepdiag.objects.positions", "PositionsObject"),
     "report": ("stepdiag.objects.report", "ReportObject"),
 }
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from calibrations import TOOL, calibrate, simulate
+from json_objects import printed
 from places import DATA
 from usual import CHAIN, small_plan
 
@@ -122,3 +123,50 @@ def test_mistakes_with_a_calibration_are_named(
 def test_readings_are_known_to_check(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(READINGS)]) == 0
     assert "table of target readings: 50 readings of 5 targets, 0 lost" in capsys.readouterr().out
+
+
+def test_object_of_readings_has_the_figures_of_the_result(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = printed("positions", capsys, "positions", str(READINGS))
+    result = sd.evaluate_positions(sd.read_positions(READINGS))
+    assert found["predicted"] is None
+    own = found["measured"]
+    assert (own["line"], own["readings"], own["lost"], own["cycles"]) == (
+        "axis of a stepper stage",
+        50,
+        0,
+        [1, 2, 3, 4, 5],
+    )
+    assert own["figures"].keys() == result.figures.keys()
+    for name, figure in result.figures.items():
+        # The decimal point is moved exactly; multiplying rounds.
+        assert own["figures"][name]["value_um"] == pytest.approx(figure.value * 1e3, rel=1e-15)
+        assert own["figures"][name]["at_mm"] == list(figure.at)
+    assert [one["mean_um"] for one in own["up"]] == pytest.approx([s.mean * 1e3 for s in result.up], rel=1e-15)
+    few = "target_mm,direction,cycle,deviation_um\n0,+,1,0\n0,+,2,1\n9,+,1,2\n9,+,2,0\n0,-,1,3\n"
+    Path("few.csv").write_text(few)
+    own = printed("positions", capsys, "positions", "few.csv")["measured"]
+    assert own["left_out"] == [
+        {"target_mm": 0.0, "direction": "-", "readings": 1},
+        {"target_mm": 9.0, "direction": "-", "readings": 0},
+    ]
+
+
+def test_object_of_a_calibration_has_its_lines(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = simulate(1, repeats=2, backward=True)
+    calibration = sd.evaluate(run, small_plan(), sd.Head(), CHAIN, TOOL, full_covariance=True)
+    sd.write_calibration(calibration, "c.nc")
+    found = printed("positions", capsys, "positions", "c.nc")
+    assert found["measured"] is None
+    assert [line["name"] for line in found["predicted"]["lines"]] == ["X", "Y", "Z", "ppp", "npp", "pnp", "nnp"]
+    expected = sd.predict_positions(calibration, *sd.axis_line(calibration, "X"))
+    line = found["predicted"]["lines"][0]
+    assert line["up_um"] == pytest.approx((expected.up * 1e3).tolist(), rel=1e-15)
+    assert line["figures"]["B"]["value_um"] == pytest.approx(expected.figures["B"].value * 1e3, rel=1e-15)
+    interval = expected.figures["E_up"].interval
+    assert interval is not None
+    assert line["figures"]["E_up"]["interval_um"] == pytest.approx([end * 1e3 for end in interval], rel=1e-15)
+    diagonal = found["predicted"]["lines"][3]
+    assert diagonal["reversal_um"] == [None] * 6
+    assert diagonal["reasons"]
+    sd.write_calibration(calibration.judged("rejected"), "bad.nc")
+    assert len(printed("positions", capsys, "positions", "bad.nc", status=3)["warnings"]) == 1
