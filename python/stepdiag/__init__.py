@@ -104,7 +104,7 @@ from stepdiag._core import (
     word_reasons_with,
 )
 from stepdiag.calibration.finding_text import reason_texts, undetermined_text
-from stepdiag.io.to_xarray import attach
+from stepdiag.io import displays, to_xarray
 
 if TYPE_CHECKING:
     from stepdiag.acquisition.acquire import acquire
@@ -408,7 +408,8 @@ _LATER = {
 }
 _MODULE_OF = {name: module for module, names in _LATER.items() for name in names}
 
-attach()
+to_xarray.attach()
+displays.attach()
 word_findings_with(undetermined_text)  # the extension's findings are worded here
 word_reasons_with(reason_texts)
 

@@ -6,6 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import os
+import stepdiag.io.displays
 import typing
 import xarray
 __all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Fault', 'FaultClass', 'FaultControl', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'trace_beams', 'uncertain_quantities', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with']
@@ -44,6 +45,8 @@ class Chain:
         ...
     def __str__(self) -> str:
         ...
+    def _repr_html_(self) -> str:
+        ...
     def carries_workpiece(self, axis: str) -> bool:
         """
         Whether the axis "X", "Y" or "Z" stands before the bed.
@@ -59,6 +62,10 @@ class ErrorMap:
         """
         functions: name -> (position, value), one-dimensional and of one length, positions ascending. negative_functions: the same of the - direction, where it has others. Raises InvalidArgument.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     def frame_deviations(self, volume: numpy.typing.ArrayLike) -> list[tuple[str, float, float]]:
         """
         Where the map breaks the frame choice (0 at home, straightness 0 at both ends of travel, approached in + direction): (function, position in mm, value in mm or rad) each.
@@ -92,6 +99,10 @@ class Machine:
     A three-axis machine: chain, the 21 errors, tool offset (mm).
     """
     def __init__(self, chain: Chain | str, errors: ErrorMap = ..., tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
         ...
     def error(self, commanded: numpy.typing.ArrayLike, approach: str = '+++') -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -158,6 +169,10 @@ class Plan:
         """
         volume: edges in mm. steps: per axis. order: in which a step moves the axes, "XYZ" ...; of several, run r goes in the order r modulo their number. Raises InvalidArgument for an unknown or doubled line, a volume without extent, steps outside 1 .. 2000.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     def frame(self, line: str) -> numpy.typing.NDArray[numpy.float64]:
         """
         Local frame of a line in machine coordinates, (3, 3), columns local x, y, z (eq. 2 of the paper).
@@ -269,6 +284,10 @@ class Measurement:
         """
     def __len__(self) -> int:
         ...
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     def to_xarray(self) -> xarray.Dataset:
         """
         The measurement as a labelled table (xarray.Dataset).
@@ -342,6 +361,10 @@ class HeadBody:
         """
         Wedge: a plate whose face at +z is turned by `angle` (rad) about y, thicker at +x.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def material(self) -> str | float:
         ...
@@ -368,6 +391,10 @@ class HeadCalibration:
     """
     What evaluators know of a head: the constants that its readings are reduced with, mm.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def beam_offsets(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
@@ -394,6 +421,10 @@ class HeadBeam:
         """
         A conventional laser whose beam comes to a sensor; `housing`: edge of the square around it that stops light.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def is_interferometer(self) -> bool:
         ...
@@ -437,6 +468,10 @@ class SpotSensor:
         """
         A lateral-effect position sensing device.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def name(self) -> str:
         ...
@@ -457,6 +492,10 @@ class HeadDesign:
         """
         Raises InvalidArgument for names given twice, a layout without its beams or sensor, components that overlap or touch, a beam that does not come back from a mirror square to it.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def beams(self) -> list[HeadBeam]:
         ...
@@ -485,6 +524,10 @@ class Head:
         """
         mirror: (width, height); none: as large as the plan needs. Raises InvalidArgument for lengths that are not positive and for beams on one line.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def aperture(self) -> float:
         ...
@@ -527,6 +570,10 @@ class GaussianMode:
         """
         Raises InvalidArgument for what is not positive or not finite.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def rayleigh_length(self) -> float:
         """
@@ -549,6 +596,10 @@ class ReturnedBeam:
         """
         position: (2,), where the axis meets the collimator's plane, mm; direction: (3,), unit, z < 0; optical_length and reduced_length: sums of n t and of t / n out and back, mm. Raises InvalidArgument naming what makes no sense.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def direction(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
@@ -569,6 +620,10 @@ class Interferometer:
         """
         aperture: edge of the square that takes the beam back, mm; acceptance: largest angle of the returned beam, rad; least_coupling: share of the light; resolution, periodic_amplitude, dead_path: mm; index_error: relative; reading_model: "chief_ray" or "coupled_mode". Raises InvalidArgument naming the value.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def acceptance(self) -> float:
         ...
@@ -601,6 +656,10 @@ class BeamSpot:
         """
         Raises InvalidArgument for what is not finite, no radius or a negative power.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def centre(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
@@ -618,6 +677,10 @@ class Camera:
         """
         pixel: pitch, mm; electrons: of a whole spot of power 1; background (a pixel), read_noise (standard deviation), full_well: electrons; bits: of the converter over the full well, 0: not quantised; centroid: "gaussian_fit" or "centre_of_gravity", the latter of what exceeds the threshold, a share of the brightest pixel above background. Raises InvalidArgument naming the value.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def background(self) -> float:
         ...
@@ -659,6 +722,10 @@ class LateralEffect:
         """
         size: (2,) of the active area, mm; noise: standard deviation at full power, mm, growing as 1 / power; resolution: mm; least_power: share of the source's power, below which a reading is lost. Raises InvalidArgument naming the value.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def least_power(self) -> float:
         ...
@@ -677,6 +744,10 @@ class BeamSegment:
     """
     A straight piece of a beam's way, in the sensor frame, mm.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def arrives(self) -> str | None:
         """
@@ -717,6 +788,10 @@ class Sensitivity:
     """
     First derivatives of a head's readings by one parameter: signals (n,) in mm by its unit, and reading (3,): distance (mm), alpha and beta (rad).
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def component(self) -> str:
         ...
@@ -740,6 +815,10 @@ class Misalignment:
         """
         Raises InvalidArgument for what is no pair of finite numbers.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def beam_constants(self) -> list[float]:
         ...
@@ -775,6 +854,10 @@ class Noise:
         """
         Raises InvalidArgument for a deviation that is negative or not finite, and for a seed outside 0 .. 2^64 - 1.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def common(self) -> float:
         ...
@@ -842,6 +925,10 @@ class ReadingUncertainty:
         """
         Raises InvalidArgument for what is not within 1e-12 .. 1e6.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def distance(self) -> float:
         ...
@@ -859,6 +946,10 @@ class PlausibleLimits:
         """
         Raises InvalidArgument for limits that are not positive.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def positioning(self) -> float:
         ...
@@ -877,6 +968,10 @@ class Undetermined:
         ...
     @staticmethod
     def reasons() -> list[str]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
         ...
     @property
     def component(self) -> int:
@@ -942,10 +1037,27 @@ class Calibration:
         """
         The keys that a provenance may have.
         """
+    def __contains__(self, parameter: object) -> bool:
+        ...
+    def __getitem__(self, parameter: str) -> stepdiag.io.displays.ParameterValues:
+        """
+        Return position, value and standard uncertainty of a parameter, such as EXX, C0Y or EXX_reversal; mm, rad.
+        
+            Of a function these are arrays (n,), of a squareness numbers without a position. Raises KeyError naming the
+            parameters that there are.
+        """
     def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None, provenance: collections.abc.Mapping[str, str] = {}) -> None:
         """
         A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises InvalidArgument naming the parameter for what is none: nodes that do not ascend, values that are not finite, a covariance that is not one of these values.
         """
+    def __iter__(self) -> collections.abc.Iterator[str]:
+        """
+        Names of the parameters that there are: functions, reversal errors, squarenesses.
+        """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     def dated(self, date: str) -> Calibration:
         """
         The same calibration with this date. Raises InvalidArgument for more than one line.
@@ -1081,6 +1193,10 @@ class Smoothness:
     """
     def __init__(self, *, translation: typing.SupportsFloat | typing.SupportsIndex = 0.0, rotation: typing.SupportsFloat | typing.SupportsIndex = 0.0, cross_validated: bool = False) -> None:
         ...
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def cross_validated(self) -> bool:
         ...
@@ -1141,6 +1257,10 @@ class SetupEstimate:
     """
     One unknown of a line's set-up as it was found; rad, mm, 1, mm/s.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def component(self) -> int:
         """
@@ -1172,6 +1292,10 @@ class Outlier:
     """
     A reading that was left out.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def channel(self) -> str:
         ...
@@ -1206,6 +1330,10 @@ class Fault:
     """
     A fault that explains the readings, if it is the one.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def channel(self) -> str:
         ...
@@ -1245,6 +1373,10 @@ class FaultClass:
     """
     Faults of which the readings do not tell which one happened.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def corrected(self) -> bool:
         """
@@ -1282,6 +1414,10 @@ class FitReason:
     """
     Why a fit is not accepted, or what its residuals have in common.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def alternative(self) -> bool:
         """
@@ -1342,6 +1478,10 @@ class Verdict:
     """
     Whether the readings of an adjustment agree with each other, with their uncertainties and with the priors. It does not see what the parameters absorb: a wrong wavelength, chain or tool.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def fit(self) -> str:
         """
@@ -1354,6 +1494,10 @@ class KnownCombination:
     """
     A sum of unknowns that are not determined one by one: of slopes of positioning errors and straightnesses, or of two unknowns of one set-up.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def component(self) -> int:
         """
@@ -1386,6 +1530,10 @@ class FaultControl:
     """
     Which faults of one kind the readings control (reliability, W. Baarda 1968). One is found with a probability of 99 % where it is 7.6 times as large as the standard uncertainty of its size, and told from another one where that makes chi-square larger by 25. Twins are not told apart at any size: their effects have a correlation of 0.999 and more, but the calibration differs.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def channel(self) -> str:
         """
@@ -1435,6 +1583,10 @@ class Adjustment:
     """
     What an adjustment found: calibration, set-ups, and how the readings fit.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def calibration(self) -> Calibration:
         ...
@@ -1509,6 +1661,8 @@ class CalibrationEntry:
     A value of a calibration's tables.
     """
     def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
         ...
     @property
     def parameter(self) -> str:
@@ -1597,6 +1751,10 @@ class Distribution:
         """
         degrees_of_freedom of a kind other than t: those of its standard uncertainty (GUM G.4). Raises InvalidArgument for a spread below 0, an edge not between 0 and the half width, degrees of freedom not above 0 (t: 2).
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def degrees_of_freedom(self) -> float:
         ...
@@ -1752,6 +1910,10 @@ class MonteCarloResult:
     """
     Figures of every output. Native units.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def covariance(self) -> numpy.typing.NDArray[numpy.float64] | None:
         ...
@@ -1928,6 +2090,10 @@ class UncertainInput:
         """
         Raises InvalidArgument for a quantity that is not known.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def component(self) -> int:
         ...
@@ -1954,6 +2120,10 @@ class ReadingNoise:
         """
         Raises InvalidArgument for a quantity that is not known.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def channel(self) -> str:
         ...
@@ -1977,6 +2147,10 @@ class UncertainInputs:
         """
         correlations: pairs of indices of normal inputs and their correlation matrix. Raises InvalidArgument for an input given twice, a line, part or component that its quantity does not have, a matrix that is no correlation.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def correlations(self) -> list[tuple[list[int], numpy.typing.NDArray[numpy.float64]]]:
         ...
@@ -2011,6 +2185,10 @@ class ErrorAtPoint:
     """
     The deviations X, Y, Z (mm) of the functional point and A, B, C (rad) of the tool at a commanded point, to first order, with covariance from the calibration's. NaN where the calibration lacks something that acts there.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def covariance(self) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -2045,6 +2223,10 @@ class DiagonalErrors:
     """
     Along a body diagonal (ISO 230-6): how much further than commanded the functional point is from where the diagonal begins.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def covariance(self) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -2087,6 +2269,10 @@ class VolumetricAccuracy:
     """
     ISO 230-1's V_XYZ: the ranges over the volume of the deviations X, Y, Z (mm) of the functional point and A, B, C (rad) of the tool, and the ranges of the four body diagonals' errors (mm); in the order of `names`. A range is not linear in the parameters and noise makes it larger: `bias` says about how much larger `value` is than the true range; `interval` takes that off.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def bias(self) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -2198,6 +2384,10 @@ class VirtualCalibrations(SampleModel):
         """
         simulation: SimulationOptions as of simulate(); of their noise nothing is used, it is among the inputs. calibration_heads: what the evaluation knows the heads as (none: the heads). method: "conventional", "enhanced", "adjustment" or "one_step". adjustment: AdjustmentOptions as of BatchEvaluator. The fields of both may be given by name instead. verified_share: of the samples, in each of which one reading of every line is traced again. derived: as derived_at_point gives them, or (name, unit, coefficients of the values of the tables). Raises InvalidArgument.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     def evaluate_at(self, deviations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
         (outputs, n) for given deviations (inputs, n) of the inputs, without reading noise. Raises InvalidArgument.
@@ -2230,6 +2420,10 @@ class Propagation:
     """
     Uncertainty of outputs by the law of propagation (GUM, JCGM 100), native units; arrays in the order of `outputs`.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     def expanded(self, coverage: typing.SupportsFloat | typing.SupportsIndex = 0.95) -> numpy.typing.NDArray[numpy.float64]:
         """
         (m,) U = t_p u, of degrees of freedom truncated to whole ones (GUM G.4.1, G.6.4). Raises InvalidArgument for a probability outside 0 .. 1.
@@ -2316,6 +2510,10 @@ class Validation:
     """
     Propagation beside the Monte Carlo method (JCGM 101, 8), arrays in the order of `outputs`, native units: validated where neither end of y -+ U is further than delta from that of the symmetric coverage interval.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def coverage(self) -> float:
         ...
@@ -2376,6 +2574,10 @@ class Compensator:
         """
         table: a file, a Calibration or an ErrorMap that carries chain, volume and tool. chain: the controller's. origin: home in the controller's coordinates. outside the calibrated volume: "hold" the error of its nearest point, go on "linear" up to `margin`, or "refuse". largest_correction: command and forward shorten a longer error to this length. approach: "mean", "positive" or "negative", of a table with reversal. accept_rejected: take a table whose fit was rejected. Warns (UserWarning) of a fit that is not accepted. Raises InvalidArgument for a table or options that a controller should not use.
         """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     def command(self, targets: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
         Where the axes must stand (n, 3), mm, for the tool to be at the targets (n, 3).

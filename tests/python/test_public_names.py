@@ -35,8 +35,9 @@ def test_type_checkers_see_what_is_loaded_later() -> None:
     later = imported(for_checkers.body)
     assert later == sd._MODULE_OF
     assert set(sd.__all__) == {*later, *imported(TREE.body)} - {
-        "attach",
+        "displays",
         "reason_texts",
+        "to_xarray",
         "undetermined_text",
         "word_findings_with",
         "word_reasons_with",

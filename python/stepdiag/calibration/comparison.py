@@ -11,6 +11,9 @@ import numpy.typing as npt
 
 from stepdiag._core import Calibration, InvalidArgument
 from stepdiag.calibration.table_sums import FloatArray, TableValues, Term
+from stepdiag.display import Displayed, Facts, lengths_text
+from stepdiag.parameters import units_of
+from stepdiag.units import report_value
 
 # Lengths that differ by less were rounded on the way, mm.
 _ROUNDING: Final = 1e-6
@@ -20,8 +23,8 @@ _NO_DIFFERENCE: Final = 1e-15
 BoolArray = npt.NDArray[np.bool_]
 
 
-@dataclass(frozen=True, eq=False)
-class Difference:
+@dataclass(frozen=True, eq=False, repr=False)
+class Difference(Displayed):
     """B - A of one parameter: arrays (n,) over its common positions, mm or rad; one value for a squareness."""
 
     parameter: str  # NAME_reversal for a reversal error
@@ -62,9 +65,21 @@ class Difference:
             return None
         return int(np.argmax(np.where(self.testable, np.abs(self.normalised), -1.0)))
 
+    def _facts(self) -> Facts:
+        k, worst = self.largest, self.most_significant
+        size, unit = report_value(units_of(self.parameter), float(self.value[k]))
+        place = "" if np.isnan(self.position[k]) else f" at {self.position[k]:g} mm"
+        normalised = "not known" if worst is None else f"{self.normalised[worst]:.3g} u"
+        return [
+            ("parameter", self.parameter + (" (shape)" if self.shape_only else "")),
+            ("largest B - A", f"{size:.4g} {unit}{place}"),
+            ("most significant B - A", normalised),
+            ("values", str(len(self.value))),
+        ]
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Displayed):
     """What two calibrations A and B say of the same parameters, and what only one of them knows."""
 
     a: Calibration
@@ -98,6 +113,20 @@ class Comparison:
         """Whether any of its values differs by more than chance would explain at the limit."""
         probability = self.probability(difference)
         return probability is not None and probability <= self.limit
+
+    def _facts(self) -> Facts:
+        significant = [difference.parameter for difference in self.differences if self.is_significant(difference)]
+        text = ", ".join(significant) or "none"
+        facts = [
+            ("significant", text if self.count else "not known: no standard uncertainties"),
+            ("compared", f"{len(self.differences)} parameters, {self.count} values"),
+            ("machine", f"{self.a.chain}, {lengths_text(self.a.volume)}"),
+        ]
+        for name, one in (("A", self.a), ("B", self.b)):
+            facts.append((name, f"{one.method or 'method not known'}, fit {one.fit or 'not known'}, {one.date}"))
+        facts += [("only in A", ", ".join(self.only_in_a))] if self.only_in_a else []
+        facts += [("only in B", ", ".join(self.only_in_b))] if self.only_in_b else []
+        return [*facts, *((d.parameter, d._facts()[1][1]) for d in self.differences)]
 
 
 def compare_calibrations(a: Calibration, b: Calibration, *, limit: float = 0.05) -> Comparison:

@@ -39,18 +39,27 @@ def largest_deviations(calibration: Calibration, truth: ErrorMap) -> dict[Kind, 
     return {kind: largest[kind] for kind in KINDS if kind in largest}
 
 
+def largest_values(calibration: Calibration) -> dict[Kind, tuple[float, str]]:
+    """The largest value of each kind, mm or rad, and the parameter and place that has it."""
+    return _largest(calibration, 0)
+
+
 def largest_uncertainties(calibration: Calibration) -> dict[Kind, tuple[float, str]]:
     """The largest standard uncertainty of each kind, mm or rad, and the parameter and place that has it."""
+    return _largest(calibration, 1)
+
+
+def _largest(calibration: Calibration, column: int) -> dict[Kind, tuple[float, str]]:
     largest: dict[Kind, tuple[float, str]] = {}
 
-    def note(name: str, uncertainty: float, where: str) -> None:
+    def note(name: str, size: float, where: str) -> None:
         kind = kind_of(name)
-        if np.isfinite(uncertainty) and uncertainty > largest.get(kind, (-1.0, ""))[0]:
-            largest[kind] = uncertainty, f"{name}{where}"
+        if np.isfinite(size) and (kind not in largest or abs(size) > abs(largest[kind][0])):
+            largest[kind] = size, f"{name}{where}"
 
-    for name, (position, _, uncertainty) in calibration.functions.items():
-        worst = int(np.argmax(uncertainty))
-        note(name, float(uncertainty[worst]), f" at {position[worst]:g} mm")
-    for name, (_, angle_uncertainty) in calibration.squareness.items():
-        note(name, angle_uncertainty, "")
+    for name, (position, *columns) in calibration.functions.items():
+        worst = int(np.argmax(np.abs(columns[column])))
+        note(name, float(columns[column][worst]), f" at {position[worst]:g} mm")
+    for name, pair in calibration.squareness.items():
+        note(name, pair[column], "")
     return {kind: largest[kind] for kind in KINDS if kind in largest}

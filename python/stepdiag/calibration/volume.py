@@ -16,6 +16,7 @@ import numpy.typing as npt
 from stepdiag import _core
 from stepdiag._core import Calibration, InvalidArgument, Machine
 from stepdiag.calibration.table_sums import FloatArray
+from stepdiag.display import Displayed, Facts, point_text
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 
 Verdict = Literal["within", "not within", "undecided"]
@@ -48,8 +49,8 @@ class VolumeFigure:
     interval: Interval | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class VolumeErrors:
+@dataclass(frozen=True, eq=False, repr=False)
+class VolumeErrors(Displayed):
     """Errors of the functional point and tilts of the tool over a box of commanded positions."""
 
     source: Calibration | Machine
@@ -80,6 +81,21 @@ class VolumeErrors:
         """Number of positions of X, Y, Z."""
         x, y, z = (len(positions) for positions in self.grid)
         return x, y, z
+
+    def _facts(self) -> Facts:
+        low, high = self.largest_interval or (float("nan"), float("nan"))
+        interval = "" if self.largest_interval is None else f", 95 % interval {low * 1e3:.3g} to {high * 1e3:.3g} µm"
+        facts = [("verdict", f"{self.verdict}, limit {self.limit * 1e3:g} µm")] if self.verdict and self.limit else []
+        facts += [("no verdict because", self.no_verdict_because)] if self.no_verdict_because else []
+        facts += [
+            ("largest", f"{self.largest * 1e3:.4g} µm at {point_text(self.largest_at)}{interval}"),
+            ("rms", f"{self.rms * 1e3:.4g} µm"),
+            ("fit", self.fit or "not known"),
+            ("box", ", ".join(f"{a:g} to {b:g}" for a, b in zip(*self.box, strict=True)) + " mm"),
+        ]
+        facts += [(f"range of {name}", f"{figure.value * 1e3:.4g} µm") for name, figure in self.ranges.items()]
+        facts += [(f"largest tilt {name}", f"{figure.value * 1e6:.4g} µrad") for name, figure in self.tilts.items()]
+        return [*facts, *((f"missing in {name}", ", ".join(which)) for name, which in self.missing.items() if which)]
 
 
 def volume_errors(

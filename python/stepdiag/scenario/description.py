@@ -17,6 +17,7 @@ from stepdiag.config.key_errors import models_of, suggest
 from stepdiag.config.key_types import narrowed
 from stepdiag.config.scenario_keys import SECTIONS_BY_LINE, TABLES_BY_NAME, KnownKeys, ScenarioKeys, TruthKeys
 from stepdiag.config.toml_text import check_keys, located, parse_toml
+from stepdiag.display import Displayed, Facts
 from stepdiag.io.whole_files import read_text
 from stepdiag.scenario.heads import describe_heads, make_heads, of_run
 from stepdiag.scenario.known import Known, known_of, runs_of
@@ -24,8 +25,8 @@ from stepdiag.scenario.planned_readings import only
 from stepdiag.scenario.truth import Truth, errors_of, truth_of
 
 
-@dataclass(frozen=True, eq=False)
-class Scenario:
+@dataclass(frozen=True, eq=False, repr=False)
+class Scenario(Displayed):
     """What a scenario file says. Make one with `read_scenario`. A file that says nothing of errors, misalignments,
     noise and air has the truth of a perfect machine."""
 
@@ -35,6 +36,9 @@ class Scenario:
     @property
     def path(self) -> Path:
         return self.known.path
+
+    def _facts(self) -> Facts:
+        return [*self.known._facts(), *self.truth._facts()]
 
     def machine(self) -> _core.Machine:
         """The machine to simulate: reads the error map, or makes the random one."""

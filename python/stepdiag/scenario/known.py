@@ -8,14 +8,15 @@ from types import MappingProxyType
 from stepdiag import _core
 from stepdiag.config.scenario_keys import KnownKeys, PlanSection
 from stepdiag.config.toml_text import located
+from stepdiag.display import Displayed, Facts, lengths_text, point_text
 from stepdiag.scenario.adjustment import plausible_limits, setup_priors, smoothness_of
 from stepdiag.scenario.heads import DescribedHead, check_alike, check_mirrors, heads_by_line, make_heads, signals_of
 from stepdiag.scenario.setup import weights
 from stepdiag.scenario.uncertain_inputs import uncertain_inputs
 
 
-@dataclass(frozen=True)
-class Known:
+@dataclass(frozen=True, repr=False)
+class Known(Displayed):
     """The known half of a scenario, checked and in native units (mm, rad, nm): all that evaluations, reports, measuring
     programs and the acquisition are given. What a run was simulated with is in no attribute of it.
 
@@ -49,6 +50,19 @@ class Known:
     def head(self) -> _core.Head:
         """The head of the first line; those of the others have the same readings."""
         return next(iter(self.heads.values()))
+
+    def _facts(self) -> Facts:
+        plan = self.plan
+        return [
+            ("file", str(self.path)),
+            ("chain", self.chain.name),
+            ("volume", lengths_text(plan.volume)),
+            ("lines", f"{', '.join(plan.lines)}, of {plan.steps} steps"),
+            ("scale lines", ", ".join(plan.scale_lines) or "none"),
+            ("signals", ", ".join(self.signals)),
+            ("tool offset", point_text(self.tool)),
+            ("heads", ", ".join(dict.fromkeys(head.layout for head in self.heads.values()))),
+        ]
 
 
 def known_of(keys: KnownKeys, described: Mapping[str, DescribedHead], path: Path) -> Known:

@@ -10,6 +10,7 @@ from stepdiag._core import InvalidArgument
 from stepdiag.config.key_errors import show
 from stepdiag.config.scenario_keys import TruthKeys
 from stepdiag.config.toml_text import located
+from stepdiag.display import Displayed, Facts
 from stepdiag.io.whole_files import check_input
 from stepdiag.scenario.heads import PoseErrors
 from stepdiag.scenario.known import Known
@@ -18,8 +19,8 @@ from stepdiag.scenario.uncertain_inputs import STATE_OF_AIR
 from stepdiag.units import MICROMETRE, MICRORADIAN
 
 
-@dataclass(frozen=True, eq=False)
-class Truth:
+@dataclass(frozen=True, eq=False, repr=False)
+class Truth(Displayed):
     """What a run is simulated with beside what is known, checked and in native units.
 
     Truth() is that of a perfect machine and a perfect set-up, read without noise. `error_map`: the file that [machine]
@@ -33,6 +34,18 @@ class Truth:
     noise: _core.Noise = field(default_factory=_core.Noise)
     environment: _core.Environment | None = None
     assumed_environment: _core.Environment | None = None
+
+    def _facts(self) -> Facts:
+        random = self.keys.machine.random
+        errors = "none" if random is None else f"random, seed {random.seed}"
+        noise = {name: getattr(self.noise, name) for name in ("distance", "tilt", "spot", "common")}
+        return [
+            ("errors", errors if self.error_map is None else str(self.error_map)),
+            ("noise (mm, rad)", ", ".join(f"{name} {size:g}" for name, size in noise.items() if size) or "none"),
+            ("misaligned", ", ".join(self.misalignment) or "no line"),
+            ("components out of place", str(sum(map(len, self.pose_errors.values())))),
+            ("air", "not stated" if self.environment is None else "stated"),
+        ]
 
 
 def truth_of(keys: TruthKeys, pose_errors: Mapping[str, PoseErrors], known: Known) -> Truth:

@@ -10,8 +10,10 @@ import numpy.typing as npt
 
 from stepdiag._core import InvalidArgument
 from stepdiag.config.key_errors import suggest
+from stepdiag.display import Displayed, Facts
 from stepdiag.parameters import KINDS, kind_of
 from stepdiag.scenario.known import Known
+from stepdiag.units import report_value
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -33,8 +35,8 @@ def only_survivors(samples: int, lost: int) -> str | None:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class UncertaintyResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class UncertaintyResult(Displayed):
     """Result for all outputs of a scenario's virtual calibrations, in native units (mm, rad).
 
     The outputs are the entries of the calibration, followed by derived quantities. All arrays have
@@ -69,6 +71,25 @@ class UncertaintyResult:
         """Why the result does not deserve trust; None if it does."""
         found = self.monte_carlo
         return None if found is None else only_survivors(found.samples, found.lost)
+
+    def _facts(self) -> Facts:
+        ways = {"propagation": self.propagation, "Monte Carlo": self.monte_carlo, "validation": self.comparison}
+        u = self.uncertainties()
+        facts = [("warning", self.warning)] if self.warning is not None else []
+        facts += [
+            ("method", self.method),
+            ("by", ", ".join(name for name, found in ways.items() if found is not None)),
+            ("outputs", str(len(self.outputs))),
+        ]
+        if self.monte_carlo is not None:
+            facts.append(("virtual calibrations", f"{self.monte_carlo.samples:,} with a result, seed {self.seed}"))
+        for family, members in self.families():
+            if family != "derived":
+                worst = int(members[np.argmax(u[members])])
+                size, unit = report_value(self.outputs[worst].unit, float(u[worst]))
+                place = "" if math.isnan(self.positions[worst]) else f" at {self.positions[worst]:g} mm"
+                facts.append((f"largest u of {family}", f"{size:.3g} {unit} ({self.outputs[worst].name}{place})"))
+        return [*facts, ("scenario", str(self.known.path))]
 
     def uncertainties(self) -> FloatArray:
         """Standard uncertainties by the Monte Carlo method if it was used, else by propagation."""

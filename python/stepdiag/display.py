@@ -1,0 +1,82 @@
+"""How values show themselves: one line in a console (`repr`), a small table in a notebook (`_repr_html_`)."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+# What is said of a value: label and text each, the most important first.
+Facts = Sequence[tuple[str, str]]
+
+LONGEST_LINE: Final = 200
+_SHOWN_ENTRIES: Final = 3
+
+
+def one_line(name: str, facts: Facts) -> str:
+    """The name and as many facts as fit into a line of 200 characters."""
+    line = f"<{name}"
+    for k, (label, text) in enumerate(facts):
+        more = f"{'; ' if k else ': '}{label} {text}"
+        if len(line) + len(more) + len("; ...>") > LONGEST_LINE:
+            return f"{line}{'; ' if k else ': '}...>"
+        line += more
+    return f"{line}>"
+
+
+def html_table(name: str, facts: Facts) -> str:
+    """The facts as a table of two columns with a caption; all texts are escaped."""
+    from html import escape
+
+    left = 'style="text-align: left"'
+    rows = "".join(
+        f'<tr><th scope="row" {left}>{escape(label)}</th><td {left}>{escape(text)}</td></tr>' for label, text in facts
+    )
+    return f"<table><caption {left}><b>{escape(name)}</b></caption><tbody>{rows}</tbody></table>"
+
+
+class Displayed:
+    """A value that shows its facts; `_facts` returns them."""
+
+    def _facts(self) -> Facts:
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return one_line(type(self).__name__, self._facts())
+
+    def _repr_html_(self) -> str:
+        return html_table(type(self).__name__, self._facts())
+
+
+def facts_of_properties(value: object) -> Facts:
+    """All properties of a value of a compiled class, in native units; large ones by their size."""
+    names = [name for name, member in vars(type(value)).items() if isinstance(member, property)]
+    return [(name, text_of(getattr(value, name))) for name in names]
+
+
+def text_of(value: Any) -> str:
+    """One value in a few words."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if value is None:
+        return "none"
+    if isinstance(value, bool | int | str):
+        return str(value)
+    shape = getattr(value, "shape", None)
+    if isinstance(shape, tuple):
+        if value.size <= _SHOWN_ENTRIES:
+            return f"({', '.join(text_of(one) for one in value.ravel().tolist())})"
+        return f"array of {' x '.join(map(str, shape))}"
+    if isinstance(value, Mapping | list | tuple):
+        plain = not isinstance(value, Mapping) and all(isinstance(one, float | int | str) for one in value)
+        if plain and 0 < len(value) <= _SHOWN_ENTRIES:
+            return ", ".join(map(text_of, value))
+        return f"{len(value)} entries"
+    return f"a {type(value).__name__}"
+
+
+def point_text(point: Any) -> str:
+    """A position or an offset: (0, 0, 30) mm."""
+    return f"({', '.join(f'{x:g}' for x in point)}) mm"
+
+
+def lengths_text(lengths: Any) -> str:
+    """Edges: 800 x 600 x 500 mm."""
+    return f"{' x '.join(f'{length:g}' for length in lengths)} mm"
