@@ -32,8 +32,9 @@ BELOW: dict[str, set[str]] = {
     "figures": {"planning"},
     "report": {"figures", "acquisition", "positions"},
     "objects": {"report"},
+    "page": {"objects"},
     "demo": {"report", "program", "export", "linuxcnc"},
-    "cli": {"demo", "objects"},
+    "cli": {"demo", "page"},
 }
 MOST_OF_A_ROOM = 20  # modules beside __init__, of more than which nobody keeps count
 

@@ -1,37 +1,100 @@
 """Commands that read calibrations: report one, compare two."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, fit_warnings, json_option, tell, tell_fit
-from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, OutputFile
+from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Command, Writes, fit_warnings, json_option, tell, tell_fit
+from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, PAGE, PDF, OutputFile
+
+_WORDS = {
+    "customer": "Who receives the report.",
+    "machine": "Maker and type of the machine.",
+    "serial_number": "Serial number of the machine.",
+    "operator": "Who measured.",
+    "instrument": "Instrument, with its serial number.",
+    "certificate": "Calibration certificate of the instrument.",
+    "conditions": "Conditions of the measurement.",
+}
 
 
-@click.command(epilog="\b\nExample: stepdiag report calibration.nc --functional-point straightness.csv")
-@click.argument("calibration", type=PATH)
+def _header_options(command: Command) -> Command:
+    for name, meaning in reversed(_WORDS.items()):
+        option = click.option(
+            f"--{name.replace('_', '-')}", metavar="TEXT", help=f"{meaning}  [default: of the scenario]"
+        )
+        command = option(command)
+    return command
+
+
+@click.command(
+    epilog="\b\nExample: stepdiag report calibration.nc --scenario scenario.toml --run run.csv -o report.html"
+)
+@click.argument("calibrations", nargs=-1, required=True, type=PATH, metavar="[BEFORE] CALIBRATION")
+@click.option(
+    "-o",
+    "output",
+    type=Writes(PAGE, PDF),
+    metavar="FILE",
+    help="Page to write (.html, one file that needs no network), or a PDF of it (.pdf, printed by Chromium).",
+)
 @click.option(
     "--functional-point",
-    "output",
     type=Writes(FUNCTIONAL_POINT),
     metavar="FILE",
     help="Also write the straightness of the functional point and that of the table (CSV).",
 )
+@click.option("--scenario", type=PATH, metavar="FILE", help="Of the page: scenario, with its [report] for the header.")
+@click.option("--run", type=PATH, metavar="FILE", help="Of the page: the run, for temperatures and residuals.")
+@click.option("--uncertainty", type=PATH, metavar="FILE", help="Of the page: uncertainty result (.nc), for the budget.")
+@_header_options
+@click.option("--logo", type=PATH, metavar="FILE", help="PNG or SVG picture in the header.")
 @json_option
 @click.pass_context
-def report(context: click.Context, calibration: Path, output: OutputFile | None, as_json: bool) -> None:
-    """Summarise a CALIBRATION (CSV or netCDF).
+def report(
+    context: click.Context,
+    /,
+    calibrations: tuple[Path, ...],
+    output: OutputFile | None,
+    functional_point: OutputFile | None,
+    scenario: Path | None,
+    run: Path | None,
+    uncertainty: Path | None,
+    logo: Path | None,
+    as_json: bool,
+    **words: str | None,
+) -> None:
+    """Summarise a CALIBRATION (CSV or netCDF), or write it as a page to hand over.
 
     Reports the largest values and uncertainties, and the point to which straightness refers. The
     tables refer to the axes' own frames. For an axis that carries the workpiece, or with a tool
     offset, the straightness of the functional point differs; netCDF files contain it as well.
+
+    With -o the report is a page: verdict of the fit, summary, all curves with 95 % intervals, the
+    volume in three dimensions, residuals, set-up and provenance. With an earlier calibration BEFORE
+    it shows before and after. Calibrations in CSV have no residuals; --scenario and --run give them.
     """
     from stepdiag.io.data_files import read_calibration
     from stepdiag.io.whole_files import check_input, write_whole
     from stepdiag.report.calibration import calibration_report, functional_point_csv
 
-    path = None if output is None else output.claim(calibration)
+    if len(calibrations) > 2:
+        raise InvalidArgument(f"expected one calibration, or an earlier one before it, got {len(calibrations)}")
+    calibration = calibrations[-1]
+    path = None if functional_point is None else functional_point.claim(*calibrations)
+    if output is not None:
+        _write_page(output, calibrations, scenario, run, uncertainty, logo, words)
+    else:
+        given = {"scenario": scenario, "run": run, "uncertainty": uncertainty, "logo": logo} | words
+        for name, value in given.items():
+            if value is not None:
+                raise InvalidArgument(f"`{name}`: goes with a page (`output` report.html)")
+        if len(calibrations) == 2:
+            raise InvalidArgument(
+                "two calibrations make a page (`output` report.html); stepdiag compare lists differences"
+            )
     check_input(calibration)
     read = read_calibration(calibration)
     if path is not None:
@@ -45,6 +108,34 @@ def report(context: click.Context, calibration: Path, output: OutputFile | None,
         for line in calibration_report(read):
             click.echo(line)
     tell_fit(context, calibration, read.fit)
+
+
+def _write_page(
+    output: OutputFile,
+    calibrations: tuple[Path, ...],
+    scenario: Path | None,
+    run: Path | None,
+    uncertainty: Path | None,
+    logo: Path | None,
+    words: Mapping[str, str | None],
+) -> None:
+    from stepdiag.io.whole_files import write_whole
+    from stepdiag.page.contents import ReportRequest
+    from stepdiag.page.document import report_page
+    from stepdiag.page.pdf import find_browser, write_pdf
+
+    before = calibrations[0] if len(calibrations) == 2 else None
+    request = ReportRequest(calibrations[-1], before, scenario, run, uncertainty, words, logo)
+    path = output.claim(*request.inputs)
+    if path.suffix.lower() == ".pdf":
+        find_browser()
+    page, contents = report_page(request, path)
+    for note in contents.notes:
+        tell("warning", note)
+    if path.suffix.lower() == ".pdf":
+        write_pdf(page, path)
+    else:
+        write_whole(path, page)
 
 
 @click.command(epilog="\b\nExample: stepdiag compare before.csv after.nc -o differences.csv")

@@ -32,6 +32,7 @@ from stepdiag.config.key_types import (
     tables,
 )
 from stepdiag.config.plan_by_time_keys import PlanByTimeSection
+from stepdiag.config.report_keys import ReportSection
 from stepdiag.config.scenario_head_keys import EnvironmentSection, HeadSection, KnownHeadKeys, LineKeys
 from stepdiag.config.uncertainty_keys import UncertaintySection
 
@@ -223,6 +224,7 @@ class KnownKeys(Section):
     smoothness: SmoothnessSection = SmoothnessSection()
     plausible: PlausibleSection = PlausibleSection()
     plan_by_time: PlanByTimeSection = PlanByTimeSection()
+    report: ReportSection = ReportSection()
 
 
 class TruthKeys(Section):

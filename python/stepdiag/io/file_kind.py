@@ -8,6 +8,12 @@ from stepdiag._core import InvalidArgument
 from stepdiag.io.whole_files import read_beginning
 
 CHECKPOINT_BEGINS: Final = "stepdiag checkpoint "
+PAGE_BEGINS: Final = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="generator" content="stepdiag report">
+"""
 # Kind by the format that a table states.
 _FORMATS: Final = {
     "measurement": "measurement",
@@ -25,6 +31,7 @@ _BEGINNINGS: Final = {
     "checkpoint": CHECKPOINT_BEGINS,
     "PNG picture": "\ufffdPNG\r\n\x1a\n",
     "SVG picture": r"(?:<\?xml[^>]*>\s*)?(?:<!DOCTYPE svg[^>]*>\s*)?<svg\b",
+    "report page": re.escape(PAGE_BEGINS),
     "PDF document": "%PDF-",
     "measuring program": r"(?i:%\n)?\((?i:measuring program)\b",
     "ISG table": "// stepdiag export --to isg\n",

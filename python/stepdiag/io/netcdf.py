@@ -89,9 +89,15 @@ class NetcdfFile:
         return tuple(str(dimension) for dimension in self._variable(name).dims)
 
     def numbers(
-        self, name: str, dimensions: Sequence[str], units: str | None, *, missing: bool = False
+        self,
+        name: str,
+        dimensions: Sequence[str],
+        units: str | None,
+        *,
+        missing: bool = False,
+        infinite: bool = False,
     ) -> npt.NDArray[np.float64]:
-        """A variable with these dimensions and units, as doubles; NaN only if `missing`."""
+        """A variable with these dimensions and units, as doubles; NaN only if `missing`, infinite ones likewise."""
         variable = self._variable(name, dimensions)
         if variable.dtype.kind not in "fiu":
             raise self.fail(name, f"expected numbers, got values of type {variable.dtype}")
@@ -100,7 +106,7 @@ class NetcdfFile:
             raise self.fail(name, f'units: expected "{units}", got {_show(given)}')
         values = np.array(self._load(name, variable), dtype=np.float64)
         values[values == _FILL] = np.nan
-        if np.isinf(values).any():
+        if not infinite and np.isinf(values).any():
             raise self.fail(name, "expected finite numbers, got an infinite one")
         if not missing and np.isnan(values).any():
             raise self.fail(name, f"expected finite numbers, but value {int(np.argmax(np.isnan(values)))} is missing")

@@ -43,6 +43,7 @@ PNG: Final = FileKind("PNG picture", (".png",))
 SVG: Final = FileKind("SVG picture", (".svg",))
 PDF: Final = FileKind("PDF document", (".pdf",))
 FIGURE: Final = (PNG, SVG, PDF)  # endings: style.FORMATS
+PAGE: Final = FileKind("report page", (".html",))
 # Not .nc: a usual ending of programs, but in stepdiag it means netCDF.
 PROGRAM: Final = FileKind("measuring program", (".ngc", ".iso", ".cnc", ".tap", ".mpf", ".txt"))
 KINEMATICS_TABLE: Final = FileKind("calibration", (".csv",))

@@ -1,0 +1,187 @@
+"""The report as one HTML document that opens no connection."""
+
+import base64
+import hashlib
+import importlib.util
+import json
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from stepdiag._core import Calibration, InvalidArgument, __version__
+from stepdiag.io.file_kind import PAGE_BEGINS
+from stepdiag.objects.calibration import fit_of, tables_of
+from stepdiag.objects.writer import measured
+from stepdiag.page.budget import budget_section
+from stepdiag.page.contents import Contents, ReportRequest, read_contents
+from stepdiag.page.curves import curves_section, squareness_section
+from stepdiag.page.figure import BAND, LAYOUT, Figures
+from stepdiag.page.html import Markup, element, markup
+from stepdiag.page.numbers import moment
+from stepdiag.page.residuals import residuals_section, setup_section, temperature_section
+from stepdiag.page.volume import VolumeErrors, drawing_of, errors_in, volume_section
+from stepdiag.page.words import (
+    HEADLINE,
+    commands_section,
+    comparison_section,
+    header_block,
+    method_section,
+    open_section,
+    provenance_section,
+    summary_section,
+    verdict_block,
+)
+from stepdiag.style import COLOUR
+
+
+def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
+    """The page, and what it is made from. `output`: its file, which the page names.
+
+    Raises InvalidArgument without Plotly, and for files that are not sound or do not belong together."""
+    plotly = _plotly()
+    contents = read_contents(request)
+    calibration, figures = contents.calibration, Figures()
+    found = errors_in(calibration)
+    before = None if contents.before is None else errors_in(contents.before)
+    sections = [
+        summary_section(contents, found, before),
+        curves_section(calibration, contents.before, figures),
+        squareness_section(calibration, contents.before),
+        volume_section(contents, found, before),
+        comparison_section(contents, found, before),
+        residuals_section(contents, figures),
+        setup_section(contents),
+        budget_section(contents.budget, figures),
+        temperature_section(contents, figures),
+        open_section(calibration),
+        method_section(contents),
+        provenance_section(contents),
+        commands_section(contents, request.command(output)),
+    ]
+    data = [
+        _json("stepdiag-figures", {"layout": dict(LAYOUT), "figures": figures.drawings, "colours": dict(COLOUR)}),
+        _json("stepdiag-volume", drawing_of(contents, found, before)),
+        _json("stepdiag-values", report_values(contents, found, before)),
+    ]
+    body = [
+        element("a", "Skip to the verdict", href="#verdict", class_="skip"),
+        element("div", header_block(contents), verdict_block(calibration), class_="opening"),
+        _contents_list(contents),
+        element("main", *sections, id="main"),
+        element("footer", element("p", f"Made by stepdiag {__version__}, {moment(contents.date)}.")),
+        element("noscript", element("p", "The figures need JavaScript. Their values are in the tables.")),
+        *data,
+    ]
+    return _whole(_title(contents), calibration, body, plotly), contents
+
+
+def report_values(contents: Contents, found: VolumeErrors, before: VolumeErrors | None) -> dict[str, Any]:
+    """The values of the report at full precision, by the keys of docs/json.md; what is not known is None."""
+    values: dict[str, Any] = {
+        "stepdiag": __version__,
+        "format": "stepdiag report 1",
+        "fit": fit_of(contents.calibration),
+        "calibration": tables_of(contents.calibration),
+        "volume": _volume_values(found),
+    }
+    if contents.before is not None and before is not None:
+        values["before"] = {
+            "fit": fit_of(contents.before),
+            "calibration": tables_of(contents.before),
+            "volume": _volume_values(before),
+        }
+    return values
+
+
+def _volume_values(found: VolumeErrors) -> dict[str, Any]:
+    at, error = found.worst
+    return {
+        "at_mm": at.tolist(),
+        **measured("um", largest=found.largest, error_there=error, rms=found.rms),
+        "grid_mm": [nodes.tolist() for nodes in found.nodes],
+    }
+
+
+def _title(contents: Contents) -> str:
+    machine = contents.header.words.get("machine", "three-axis machine tool")
+    words = f"Calibration report: {machine}"
+    return words if contents.calibration.fit == "accepted" else f"{HEADLINE[contents.calibration.fit]}. {words}"
+
+
+def _contents_list(contents: Contents) -> Markup:
+    entries = [
+        ("summary", "Summary"),
+        ("curves", "Error functions"),
+        ("squareness", "Squareness"),
+        ("volume", "Volume"),
+        *([("comparison", "Before and after")] if contents.comparison is not None else []),
+        ("residuals", "Residuals"),
+        ("setup", "Set-up"),
+        ("budget", "Uncertainty"),
+        ("temperatures", "Temperatures"),
+        ("open", "Not determined"),
+        ("method", "Method"),
+        ("provenance", "Provenance"),
+        ("commands", "Commands"),
+    ]
+    links = [element("li", element("a", words, href=f"#{name}")) for name, words in entries]
+    return element("nav", element("ul", *links), aria_label="Contents", class_="screen-only")
+
+
+def _whole(title: str, calibration: Calibration, body: list[Markup], plotly: str) -> str:
+    own = _own("report.js")
+    policy = (
+        "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; "
+        f"script-src {_fingerprint(plotly)} {_fingerprint(own)}; base-uri 'none'; form-action 'none'"
+    )
+    colours = "".join(
+        f"--{name}: {COLOUR[name]}; " for name in ("accepted", "rejected", "doubtful", "after", "before", "backward")
+    )
+    style = f":root {{ {colours}--band: {BAND}; }}\n{_own('report.css')}{_running_words(calibration)}"
+    head = markup(
+        element("meta", http_equiv="Content-Security-Policy", content=policy),
+        Markup("\n"),
+        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        Markup("\n"),
+        element("title", title),
+        Markup(f"\n<style>\n{style}</style>\n"),
+    )
+    scripts = Markup(f"<script>{plotly}</script>\n<script>{own}</script>\n")
+    inside = Markup("\n").join(part for part in body if part)
+    return f"{PAGE_BEGINS}{head}</head>\n<body>\n{inside}\n{scripts}</body>\n</html>\n"
+
+
+def _running_words(calibration: Calibration) -> str:
+    """On every printed page, of a calibration that is not to be relied on."""
+    if calibration.fit not in ("rejected", "doubtful"):
+        return ""
+    return f'@page {{ @top-left {{ content: "{HEADLINE[calibration.fit]}"; color: {COLOUR["rejected"]}; font-weight: 700; }} }}\n'
+
+
+def _json(identifier: str, content: Any) -> Markup:
+    """Data for the script; nothing in it can end the element."""
+    text = json.dumps(content, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
+    for sign in "<>&\u2028\u2029":
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    return Markup(f'<script type="application/json" id="{identifier}">{text}</script>')
+
+
+def _fingerprint(script: str) -> str:
+    """By which the policy allows a script, and no other."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
+
+
+def _own(name: str) -> str:
+    return (files("stepdiag.page") / name).read_text(encoding="utf-8")
+
+
+def _plotly() -> str:
+    """The text of plotly.js as Plotly's Python package brings it."""
+    found = importlib.util.find_spec("plotly")
+    if found is None or found.origin is None:
+        raise InvalidArgument("a report as a page needs Plotly: pip install 'stepdiag[report]'")
+    path = Path(found.origin).parent / "package_data" / "plotly.min.js"
+    if not path.is_file():
+        raise InvalidArgument(f"{path}: is missing in this Plotly: pip install 'stepdiag[report]'")
+    # Nothing in a script element may end it.
+    return path.read_text(encoding="utf-8").replace("</script", "<\\/script")

@@ -1,0 +1,69 @@
+"""HTML from Python: elements whose text and attributes are escaped."""
+
+import html
+from collections.abc import Iterable, Sequence
+
+
+class Markup(str):
+    """Text that is HTML already; any other text is escaped where it is put into an element."""
+
+    __slots__ = ()
+
+
+def markup(*content: object) -> Markup:
+    """The contents one after the other: what is not Markup is escaped, None is left out."""
+    return Markup(
+        "".join(part if isinstance(part, Markup) else html.escape(str(part)) for part in content if part is not None)
+    )
+
+
+def element(name: str, /, *content: object, **attributes: object) -> Markup:
+    """An element. `class_` and `aria_label` stand for class and aria-label; True is an attribute without a value, None
+    and False are none."""
+    given = []
+    for key, value in attributes.items():
+        if value is None or value is False:
+            continue
+        key = key.removesuffix("_").replace("_", "-")
+        given.append(f" {key}" if value is True else f' {key}="{html.escape(str(value))}"')
+    opening = f"<{name}{''.join(given)}>"
+    if name in ("meta", "img", "input", "link", "br", "hr"):
+        return Markup(opening)
+    return Markup(f"{opening}{markup(*content)}</{name}>")
+
+
+def table(
+    caption: object, heading: Sequence[object], rows: Iterable[Sequence[object]], class_: str | None = None
+) -> Markup:
+    """A data table; the first cell of each row is its heading."""
+    head = element("thead", element("tr", *(element("th", cell, scope="col") for cell in heading)))
+    body = [
+        element("tr", element("th", first, scope="row"), *(element("td", cell) for cell in others))
+        for first, *others in rows
+    ]
+    return element(
+        "div",
+        element("table", element("caption", caption), head, element("tbody", *body), class_=class_),
+        class_="scroll",
+        tabindex="0",
+        role="region",
+        aria_label=caption,
+    )
+
+
+def listed(items: Iterable[object], class_: str | None = None) -> Markup:
+    """An unordered list."""
+    return element("ul", *(element("li", item) for item in items), class_=class_)
+
+
+def definitions(pairs: Iterable[tuple[object, object]], class_: str | None = None) -> Markup:
+    """Names with what they say."""
+    return element(
+        "dl", *(element("div", element("dt", name), element("dd", value)) for name, value in pairs), class_=class_
+    )
+
+
+def section(identifier: str, title: object, *content: object, class_: str | None = None) -> Markup:
+    """A part of the page with its heading."""
+    heading = element("h2", title, id=f"{identifier}-heading")
+    return element("section", heading, *content, id=identifier, aria_labelledby=f"{identifier}-heading", class_=class_)

@@ -1,0 +1,374 @@
+"""The parts of a report that are words: verdict, summary, what is open, method, provenance, commands."""
+
+import shlex
+from collections.abc import Iterator
+from typing import Any, Final
+
+import numpy as np
+
+from stepdiag._core import Calibration
+from stepdiag.calibration.finding_text import MEANING, NOISE_ALONE, NOT_SEEN, PROVENANCE
+from stepdiag.calibration.largest_by_kind import largest_uncertainties
+from stepdiag.page.contents import Contents
+from stepdiag.page.header import TITLES
+from stepdiag.page.html import Markup, definitions, element, listed, markup, section, table
+from stepdiag.page.numbers import COVERAGE_FACTOR, NOT_KNOWN, moment, position, shown, with_interval
+from stepdiag.page.volume import MICRO, VolumeErrors
+from stepdiag.parameters import FUNCTIONS, KINDS, REPORT_UNIT, SQUARENESSES, Kind, in_report_units, kind_of
+
+HEADLINE: Final = {
+    "accepted": "Fit accepted",
+    "doubtful": "Fit DOUBTFUL: do not rely on the stated uncertainties",
+    "rejected": "Fit REJECTED: do not use this calibration",
+    "unchecked": "Fit UNCHECKED: nothing controls the readings",
+    None: "Fit NOT KNOWN",
+}
+_CAN_BE_USED: Final = {
+    "accepted": "Yes. The readings agree with each other and with the described set-up.",
+    "doubtful": "With care. The values are the best fit, but the stated uncertainties are not to be relied on.",
+    "rejected": "No. The readings contradict each other. Do not correct the machine with these values.",
+    "unchecked": "Unchecked. There are no more readings than unknowns, so that nothing would show a wrong one.",
+    None: "Not known. The file does not say how well the readings agree.",
+}
+LEAST_PROBABILITY: Final = 1e-12  # that is told
+MOST_REASONS: Final = 6  # that are shown at once
+SYMBOL: Final = {"accepted": "✓", "doubtful": "!", "rejected": "✕", "unchecked": "?", None: "?"}
+
+
+def header_block(contents: Contents) -> Markup:
+    """Title, logo, and who, which machine, with what."""
+    calibration, words = contents.calibration, contents.header.words
+    pairs: list[tuple[str, object]] = [(title, words[key]) for key, title in TITLES.items() if key in words]
+    pairs += [
+        ("Calibrated volume", f"{' × '.join(position(edge) for edge in calibration.volume)} mm"),
+        ("Kinematic chain", calibration.chain.name),
+        ("Evaluated", moment(calibration.date) or "date not known"),
+        ("Report made", moment(contents.date)),
+    ]
+    logo = element("img", src=contents.header.logo, alt="Logo", class_="logo") if contents.header.logo else None
+    what = " and ".join(
+        filter(None, (words.get("machine"), words.get("serial_number") and f"no. {words['serial_number']}"))
+    )
+    return element(
+        "header",
+        element(
+            "div",
+            element("p", "Calibration report", class_="kind"),
+            element("h1", what.replace(" and no.", ", no.") or "Three-axis machine tool"),
+            element("p", "Geometric errors by the laser step-diagonal method", class_="subject"),
+        ),
+        logo,
+        definitions(pairs, "facts"),
+        id="top",
+    )
+
+
+def verdict_block(calibration: Calibration) -> Markup:
+    """The verdict of the fit with its reasons, before anything else."""
+    fit = calibration.fit
+    parts: list[Any] = [
+        element(
+            "h2",
+            element("span", SYMBOL[fit], class_="symbol", aria_hidden="true"),
+            f" {HEADLINE[fit]}",
+            id="verdict-heading",
+        )
+    ]
+    meaning = (
+        "The file does not say how well the readings agree."
+        if fit is None
+        else f"{MEANING[fit][0].upper()}{MEANING[fit][1:]}."
+    )
+    factor = calibration.variance_factor
+    if factor is not None:
+        meaning += f" Variance factor {factor:.3g}; 1 is expected."
+    parts.append(element("p", meaning))
+    if calibration.fit_reasons:
+        parts.append(element("p", element("strong", f"{fit or 'not known'} because:".capitalize())))
+        first, others = calibration.fit_reasons[:MOST_REASONS], calibration.fit_reasons[MOST_REASONS:]
+        parts.append(listed(first))
+        if others:
+            parts.append(element("details", element("summary", f"{len(others)} more reasons"), listed(others)))
+    notes = []
+    if calibration.uncertainty_scaled is not None:
+        notes.append(f"All standard uncertainties were multiplied by {calibration.uncertainty_scaled:.3g}.")
+    if calibration.method in NOISE_ALONE:
+        notes.append(_sentence(NOISE_ALONE[calibration.method]))
+    if fit == "accepted":
+        notes.append(_sentence(NOT_SEEN))
+    parts += [element("p", note, class_="note") for note in notes]
+    return element(
+        "section", *parts, id="verdict", class_=f"verdict {fit or 'unknown'}", aria_labelledby="verdict-heading"
+    )
+
+
+def _sentence(note: str) -> str:
+    text = note.removeprefix("note: ")
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def summary_section(contents: Contents, found: VolumeErrors, before: VolumeErrors | None) -> Markup:
+    """Five lines that a customer understands."""
+    calibration = contents.calibration
+    at, _ = found.worst
+    largest = f"{shown(MICRO * found.largest)} µm"
+    where = f"X {position(at[0])}, Y {position(at[1])}, Z {position(at[2])} mm"
+    whole = not calibration.undetermined_slopes and not _missing(calibration)
+    volume: list[Any] = [
+        "The tool is at most " if whole else "Without what was not determined, which counts as 0, the tool is at most ",
+        element("strong", largest),
+        f" away from its commanded position, at {where}; {shown(MICRO * found.rms)} µm rms over the volume.",
+    ]
+    if before is not None:
+        volume.append(f" Before: {shown(MICRO * before.largest)} µm, {shown(MICRO * before.rms)} µm rms.")
+    lines: list[tuple[str, object]] = [
+        ("Can it be used?", _CAN_BE_USED[calibration.fit]),
+        ("Error in the volume", markup(*volume)),
+        ("Largest errors", "; ".join(_largest(calibration)) + "."),
+        ("How well known", _how_well(calibration)),
+        ("Not determined", _open(calibration)),
+    ]
+    note = None
+    if calibration.fit == "rejected":
+        note = element("p", element("strong", "The fit is rejected: the figures below are not to be used."))
+    return section("summary", "Summary", note, definitions(lines, "lines"))
+
+
+def largest_values(calibration: Calibration) -> dict[Kind, tuple[str, float, float, float]]:
+    """By kind the parameter with the largest value, its position (NaN of a squareness), value and u, native units."""
+    found: dict[Kind, tuple[str, float, float, float]] = {}
+    for name, (where, value, u) in calibration.functions.items():
+        k = int(np.argmax(np.abs(value)))
+        if abs(value[k]) > abs(found.get(kind_of(name), ("", 0.0, 0.0, 0.0))[2]) or kind_of(name) not in found:
+            found[kind_of(name)] = name, float(where[k]), float(value[k]), float(u[k])
+    for name, (angle, u_angle) in calibration.squareness.items():
+        if "squareness" not in found or abs(angle) > abs(found["squareness"][2]):
+            found["squareness"] = name, float("nan"), angle, u_angle
+    return found
+
+
+def _largest(calibration: Calibration) -> Iterator[str]:
+    values = largest_values(calibration)
+    for kind in KINDS:
+        if kind in values:
+            name, where, value, u = values[kind]
+            place = name if np.isnan(where) else f"{name} at {position(where)} mm"
+            figure, wide = in_report_units(kind, value), in_report_units(kind, u)
+            yield f"{kind} {with_interval(figure, wide, REPORT_UNIT[kind])} ({place})"
+
+
+def _how_well(calibration: Calibration) -> str:
+    uncertain = [
+        f"{kind} {shown(in_report_units(kind, COVERAGE_FACTOR * u))} {REPORT_UNIT[kind]}"
+        for kind, (u, _) in largest_uncertainties(calibration).items()
+    ]
+    if not uncertain:
+        return "The file has no uncertainties."
+    said = f"Every value to within (95 %): {', '.join(uncertain)}, or better."
+    if calibration.fit in ("rejected", "doubtful"):
+        said += " The fit is " + calibration.fit + ": these figures are not to be relied on."
+    return said
+
+
+def _open(calibration: Calibration) -> str:
+    count = len(calibration.functions) + len(calibration.squareness)
+    if not calibration.undetermined:
+        return (
+            f"Nothing: all {count} parameters are determined."
+            if count == 21
+            else f"{21 - count} of 21 parameters have no values."
+        )
+    open_ = [f"the slope of {name}" for name in calibration.undetermined_slopes] + _missing(calibration)
+    parts = [
+        f"{', '.join(open_)}." if open_ else f"All {count} parameters are determined, parts of the set-up are not."
+    ]
+    return " ".join([*(part[0].upper() + part[1:] for part in parts), "See “What was not determined”."])
+
+
+def open_section(calibration: Calibration) -> Markup:
+    """What was not determined, and why."""
+    title = "What was not determined"
+    missing = _missing(calibration)
+    if not calibration.undetermined and not missing:
+        return section("open", title, element("p", "Nothing: the readings determine all 21 parameters."))
+    parts: list[Any] = []
+    if calibration.undetermined:
+        parts.append(listed([f"{text[0].upper()}{text[1:]}." for text in calibration.undetermined]))
+    if missing:
+        parts.append(element("p", f"Without values: {', '.join(missing)}."))
+    if calibration.undetermined_slopes:
+        parts.append(
+            element(
+                "p",
+                f"Of {', '.join(calibration.undetermined_slopes)} only the shape is known, given with 0 at both ends.",
+            )
+        )
+    return section("open", title, *parts)
+
+
+def _missing(calibration: Calibration) -> list[str]:
+    """Parameters without values."""
+    return [
+        name for name in (*FUNCTIONS, *SQUARENESSES) if name not in {*calibration.functions, *calibration.squareness}
+    ]
+
+
+def method_section(contents: Contents) -> Markup:
+    """How it was measured and evaluated, and how the signs are."""
+    calibration = contents.calibration
+    ways = {
+        "adjustment": "Least squares over all readings at once, with the exact pose of the machine. Unknowns are the "
+        "21 error parameters, and how head and mirror stood on each line.",
+        "enhanced": "Distances, tilts and scale lines, to first order.",
+        "conventional": "Distances of body diagonals, to first order.",
+    }
+    rows: list[tuple[str, object]] = [
+        (
+            "Measurement",
+            "The machine moves a mirror along diagonals of its volume, in steps of one axis after the other. A laser "
+            "head that stands still reads its distance, and with most heads its tilts, at every point.",
+        ),
+        ("Evaluation", f"{calibration.method or 'not known'}. {ways.get(calibration.method, '')}"),
+    ]
+    if contents.lines:
+        rows.append(("Lines", ", ".join(contents.lines)))
+    if contents.details is not None:
+        rows.append(("Readings", f"{len(contents.details.line)} points, {', '.join(contents.details.channels)}"))
+    rows += [
+        ("Tool offset", f"{', '.join(position(t) for t in calibration.tool)} mm"),
+        (
+            "Signs",
+            "Actual less commanded. Rotations and squarenesses by the right-hand rule. Errors are those of the tool "
+            "relative to the workpiece.",
+        ),
+        ("Reference", f"{calibration.straightness_reference[0].upper()}{calibration.straightness_reference[1:]}."),
+        ("Uncertainties", "95 % intervals are ± 1.96 standard uncertainties (GUM), of each value by itself."),
+        (
+            "Error in the volume",
+            "The exact pose of the functional point, less the commanded one, at the nodes of a grid.",
+        ),
+    ]
+    return section("method", "Method", definitions(rows, "lines"))
+
+
+def provenance_section(contents: Contents) -> Markup:
+    """Fingerprints of what the calibration was made from, and what does not fit."""
+    made = contents.calibration.provenance
+    rows = [[words, element("code", made[key])] for key, words in PROVENANCE.items() if key in made]
+    parts: list[Any] = []
+    if rows:
+        parts.append(table("What the calibration was made from", ["What", "Fingerprint or version"], rows, "prints"))
+    else:
+        parts.append(element("p", "The file does not say what it was made from."))
+    parts += [element("p", note, class_="note") for note in contents.notes]
+    files = [
+        ("Calibration", contents.request.calibration),
+        ("Before", contents.request.before),
+        ("Scenario", contents.request.scenario),
+        ("Run", contents.request.run),
+        ("Uncertainty", contents.request.uncertainty),
+    ]
+    parts.append(
+        element(
+            "p",
+            "Files of this report: "
+            + "; ".join(f"{what.lower()} {path.name}" for what, path in files if path is not None)
+            + ".",
+        )
+    )
+    return section("provenance", "Provenance", *parts)
+
+
+def commands_section(contents: Contents, command: str) -> Markup:
+    """The commands that repeat all of it."""
+    request, method = contents.request, contents.calibration.method
+    scenario, run = (
+        shlex.quote(path.name) if path else name
+        for path, name in ((request.scenario, "SCENARIO"), (request.run, "RUN"))
+    )
+    calibration = shlex.quote(request.calibration.name)
+    option = "" if method in ("adjustment", "") else f" -m {method}"
+    covariance = " --covariance" if contents.calibration.covariance is not None else ""
+    lines = [
+        f"sha256sum {scenario} {run}",
+        f"stepdiag check {scenario} {run}",
+        f"stepdiag evaluate {scenario} {run}{option}{covariance} -o {calibration}",
+        command,
+    ]
+    return section(
+        "commands",
+        "Commands that repeat it",
+        element(
+            "p",
+            "The fingerprints above show whether the files are the same. Words in capitals stand for files that were "
+            "not given.",
+        ),
+        element("pre", element("code", "\n".join(lines))),
+    )
+
+
+def _probability(probability: float | None) -> str:
+    if probability is None:
+        return NOT_KNOWN
+    return f"{probability:.2g}" if probability >= LEAST_PROBABILITY else f"below {LEAST_PROBABILITY:g}"
+
+
+def comparison_section(contents: Contents, found: VolumeErrors, before: VolumeErrors | None) -> Markup | None:
+    """Before and after, parameter by parameter."""
+    comparison = contents.comparison
+    if comparison is None or before is None:
+        return None
+    rows = []
+    for difference in comparison.differences:
+        kind, k = kind_of(difference.parameter), difference.largest
+        unit, u = REPORT_UNIT[kind], float(difference.standard_uncertainty[k])
+        place = "" if np.isnan(difference.position[k]) else f"{position(difference.position[k])} mm"
+        probability = comparison.probability(difference)
+        rows.append(
+            [
+                difference.parameter.replace("_", " ") + (" shape" if difference.shape_only else ""),
+                with_interval(in_report_units(kind, float(difference.value[k])), in_report_units(kind, u), unit),
+                place,
+                _probability(probability),
+                "significant" if comparison.is_significant(difference) else "",
+            ]
+        )
+    volume = [
+        [
+            "largest",
+            f"{shown(MICRO * before.largest)} µm",
+            f"{shown(MICRO * found.largest)} µm",
+        ],
+        ["root mean square", f"{shown(MICRO * before.rms)} µm", f"{shown(MICRO * found.rms)} µm"],
+    ]
+    change = MICRO * (found.largest - before.largest)
+    way = "smaller" if change < 0 else "larger"
+    notes = [*comparison.notes]
+    if comparison.only_in_a:
+        notes.append(f"only before: {', '.join(comparison.only_in_a)}")
+    if comparison.only_in_b:
+        notes.append(f"only after: {', '.join(comparison.only_in_b)}")
+    fit = comparison.a.fit
+    return section(
+        "comparison",
+        "Before and after",
+        element(
+            "p",
+            element("strong", f"The largest error in the volume is {shown(abs(change))} µm {way} than before."),
+            " The curves above have the earlier calibration as dashed lines.",
+        ),
+        None if fit == "accepted" else element("p", f"The earlier calibration: {HEADLINE[fit]}.", class_="note"),
+        table("Error of the tool in the volume", ["", "before", "after"], volume),
+        table(
+            "Largest difference of each parameter, after less before",
+            ["Parameter", "difference (95 %)", "at", "probability by chance", ""],
+            rows,
+        ),
+        element(
+            "p",
+            f"Probability: that chance alone makes any of the {comparison.count} values differ so (Bonferroni); "
+            f"significant up to {comparison.limit:g}.",
+            class_="note",
+        ),
+        listed([f"{note[0].upper()}{note[1:]}." for note in notes]) if notes else None,
+    )
