@@ -10,7 +10,7 @@ from typing import Any
 
 from stepdiag._core import Calibration, InvalidArgument, __version__
 from stepdiag.io.file_kind import PAGE_BEGINS
-from stepdiag.objects.calibration import fit_of, tables_of
+from stepdiag.objects.report import report_object
 from stepdiag.objects.writer import measured
 from stepdiag.page.budget import budget_section
 from stepdiag.page.contents import Contents, ReportRequest, read_contents
@@ -76,18 +76,16 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
 
 
 def report_values(contents: Contents, found: VolumeErrors, before: VolumeErrors | None) -> dict[str, Any]:
-    """The values of the report at full precision, by the keys of docs/json.md; what is not known is None."""
+    """The values of the report at full precision: the object of `report --json`, and what the page has beside it."""
+    request = contents.request
     values: dict[str, Any] = {
-        "stepdiag": __version__,
-        "format": "stepdiag report 1",
-        "fit": fit_of(contents.calibration),
-        "calibration": tables_of(contents.calibration),
+        **report_object(contents.calibration, Path(request.calibration.name), contents.notes),
+        "format": "stepdiag report page 1",
         "volume": _volume_values(found),
     }
-    if contents.before is not None and before is not None:
+    if request.before is not None and contents.before is not None and before is not None:
         values["before"] = {
-            "fit": fit_of(contents.before),
-            "calibration": tables_of(contents.before),
+            **report_object(contents.before, Path(request.before.name), []),
             "volume": _volume_values(before),
         }
     return values
@@ -155,7 +153,8 @@ def _running_words(calibration: Calibration) -> str:
     """On every printed page, of a calibration that is not to be relied on."""
     if calibration.fit not in ("rejected", "doubtful"):
         return ""
-    return f'@page {{ @top-left {{ content: "{HEADLINE[calibration.fit]}"; color: {COLOUR["rejected"]}; font-weight: 700; }} }}\n'
+    words, colour = HEADLINE[calibration.fit], COLOUR["rejected"]
+    return f"@page {{ @top-left {{ content: '{words}'; color: {colour}; font-weight: 700; }} }}\n"
 
 
 def _json(identifier: str, content: Any) -> Markup:

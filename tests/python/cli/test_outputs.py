@@ -54,7 +54,10 @@ FILES: dict[tuple[str, str], list[tuple[list[str], tuple[str, ...]]]] = {
         (["beams.toml", *NOBODY, "-o", "acquired.csv", "--raw", OUT], (".jsonl",)),
         (["beams.toml", *NOBODY, "-o", "acquired.csv", "--resume", "--raw", OUT], (".jsonl",)),
     ],
-    ("report", "output"): [(["calibration.csv", "--functional-point", OUT], (".csv",))],
+    ("report", "output"): [
+        (["calibration.csv", "--scenario", "scenario.toml", "--run", "run.csv", "-o", OUT], (".html",))
+    ],
+    ("report", "functional_point"): [(["calibration.csv", "--functional-point", OUT], (".csv",))],
     ("compare", "output"): [(["calibration.csv", "calibration.nc", "-o", OUT], (".csv", ".nc"))],
     ("export", "output"): [
         (["calibration.csv", "--to", "linuxcnc-kins", "-o", OUT], (".csv",)),
@@ -69,14 +72,9 @@ FOLDERS = {("demo", "output"), ("init", "output"), ("export", "output")}
 INPUTS = {
     *{(name, "scenario") for name in ("simulate", "evaluate", "observe", "plan", "uncertainty", "nc")},
     *{("acquire", "scenario"), ("acquire", "from_raw"), ("twin", "scenario"), ("init", "scenario"), ("study", "file")},
-    *{("evaluate", "run"), ("report", "calibration"), ("compare", "a"), ("compare", "b"), ("export", "calibration")},
-    *{
-        ("positions", "file"),
-        ("check", "files"),
-        ("head show", "name"),
-        ("head check", "name"),
-        ("head sensitivity", "name"),
-    },
+    *{("report", name) for name in ("calibrations", "scenario", "run", "uncertainty", "logo")},
+    *{("evaluate", "run"), ("compare", "a"), ("compare", "b"), ("export", "calibration"), ("positions", "file")},
+    *{("check", "files"), ("head show", "name"), ("head check", "name"), ("head sensitivity", "name")},
 }
 
 

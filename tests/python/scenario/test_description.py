@@ -131,7 +131,9 @@ MALFORMED = [
     ("steps = 50", 'steps = "ten"', STEPS + '"ten"'),
     ('["ppp", "npp", "pnp", "nnp"]', '"ppp"', 'plan.lines: expected a list of lines such as "ppp" (three of p, n, 0), got "ppp"'),
     ("laser_urad = [700, 1000]", "laser_urad = [700]", "misalignment.npp.laser_urad: expected two angles below 0.1 rad, in µrad, got [700]"),
+    ("[noise]", "[report]\ncustomer = 3\n[noise]", "report.customer: expected a text of 1 to 400 characters, got 3"),
     # ranges
+    ("[noise]", '[report]\noperator = ""\n[noise]', 'report.operator: expected a text of 1 to 400 characters, got ""'),
     ("x_mm = 800.0", "x_mm = 0", f"volume.x_mm: {EDGE}0"),
     ("x_mm = 800.0", "x_mm = -800.0", f"volume.x_mm: {EDGE}-800.0"),
     ("x_mm = 800.0", "x_mm = nan", f"volume.x_mm: {EDGE}nan"),

@@ -1,0 +1,346 @@
+"""The report as a page: one file, its values those of the calibration, everything of files escaped."""
+
+import json
+import re
+from collections.abc import Callable
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from small_scenario import SCENARIO
+
+import stepdiag as sd
+from stepdiag._core import InvalidArgument
+from stepdiag.cli import main
+from stepdiag.io.file_kind import kind_of_file
+from stepdiag.page.contents import ReportRequest
+from stepdiag.page.document import report_page
+from stepdiag.page.html import Markup, element, table
+from stepdiag.page.numbers import shown, with_interval
+
+VOID = {"meta", "img", "input", "br", "hr", "link"}
+
+
+class Page(HTMLParser):
+    """Elements of a page in their order, with attributes and text; open elements must be closed in their order."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.words: list[str] = []
+        self.scripts: dict[str, str] = {}
+        self.feed(text)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] == "script":
+            self.scripts[self.elements[-1][1].get("id") or ""] = data
+        elif self.open and self.open[-1] not in ("style",):
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.words).split())
+
+    def all(self, tag: str) -> list[dict[str, str | None]]:
+        return [attributes for name, attributes in self.elements if name == tag]
+
+    def values(self) -> Any:
+        return json.loads(self.scripts["stepdiag-values"])
+
+
+def page_of(**request: Any) -> Page:
+    return Page(report_page(ReportRequest(**request), Path("report.html"))[0])
+
+
+@pytest.fixture
+def evaluated(here: Path) -> Path:
+    """The folder of a scenario and its run, with the calibration in both formats."""
+    for name in ("calibration.nc", "calibration.csv"):
+        assert main(["evaluate", "scenario.toml", "run.csv", "-o", name]) == 0
+    return here
+
+
+def test_command_writes_one_page_of_at_most_six_megabytes(evaluated: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["report", "calibration.nc", "-o", "report.html"]) == 0
+    text = Path("report.html").read_text()
+    assert kind_of_file(Path("report.html")) == "report page"
+    assert len(text.encode()) <= 6_000_000
+    assert capsys.readouterr().out.startswith("fit: ")
+    policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', text)
+    assert policy
+    assert policy[1].startswith("default-src &#x27;none&#x27;;")
+    assert "connect-src" not in policy[1], "nothing loosens the default"
+    assert "unsafe-eval" not in policy[1]
+    page = Page(text)
+    for tag, attributes in page.elements:
+        for name in ("src", "href"):
+            if name in attributes:
+                assert re.match("#|data:", attributes[name] or ""), (tag, attributes)
+
+
+def test_values_on_the_page_are_those_of_the_file_bit_by_bit(evaluated: Path) -> None:
+    calibration = sd.read_calibration("calibration.nc")
+    said = page_of(calibration=Path("calibration.nc")).values()
+    found = {one["parameter"]: one for one in said["calibration"]["functions"]}
+    assert found.keys() == calibration.functions.keys()
+    for name, (position, value, u) in calibration.functions.items():
+        unit, power = ("um", 3) if sd.kind_of(name) in ("positioning", "straightness") else ("urad", 6)
+        native = [
+            [float(f"{one!r}e-{power}") for one in found[name][f"{key}_{unit}"]]
+            for key in ("value", "standard_uncertainty")
+        ]
+        # The decimal point is moved in the text of the number: back it gives the same number but for one rounding.
+        np.testing.assert_allclose(native[0], value, rtol=3e-16, atol=0.0)
+        np.testing.assert_allclose(native[1], u, rtol=3e-16, atol=0.0)
+        assert found[name]["position_mm"] == position.tolist()
+    assert said["fit"]["verdict"] == calibration.fit
+
+
+def test_curves_are_drawn_with_the_values_of_the_file(evaluated: Path) -> None:
+    calibration = sd.read_calibration("calibration.nc")
+    drawn = json.loads(page_of(calibration=Path("calibration.nc")).scripts["stepdiag-figures"])["figures"]
+    for name, (position, value, u) in calibration.functions.items():
+        factor = sd.in_report_units(sd.kind_of(name), 1.0)
+        low, high, curve = drawn[f"figure-{name}"]["data"]
+        assert curve["x"] == position.tolist()
+        np.testing.assert_array_equal(curve["y"], factor * value)
+        # 1.96: half of a 95 % interval of a normal distribution; both sides are rounded once or twice.
+        np.testing.assert_allclose(high["y"], factor * (value + 1.959963984540054 * u), rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(low["y"], factor * (value - 1.959963984540054 * u), rtol=1e-12, atol=1e-12)
+
+
+def test_drawings_are_those_that_plotly_knows(evaluated: Path) -> None:
+    """Plotly's own check of every key and value."""
+    import plotly.graph_objects as go
+
+    content = json.loads(page_of(calibration=Path("calibration.nc")).scripts["stepdiag-figures"])
+    assert len(content["figures"]) == 21, "18 functions and three channels"
+    for drawing in content["figures"].values():
+        go.Figure(data=drawing["data"], layout={**content["layout"], **drawing["layout"]})
+
+
+def test_page_can_be_read_without_seeing_it(evaluated: Path) -> None:
+    page = page_of(calibration=Path("calibration.nc"))
+    assert page.all("html")[0]["lang"] == "en"
+    assert [tag for tag, _ in page.elements if tag in ("header", "main", "nav", "footer")] == [
+        "header",
+        "nav",
+        "main",
+        "footer",
+    ]
+    first_link = page.all("a")[0]
+    assert first_link["href"] == "#verdict"
+    identifiers = [attributes["id"] for _, attributes in page.elements if "id" in attributes]
+    assert len(identifiers) == len(set(identifiers))
+    for _, attributes in page.elements:
+        for reference in ("aria-labelledby", "aria-describedby", "for"):
+            if attributes.get(reference):
+                assert attributes[reference] in identifiers
+    for attributes in [*page.all("div"), *page.all("svg")]:
+        if attributes.get("role") == "img":
+            assert len(attributes["aria-label"] or "") > 10
+    levels = [int(tag[1]) for tag, _ in page.elements if re.fullmatch("h[1-6]", tag)]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+    assert all(attributes.get("scope") in ("col", "row") for attributes in page.all("th"))
+    assert len(page.all("table")) == len(page.all("caption"))
+    labels = {attributes.get("for") for attributes in page.all("label")}
+    assert all(one["id"] in labels for one in page.all("input") if one["type"] == "range")
+
+
+@pytest.mark.parametrize("fit", ["rejected", "doubtful", "unchecked", "accepted"])
+def test_verdict_is_the_first_thing_that_is_said(fit: str, evaluated: Path) -> None:
+    calibration = sd.read_calibration("calibration.nc")
+    calibration.judged(fit, ["the <first> reason", "the second reason"]).write("judged.csv")
+    page = page_of(calibration=Path("judged.csv"))
+    (section,) = [attributes for attributes in page.all("section") if attributes.get("id") == "verdict"]
+    assert section["class"] == f"verdict {fit}"
+    first = page.text.index(f"Fit {fit}" if fit == "accepted" else f"Fit {fit.upper()}")
+    assert first < page.text.index("Summary")
+    assert page.text.index("the <first> reason") < page.text.index("Summary")
+    if fit == "rejected":
+        assert page.text.startswith("Fit REJECTED: do not use this calibration"), "the title"
+        assert "the figures below are not to be used" in page.text
+
+
+def test_words_of_files_and_flags_are_escaped(evaluated: Path) -> None:
+    bad = '<script>alert("&")</script>'
+    Path("scenario.toml").write_text(SCENARIO + f"[report]\ncustomer = '{bad}'\nmachine = '</title>{bad}'\n")
+    Path("<b>&.nc").write_bytes(Path("calibration.nc").read_bytes())
+    page = page_of(calibration=Path("<b>&.nc"), scenario=Path("scenario.toml"), words={"operator": bad})
+    assert page.text.count(bad) == 6, "customer, operator and its flag, and the machine thrice: title, heading, header"
+    assert "<b>&.nc" in page.text
+    assert len([one for one in page.all("script") if "type" not in one]) == 2, "Plotly's and ours"
+    assert not page.all("b")
+
+
+def test_scenario_that_changed_is_noted_and_another_run_is_refused(evaluated: Path) -> None:
+    request = {"calibration": Path("calibration.nc"), "scenario": Path("scenario.toml"), "run": Path("run.csv")}
+    assert "has changed since the evaluation" not in page_of(**request).text
+    Path("scenario.toml").write_text(SCENARIO + '[report]\ncustomer = "Example"\n')
+    assert "scenario.toml has changed since the evaluation" in page_of(**request).text
+    Path("other.csv").write_text(Path("run.csv").read_text() + "\n")
+    with pytest.raises(InvalidArgument, match=r"other.csv: is not the run of calibration.nc: its SHA-256 is"):
+        page_of(**request | {"run": Path("other.csv")})
+
+
+def test_residuals_of_a_csv_calibration_are_computed_again(evaluated: Path) -> None:
+    without = page_of(calibration=Path("calibration.csv"))
+    assert "calibration.csv has no residuals (a CSV file has none)" in without.text
+    given = {"scenario": Path("scenario.toml"), "run": Path("run.csv")}
+    again, direct = (
+        json.loads(page_of(calibration=Path(name), **given).scripts["stepdiag-figures"])["figures"]
+        for name in ("calibration.csv", "calibration.nc")
+    )
+    assert again == direct
+    assert "figure-residual-distance" in again
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("seed = 3", "seed = 3\n[adjustment]\nlateral_mm = 3.0"), "does not give calibration.csv: E.. differs by"),
+        (
+            ("x_mm = 80.0", "x_mm = 90.0"),
+            "scenario.toml: does not belong to calibration.csv: its volume is 90 60 50 mm",
+        ),
+        (("[w X' b Y Z t]", "[w Y' b X Z t]"), "does not belong to calibration.csv: its chain is"),
+    ],
+)
+def test_scenario_of_another_evaluation_is_refused(change: tuple[str, str], message: str, evaluated: Path) -> None:
+    Path("scenario.toml").write_text(SCENARIO.replace(*change))
+    with pytest.raises(InvalidArgument, match=re.escape(message).replace(r"E\.\.", "E..")):
+        page_of(calibration=Path("calibration.csv"), scenario=Path("scenario.toml"), run=Path("run.csv"))
+
+
+def test_before_and_after_stand_side_by_side(evaluated: Path) -> None:
+    Path("later.toml").write_text(SCENARIO.replace("seed = 7", "seed = 8"))
+    assert main(["simulate", "later.toml", "-o", "later.csv"]) == 0
+    assert main(["evaluate", "later.toml", "later.csv", "-o", "later.nc"]) == 0
+    page = page_of(calibration=Path("later.nc"), before=Path("calibration.nc"))
+    drawn = json.loads(page.scripts["stepdiag-figures"])["figures"]
+    before = sd.read_calibration("calibration.nc").functions["EXX"][1]
+    (old,) = [trace for trace in drawn["figure-EXX"]["data"] if trace["name"] == "before"]
+    np.testing.assert_array_equal(old["y"], 1e3 * before)
+    assert {"Before and after", "difference (95 %)"} <= {word.strip() for word in page.words}
+    assert (
+        page.values()["before"]["calibration"]["provenance"]["run_sha256"]
+        != page.values()["calibration"]["provenance"]["run_sha256"]
+    )
+    assert main(["report", "calibration.nc", "later.nc"]) == 2, "as text there is one"
+
+
+def test_what_is_not_determined_is_said_where_it_counts(here: Path) -> None:
+    Path("scenario.toml").write_text(SCENARIO.replace('scale_lines = ["p00", "0p0", "00p"]\n', ""))
+    assert main(["simulate", "scenario.toml", "-o", "short.csv"]) == 0
+    assert main(["evaluate", "scenario.toml", "short.csv", "-o", "short.nc"]) == 0
+    page = page_of(calibration=Path("short.nc"))
+    for sentence in sd.read_calibration("short.nc").undetermined:
+        assert sentence[1:] in page.text
+    assert "Without what was not determined, which counts as 0, the tool is at most" in page.text
+    assert "The slope of EXX, the slope of EYY, the slope of EZZ." in page.text
+
+
+def test_budget_is_that_of_the_uncertainty_result(evaluated: Path) -> None:
+    assert main(["uncertainty", "scenario.toml", "-o", "uncertainty.nc"]) == 0
+    page = page_of(calibration=Path("calibration.nc"), uncertainty=Path("uncertainty.nc"))
+    bars = json.loads(page.scripts["stepdiag-figures"])["figures"]["figure-budget"]["data"]
+    # Shares of a variance, with those of correlations and of the rest: they add up but for roundings of a sum.
+    np.testing.assert_allclose(np.sum([bar["x"] for bar in bars], axis=0), 100.0, atol=1e-9)
+    Path("longer.toml").write_text(SCENARIO.replace("steps = 5", "steps = 4"))
+    assert main(["uncertainty", "longer.toml", "-o", "other.nc"]) == 0
+    with pytest.raises(InvalidArgument, match=r"other.nc: E.. has other positions than the calibration"):
+        page_of(calibration=Path("calibration.nc"), uncertainty=Path("other.nc"))
+    with pytest.raises(InvalidArgument, match=r"calibration.nc: expected a result of `stepdiag uncertainty`"):
+        page_of(calibration=Path("calibration.nc"), uncertainty=Path("calibration.nc"))
+
+
+def test_header_is_that_of_the_scenario_unless_a_flag_says_otherwise(evaluated: Path) -> None:
+    Path("logo.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"/>')
+    Path("scenario.toml").write_text(SCENARIO + '[report]\ncustomer = "A"\noperator = "B"\nlogo = "logo.svg"\n')
+    page = page_of(calibration=Path("calibration.nc"), scenario=Path("scenario.toml"), words={"operator": "C"})
+    assert "Customer A Operator C" in page.text
+    assert (page.all("img")[0]["src"] or "").startswith("data:image/svg+xml;base64,")
+    for content in ("<html><svg></svg></html>", "text"):
+        Path("logo.svg").write_text(content)
+        with pytest.raises(InvalidArgument, match=r"logo.svg: expected a PNG or SVG picture"):
+            page_of(calibration=Path("calibration.nc"), scenario=Path("scenario.toml"))
+
+
+def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    capsys.readouterr()
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    return said
+
+
+def test_without_plotly_one_line_says_how_to_install_it(
+    evaluated: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    said = refused(["report", "calibration.nc", "-o", "report.html"], capsys)
+    assert said == "stepdiag: error: a report as a page needs Plotly: pip install 'stepdiag[report]'\n"
+    assert not Path("report.html").exists()
+    assert main(["report", "calibration.nc"]) == 0, "the text needs none"
+
+
+def test_pdf_without_chromium_is_refused(
+    evaluated: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PATH", "")
+    said = refused(["report", "calibration.nc", "-o", "report.pdf"], capsys)
+    assert "a PDF needs Chromium, and none of chromium, " in said
+    assert not Path("report.pdf").exists()
+
+
+def test_options_of_the_page_are_refused_without_one(evaluated: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "--customer: goes with a page (-o report.html)" in refused(
+        ["report", "calibration.nc", "--customer", "A"], capsys
+    )
+    assert "at most" not in refused(["report", "a.nc", "b.nc", "c.nc", "-o", "report.html"], capsys)
+
+
+def test_rejected_calibration_ends_with_status_three_and_is_written(evaluated: Path) -> None:
+    sd.read_calibration("calibration.nc").judged("rejected", ["x"]).write("judged.csv")
+    assert main(["report", "judged.csv", "-o", "report.html"]) == 3
+    assert Path("report.html").is_file()
+
+
+def test_content_is_escaped_and_markup_is_not() -> None:
+    assert element("p", "a < b & c", title='"x"') == '<p title="&quot;x&quot;">a &lt; b &amp; c</p>'
+    assert element("p", element("br"), Markup("<i>")) == "<p><br><i></p>"
+    assert "&lt;td&gt;" in table("<caption>", ["<th>"], [["<td>"]])
+
+
+NUMBERS: list[tuple[Callable[[], str], str]] = [
+    (lambda: shown(1234.4), "1234"),
+    (lambda: shown(-12.345), "−12.3"),
+    (lambda: shown(0.0), "0.00"),
+    (lambda: shown(0.00012), "0.00012"),
+    (lambda: shown(9.999), "10.0"),
+    (lambda: with_interval(21.04, 0.7, "µm"), "21.0 ± 1.4 µm"),
+    (lambda: with_interval(-1234.4, 60.0, "µm"), "−1234 ± 118 µm"),
+    (lambda: with_interval(1.0, float("nan"), "µm"), "1.00 µm (uncertainty not known)"),
+    (lambda: with_interval(1.0, 0.0, "µm"), "1.00 µm"),
+]
+
+
+@pytest.mark.parametrize(("write", "text"), NUMBERS)
+def test_numbers_have_the_digits_that_count(write: Callable[[], str], text: str) -> None:
+    assert write() == text
