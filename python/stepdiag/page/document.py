@@ -19,7 +19,7 @@ from stepdiag.page.figure import BAND, LAYOUT, Figures
 from stepdiag.page.html import Markup, element, markup
 from stepdiag.page.numbers import moment
 from stepdiag.page.residuals import residuals_section, setup_section, temperature_section
-from stepdiag.page.volume import VolumeErrors, drawing_of, errors_in, volume_section
+from stepdiag.page.volume import GridErrors, drawing_of, errors_in, volume_section
 from stepdiag.page.words import (
     HEADLINE,
     commands_section,
@@ -75,7 +75,7 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
     return _whole(_title(contents), calibration, body, plotly), contents
 
 
-def report_values(contents: Contents, found: VolumeErrors, before: VolumeErrors | None) -> dict[str, Any]:
+def report_values(contents: Contents, found: GridErrors, before: GridErrors | None) -> dict[str, Any]:
     """The values of the report at full precision: the object of `report --json`, and what the page has beside it."""
     request = contents.request
     values: dict[str, Any] = {
@@ -91,7 +91,7 @@ def report_values(contents: Contents, found: VolumeErrors, before: VolumeErrors 
     return values
 
 
-def _volume_values(found: VolumeErrors) -> dict[str, Any]:
+def _volume_values(found: GridErrors) -> dict[str, Any]:
     at, error = found.worst
     return {
         "at_mm": at.tolist(),

@@ -18,7 +18,7 @@ NODES: Final = 13  # of the grid along each axis
 MICRO: Final = 1e3  # µm of a mm
 
 
-class VolumeErrors(NamedTuple):
+class GridErrors(NamedTuple):
     """Error of the functional point on a grid: nodes along X, Y, Z (mm), and the error (nx, ny, nz, 3), mm."""
 
     nodes: tuple[FloatArray, FloatArray, FloatArray]
@@ -48,15 +48,15 @@ class VolumeErrors(NamedTuple):
         return float(np.sqrt(np.mean(self.size**2)))
 
 
-def errors_in(calibration: Calibration, count: int = NODES) -> VolumeErrors:
+def errors_in(calibration: Calibration, count: int = NODES) -> GridErrors:
     """The error on a grid of `count` nodes along each edge; what is not determined counts as 0."""
     x, y, z = (np.linspace(0.0, float(edge), count) for edge in calibration.volume)
     points = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
     machine = Machine(calibration.chain, calibration.to_error_map(), calibration.tool)
-    return VolumeErrors((x, y, z), machine.error(points).reshape(count, count, count, 3))
+    return GridErrors((x, y, z), machine.error(points).reshape(count, count, count, 3))
 
 
-def drawing_of(contents: Contents, found: VolumeErrors, before: VolumeErrors | None) -> dict[str, Any]:
+def drawing_of(contents: Contents, found: GridErrors, before: GridErrors | None) -> dict[str, Any]:
     """What report.js draws: nodes (mm), errors (µm) in the order x, y, z, measured lines, the worst point."""
     edges = contents.calibration.volume
     lines = [{"name": line, "from": start, "to": end} for line, start, end in _ends(contents.lines, edges)]
@@ -71,7 +71,7 @@ def drawing_of(contents: Contents, found: VolumeErrors, before: VolumeErrors | N
     }
 
 
-def exaggeration(edges: FloatArray, found: VolumeErrors, before: VolumeErrors | None) -> float:
+def exaggeration(edges: FloatArray, found: GridErrors, before: GridErrors | None) -> float:
     """1, 2 or 5 times a power of ten: the largest error is drawn as about a tenth of the shortest edge."""
     largest = max(one.largest for one in (found, before) if one is not None)
     if largest <= 0.0:
@@ -91,7 +91,7 @@ def _ends(lines: Sequence[str], edges: FloatArray) -> list[tuple[str, list[float
     return ends
 
 
-def volume_section(contents: Contents, found: VolumeErrors, before: VolumeErrors | None) -> Markup:
+def volume_section(contents: Contents, found: GridErrors, before: GridErrors | None) -> Markup:
     """The drawing with its controls, and the errors at the corners and the centre as a table."""
     scale = exaggeration(contents.calibration.volume, found, before)
     at, error = found.worst
@@ -197,7 +197,7 @@ def _controls(scale: float, has_before: bool, has_lines: bool) -> Markup:
     )
 
 
-def _table(found: VolumeErrors, before: VolumeErrors | None) -> Markup:
+def _table(found: GridErrors, before: GridErrors | None) -> Markup:
     """Corners and middles of the volume."""
     last = NODES - 1
     heading = ["X, Y, Z (mm)", "e_X (µm)", "e_Y (µm)", "e_Z (µm)", "|e| (µm)"]

@@ -13,7 +13,7 @@ from stepdiag.page.contents import Contents
 from stepdiag.page.header import TITLES
 from stepdiag.page.html import Markup, definitions, element, listed, markup, section, table
 from stepdiag.page.numbers import COVERAGE_FACTOR, NOT_KNOWN, moment, position, shown, with_interval
-from stepdiag.page.volume import MICRO, VolumeErrors
+from stepdiag.page.volume import MICRO, GridErrors
 from stepdiag.parameters import FUNCTIONS, KINDS, REPORT_UNIT, SQUARENESSES, Kind, in_report_units, kind_of
 
 HEADLINE: Final = {
@@ -107,7 +107,7 @@ def _sentence(note: str) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def summary_section(contents: Contents, found: VolumeErrors, before: VolumeErrors | None) -> Markup:
+def summary_section(contents: Contents, found: GridErrors, before: GridErrors | None) -> Markup:
     """Five lines that a customer understands."""
     calibration = contents.calibration
     at, _ = found.worst
@@ -313,7 +313,7 @@ def _probability(probability: float | None) -> str:
     return f"{probability:.2g}" if probability >= LEAST_PROBABILITY else f"below {LEAST_PROBABILITY:g}"
 
 
-def comparison_section(contents: Contents, found: VolumeErrors, before: VolumeErrors | None) -> Markup | None:
+def comparison_section(contents: Contents, found: GridErrors, before: GridErrors | None) -> Markup | None:
     """Before and after, parameter by parameter."""
     comparison = contents.comparison
     if comparison is None or before is None:
