@@ -117,6 +117,7 @@ if TYPE_CHECKING:
     from stepdiag.calibration.comparison import Comparison, Difference, compare_calibrations
     from stepdiag.calibration.functional_point import functional_point_straightness
     from stepdiag.calibration.largest_by_kind import Deviation, largest_deviations, largest_uncertainties
+    from stepdiag.calibration.truth import TruthAgreement
     from stepdiag.calibration.volume import (
         PointErrors,
         VolumeContribution,
@@ -126,6 +127,7 @@ if TYPE_CHECKING:
         volume_errors,
         volume_grid,
     )
+    from stepdiag.calibration.volume_change import FigureChange, ParameterEffect, VolumeChange, volume_change
     from stepdiag.export.common import ExportOptions
     from stepdiag.export.write import export_calibration
     from stepdiag.head.description import parse_head_design, read_head_design, shipped_head
@@ -183,6 +185,7 @@ __all__ = [
     "Fault",
     "FaultClass",
     "FaultControl",
+    "FigureChange",
     "FinishedCells",
     "FitReason",
     "FunctionModel",
@@ -208,6 +211,7 @@ __all__ = [
     "MonteCarloResult",
     "Noise",
     "Outlier",
+    "ParameterEffect",
     "Plan",
     "PlausibleLimits",
     "PointErrors",
@@ -233,6 +237,7 @@ __all__ = [
     "StatisticsOptions",
     "TcpTrigger",
     "Truth",
+    "TruthAgreement",
     "Twin",
     "UncertainInput",
     "UncertainInputs",
@@ -243,6 +248,7 @@ __all__ = [
     "Verdict",
     "VirtualCalibrations",
     "VirtualReadout",
+    "VolumeChange",
     "VolumeContribution",
     "VolumeErrors",
     "VolumeFigure",
@@ -303,6 +309,7 @@ __all__ = [
     "study_table",
     "trace_beams",
     "uncertainty_table",
+    "volume_change",
     "volume_errors",
     "volume_grid",
     "volumetric_accuracy",
@@ -332,6 +339,7 @@ _LATER = {
         "largest_deviations",
         "largest_uncertainties",
     ),
+    "calibration.truth": ("TruthAgreement",),
     "calibration.volume": (
         "PointErrors",
         "VolumeContribution",
@@ -340,6 +348,12 @@ _LATER = {
         "errors_at_points",
         "volume_errors",
         "volume_grid",
+    ),
+    "calibration.volume_change": (
+        "FigureChange",
+        "ParameterEffect",
+        "VolumeChange",
+        "volume_change",
     ),
     "export.common": ("ExportOptions",),
     "export.write": ("export_calibration",),

@@ -1,4 +1,5 @@
-"""Two calibrations of one machine side by side: what differs, and whether by more than their uncertainties."""
+"""Two calibrations of one machine side by side, or one and the truth: what differs, and whether by more than their
+uncertainties."""
 
 import math
 import sys
@@ -9,8 +10,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from stepdiag._core import Calibration, InvalidArgument
+from stepdiag._core import Calibration, ErrorMap, InvalidArgument
 from stepdiag.calibration.table_sums import FloatArray, TableValues, Term
+from stepdiag.calibration.truth import TruthAgreement, agreement_with_truth, truth_as_calibration
 from stepdiag.display import Displayed, Facts, lengths_text
 from stepdiag.parameters import units_of
 from stepdiag.units import report_value
@@ -89,6 +91,7 @@ class Comparison(Displayed):
     only_in_b: tuple[str, ...]
     limit: float
     notes: tuple[str, ...]
+    agreement: TruthAgreement | None = None  # where one of them is a truth
 
     @property
     def count(self) -> int:
@@ -129,8 +132,10 @@ class Comparison(Displayed):
         return [*facts, *((d.parameter, d._facts()[1][1]) for d in self.differences)]
 
 
-def compare_calibrations(a: Calibration, b: Calibration, *, limit: float = 0.05) -> Comparison:
+def compare_calibrations(a: Calibration | ErrorMap, b: Calibration | ErrorMap, *, limit: float = 0.05) -> Comparison:
     """Differences B - A of all parameters that both determine, with their significance.
+
+    One of the two may be an error map, such as a known truth: it is taken at the nodes of the other one, as exact.
 
     Where nodes differ, those of the shorter table are taken and the other one is interpolated, linearly, its
     uncertainties likewise. Of functions whose slope one of them leaves open the shapes are compared. `limit` is the
@@ -138,7 +143,17 @@ def compare_calibrations(a: Calibration, b: Calibration, *, limit: float = 0.05)
     does and a method takes no account of it, or where there is nothing to compare."""
     if not 0.0 < limit < 1.0:
         raise InvalidArgument(f"limit: expected a probability between 0 and 1, got {limit}")
-    notes = _check_machines(a, b)
+    truths: list[str] = []
+    calibration = b if isinstance(a, ErrorMap) else a
+    if isinstance(calibration, ErrorMap):
+        raise InvalidArgument("expected one calibration at least, got two error maps")
+    if isinstance(a, ErrorMap):
+        a, truths = truth_as_calibration(a, calibration)
+    with_truth = a is not calibration
+    if isinstance(b, ErrorMap):
+        b, truths = truth_as_calibration(b, calibration)
+        with_truth = True
+    notes = [*_check_machines(a, b), *truths]
     run = a.provenance.get("run_sha256")
     if run is not None and run == b.provenance.get("run_sha256"):
         notes.append("A and B are evaluations of the same run: they are not independent")
@@ -165,7 +180,13 @@ def compare_calibrations(a: Calibration, b: Calibration, *, limit: float = 0.05)
         notes.append("functions are those of positions approached in + direction")
     known_a, known_b = {*tables_a.functions, *mine}, {*tables_b.functions, *theirs}
     only_in_a, only_in_b = (tuple(sorted(names, key=_order)) for names in (known_a - known_b, known_b - known_a))
-    return Comparison(a, b, tuple(differences), only_in_a, only_in_b, limit, tuple(notes))
+    agreement = None
+    if with_truth:
+        deviations = {difference.parameter: difference.value for difference in differences}
+        shapes = {difference.parameter for difference in differences if difference.shape_only}
+        tested = [d.normalised[d.testable & np.isfinite(d.normalised)] for d in differences]
+        agreement = agreement_with_truth(calibration, deviations, shapes, np.concatenate(tested))
+    return Comparison(a, b, tuple(differences), only_in_a, only_in_b, limit, tuple(notes), agreement)
 
 
 def _check_machines(a: Calibration, b: Calibration) -> list[str]:

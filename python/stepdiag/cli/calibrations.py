@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from stepdiag._core import InvalidArgument
+from stepdiag._core import InvalidArgument, read_error_map
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Command, Writes, fit_warnings, json_option, tell, tell_fit
 from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, PAGE, PDF, OutputFile
 
@@ -155,7 +155,10 @@ def _write_page(
 @json_option
 @click.pass_context
 def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None, limit: float, as_json: bool) -> None:
-    """Compare two calibrations A and B (CSV or netCDF).
+    """Compare two calibrations A and B (CSV or netCDF), or a calibration and an error map.
+
+    Reports the error of the tool in the volume by A and by B, whether it became better or worse, and
+    which parameters matter most there.
 
     Reports for every parameter the largest difference B - A, its position, its standard uncertainty
     sqrt(u_A^2 + u_B^2), and whether a difference is significant. The probability of each difference
@@ -163,7 +166,9 @@ def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None,
     is interpolated. Functions whose slope is not determined in both are compared by shape.
     """
     from stepdiag.calibration.comparison import compare_calibrations
+    from stepdiag.calibration.volume_change import volume_change
     from stepdiag.io.data_files import read_calibration
+    from stepdiag.io.file_kind import kind_of_file
     from stepdiag.io.whole_files import check_input
     from stepdiag.report.comparison import comparison_report
 
@@ -172,25 +177,29 @@ def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None,
         raise InvalidArgument(f"--limit: expected a probability between 0 and 1, got {limit:g}")
     for path in (a, b):
         check_input(path)
-    one, other = read_calibration(a), read_calibration(b)
+    one, other = (
+        read_error_map(path) if kind_of_file(path) == "error map" else read_calibration(path) for path in (a, b)
+    )
     try:
         comparison = compare_calibrations(one, other, limit=limit)
     except InvalidArgument as error:
         raise InvalidArgument(f"{a}, {b}: {error}") from None
+    change = volume_change(comparison)
     if written is not None:
         from stepdiag.report.comparison import write_comparison
 
         write_comparison(comparison, written)
-    warnings = [*fit_warnings(a, one.fit), *fit_warnings(b, other.fit)]
+    fits = comparison.a.fit, comparison.b.fit
+    warnings = [*fit_warnings(a, fits[0]), *fit_warnings(b, fits[1])]
     if as_json:
         from stepdiag.objects.comparison import comparison_object
         from stepdiag.objects.writer import json_text
 
-        click.echo(json_text(comparison_object(comparison, (a, b), warnings)))
+        click.echo(json_text(comparison_object(comparison, change, (a, b), warnings)))
     else:
-        for line in comparison_report(comparison, str(a), str(b)):
+        for line in comparison_report(comparison, change, str(a), str(b)):
             click.echo(line)
     for warning in warnings:
         tell("warning", warning)
-    if "rejected" in (one.fit, other.fit):
+    if "rejected" in fits:
         context.exit(NOT_TO_BE_TRUSTED)

@@ -7,9 +7,10 @@ from typing import Any, Literal
 from typing_extensions import TypedDict
 
 from stepdiag._core import Calibration, __version__
+from stepdiag.calibration import truth, volume_change
 from stepdiag.calibration.comparison import Comparison, Difference
 from stepdiag.objects.calibration import Fit, fit_of, unit_key
-from stepdiag.objects.writer import measured, number
+from stepdiag.objects.writer import in_unit, measured, number
 
 
 class ComparedCalibration(TypedDict):
@@ -54,6 +55,54 @@ class AngleDifference(_ParameterDifference):
     standard_uncertainty_urad: list[float | None]
 
 
+class ChangedFigure(TypedDict):
+    """A figure of the error of the tool in the volume, by A and by B."""
+
+    a_um: float | None
+    """null: a parameter that acts in it is not determined"""
+    b_um: float | None
+    change_um: float | None
+    """B - A"""
+    interval_um: list[float | None] | None
+    """95 % of the change; null: not known"""
+    verdict: Literal["improved", "worse", "cannot be told"] | None
+
+
+class Effect(TypedDict):
+    """The error of the tool in the volume that the difference of a parameter makes alone."""
+
+    parameter: str
+    largest_um: float
+    rms_um: float
+    significant: bool
+
+
+class ChangedVolume(TypedDict):
+    """The error of the tool over the whole volume, at the tool offset of A."""
+
+    largest: ChangedFigure
+    rms: ChangedFigure
+    no_verdict_because: str | None
+    effects: list[Effect]
+    """The largest first."""
+
+
+class AgreementWithMap(TypedDict):
+    """How a calibration agrees with an error map that is taken as the truth."""
+
+    values: int
+    """With a standard uncertainty other than 0."""
+    beyond_two: int
+    """Of these: deviation beyond two standard uncertainties."""
+    rms_normalised: float | None
+    """Root mean square of deviations by their standard uncertainties."""
+    chi_square: float | None
+    """Of all values with their covariance; null: there is none"""
+    degrees_of_freedom: int
+    chi_square_probability: float | None
+    """Of a larger chi-square, if the uncertainties are right."""
+
+
 class ComparisonObject(TypedDict):
     """Result of `stepdiag compare`."""
 
@@ -72,14 +121,19 @@ class ComparisonObject(TypedDict):
     """Normalised difference beyond which a value is significant; null: no value is tested."""
     significant: list[str]
     """Parameters that differ by more than chance explains."""
+    volume: ChangedVolume
+    agreement: AgreementWithMap | None
+    """null: both are calibrations"""
     differences: list[LengthDifference | AngleDifference]
     only_in_a: list[str]
     only_in_b: list[str]
     notes: list[str]
 
 
-def comparison_object(comparison: Comparison, files: tuple[Path, Path], warnings: Sequence[str]) -> ComparisonObject:
-    """How two calibrations differ."""
+def comparison_object(
+    comparison: Comparison, change: volume_change.VolumeChange, files: tuple[Path, Path], warnings: Sequence[str]
+) -> ComparisonObject:
+    """How two calibrations, or a calibration and an error map, differ."""
     significant = filter(comparison.is_significant, comparison.differences)
     return {
         "stepdiag": __version__,
@@ -93,6 +147,13 @@ def comparison_object(comparison: Comparison, files: tuple[Path, Path], warnings
         "values": comparison.count,
         "threshold": comparison.threshold if comparison.count else None,
         "significant": [difference.parameter for difference in significant],
+        "volume": {
+            "largest": _change(change.largest),
+            "rms": _change(change.rms),
+            "no_verdict_because": change.no_verdict_because or None,
+            "effects": [_effect(effect) for effect in change.effects],
+        },
+        "agreement": None if comparison.agreement is None else _agreement(comparison.agreement),
         "differences": [_difference(comparison, one) for one in comparison.differences],
         "only_in_a": list(comparison.only_in_a),
         "only_in_b": list(comparison.only_in_b),
@@ -108,6 +169,28 @@ def _compared(calibration: Calibration, file: Path) -> ComparedCalibration:
         "date": calibration.date,
         "tool_mm": calibration.tool.tolist(),
         "provenance": dict(calibration.provenance),
+    }
+
+
+def _change(figure: volume_change.FigureChange) -> Any:
+    interval = None if figure.interval is None else [in_unit("um", end) for end in figure.interval]
+    values = measured("um", a=figure.a, b=figure.b, change=figure.change)
+    return {**values, "interval_um": interval, "verdict": figure.verdict}
+
+
+def _effect(effect: volume_change.ParameterEffect) -> Any:
+    values = measured("um", largest=effect.largest, rms=effect.rms)
+    return {"parameter": effect.parameter, **values, "significant": effect.significant}
+
+
+def _agreement(agreement: truth.TruthAgreement) -> AgreementWithMap:
+    return {
+        "values": agreement.values,
+        "beyond_two": agreement.beyond_two,
+        "rms_normalised": number(agreement.rms),
+        "chi_square": agreement.chi_square,
+        "degrees_of_freedom": agreement.degrees_of_freedom,
+        "chi_square_probability": agreement.probability,
     }
 
 

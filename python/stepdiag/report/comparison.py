@@ -9,31 +9,81 @@ import numpy as np
 
 from stepdiag._core import Calibration
 from stepdiag.calibration.comparison import Comparison, Difference
+from stepdiag.calibration.truth import TruthAgreement
+from stepdiag.calibration.volume_change import VolumeChange
 from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.io.data_files import date_of_today, is_netcdf
 from stepdiag.io.whole_files import write_whole
 from stepdiag.parameters import REPORT_UNIT, in_report_units, kind_of, units_of
+from stepdiag.report.text_columns import text_columns
+from stepdiag.units import report_value
 
 if TYPE_CHECKING:
     import xarray as xr
 
 COMPARISON_FORMAT: Final = "stepdiag comparison 1"
+EFFECTS_SHOWN: Final = 5
 
 
-def comparison_report(comparison: Comparison, name_a: str, name_b: str) -> Iterator[str]:
-    """What is compared, a table by parameter with the significant ones marked, and what cannot be compared."""
+def comparison_report(comparison: Comparison, change: VolumeChange, name_a: str, name_b: str) -> Iterator[str]:
+    """What is compared, what it means in the volume, a table by parameter with the significant ones marked, and what
+    cannot be compared."""
     yield f"A: {name_a}: {_described(comparison.a)}"
     yield f"B: {name_b}: {_described(comparison.b)}"
     a = comparison.a
     volume, tool = (" x ".join(f"{edge:g}" for edge in a.volume), " ".join(f"{offset:g}" for offset in a.tool))
     yield f"machine: chain {a.chain}, volume {volume} mm, tool offset {tool} mm"
     yield ""
+    yield from _volume_rows(change)
+    yield ""
+    if comparison.agreement is not None:
+        yield from _agreement_rows(comparison.agreement)
+        yield ""
     yield f"{'':<19}{'largest difference':>30}   {'most significant difference':>33}"
     yield f"{'':<19}{'B - A':>10}{'u':>10}{'at mm':>10}   {'(B - A)/u':>10}{'at mm':>10}{'probability':>13}"
     for difference in comparison.differences:
         yield _row(comparison, difference)
     yield ""
     yield from _rules(comparison)
+
+
+def _volume_rows(change: VolumeChange) -> Iterator[str]:
+    rows: list[tuple[str, ...]] = [("error of the tool in the volume", "A", "B", "B - A", "95 %", "")]
+    for name, figure in (("largest", change.largest), ("rms", change.rms)):
+        interval = "-" if figure.interval is None else " to ".join(map(_micrometres, figure.interval))
+        values = map(_micrometres, (figure.a, figure.b, figure.change))
+        rows.append((name, *values, interval, f"µm  {figure.verdict or ''}"))
+    yield from text_columns(rows, left=(0, 5))
+    if change.no_verdict_because:
+        yield f"no verdict: {change.no_verdict_because}"
+    rows = [("errors that differences make alone", "largest", "rms", "")]
+    for effect in change.effects[:EFFECTS_SHOWN]:
+        mark = "µm  significant" if effect.significant else "µm"
+        rows.append((effect.parameter, _micrometres(effect.largest), _micrometres(effect.rms), mark))
+    if len(rows) > 1:
+        yield from text_columns(rows, left=(0, 3))
+
+
+def _agreement_rows(agreement: TruthAgreement) -> Iterator[str]:
+    if not agreement.values:
+        yield "agreement with the error map: not known, because the calibration has no standard uncertainties"
+        return
+    share = 100.0 * agreement.beyond_two / agreement.values
+    yield (
+        f"agreement with the error map: {agreement.beyond_two} of {agreement.values} values beyond 2 u "
+        f"({share:.1f} %; 4.6 % expected), rms {agreement.rms:.3g} u"
+    )
+    if agreement.chi_square is None or agreement.probability is None:
+        yield "chi-square: not known, because the calibration has no covariance (write it as .nc)"
+    else:
+        yield (
+            f"chi-square: {agreement.chi_square:.4g} with {agreement.degrees_of_freedom} degrees of freedom, "
+            f"probability of a larger one {agreement.probability:.3g}"
+        )
+
+
+def _micrometres(value: float) -> str:
+    return "-" if np.isnan(value) else f"{report_value('mm', value)[0]:.4g}"
 
 
 def _described(calibration: Calibration) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from calibrations import calibrate, parts_of
+from json_objects import printed
 
 import stepdiag as sd
 from stepdiag.cli import main
@@ -29,7 +30,7 @@ def test_command_tells_methods_dates_and_marks_what_is_significant(
     said = capsys.readouterr().out.splitlines()
     assert said[0] == "A: a.csv: enhanced, 2026-01-02T03:04:05Z"
     assert said[1].startswith("B: b.nc: adjustment, 2026-11-21T")
-    assert [line.split()[0] for line in said if line.endswith("significant")] == ["EXX"]
+    assert {line.split()[0] for line in said if line.endswith("significant")} == {"EXX"}
     assert any("Bonferroni" in line for line in said)
     assert any("as if A and B were independent" in line for line in said)
     assert sum(line[:3] in FUNCTIONS for line in said) == 18
@@ -72,7 +73,7 @@ def test_differences_are_written(here: Path) -> None:
         (["a.csv", "b.nc", "-o", "b.nc"], "b.nc: is also an input"),
         (["a.csv", "b.nc", "-o", "no/such.csv"], "no/such.csv: cannot be written"),
         (["a.csv", "b.nc", "--limit", "2"], "--limit: expected a probability between 0 and 1, got 2"),
-        (["a.csv", "map.csv"], "map.csv"),
+        (["map.csv", "map.csv"], "map.csv, map.csv: expected one calibration at least, got two error maps"),
     ],
 )
 def test_mistakes_of_a_comparison_are_told_in_a_line(
@@ -86,3 +87,43 @@ def test_mistakes_of_a_comparison_are_told_in_a_line(
     assert message in said
     assert said.count("\n") == 1
     assert {path.name: path.read_bytes() for path in here.iterdir()} == before
+
+
+def test_volume_before_and_after_stands_before_the_parameters(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "a.csv", "b.nc"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    change = sd.volume_change(sd.compare_calibrations(sd.read_calibration("a.csv"), sd.read_calibration("b.nc")))
+    (largest,) = (line.split() for line in said if line.startswith("  largest "))
+    assert largest[1:4] == [
+        f"{value * 1e3:.4g}" for value in (change.largest.a, change.largest.b, change.largest.change)
+    ]
+    assert "no verdict: no covariance of A (write it as .nc)" in said
+    first = said[said.index(next(line for line in said if "differences make alone" in line)) + 1].split()
+    assert first == [
+        "EXX",
+        f"{change.effects[0].largest * 1e3:.4g}",
+        f"{change.effects[0].rms * 1e3:.4g}",
+        "µm",
+        "significant",
+    ]
+
+
+def test_calibration_is_compared_with_the_truth(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    truth = sd.random_error_map((80.0, 60.0, 50.0), seed=3, intervals=5)
+    truth.write("truth.csv")
+    sd.write_calibration(calibrate(1, full_covariance=True), "c.nc")
+    assert main(["compare", "c.nc", "truth.csv"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    agreement = sd.compare_calibrations(sd.read_calibration("c.nc"), truth).agreement
+    assert agreement is not None
+    assert said[1] == "B: truth.csv: error map, date not known"
+    assert any(
+        line.startswith(f"agreement with the error map: {agreement.beyond_two} of 87 values beyond 2 u")
+        for line in said
+    )
+    assert any(line.startswith(f"chi-square: {agreement.chi_square:.4g} with 87 degrees of freedom") for line in said)
+    found = printed("comparison", capsys, "compare", "truth.csv", "c.nc")
+    assert found["agreement"]["chi_square"] == pytest.approx(agreement.chi_square, rel=1e-12)
+    assert found["volume"]["largest"]["verdict"] is None
+    assert found["volume"]["no_verdict_because"] == "one of the two is an error map"
+    assert found["a"]["method"] == "error map"

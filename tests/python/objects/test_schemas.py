@@ -16,11 +16,13 @@ UNITS = ("um", "mm", "urad", "ppm", "um_per_h", "um_per_m", "minutes")
 # Numbers that have no unit.
 OF_UNIT_ONE = {
     *("positioning", "straightness", "angle", "squareness"),  # exponents
+    "chi_square",
     "chi_square_gain",
     "chi_square_probability",
     "limit",
     "normalised",
     "probability",
+    "rms_normalised",
     "threshold",
     "uncertainties_multiplied_by",
     "variance_factor",
