@@ -10,6 +10,7 @@ from stepdiag._core import Calibration, ErrorMap, Machine
 from stepdiag.calibration.comparison import Comparison, Difference
 from stepdiag.calibration.table_sums import FloatArray
 from stepdiag.calibration.volume import Interval, VolumeErrors, volume_errors
+from stepdiag.display import Displayed, Facts
 
 ChangeVerdict = Literal["improved", "worse", "cannot be told"]
 # Positions an axis, besides the nodes: the trapezoidal rule is then good to 1 % of the rms between rough nodes.
@@ -43,8 +44,8 @@ class ParameterEffect:
     significant: bool
 
 
-@dataclass(frozen=True, eq=False)
-class VolumeChange:
+@dataclass(frozen=True, eq=False, repr=False)
+class VolumeChange(Displayed):
     """The error of the tool over the volume by A and by B, and which differences make it."""
 
     tool: FloatArray  # (3,) mm: that of A, for both
@@ -54,6 +55,17 @@ class VolumeChange:
     rms: FigureChange
     effects: tuple[ParameterEffect, ...]  # the largest first; 0 left out
     no_verdict_because: str  # empty where there are verdicts
+
+    def _facts(self) -> Facts:
+        facts = []
+        for name, figure in (("largest", self.largest), ("rms", self.rms)):
+            verdict = f", {figure.verdict}" if figure.verdict else ""
+            facts.append((name, f"{figure.a * 1e3:.4g} to {figure.b * 1e3:.4g} µm{verdict}"))
+        facts += [("no verdict because", self.no_verdict_because)] if self.no_verdict_because else []
+        return [
+            *facts,
+            *((f"effect of {effect.parameter}", f"{effect.largest * 1e3:.4g} µm") for effect in self.effects),
+        ]
 
 
 def volume_change(comparison: Comparison) -> VolumeChange:

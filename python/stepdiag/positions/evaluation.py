@@ -18,7 +18,8 @@ from statistics import fmean, stdev
 from typing import Final
 
 from stepdiag._core import InvalidArgument
-from stepdiag.positions.figures import FIGURES, PositionFigure
+from stepdiag.display import Displayed, Facts
+from stepdiag.positions.figures import FIGURES, PositionFigure, figure_facts
 from stepdiag.positions.readings import PositionReadings
 
 CYCLES_OF_THE_STANDARD: Final = 5
@@ -44,8 +45,8 @@ class TargetScatter:
         return self.deviation**2 / (2 * (self.count - 1))
 
 
-@dataclass(frozen=True)
-class MeasuredPositions:
+@dataclass(frozen=True, repr=False)
+class MeasuredPositions(Displayed):
     """Figures of repeated readings: symbol -> figure (`FIGURES`); those of a direction without readings are absent."""
 
     readings: PositionReadings
@@ -60,6 +61,10 @@ class MeasuredPositions:
     def fewest_readings(self) -> int:
         """Of any target and direction that counts."""
         return min(scatter.count for scatter in (*self.up, *self.down))
+
+    def _facts(self) -> Facts:
+        left_out = [("left out", f"{len(self.left_out)} targets with fewer than two readings in a direction")]
+        return [*(left_out if self.left_out else ()), *figure_facts(self.figures), *self.readings._facts()]
 
 
 def evaluate_positions(readings: PositionReadings) -> MeasuredPositions:

@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from stepdiag.display import Facts
+from stepdiag.units import report_value
+
 # By their symbols, in the order of reports. UP: target approached in + direction, DOWN: in - direction.
 FIGURES: Final[Mapping[str, str]] = {
     "A": "accuracy, bidirectional",
@@ -36,3 +39,15 @@ class PositionFigure:
     at: tuple[float, ...] = ()  # mm along the line; empty for a mean
     standard_uncertainty: float | None = None
     interval: tuple[float, float] | None = None
+
+
+def figure_facts(figures: Mapping[str, PositionFigure]) -> Facts:
+    """Symbols and values with their intervals, µm."""
+    found = []
+    for name, figure in figures.items():
+        interval = ""
+        if figure.interval is not None:
+            low, high = (report_value("mm", end)[0] for end in figure.interval)
+            interval = f", 95 % interval {low:.4g} to {high:.4g} µm"
+        found.append((symbol(name), f"{report_value('mm', figure.value)[0]:.4g} µm{interval}"))
+    return found

@@ -20,8 +20,9 @@ import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
 from stepdiag.calibration.table_sums import FloatArray
+from stepdiag.display import Displayed, Facts, point_text
 from stepdiag.parameters import AXES
-from stepdiag.positions.figures import FIGURES, PositionFigure
+from stepdiag.positions.figures import FIGURES, PositionFigure, figure_facts
 from stepdiag.positions.line_effects import LineEffects
 
 Point = tuple[float, float, float]
@@ -33,8 +34,8 @@ _SAMPLES: Final = 10_000
 _ROUNDING: Final = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class PredictedPositions:
+@dataclass(frozen=True, eq=False, repr=False)
+class PredictedPositions(Displayed):
     """Deviations at targets along a line, arrays (n,) in mm, and the figures that follow: symbol -> figure.
 
     Deviations are NaN, and figures absent, where the calibration lacks something; `reasons` says what. Figures and
@@ -51,6 +52,14 @@ class PredictedPositions:
     reversal_standard_uncertainty: FloatArray  # terms as independent: the covariance of reversal errors is not known
     figures: Mapping[str, PositionFigure]
     reasons: tuple[str, ...]  # why figures or intervals are missing, a sentence each
+
+    def _facts(self) -> Facts:
+        return [
+            *figure_facts(self.figures),
+            ("line", f"{point_text(self.start)} to {point_text(self.end)}, {len(self.target)} targets"),
+            ("tool offset", point_text(self.tool)),
+            *(("note", reason) for reason in self.reasons),
+        ]
 
 
 def axis_line(calibration: Calibration, axis: str, at: Point = (0.0, 0.0, 0.0)) -> tuple[Point, Point]:

@@ -4,12 +4,13 @@ import csv
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Final
 
 from stepdiag._core import InvalidArgument
+from stepdiag.display import Displayed, Facts
 from stepdiag.io.file_kind import head_of
 from stepdiag.io.whole_files import read_text
 from stepdiag.units import MICROMETRE
@@ -20,8 +21,8 @@ _VALUES: Final = ("deviation_um", "position_mm")
 _ROUNDING: Final = 1e-6
 
 
-@dataclass(frozen=True)
-class PositionReadings:
+@dataclass(frozen=True, repr=False)
+class PositionReadings(Displayed):
     """Deviations, actual less target position (mm), of targets approached repeatedly on one line.
 
     `deviations`: (target in mm, direction "+" or "-", cycle) -> deviation. A lost reading is absent. `targets`: of all
@@ -31,7 +32,7 @@ class PositionReadings:
     targets: tuple[float, ...]
     deviations: Mapping[tuple[float, str, int], float]
     line: str = ""  # what was measured, in words
-    lost: int = field(default=0)  # rows whose reading is missing
+    lost: int = 0  # rows whose reading is missing
 
     def __post_init__(self) -> None:
         if len(self.targets) < 2 or list(self.targets) != sorted(set(self.targets)):
@@ -58,6 +59,16 @@ class PositionReadings:
     def directions(self) -> tuple[str, ...]:
         """Directions that have a reading: "+", "-"."""
         return tuple(sorted({direction for _, direction, _ in self.deviations}))
+
+    def _facts(self) -> Facts:
+        line = [("line", self.line)] if self.line else []
+        return [
+            *line,
+            ("targets", f"{len(self.targets)}, {self.targets[0]:g} to {self.targets[-1]:g} mm"),
+            ("cycles", str(len(self.cycles))),
+            ("directions", " and ".join(self.directions) or "none"),
+            ("readings", f"{len(self.deviations)}, {self.lost} lost"),
+        ]
 
 
 def read_positions(path: str | PathLike[str]) -> PositionReadings:

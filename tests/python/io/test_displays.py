@@ -9,11 +9,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from calibrations import CHAIN, PLAN, calibrate, parts_of, simulate
+from places import DATA
 from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag.display import LONGEST_LINE, html_table, one_line
 
+READINGS = DATA / "positions" / "stepper_stage.csv"
 # Options, verbs, errors and open connections: they are not results.
 SHOW_NOTHING = {
     *("AcquireOptions", "AdjustmentOptions", "ExportOptions", "SimulationOptions", "StatisticsOptions"),
@@ -41,6 +43,8 @@ def values() -> Mapping[str, Any]:
         *(comparison, comparison.differences[0], a.to_error_map(), a.chain),
         *(described, described.bodies[0], described.beams[0], *described.sensors[:1]),
         *(sd.volumetric_accuracy(a), sd.error_at_point(a, (1, 2, 3)), sd.volume_errors(a, limit=0.02)),
+        *(sd.volume_change(comparison), sd.predict_positions(a, *sd.axis_line(a, "X"))),
+        *(sd.read_positions(READINGS), sd.evaluate_positions(sd.read_positions(READINGS))),
         sd.evaluate_uncertainty(scenario, sd.UncertaintyRequest(samples=10_000)),
         *(sd.Noise(), sd.Misalignment(), sd.Distribution(spread=1.0), sd.ReadingUncertainty()),
     ]

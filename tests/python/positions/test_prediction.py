@@ -167,6 +167,7 @@ def test_values_are_those_of_the_exact_pose(calibration: sd.Calibration) -> None
     np.testing.assert_allclose(line.up, (error - error[0]) @ direction, atol=1e-13)  # rounding of 100 mm
 
 
+@pytest.mark.slow
 def test_interval_covers_the_true_range(calibration: sd.Calibration) -> None:
     """The calibration taken as the truth, and 600 calibrations drawn about it with its covariance."""
     truth = sd.predict_positions(calibration, *sd.axis_line(calibration, "Y", (0.0, 0.0, 50.0))).figures["E_up"].value
@@ -191,6 +192,40 @@ def test_interval_covers_the_true_range(calibration: sd.Calibration) -> None:
         covered += found[0] <= truth <= found[1]
     # Binomial, 600 of 0.95: 570 with a standard deviation of 5.3; four of them.
     assert 549 <= covered <= 591
+
+
+def test_calibrations_of_a_known_machine_predict_its_ranges() -> None:
+    """Runs with noise of a machine, whose true range follows from its exact pose."""
+    machine = sd.Machine(CHAIN, sd.random_error_map(VOLUME, seed=3, intervals=5), TOOL)
+    covered = 0
+    for seed in range(40):
+        found = calibrate(seed, full_covariance=True)
+        for start, end in (sd.axis_line(found, "X", (0.0, 60.0, 50.0)), sd.diagonal_line(found, "pnp")):
+            points = np.array(start) + np.linspace(0.0, 1.0, 6)[:, None] * (np.array(end) - np.array(start))
+            direction = (points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0])
+            truth = np.ptp(machine.error(points) @ direction)
+            interval = sd.predict_positions(found, start, end).figures["E_up"].interval
+            assert interval is not None
+            covered += interval[0] <= truth <= interval[1]
+    # Binomial, 80 of 0.95: 76 with a standard deviation of 2; four of them. Priors of the set-up may make it more.
+    assert covered >= 68
+
+
+def test_backlash_of_a_known_machine_is_the_b_that_is_predicted() -> None:
+    """EXX is 2 µm less in - direction, and ECX 20 µrad: at y = 60 mm, B = 2 µm - 60 mm times 20 µrad and the tool's."""
+    errors = sd.random_error_map(VOLUME, seed=3, intervals=5)
+    shifts = {"EXX": -2e-3, "ECX": -20e-6}
+    negative = {name: (p, v + shifts[name]) for name, (p, v) in errors.functions.items() if name in shifts}
+    machine = sd.Machine(CHAIN, sd.ErrorMap(errors.functions, errors.squareness, negative_functions=negative), TOOL)
+    noise = sd.Noise(distance=1e-4, tilt=1e-6, seed=1)
+    run = sd.simulate(machine, small_plan(), sd.Head(), noise=noise, repeats=2, backward=True)
+    found = sd.evaluate(run, small_plan(), sd.Head(), CHAIN, TOOL)
+    for y in (0.0, 60.0):
+        line = sd.predict_positions(found, *sd.axis_line(found, "X", (0.0, y, 0.0)))
+        truth = 2e-3 - (y + TOOL[1]) * 20e-6
+        deviations = (line.reversal - truth) / line.reversal_standard_uncertainty
+        assert np.max(np.abs(deviations)) < 4.0  # six values, at most 4 u
+        assert line.figures["B"].value == np.max(np.abs(line.reversal))
 
 
 # --- what is not known ------------------------------------------------------------------------------------------------
