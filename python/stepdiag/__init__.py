@@ -104,6 +104,7 @@ from stepdiag._core import (
     word_reasons_with,
 )
 from stepdiag.calibration.finding_text import reason_texts, undetermined_text
+from stepdiag.figures import methods
 from stepdiag.io import displays, to_xarray
 
 if TYPE_CHECKING:
@@ -424,6 +425,7 @@ _MODULE_OF = {name: module for module, names in _LATER.items() for name in names
 
 to_xarray.attach()
 displays.attach()
+methods.attach()
 word_findings_with(undetermined_text)  # the extension's findings are worded here
 word_reasons_with(reason_texts)
 

@@ -3,6 +3,7 @@ The C++ core of stepdiag. Native units: mm, rad, nm.
 """
 from __future__ import annotations
 import collections.abc
+import matplotlib.figure
 import numpy
 import numpy.typing
 import os
@@ -288,6 +289,10 @@ class Measurement:
         ...
     def _repr_html_(self) -> str:
         ...
+    def plot(self, *, adjustment: Adjustment | None = None) -> matplotlib.figure.Figure:
+        """
+        Draw the readings, or with the adjustment of this measurement its residuals (a matplotlib Figure).
+        """
     def to_xarray(self) -> xarray.Dataset:
         """
         The measurement as a labelled table (xarray.Dataset).
@@ -1065,6 +1070,10 @@ class Calibration:
     def judged(self, fit: str, fit_reasons: collections.abc.Sequence[str] = []) -> Calibration:
         """
         The same calibration with this verdict of its fit. Raises InvalidArgument for another word.
+        """
+    def plot(self, *, truth: ErrorMap | None = None) -> matplotlib.figure.Figure:
+        """
+        Draw the 21 parameters with 95 % bands (a matplotlib Figure). truth: errors to draw beside them.
         """
     def to_error_map(self) -> ErrorMap:
         """

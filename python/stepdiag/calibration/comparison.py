@@ -5,7 +5,7 @@ import math
 import sys
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,11 @@ from stepdiag.calibration.table_sums import FloatArray, TableValues, Term
 from stepdiag.calibration.truth import TruthAgreement, agreement_with_truth, truth_as_calibration
 from stepdiag.display import Displayed, Facts, lengths_text
 from stepdiag.parameters import units_of
+from stepdiag.style import drawn
 from stepdiag.units import report_value
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Lengths that differ by less were rounded on the way, mm.
 _ROUNDING: Final = 1e-6
@@ -101,7 +105,7 @@ class Comparison(Displayed):
     @property
     def threshold(self) -> float:
         """The normalised difference beyond which one of all values is significant (Bonferroni, two-sided)."""
-        return -NormalDist().inv_cdf(max(0.5 * self.limit / max(self.count, 1), sys.float_info.min))
+        return significance_threshold(self.limit, self.count)
 
     def probability(self, difference: Difference) -> float | None:
         """That chance alone makes any of all values compared differ by as many uncertainties as this parameter's worst.
@@ -130,6 +134,17 @@ class Comparison(Displayed):
         facts += [("only in A", ", ".join(self.only_in_a))] if self.only_in_a else []
         facts += [("only in B", ", ".join(self.only_in_b))] if self.only_in_b else []
         return [*facts, *((d.parameter, d._facts()[1][1]) for d in self.differences)]
+
+    def plot(self) -> "Figure":
+        """Draw the differences with 95 % bands and the limits of significance (a matplotlib Figure)."""
+        return drawn(self)
+
+
+def significance_threshold(limit: float, count: int) -> float:
+    """The normalised difference that chance exceeds in any of `count` values with this probability at most.
+
+    Bonferroni, two-sided."""
+    return -NormalDist().inv_cdf(max(0.5 * limit / max(count, 1), sys.float_info.min))
 
 
 def compare_calibrations(a: Calibration | ErrorMap, b: Calibration | ErrorMap, *, limit: float = 0.05) -> Comparison:

@@ -8,7 +8,7 @@ from home may be small from another reference point. docs/volume.md has the form
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,10 @@ from stepdiag._core import Calibration, InvalidArgument, Machine
 from stepdiag.calibration.table_sums import FloatArray
 from stepdiag.display import Displayed, Facts, point_text
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
+from stepdiag.style import drawn
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Verdict = Literal["within", "not within", "undecided"]
 Interval = tuple[float, float]
@@ -96,6 +100,10 @@ class VolumeErrors(Displayed):
         facts += [(f"range of {name}", f"{figure.value * 1e3:.4g} µm") for name, figure in self.ranges.items()]
         facts += [(f"largest tilt {name}", f"{figure.value * 1e6:.4g} µrad") for name, figure in self.tilts.items()]
         return [*facts, *((f"missing in {name}", ", ".join(which)) for name, which in self.missing.items() if which)]
+
+    def plot(self) -> "Figure":
+        """Draw the error in three planes through the point with the largest one (a matplotlib Figure)."""
+        return drawn(self)
 
 
 def volume_errors(

@@ -18,6 +18,7 @@ from stepdiag.cli.head import head
 from stepdiag.cli.nc import nc
 from stepdiag.cli.options import InOrder, tell
 from stepdiag.cli.plan import plan
+from stepdiag.cli.plot import plot
 from stepdiag.cli.positions import positions
 from stepdiag.cli.simulate import demo, simulate
 from stepdiag.cli.study import study
@@ -47,6 +48,7 @@ COMMANDS = {
     twin: "Simulate the instrument on a socket.",
     simulate: "Simulate the run of a scenario.",
     evaluate: "Calibrate the machine from a run.",
+    plot: "Draw a calibration, a measurement and other files.",
     report: "Summarise a calibration.",
     compare: "Compare two calibrations.",
     positions: "Evaluate or predict positioning tests (ISO 230-2, 230-6).",

@@ -75,27 +75,26 @@ def _notes(calibration: Calibration) -> list[str]:
 
 def _draw_function(panels: ParameterPanels, calibration: Calibration, parameter: str) -> None:
     position, value, u = calibration.functions[parameter]
-    known = _with_gaps(calibration, parameter, position, value, u)
+    known = with_gaps(calibration, parameter, position, value, u)
     remark = largest(parameter, position, value)
     if parameter in calibration.undetermined_slopes:
         remark = "shape only, ends at 0"
     elif np.isnan(known[1]).any():
         remark = "some positions only"
-        for low, high in _gaps(*known[:2]):
-            panels.axes[parameter].axvspan(low, high, zorder=0.5, **HATCH)
+        panels.mark_gaps(parameter, *known[:2])
     band = COVERAGE_FACTOR * known[2]
     panels.draw(parameter, known[0], known[1], known[1] - band, known[1] + band)
     panels.remark(parameter, remark)
     if parameter in calibration.negative_functions:
-        position, value, u = _with_gaps(calibration, parameter, *calibration.negative_functions[parameter])
+        position, value, u = with_gaps(calibration, parameter, *calibration.negative_functions[parameter])
         band = COVERAGE_FACTOR * u
         panels.draw(parameter, position, value, value - band, value + band, **NEGATIVE)
 
 
-def _with_gaps(
+def with_gaps(
     calibration: Calibration, parameter: str, position: FloatArray, value: FloatArray, u: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """With NaN at nodes of the axis where a finding says that the parameter is not determined."""
+    """A table with NaN at nodes of the axis where a finding says that the parameter is not determined."""
     if not any(re.search(rf"\b{parameter} at \d+ of its positions", text) for text in calibration.undetermined):
         return position, value, u
     tables = [table[0] for name, table in calibration.functions.items() if name[2] == parameter[2]]
@@ -104,17 +103,6 @@ def _with_gaps(
     values, uncertainties = np.full((2, len(nodes)), np.nan)
     values[place], uncertainties[place] = value, u
     return nodes, values, uncertainties
-
-
-def _gaps(position: FloatArray, value: FloatArray) -> Iterator[tuple[float, float]]:
-    """Ranges without a value, each between its known neighbours."""
-    known = np.flatnonzero(np.isfinite(value))
-    for before, after in zip(known[:-1], known[1:], strict=True):
-        if after > before + 1:
-            yield float(position[before]), float(position[after])
-    for start, end in ((0, known[0]), (known[-1], len(value) - 1)):
-        if end > start:
-            yield float(position[start]), float(position[end])
 
 
 def _draw_truth(panels: ParameterPanels, calibration: Calibration, parameter: str, truth: ErrorMap) -> None:

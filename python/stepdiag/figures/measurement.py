@@ -1,4 +1,4 @@
-"""Figure of a measurement: readings, or the residuals of its adjustment with outliers and slips, by line and channel."""
+"""Figure of a measurement: readings, or residuals of its adjustment with outliers and slips."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -161,9 +161,7 @@ def _limit(axes: Axes, used: FloatArray, band: FloatArray) -> None:
         axes.set_ylim(-1.3 * largest, 1.3 * largest)
 
 
-def _mark_faults(
-    panels: Mapping[tuple[str, str], Axes], adjustment: Adjustment, lines: Mapping[str, _Line]
-) -> None:
+def _mark_faults(panels: Mapping[tuple[str, str], Axes], adjustment: Adjustment, lines: Mapping[str, _Line]) -> None:
     """Mark every reading that was left out, and every slip, with the number of its class."""
     for outlier in adjustment.outliers:
         axes, line = panels[outlier.line, outlier.channel], lines[outlier.line]

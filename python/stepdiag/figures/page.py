@@ -62,19 +62,16 @@ class Page:
         if heading.fit is not None:
             self._show_verdict(heading.fit)
 
-    def grid(self, rows: int, columns: int, *, below: float = 0.0, above: float = 0.0, **shape: Any) -> GridSpec:
-        """Panels in rows and columns. `below`, `above`: parts of the panels' height that are left free."""
+    def grid(self, rows: int, columns: int, *, below: float = 0.0, **shape: Any) -> GridSpec:
+        """Panels in rows and columns. `below`: part of the panels' height that is left free."""
         width, height = self.size
-        return GridSpec(
-            rows,
-            columns,
-            figure=self.figure,
-            left=LEFT / width,
-            right=1.0 - RIGHT / width,
-            bottom=(self._bottom + 0.42 + below) / height,
-            top=1.0 - (self._top + 0.22 + above) / height,
-            **shape,
-        )
+        edges = {
+            "left": LEFT / width,
+            "right": 1.0 - RIGHT / width,
+            "bottom": (self._bottom + 0.42 + below) / height,
+            "top": 1.0 - (self._top + 0.22) / height,
+        }
+        return GridSpec(rows, columns, figure=self.figure, **(edges | shape))
 
     def legend(self, handles: Sequence[Any]) -> None:
         """One line between panels and notes."""

@@ -1,6 +1,7 @@
 """Panels of the 21 parameters: a row for each axis, columns by family, squarenesses as bars."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -10,7 +11,6 @@ from matplotlib.axes import Axes
 from stepdiag.figures.page import SMALL, Page
 from stepdiag.parameters import (
     AXES,
-    NATIVE_UNIT,
     REPORT_UNIT,
     SQUARENESSES,
     Kind,
@@ -120,6 +120,11 @@ class ParameterPanels:
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
         )
 
+    def mark_gaps(self, name: str, position: FloatArray, value: FloatArray) -> None:
+        """Hatch the ranges of a function without values."""
+        for low, high in _gaps(position, value):
+            self.axes[name].axvspan(low, high, zorder=0.5, **HATCH)
+
     def zero_lines(self) -> None:
         for axes in (*self.axes.values(), self.squareness):
             axes.axhline(0.0, color="#777777", linewidth=0.6, zorder=0.8)
@@ -130,10 +135,22 @@ def scaled(name: str, value: Any) -> Any:
     return np.asarray(value, dtype=float) * in_report_units(kind_of(name), 1.0)
 
 
+def _gaps(position: FloatArray, value: FloatArray) -> Iterator[tuple[float, float]]:
+    """Ranges without a value, each between its known neighbours."""
+    known = np.flatnonzero(np.isfinite(value))
+    for before, after in pairwise(known):
+        if after > before + 1:
+            yield float(position[before]), float(position[after])
+    for start, end in ((0, known[0]), (known[-1], len(value) - 1)):
+        if end > start:
+            yield float(position[start]), float(position[end])
+
+
 def _alone(value: FloatArray) -> npt.NDArray[np.bool_]:
     """Values without a neighbour, of which no line would show anything."""
     known = np.concatenate([[False], np.isfinite(value), [False]])
-    return known[1:-1] & ~known[:-2] & ~known[2:]
+    alone: npt.NDArray[np.bool_] = known[1:-1] & ~known[:-2] & ~known[2:]
+    return alone
 
 
 def largest(name: str, position: FloatArray, value: FloatArray) -> str:

@@ -14,7 +14,8 @@ from typing import Final
 
 from stepdiag._core import InvalidArgument
 from stepdiag.io.file_kind import kind_of_file
-from stepdiag.io.whole_files import check_output
+from stepdiag.io.whole_files import check_output, read_beginning
+from stepdiag.style import MADE_BY
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,20 @@ def claim(path: Path, kind: FileKind, *, overwrite: bool = False) -> None:
         )
     if kind.kept and not overwrite:
         raise InvalidArgument(f"{path}: {kind.kept}")
+
+
+def claim_beside(given: Path, kind: FileKind) -> Path:
+    """Claim a picture that the user has not named: beside `given`, with the ending of `kind`.
+
+    It replaces only pictures of stepdiag, because others may have this name. Raises
+    InvalidArgument."""
+    path = given.with_suffix(kind.endings[0])
+    if path == given:
+        raise InvalidArgument(f"{given}: is an input; name the figure with `output`")
+    claim(path, kind)
+    if path.exists() and path.stat().st_size and f"Software\0{MADE_BY}" not in read_beginning(path):
+        raise InvalidArgument(f"{path}: is a picture that stepdiag has not made; name another one with `output`")
+    return path
 
 
 def claim_folder(folder: Path, files: Mapping[str, FileKind | str], marks: Iterable[str]) -> Path:

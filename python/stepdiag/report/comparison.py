@@ -11,6 +11,7 @@ from stepdiag._core import Calibration
 from stepdiag.calibration.comparison import Comparison, Difference
 from stepdiag.calibration.truth import TruthAgreement
 from stepdiag.calibration.volume_change import VolumeChange
+from stepdiag.io.comparison_read import COMPARISON_FORMAT
 from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.io.data_files import date_of_today, is_netcdf
 from stepdiag.io.whole_files import write_whole
@@ -21,7 +22,6 @@ from stepdiag.units import report_value
 if TYPE_CHECKING:
     import xarray as xr
 
-COMPARISON_FORMAT: Final = "stepdiag comparison 1"
 EFFECTS_SHOWN: Final = 5
 
 

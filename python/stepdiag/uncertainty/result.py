@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,11 @@ from stepdiag.config.key_errors import suggest
 from stepdiag.display import Displayed, Facts
 from stepdiag.parameters import KINDS, kind_of
 from stepdiag.scenario.known import Known
+from stepdiag.style import drawn
 from stepdiag.units import report_value
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -96,6 +100,10 @@ class UncertaintyResult(Displayed):
         source = self.propagation if self.monte_carlo is None else self.monte_carlo
         assert source is not None
         return np.asarray(source.standard_uncertainty)
+
+    def plot(self) -> "Figure":
+        """Draw the standard uncertainties of all parameters, and the budget as stacked bars (a matplotlib Figure)."""
+        return drawn(self)
 
 
 def label(output: Any) -> str:

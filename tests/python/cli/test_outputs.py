@@ -58,6 +58,7 @@ FILES: dict[tuple[str, str], list[tuple[list[str], tuple[str, ...]]]] = {
         (["calibration.csv", "--scenario", "scenario.toml", "--run", "run.csv", "-o", OUT], (".html",))
     ],
     ("report", "functional_point"): [(["calibration.csv", "--functional-point", OUT], (".csv",))],
+    ("plot", "output"): [(["calibration.csv", "-o", OUT], (".png", ".svg", ".pdf"))],
     ("compare", "output"): [(["calibration.csv", "calibration.nc", "-o", OUT], (".csv", ".nc"))],
     ("export", "output"): [
         (["calibration.csv", "--to", "linuxcnc-kins", "-o", OUT], (".csv",)),
@@ -75,6 +76,7 @@ INPUTS = {
     *{("report", name) for name in ("calibrations", "scenario", "run", "uncertainty", "logo")},
     *{("evaluate", "run"), ("compare", "a"), ("compare", "b"), ("export", "calibration"), ("positions", "file")},
     *{("check", "files"), ("head show", "name"), ("head check", "name"), ("head sensitivity", "name")},
+    *{("plot", "files"), ("plot", "truth"), ("plot", "scenario")},
 }
 
 

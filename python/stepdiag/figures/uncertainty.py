@@ -1,0 +1,234 @@
+"""Figures of standard uncertainties: of an uncertainty result with its budget, and of what a plan determines."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from stepdiag._core import Adjustment, InvalidArgument, Measurement
+from stepdiag.calibration.finding_text import combination_text
+from stepdiag.figures.calibration import with_gaps
+from stepdiag.figures.page import SMALL, Heading, Page
+from stepdiag.figures.parameter_panels import HATCH, HEIGHT, WIDTH, ParameterPanels, scaled
+from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, kind_of, units_of
+from stepdiag.scenario.known import Known
+from stepdiag.style import COLOUR, SERIES, axis_label, own_style, plain
+from stepdiag.uncertainty.result import UncertaintyResult
+
+if TYPE_CHECKING:
+    from stepdiag.io.netcdf import NetcdfFile
+
+FloatArray = npt.NDArray[np.float64]
+Curves = Mapping[str, tuple[FloatArray, FloatArray]]  # name -> position (mm; NaN of a squareness), u (mm or rad)
+
+BUDGET_HEIGHT: Final = 2.3
+PARAMETERS: Final = (*FUNCTIONS, *SQUARENESSES)
+PROPAGATED: Final[Mapping[str, Any]] = {"color": "black", "linewidth": 0.9, "linestyle": (0, (3, 2)), "marker": ""}
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnUncertainty:
+    """What the figure of an uncertainty result shows; native units."""
+
+    volume: FloatArray
+    facts: str
+    sampled: Curves  # by the Monte Carlo method; empty without
+    propagated: Curves  # empty without
+    groups: Sequence[str]  # of the budget
+    budget: Mapping[str, tuple[float, FloatArray]]  # name -> position and parts, where its u is largest
+    warning: str
+
+
+def draw_uncertainty(result: UncertaintyResult | DrawnUncertainty, name: str = "uncertainty") -> Figure:
+    """Draw the standard uncertainties of all parameters, and the budget as stacked bars.
+
+    A bar shows which shares of the variance the groups of inputs make, at the node with the largest
+    uncertainty of a parameter. `name`: the title."""
+    drawn = _of_result(result) if isinstance(result, UncertaintyResult) else result
+    with own_style():
+        height = HEIGHT + (BUDGET_HEIGHT if drawn.budget else 0.0)
+        notes = [f"not to be trusted: {drawn.warning}"] if drawn.warning else []
+        page = Page(Heading(f"{name}: standard uncertainties", drawn.facts), WIDTH, height, notes)
+        below = BUDGET_HEIGHT if drawn.budget else 0.0
+        panels = ParameterPanels(page, drawn.volume, "u", below=below)
+        main = drawn.sampled or drawn.propagated
+        _draw_curves(panels, main)
+        if drawn.sampled:
+            for parameter, (position, u) in drawn.propagated.items():
+                if parameter in panels.axes:
+                    panels.draw(parameter, position, u, **PROPAGATED)
+                else:
+                    panels.draw_true_squareness(parameter, float(u[0]))
+        if drawn.budget:
+            _draw_budget(page, drawn)
+        page.legend(list(_handles(drawn, missing=len(main) < len(PARAMETERS))))
+        return page.finish()
+
+
+def draw_observation(run: Measurement, found: Adjustment, known: Known, name: str = "scenario") -> Figure:
+    """Draw what `observe` has found: standard uncertainties of what a plan determines.
+
+    What it does not determine is hatched, and below is what would help. `name`: the title."""
+    calibration, plan = found.calibration, known.plan
+    facts = (
+        f"{len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines, {len(run)} points, "
+        f"{', '.join(known.signals)}; {found.degrees_of_freedom} readings more than unknowns"
+    )
+    tables = {p: with_gaps(calibration, p, *table) for p, table in calibration.functions.items()}
+    curves = {parameter: (position, u) for parameter, (position, _, u) in tables.items()}
+    curves |= {p: (np.array([np.nan]), np.array([u])) for p, (_, u) in calibration.squareness.items()}
+    notes = [f"undetermined: {sentence}" for sentence in calibration.undetermined]
+    notes += [f"known: {combination_text(combination, value=False)}" for combination in found.combinations]
+    with own_style():
+        page = Page(Heading(f"{name}: what the plan determines, and how well", facts), WIDTH, HEIGHT, notes)
+        panels = ParameterPanels(page, plan.volume, "u")
+        _draw_curves(panels, curves)
+        for parameter in calibration.undetermined_slopes:
+            panels.remark(parameter, "shape only")
+        handles = [_curve_handle("standard uncertainty u, for a perfect machine")]
+        if len(curves) < len(PARAMETERS):
+            handles.append(Patch(label="not determined", **HATCH))
+        page.legend(handles)
+        return page.finish()
+
+
+def read_drawn_uncertainty(path: Path) -> DrawnUncertainty:
+    """Read what the figure shows from the netCDF file of an uncertainty result.
+
+    Raises InvalidArgument naming file and variable."""
+    from stepdiag.io.netcdf import open_dataset
+
+    if path.suffix.lower() != ".nc":
+        raise InvalidArgument(f"{path}: expected the netCDF file (.nc) of an uncertainty result: CSV has no budget")
+    with open_dataset(path) as file:
+        return _of_file(file)
+
+
+def _of_result(result: UncertaintyResult) -> DrawnUncertainty:
+    from stepdiag.io.netcdf import NetcdfFile
+    from stepdiag.uncertainty.table import uncertainty_table
+
+    return _of_file(NetcdfFile(result.known.path, uncertainty_table(result)))
+
+
+def _of_file(file: "NetcdfFile") -> DrawnUncertainty:
+    sampled, propagated = _curves(file, "_u"), _curves(file, "_propagated_u")
+    if not sampled and not propagated:
+        raise InvalidArgument(f"{file.path}: expected standard uncertainties EXX_u ... or EXX_propagated_u, got none")
+    facts = [file.text("scenario", ""), f"method {file.text('method', 'not known')}"]
+    samples = file.number("samples")
+    facts += [f"{samples:,.0f} virtual calibrations"] if samples else []
+    groups, budget = _budget(file, propagated)
+    text = ", ".join(filter(None, facts))
+    return DrawnUncertainty(
+        file.lengths("volume_mm"), text, sampled, propagated, groups, budget, file.text("warning", "")
+    )
+
+
+def _curves(file: "NetcdfFile", ending: str) -> Curves:
+    found = {}
+    for name in PARAMETERS:
+        if f"{name}{ending}" not in file:
+            continue
+        dimensions = file.dimensions(f"{name}{ending}")
+        if len(dimensions) != (name in FUNCTIONS):
+            raise file.fail(f"{name}{ending}", f"expected the positions of {name} as its only dimension")
+        u = np.atleast_1d(file.numbers(f"{name}{ending}", dimensions, units_of(name), missing=True))
+        found[name] = (file.numbers(dimensions[0], dimensions, "mm") if dimensions else np.array([np.nan]), u)
+    return found
+
+
+def _budget(file: "NetcdfFile", propagated: Curves) -> tuple[list[str], dict[str, tuple[float, FloatArray]]]:
+    """Groups, and by parameter the position of its largest u with the part of each group there."""
+    if "budget" not in file:
+        return [], {}
+    group, output = file.dimensions("group"), file.dimensions("output_name")
+    groups, names = file.texts("group", group), np.array(file.texts("output_name", output))
+    parts = file.numbers("budget", (*group, *output), None)
+    position = file.numbers("output_position", output, "mm", missing=True)
+    budget = {}
+    for name, (_, u) in propagated.items():
+        rows = np.flatnonzero(names == name)
+        if len(rows) != len(u):
+            raise file.fail("output_name", f"expected the {len(u)} outputs of {name}, got {len(rows)}")
+        k = rows[int(np.argmax(np.nan_to_num(u)))]
+        if np.any(parts[:, k] > 0.0):
+            budget[name] = float(position[k]), parts[:, k]
+    return groups, budget
+
+
+def _draw_curves(panels: ParameterPanels, curves: Curves) -> None:
+    for name in PARAMETERS:
+        if name not in curves:
+            panels.mark_missing(name)
+            continue
+        position, u = curves[name]
+        if name in panels.axes:
+            panels.draw(name, position, u, np.zeros(len(u)), u)
+            k = int(np.argmax(np.nan_to_num(u)))
+            unit = REPORT_UNIT[kind_of(name)]
+            panels.remark(name, f"{scaled(name, u[k]):.3g} {unit} at {position[k]:g}")
+            if np.isnan(u).any():
+                panels.mark_gaps(name, position, u)
+        else:
+            place = SQUARENESSES.index(name)
+            panels.squareness.bar(place, scaled(name, u[0]), width=0.6, color="#9a9a9a", edgecolor="#4a4a4a")
+    for axes in (*panels.axes.values(), panels.squareness):
+        axes.set_ylim(bottom=0.0)
+
+
+def _draw_budget(page: Page, drawn: DrawnUncertainty) -> None:
+    """Shares of the variance, the largest groups first; all others are one."""
+    names = list(drawn.budget)
+    shares = np.array([parts**2 / np.sum(parts**2) for _, parts in drawn.budget.values()]).T
+    order = np.argsort(-shares.sum(axis=1), kind="stable")
+    kept = order if len(order) <= len(SERIES) else order[: len(SERIES) - 1]
+    rest = [k for k in order if k not in kept]
+    bars = [(drawn.groups[k], shares[k]) for k in kept]
+    if rest:
+        bars.append((f"{len(rest)} others", shares[rest].sum(axis=0)))
+    width, height = page.size
+    grid = page.grid(1, 1)
+    bottom = float(grid.bottom or 0.0)
+    axes = page.figure.add_axes((0.72 / width, bottom, (width - 3.6) / width, (BUDGET_HEIGHT - 0.85) / height))
+    floor = np.zeros(len(names))
+    for (group, share), colour in zip(bars, SERIES, strict=False):
+        axes.bar(
+            range(len(names)),
+            100.0 * share,
+            bottom=floor,
+            color=colour,
+            width=0.72,
+            edgecolor="white",
+            linewidth=0.5,
+            label=plain(group),
+        )
+        floor += 100.0 * share
+    labels = [
+        name if np.isnan(position) else f"{name}\nat {position:g}" for name, (position, _) in drawn.budget.items()
+    ]
+    axes.set_xticks(range(len(names)), labels, size=6.5)
+    axes.set_xlim(-0.6, len(names) - 0.4)
+    axes.set_ylim(0.0, 100.0)
+    axes.grid(axis="x", visible=False)
+    axes.set_ylabel(axis_label("share of the variance", "%"))
+    axes.set_title("budget at the node with the largest standard uncertainty", weight="bold", pad=3.0)
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=SMALL, reverse=True, borderaxespad=0.0)
+
+
+def _curve_handle(label: str) -> Any:
+    return Line2D([], [], color=COLOUR["X"], marker=".", markersize=4.0, linewidth=1.1, label=label)
+
+
+def _handles(drawn: DrawnUncertainty, *, missing: bool) -> Iterator[Any]:
+    yield _curve_handle("u, Monte Carlo method" if drawn.sampled else "u, propagated")
+    if drawn.sampled and drawn.propagated:
+        yield Line2D([], [], label="u, propagated", **PROPAGATED)
+    if missing:
+        yield Patch(label="not determined", **HATCH)

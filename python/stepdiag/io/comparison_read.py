@@ -1,0 +1,155 @@
+"""Comparisons from their files, CSV or netCDF."""
+
+import csv
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from stepdiag._core import InvalidArgument
+from stepdiag.calibration.comparison import Difference, significance_threshold
+from stepdiag.calibration.table_sums import FloatArray
+from stepdiag.io.data_files import is_netcdf
+from stepdiag.io.whole_files import read_text
+from stepdiag.parameters import units_of
+from stepdiag.units import native
+
+if TYPE_CHECKING:
+    from stepdiag.io.netcdf import NetcdfFile
+
+COMPARISON_FORMAT: Final = "stepdiag comparison 1"
+_PARAMETER: Final = re.compile(r"(E[XYZABC][XYZ](_reversal)?)|C0Y|B0Z|A0Z")
+_COLUMNS: Final = ("parameter", "position_mm", "difference", "unit", "standard_uncertainty", "shape_only")
+
+
+@dataclass(frozen=True, eq=False)
+class StoredComparison:
+    """What the file of a comparison holds: differences B - A, native units (mm, rad)."""
+
+    differences: tuple[Difference, ...]
+    volume: FloatArray  # mm
+    limit: float
+    count: int  # how many values were tested
+    made: dict[str, str]  # method_a, date_a, method_b, date_b
+
+    @property
+    def threshold(self) -> float:
+        """The normalised difference beyond which one of all values is significant."""
+        return significance_threshold(self.limit, self.count)
+
+
+def read_comparison(path: Path) -> StoredComparison:
+    """Read a comparison. Raises InvalidArgument naming the file, and the line or variable."""
+    return _read_netcdf(path) if is_netcdf(path) else _read_csv(path)
+
+
+def _read_netcdf(path: Path) -> StoredComparison:
+    from stepdiag.io.netcdf import open_dataset  # imports xarray, which takes half a second
+
+    with open_dataset(path) as file:
+        given = file.text("format", COMPARISON_FORMAT)
+        if given != COMPARISON_FORMAT:
+            raise file.fail("attribute format", f'expected "{COMPARISON_FORMAT}", got "{given}"')
+        names = [name.removesuffix("_difference") for name in file.names if name.endswith("_difference")]
+        differences = tuple(_difference(file, name) for name in names if _PARAMETER.fullmatch(name))
+        numbers = {key: file.number(key) for key in ("limit", "values")}
+        made = {key: file.text(key, "") for key in _MADE}
+        leading = {key: f"{number!r}" for key, number in numbers.items() if number is not None}
+        return _checked(path, differences, file.lengths("volume_mm"), leading, made)
+
+
+def _difference(file: "NetcdfFile", name: str) -> Difference:
+    whole = f"{name}_difference"
+    dimensions, units = file.dimensions(whole), units_of(name[:3])
+    if len(dimensions) > 1:
+        raise file.fail(whole, f"expected one dimension, that of its positions, got {len(dimensions)}")
+    value = np.atleast_1d(file.numbers(whole, dimensions, units))
+    position = file.numbers(dimensions[0], dimensions, "mm") if dimensions else np.array([np.nan])
+    u = np.atleast_1d(file.numbers(f"{whole}_u", dimensions, units, missing=True))
+    return Difference(name, position, value, u, file.text("shape_only", "false", of=whole) == "true")
+
+
+_MADE: Final = ("method_a", "date_a", "method_b", "date_b")
+
+
+def _read_csv(path: Path) -> StoredComparison:
+    lines = read_text(path).splitlines()
+    leading = dict(re.findall(r"(?m)^#\s*(\w+)\s*=\s*(.*?)\s*$", "\n".join(line for line in lines if line[:1] == "#")))
+    if leading.get("format") != COMPARISON_FORMAT:
+        raise InvalidArgument(f'{path}: format: expected "{COMPARISON_FORMAT}", got "{leading.get("format", "")}"')
+    start = next((k for k, line in enumerate(lines) if line.strip() and not line.startswith("#")), len(lines))
+    rows: dict[str, list[tuple[float, float, float, bool]]] = {}
+    table = csv.DictReader(lines[start:])
+    missing = [column for column in _COLUMNS if column not in (table.fieldnames or ())]
+    if missing:
+        raise InvalidArgument(f"{path}, line {start + 1}: expected the column {missing[0]}")
+    for row in table:
+        where = f"{path}, line {start + table.line_num}"
+        name, unit = row["parameter"], row["unit"]
+        if not _PARAMETER.fullmatch(name or ""):
+            raise InvalidArgument(f"{where}: parameter: expected EXX ... ECZ, C0Y, B0Z or A0Z, got {name!r}")
+        expected = "um" if units_of(name[:3]) == "mm" else "urad"
+        if unit != expected:
+            raise InvalidArgument(f"{where}: unit: expected {expected} for {name}, got {unit!r}")
+        position, value, u = (_number(row, key, where) for key in ("position_mm", "difference", "standard_uncertainty"))
+        if np.isnan(value):
+            raise InvalidArgument(f"{where}: difference: expected a number, got an empty field")
+        shape_only = row["shape_only"] == "true"
+        rows.setdefault(name, []).append((position, native(f"_{unit}", value), native(f"_{unit}", u), shape_only))
+    differences = tuple(_of_rows(name, own) for name, own in rows.items())
+    try:
+        volume = np.array([float(edge) for edge in leading.get("volume_mm", "").split()])
+    except ValueError:
+        volume = np.empty(0)
+    if len(volume) != 3:
+        raise InvalidArgument(f"{path}: volume_mm: expected three numbers, got {leading.get('volume_mm', 'none')}")
+    return _checked(path, differences, volume, leading, {key: leading.get(key, "") for key in _MADE})
+
+
+def _number(row: dict[str, str], key: str, where: str) -> float:
+    """A number of a row; NaN for an empty field."""
+    field = row[key] or ""
+    if not field:
+        return np.nan
+    try:
+        number = float(field)
+    except ValueError:
+        number = np.nan
+    if not np.isfinite(number):
+        raise InvalidArgument(f"{where}: {key}: expected a finite number, got {field!r}")
+    return number
+
+
+def _of_rows(name: str, rows: Sequence[tuple[float, float, float, bool]]) -> Difference:
+    position, value, u, shape_only = (np.array(column) for column in zip(*rows, strict=True))
+    return Difference(name, position, value, u, bool(shape_only[0]))
+
+
+def _checked(
+    path: Path, differences: tuple[Difference, ...], volume: FloatArray, leading: dict[str, str], made: dict[str, str]
+) -> StoredComparison:
+    if not differences:
+        raise InvalidArgument(f"{path}: expected differences of the parameters EXX ... A0Z, got none")
+    for problem in _problems(differences):
+        raise InvalidArgument(f"{path}: {problem}")
+    try:
+        limit, count = float(leading.get("limit", "")), int(float(leading.get("values", "")))
+    except ValueError:
+        raise InvalidArgument(f"{path}: limit and values: expected two numbers") from None
+    if not 0.0 < limit < 1.0 or count < 0:
+        raise InvalidArgument(f"{path}: limit: expected a probability between 0 and 1, got {limit:g}")
+    return StoredComparison(differences, volume, limit, count, made)
+
+
+def _problems(differences: Sequence[Difference]) -> Iterator[str]:
+    for difference in differences:
+        has_position = np.isfinite(difference.position)
+        if difference.parameter[0] == "E" and not has_position.all():
+            yield f"{difference.parameter}: expected a position of every value"
+        if difference.parameter[0] != "E" and (has_position.any() or len(has_position) != 1):
+            yield f"{difference.parameter}: expected one value without a position"
+        if difference.parameter[0] == "E" and not (np.diff(difference.position) > 0.0).all():
+            yield f"{difference.parameter}: expected positions that ascend"
