@@ -36,6 +36,7 @@ def test_type_checkers_see_what_is_loaded_later() -> None:
     assert later == sd._MODULE_OF
     assert set(sd.__all__) == {*later, *imported(TREE.body)} - {
         "displays",
+        "methods",
         "reason_texts",
         "to_xarray",
         "undetermined_text",

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, Writes, tell_fit
+from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, fit_warnings, tell
 from stepdiag.io.outputs import FIGURE, PNG, OutputFile
 
 
@@ -61,8 +61,10 @@ def plot(
         content = save(figure, path.suffix.lower().removeprefix("."))
     write_whole(path, content)
     click.echo(f"wrote {path}")
-    for file, fit in fits.items():
-        tell_fit(context, file, fit)
+    for warning in (warning for file, fit in fits.items() for warning in fit_warnings(file, fit)):
+        tell("warning", warning)
+    if "rejected" in fits.values():
+        context.exit(NOT_TO_BE_TRUSTED)
 
 
 def _check_options(files: tuple[Path, ...], truth: Path | None, scenario: Path | None) -> None:

@@ -1,0 +1,73 @@
+"""Figures of uncertainties: curves and budgets of a result, from Python as from its file; what a plan determines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ink import ink, panel, texts
+from small_scenario import SCENARIO
+
+import stepdiag as sd
+from stepdiag.figures.uncertainty import draw_observation, draw_uncertainty, read_drawn_uncertainty
+from stepdiag.parameters import FUNCTIONS
+from stepdiag.uncertainty.write import write_uncertainty
+
+UNCERTAIN = SCENARIO + "[uncertainty]\ndistance_um = 0.1\nscale_ppm = 0.5\nreflector_urad = 300.0\n"
+
+
+@pytest.fixture(scope="module")
+def result() -> sd.UncertaintyResult:
+    scenario = sd.parse_scenario(UNCERTAIN)
+    return sd.evaluate_uncertainty(scenario, sd.UncertaintyRequest(samples=10_000))
+
+
+def test_curves_are_standard_uncertainties_and_bars_are_shares_of_the_variance(result: sd.UncertaintyResult) -> None:
+    figure = draw_uncertainty(result)
+    assert all(count > 60 for count in ink(figure).values()), ink(figure)
+    sampled, propagated = (np.asarray(x.standard_uncertainty) for x in (result.monte_carlo, result.propagation))
+    names = np.array([output.name for output in result.outputs])
+    for name in FUNCTIONS:
+        factor = 1e6 if name[1] in "ABC" else 1e3
+        curve, _, other, *_ = panel(figure, name).lines
+        np.testing.assert_allclose(curve.get_ydata(), sampled[names == name] * factor, rtol=1e-15)
+        np.testing.assert_allclose(other.get_ydata(), propagated[names == name] * factor, rtol=1e-15)
+    bars = panel(figure, "budget at the node with the largest standard uncertainty").containers
+    heights = np.array([[bar.get_height() for bar in group] for group in bars])
+    assert heights.shape[1] == 21
+    np.testing.assert_allclose(heights.sum(axis=0), 100.0, rtol=1e-12)
+    budget = result.propagation.budget
+    k = int(np.flatnonzero(names == "EXX")[np.argmax(propagated[names == "EXX"])])
+    by_group = {group.get_label(): 100.0 * budget[group.get_label()][k] ** 2 for group in bars}
+    expected = np.array(list(by_group.values())) / sum(by_group.values()) * 100.0
+    column = [label.get_text().split("\n")[0] for label in bars[0][0].axes.get_xticklabels()].index("EXX")
+    np.testing.assert_allclose(heights[:, column], expected, rtol=1e-9, atol=1e-12)  # of 100: rounding
+
+
+def test_file_gives_the_same_figure(result: sd.UncertaintyResult, tmp_path: Path) -> None:
+    write_uncertainty(result, tmp_path / "u.nc")
+    assert texts(draw_uncertainty(read_drawn_uncertainty(tmp_path / "u.nc"))) == texts(draw_uncertainty(result))
+    assert texts(result.plot()) == texts(draw_uncertainty(result))
+
+
+def test_table_without_a_budget_is_refused(result: sd.UncertaintyResult, tmp_path: Path) -> None:
+    write_uncertainty(result, tmp_path / "u.csv")
+    with pytest.raises(sd.InvalidArgument, match=r"u.csv: expected the netCDF file \(.nc\)"):
+        read_drawn_uncertainty(tmp_path / "u.csv")
+
+
+def test_observation_shows_what_is_determined_and_what_is_not() -> None:
+    scenario = sd.parse_scenario(SCENARIO.replace('"ppp", "npp", "pnp", "nnp"', '"ppp", "npp"'))
+    run, found = sd.observe(scenario)
+    figure = draw_observation(run, found, scenario.known)
+    calibration = found.calibration
+    missing = [name for name in FUNCTIONS if name not in calibration.functions]
+    assert missing
+    for name in FUNCTIONS:
+        assert bool(panel(figure, name).texts) == (name in missing)
+    for name, (_, _, u) in calibration.functions.items():
+        if name not in ("EYY", "EZZ"):  # determined at some of the positions
+            factor = 1e6 if name[1] in "ABC" else 1e3
+            np.testing.assert_allclose(panel(figure, name).lines[0].get_ydata(), u * factor, rtol=1e-15)
+    assert any(text.startswith("undetermined: ") for text in texts(figure))
