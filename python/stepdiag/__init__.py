@@ -141,6 +141,7 @@ if TYPE_CHECKING:
     from stepdiag.positions.figures import PositionFigure
     from stepdiag.positions.prediction import PredictedPositions, axis_line, diagonal_line, predict_positions
     from stepdiag.positions.readings import PositionReadings, read_positions
+    from stepdiag.progress import Progress
     from stepdiag.scenario.description import (
         Scenario,
         adjust_scenario,
@@ -219,6 +220,7 @@ __all__ = [
     "PositionFigure",
     "PositionReadings",
     "PredictedPositions",
+    "Progress",
     "Propagation",
     "RangeModel",
     "ReadingNoise",
@@ -394,6 +396,7 @@ _LATER = {
         "PositionReadings",
         "read_positions",
     ),
+    "progress": ("Progress",),
     "scenario.description": (
         "Scenario",
         "adjust_scenario",

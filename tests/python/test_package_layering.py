@@ -17,6 +17,7 @@ BELOW: dict[str, set[str]] = {
     "setup_quantities": {"units"},
     "style": set(),
     "display": set(),
+    "progress": set(),
     "config": {"setup_quantities"},
     "calibration": {"parameters", "setup_quantities", "style", "display"},
     "io": {"config", "calibration"},
@@ -34,7 +35,7 @@ BELOW: dict[str, set[str]] = {
     "objects": {"report"},
     "page": {"objects"},
     "demo": {"report", "program", "export", "linuxcnc"},
-    "cli": {"demo", "page"},
+    "cli": {"demo", "page", "progress"},
 }
 MOST_OF_A_ROOM = 20  # modules beside __init__, of more than which nobody keeps count
 

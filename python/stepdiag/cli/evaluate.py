@@ -8,6 +8,7 @@ import click
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import PATH, Writes, fit_warnings, json_option, out_file, tell_fit
 from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
+from stepdiag.progress import Progress
 
 
 @click.command(epilog="\b\nExample: stepdiag evaluate scenario.toml run.csv -o calibration.csv")
@@ -75,7 +76,7 @@ def evaluate(
     known = described.known
     measurement = read_measurement(run)
     provenance = provenance_of(known, run, method=method)
-    with located(str(run)):
+    with located(str(run)), Progress("evaluate"):
         result = (
             adjust_scenario(known, measurement, full_covariance=covariance, reliability=reliability)
             if method == "adjustment"
@@ -142,15 +143,18 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
     described = read_scenario(scenario)
     path = None if output is None else output.claim(scenario, error_map=described.truth.error_map)
     known = described.known
-    run, found = observe(known)
+    with Progress("observe"):
+        run, found = observe(known)
     if not as_json:
         for line in [*observation_report(found, run, known), *control_rows(found.reliability)]:
             click.echo(line)
-    tried = [] if tells_all(found.reliability) else list(extensions(known))
+    with Progress("larger plans"):
+        tried = [] if tells_all(found.reliability) else list(extensions(known))
     if not as_json:
         for line in extension_rows(found.reliability, tried):
             click.echo(line)
-    table = prospects(known, [*(steps or USUAL_STEPS), known.plan.steps])
+    with Progress("numbers of steps") as progress:
+        table = prospects(known, [*(steps or USUAL_STEPS), known.plan.steps], progress)
     if as_json:
         from stepdiag.objects.observation import observation_object
         from stepdiag.objects.writer import json_text

@@ -9,6 +9,7 @@ import click
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, json_option, tell
 from stepdiag.io.outputs import OutputFile
+from stepdiag.progress import Progress
 
 Result = TypeVar("Result")
 
@@ -33,7 +34,8 @@ def check(context: click.Context, files: tuple[Path, ...], as_json: bool) -> Non
     say = _silent if as_json else click.echo
     found: list[tuple[Path, Finding | InvalidArgument]] = []
     for file in files:
-        finding = _found_or_refused(examine, file)
+        with Progress(f"check {file.name}"):
+            finding = _found_or_refused(examine, file)
         found.append((file, finding))
         if isinstance(finding, Finding):
             say(f"{file}: {finding.kind}: {finding.summary}")
@@ -47,7 +49,8 @@ def check(context: click.Context, files: tuple[Path, ...], as_json: bool) -> Non
     scenario = of_kind["scenario"][0] if len(of_kind.get("scenario", [])) == 1 else None
     if scenario is not None:
         for run in of_kind.get("measurement", []):
-            together = _found_or_refused(adjust_run, scenario, run)
+            with Progress(f"adjust {run.name}"):
+                together = _found_or_refused(adjust_run, scenario, run)
             runs.append((run, together))
             if isinstance(together, FoundTogether):
                 for line in together.text:

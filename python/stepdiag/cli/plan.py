@@ -1,7 +1,6 @@
 """The command that chooses a plan for the available time."""
 
 import math
-import sys
 from pathlib import Path
 from typing import Any, Literal
 
@@ -9,6 +8,7 @@ import click
 
 from stepdiag.cli.options import PATH, Writes
 from stepdiag.io.outputs import FIGURE, PLANS, OutputFile
+from stepdiag.progress import Progress
 
 Family = Literal["length", "angle", "squareness"]
 
@@ -78,13 +78,8 @@ def plan(
     path = None if output is None else output.claim(scenario, error_map=described.truth.error_map)
     available = described.known.keys.plan_by_time.minutes if minutes is None else minutes
     near = own_spacing(described.known) if spacing is None else spacing
-    with click.progressbar(length=1, label="plans", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
-
-        def show(done: int, of: int) -> None:
-            bar.length = of
-            bar.update(done - bar.pos)
-
-        found = outcomes(described, show)
+    with Progress("plans") as progress:
+        found = outcomes(described, progress)
     choice = choose(found, available, near, family)
     click.echo("largest standard uncertainties by measuring time, for a machine with usual errors:")
     for line in plan_rows(found, choice, available, family):
@@ -92,7 +87,9 @@ def plan(
     for line in [*left_out_rows(found), *advice(found, available, near, family)]:
         click.echo(line)
     if choice.taken is not None:
-        for line in fault_advice(*telling(described, found, choice.taken, family)):
+        with Progress("faults of the chosen plan"):
+            told = telling(described, found, choice.taken, family)
+        for line in fault_advice(*told):
             click.echo(line)
     suffix = "" if path is None else path.suffix.lower().lstrip(".")
     if path is not None and suffix == "csv":

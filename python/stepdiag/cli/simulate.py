@@ -6,6 +6,7 @@ import click
 
 from stepdiag.cli.options import PATH, Writes, out_file, tell
 from stepdiag.io.outputs import MEASUREMENT, OutputFile
+from stepdiag.progress import Progress
 
 
 @click.command(epilog="\b\nExample: stepdiag simulate scenario.toml -o run.csv")
@@ -27,7 +28,9 @@ def simulate(scenario: Path, output: OutputFile, overwrite: bool) -> None:
     path = output.claim(scenario, error_map=described.truth.error_map, overwrite=overwrite)
     for warning in scenario_warnings(described):
         tell("warning", warning)
-    write_measurement(simulate_scenario(described), path)
+    with Progress("simulate"):
+        run = simulate_scenario(described)
+    write_measurement(run, path)
 
 
 @click.command(epilog="\b\nExample: stepdiag demo -o demo")

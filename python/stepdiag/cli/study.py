@@ -1,6 +1,5 @@
 """The command that computes a grid of scenarios."""
 
-import sys
 from pathlib import Path
 
 import click
@@ -8,6 +7,7 @@ import click
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, out_file, tell
 from stepdiag.cli.workers import chosen_workers, worker_options
 from stepdiag.io.outputs import STUDY, OutputFile
+from stepdiag.progress import Progress
 
 
 @click.command(epilog="\b\nExample: stepdiag study study.toml -o study.nc --workers 2")
@@ -39,16 +39,8 @@ def study(
     path = output.claim(file, wanted.scenario, *(wanted.scenario.parent / name for name in maps))
     finished = FinishedCells(Path(f"{path}.cells"), resume)
     try:
-        with (
-            chosen_workers(scheduler, workers) as chosen,
-            click.progressbar(length=1, label="cells", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar,
-        ):
-
-            def show(done: int, of: int) -> None:
-                bar.length = of
-                bar.update(done - bar.pos)
-
-            results = run_study(wanted, finished, workers=chosen, progress=show)
+        with chosen_workers(scheduler, workers) as chosen, Progress("cells") as progress:
+            results = run_study(wanted, finished, workers=chosen, progress=progress)
         write_study(wanted, results, path)
     except BaseException:
         finished.close()

@@ -2,8 +2,6 @@
 
 import math
 import re
-import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +13,7 @@ from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, tell
 from stepdiag.cli.workers import chosen_workers, worker_options
 from stepdiag.io.outputs import CHECKPOINT, UNCERTAINTY, OutputFile
+from stepdiag.progress import Progress
 
 if TYPE_CHECKING:
     from stepdiag.scenario.description import Scenario
@@ -244,42 +243,10 @@ def _kept(wanted: "UncertaintyRequest", errors: type[BaseException]) -> Iterator
 
 
 def _evaluate(scenario: "Scenario", wanted: "UncertaintyRequest", workers: "Workers | None") -> "UncertaintyResult":
-    """Evaluate with a progress bar."""
+    """Evaluate and show the progress."""
     from stepdiag.uncertainty.packed_calibrations import pack_calibrations
     from stepdiag.uncertainty.run import evaluate_uncertainty
 
     executor = workers.executor(pack_calibrations(scenario.path, wanted)) if workers is not None else None
-    with Bar() as bar:
-        return evaluate_uncertainty(scenario, wanted, bar.show, executor)
-
-
-class Bar:
-    """A progress bar on standard error if that is a terminal: samples done, rate and time left."""
-
-    def __init__(self) -> None:
-        self._bar: Any = None
-        self._done = 0
-        self._start = 0.0
-        self._first = 0
-
-    def __enter__(self) -> "Bar":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        if self._bar is not None:
-            self._bar.render_finish()
-
-    def show(self, done: int, total: int) -> None:
-        """Update the bar. Called several times per second."""
-        now = time.monotonic()
-        if self._bar is None:
-            if not sys.stderr.isatty():
-                return
-            self._bar = click.progressbar(
-                length=total, label="virtual calibrations", file=sys.stderr, item_show_func=lambda rate: rate
-            )
-            self._start, self._first = now, done
-        rate = (done - self._first) / max(now - self._start, 1e-9)
-        self._bar.length = total
-        self._bar.update(done - self._done, f"{rate:,.0f} a second" if done > self._first else "")
-        self._done = done
+    with Progress("virtual calibrations" if wanted.draws else "propagation") as progress:
+        return evaluate_uncertainty(scenario, wanted, progress, executor)

@@ -4,7 +4,7 @@ An error-free run of the scenario's plan (perfect machine, nothing out of true, 
 scenario's weights and unknowns: uncertainties and rank depend on where is read what, hardly on what is read."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -44,9 +44,15 @@ def observe(scenario: Scenario | Known) -> tuple[_core.Measurement, Adjustment]:
         return run, adjust_scenario(known, run, reliability=True)
 
 
-def prospects(known: Known, steps: Sequence[int]) -> list[Prospect]:
-    """By the number of steps, ascending."""
-    return [_prospect(known, count) for count in sorted(set(steps))]
+def prospects(
+    known: Known, steps: Sequence[int], progress: Callable[[int, int], None] = lambda done, total: None
+) -> list[Prospect]:
+    """By the number of steps, ascending. `progress` is told how many of how many are done."""
+    found: list[Prospect] = []
+    for count in sorted(set(steps)):
+        found.append(_prospect(known, count))
+        progress(len(found), len(set(steps)))
+    return found
 
 
 def _prospect(known: Known, steps: int) -> Prospect:

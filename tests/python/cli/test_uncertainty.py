@@ -15,7 +15,7 @@ from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag.cli import main
-from stepdiag.cli.uncertainty import Bar
+from stepdiag.progress import Progress
 from stepdiag.io import whole_files as files
 from stepdiag.uncertainty import write as uncertainty_write
 from stepdiag.uncertainty.run import UncertaintyRequest, evaluate_uncertainty
@@ -162,7 +162,7 @@ def test_interrupted_run_goes_on_to_the_same_bytes(
     capsys.readouterr()
 
     with monkeypatch.context() as patched:
-        patched.setattr(Bar, "show", interrupt)
+        patched.setattr(Progress, "__call__", interrupt)
         assert run("-n", SAMPLES, "-o", "u.nc") == 130
     said = capsys.readouterr()
     assert "--resume" in said.err
@@ -174,8 +174,8 @@ def test_interrupted_run_goes_on_to_the_same_bytes(
     assert not Path("u.nc.checkpoint").exists(), "of no more use"
 
 
-def interrupt(self: Bar, done: int, total: int) -> None:
-    """In place of Bar.show."""
+def interrupt(self: Progress, done: int, total: int) -> None:
+    """In place of the progress bar."""
     if done > 0:
         raise KeyboardInterrupt
 
@@ -184,7 +184,7 @@ def test_checkpoint_of_an_interrupted_run_is_not_overwritten_by_another(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with monkeypatch.context() as patched:
-        patched.setattr(Bar, "show", interrupt)
+        patched.setattr(Progress, "__call__", interrupt)
         assert run("-n", SAMPLES) == 130
     kept = Path("scenario.checkpoint").read_bytes()
     capsys.readouterr()
@@ -292,7 +292,7 @@ def test_checkpoint_of_another_run_is_refused(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with monkeypatch.context() as patched:
-        patched.setattr(Bar, "show", interrupt)
+        patched.setattr(Progress, "__call__", interrupt)
         assert run("-n", SAMPLES, "--checkpoint", "c.checkpoint") == 130
     capsys.readouterr()
     assert run("-n", SAMPLES, "--checkpoint", "c.checkpoint", "--resume", "--seed", "1") == 2

@@ -21,7 +21,7 @@ SHOW_NOTHING = {
     *("AcquireOptions", "AdjustmentOptions", "ExportOptions", "SimulationOptions", "StatisticsOptions"),
     *("SetupPriors", "Settling", "UncertaintyRequest", "KeyTrigger", "SettleTrigger", "TcpTrigger", "Twin"),
     *("BatchEvaluator", "FinishedCells", "FunctionModel", "ModelSource", "RangeModel", "SampleModel", "VirtualReadout"),
-    *("InvalidArgument", "LinuxcncError", "LinuxcncSession", "ReplayMismatch"),
+    *("InvalidArgument", "LinuxcncError", "LinuxcncSession", "Progress", "ReplayMismatch"),
     "Environment",  # a function of the wavelength
 }
 RESULTS = [
