@@ -15,8 +15,8 @@ from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag.cli import main
-from stepdiag.progress import Progress
 from stepdiag.io import whole_files as files
+from stepdiag.progress import Progress
 from stepdiag.uncertainty import write as uncertainty_write
 from stepdiag.uncertainty.run import UncertaintyRequest, evaluate_uncertainty
 
