@@ -75,8 +75,8 @@ class LineEffects:
         ]
         return tables.sum(terms)[1] if terms else np.full(len(self._points), np.nan)
 
-    def covariance(self, approach: str) -> tuple[FloatArray | None, str]:
-        """(n, n) mm²: of the deviations in this direction of approach; else why it is not known."""
+    def covariance_root(self, approach: str) -> tuple[FloatArray | None, str]:
+        """(n, r) mm: root · rootᵀ is the covariance of the deviations in this direction; else why it is not known."""
         calibration = self._calibration
         if calibration.covariance is None:
             return None, "the calibration has no covariance (write it as .nc with its covariance)"
@@ -84,8 +84,13 @@ class LineEffects:
         if any(self._acts(self._of(name)) for name in down):
             return None, "the line approaches positions in - direction, where the covariance of tables is not known"
         known = np.isin(self._parameter, [name for name, _ in calibration.covariance_labels])
-        rows = self._change[:, known]
-        return rows @ calibration.covariance @ rows.T, ""
+        acting = np.any(self._change[:, known] != 0.0, axis=0)
+        rows = self._change[:, known][:, acting]
+        covariance = calibration.covariance[np.ix_(acting, acting)]
+        # The smaller of two matrices is decomposed.
+        if len(rows) <= rows.shape[1]:
+            return _root(rows @ covariance @ rows.T), ""
+        return rows @ _root(covariance), ""
 
     def _of(self, name: str) -> FloatArray:
         """(n, nodes) coefficients of a function."""
@@ -98,3 +103,11 @@ class LineEffects:
 
     def _acts(self, coefficients: FloatArray) -> bool:
         return bool(np.any(np.abs(coefficients) > self._negligible))
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """R with R · Rᵀ = covariance, which may be singular."""
+    variances, directions = np.linalg.eigh(covariance)
+    known = variances > 1e-14 * variances.max(initial=0.0)
+    root: FloatArray = directions[:, known] * np.sqrt(variances[known])
+    return root

@@ -141,22 +141,24 @@ def predict_positions(
         if effects.constants_change_along(constants):
             down[:] = np.nan
     u_reversal[np.isnan(reversal)] = np.nan
-    covariance, reason = effects.covariance(upward)
+    root, reason = effects.covariance_root(upward)
     if reason and not missing:
         reasons.append(f"no interval of E↑: {reason}")
     if not np.isnan(down).any():
         reasons.append("no intervals of E↓, M and the bidirectional E: the covariance of reversal errors is not known")
     target = share * length
     figures = _figures(target, up, down, reversal, u_reversal)
-    if "E_up" in figures and covariance is not None:
-        figures["E_up"] = _with_interval(figures["E_up"], up, covariance, seed)
+    u_up = np.full(points, np.nan)
+    if "E_up" in figures and root is not None:
+        figures["E_up"] = _with_interval(figures["E_up"], up, root, seed)
+        u_up = np.linalg.norm(root, axis=1)
     return PredictedPositions(
         _point(ends[0]),
         _point(ends[1]),
         offset,
         target,
         up,
-        np.full(points, np.nan) if missing or covariance is None else np.sqrt(np.diagonal(covariance).clip(0.0)),
+        u_up,
         down,
         reversal,
         u_reversal,
@@ -206,11 +208,9 @@ def _range(target: FloatArray, values: FloatArray) -> PositionFigure:
     return PositionFigure(float(values[high] - values[low]), (float(target[high]), float(target[low])))
 
 
-def _with_interval(figure: PositionFigure, values: FloatArray, covariance: FloatArray, seed: int) -> PositionFigure:
+def _with_interval(figure: PositionFigure, values: FloatArray, root: FloatArray, seed: int) -> PositionFigure:
     """The figure with the interval of its range. Noise widens ranges: reflected, the interval loses that bias."""
-    variances, directions = np.linalg.eigh(covariance)
-    root = directions * np.sqrt(variances.clip(0.0))
-    numbers = np.random.default_rng(seed).standard_normal((len(values), _SAMPLES))
+    numbers = np.random.default_rng(seed).standard_normal((root.shape[1], _SAMPLES))
     ranges = np.ptp(values[:, None] + root @ numbers, axis=0)
     low, high = np.quantile(ranges, [(1.0 - COVERAGE) / 2.0, (1.0 + COVERAGE) / 2.0])
     interval = (max(2.0 * figure.value - float(high), 0.0), max(2.0 * figure.value - float(low), 0.0))
