@@ -61,9 +61,9 @@ class LineEffects:
         open_constants = calibration.undetermined_reversal_constants
         return without, [name for name in acting if name in open_constants and self._acts(self._coefficient(name))]
 
-    def constants_change_along(self, names: list[str]) -> bool:
-        """Whether constants of these functions would act differently at different points."""
-        return any(self._acts(self._coefficient(name) - self._coefficient(name)[0]) for name in names)
+    def changing(self, names: list[str]) -> list[str]:
+        """The functions of these whose constant acts differently at different points."""
+        return [name for name in names if self._acts(self._coefficient(name) - self._coefficient(name)[0])]
 
     def reversal_uncertainty(self) -> FloatArray:
         """(n,) mm: of the reversal error along the line; NaN where a table is missing. Functions as independent."""

@@ -22,7 +22,7 @@ from stepdiag._core import Calibration, InvalidArgument, Machine
 from stepdiag.calibration.table_sums import FloatArray
 from stepdiag.display import Displayed, Facts, point_text
 from stepdiag.parameters import AXES
-from stepdiag.positions.figures import FIGURES, PositionFigure, figure_facts
+from stepdiag.positions.figures import FIGURES, PositionFigure, figure_facts, symbol
 from stepdiag.positions.line_effects import LineEffects
 
 Point = tuple[float, float, float]
@@ -101,7 +101,7 @@ def predict_positions(
     ends = np.array([start, end], dtype=float)
     _check_line(calibration, ends)
     if points is None:
-        points = max(2, *(len(nodes) for nodes, _, _ in calibration.functions.values()))
+        points = max([2, *(len(nodes) for nodes, _, _ in calibration.functions.values())])
     if points < 2:
         raise InvalidArgument(f"`points`: expected two or more, got {points}")
     offset = _point(calibration.tool if tool is None else tool)
@@ -131,23 +131,29 @@ def predict_positions(
         what = f"of {', '.join(without_table)}" if calibration.reversal else "(no backward lines)"
         reasons.append(f"B, M, E↓ and the bidirectional E are not predicted: no reversal tables {what}")
     elif constants:
+        # Tables of the - direction count upward for axes that fall along the line, and downward for the others.
+        changing = effects.changing(constants)
+        fall = {axis for axis, sign in zip(AXES, upward, strict=True) if sign == "-"}
+        figures_of = (("E↑", up, fall), ("E↓", down, set(AXES) - fall))
+        lost = [(name, values) for name, values, axes in figures_of if axes & {one[2] for one in changing}]
+        for _, values in lost:
+            values[:] = np.nan
         reasons.append(
-            "B, M and the bidirectional E are not predicted: the reversal error of "
-            f"{', '.join(constants)} is known but for a constant"
+            f"{', '.join(['B', 'M', *(name for name, _ in lost)])} and the bidirectional E are not predicted: "
+            f"the reversal error of {', '.join(constants)} is known but for a constant"
         )
     reversal, u_reversal = up - down, effects.reversal_uncertainty()
     if constants:
         reversal[:] = np.nan
-        if effects.constants_change_along(constants):
-            down[:] = np.nan
     u_reversal[np.isnan(reversal)] = np.nan
     root, reason = effects.covariance_root(upward)
-    if reason and not missing:
+    if reason and not np.isnan(up).any():
         reasons.append(f"no interval of E↑: {reason}")
-    if not np.isnan(down).any():
-        reasons.append("no intervals of E↓, M and the bidirectional E: the covariance of reversal errors is not known")
     target = share * length
     figures = _figures(target, up, down, reversal, u_reversal)
+    without = [symbol(name) for name in ("E_down", "M", "E") if name in figures]
+    if without:
+        reasons.append(f"no interval of {', '.join(without)}: the covariance of reversal errors is not known")
     u_up = np.full(points, np.nan)
     if "E_up" in figures and root is not None:
         figures["E_up"] = _with_interval(figures["E_up"], up, root, seed)

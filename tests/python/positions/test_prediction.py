@@ -262,6 +262,19 @@ def test_unknown_constants_of_reversal_leave_b_open_but_not_the_range_of_a_direc
     assert any("EYX, EZX" in reason and "known but for a constant" in reason for reason in diagonal.reasons)
 
 
+def test_unknown_constant_of_a_rotation_leaves_the_direction_open_in_which_it_acts() -> None:
+    """EAY acts along d in the plane YZ by its lever z, which changes along the line; - tables are those that fall."""
+    none = dict.fromkeys(FUNCTIONS, (0.0, 0.0))
+    calibration = synthetic({}, reversal=none, undetermined_reversal_constants=["EAY"])
+    start, end = sd.diagonal_line(calibration, "0pp")
+    rising, falling = (sd.predict_positions(calibration, *ends) for ends in ((start, end), (end, start)))
+    assert (list(rising.figures), list(falling.figures)) == (["E_up"], ["E_down"])
+    assert rising.reasons[0].startswith("B, M, E↓ and the bidirectional E are not predicted: the reversal error of EAY")
+    assert falling.reasons[0].startswith("B, M, E↑ and the bidirectional E are not predicted")
+    # At one place of Y and Z the lever is the same all along X.
+    assert "B" in sd.predict_positions(calibration, *sd.axis_line(calibration, "X")).figures
+
+
 def test_reversal_is_uncertain_as_its_table_says(of_both_directions: sd.Calibration) -> None:
     line = sd.predict_positions(of_both_directions, *sd.axis_line(of_both_directions, "X", (0.0, 0.0, 0.0)))
     position, value, u = of_both_directions.reversal["EXX"]
