@@ -36,6 +36,7 @@ BELOW: dict[str, set[str]] = {
     "page": {"objects"},
     "demo": {"report", "program", "export", "linuxcnc"},
     "cli": {"demo", "page", "progress"},
+    "__main__": {"cli"},
 }
 MOST_OF_A_ROOM = 20  # modules beside __init__, of more than which nobody keeps count
 

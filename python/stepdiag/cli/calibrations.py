@@ -7,6 +7,7 @@ import click
 
 from stepdiag._core import InvalidArgument, read_error_map
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Command, Writes, fit_warnings, json_option, tell, tell_fit
+from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, PAGE, PDF, OutputFile
 
 _WORDS = {
@@ -106,7 +107,7 @@ def report(
         click.echo(json_text(report_object(read, calibration, fit_warnings(calibration, read.fit))))
     else:
         for line in calibration_report(read):
-            click.echo(line)
+            say(line)
     tell_fit(context, calibration, read.fit)
 
 
@@ -198,7 +199,7 @@ def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None,
         click.echo(json_text(comparison_object(comparison, change, (a, b), warnings)))
     else:
         for line in comparison_report(comparison, change, str(a), str(b)):
-            click.echo(line)
+            say(line)
     for warning in warnings:
         tell("warning", warning)
     if "rejected" in fits:

@@ -7,6 +7,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import PATH, Writes, fit_warnings, json_option, out_file, tell_fit
+from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
 from stepdiag.progress import Progress
 
@@ -96,7 +97,7 @@ def evaluate(
         click.echo(json_text(evaluation_object(result, written, files, measurement, known, warnings)))
     else:
         for line in evaluation_report(result, measurement, known):
-            click.echo(line)
+            say(line)
     tell_fit(context, path, written.fit)
 
 
@@ -147,12 +148,12 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
         run, found = observe(known)
     if not as_json:
         for line in [*observation_report(found, run, known), *control_rows(found.reliability)]:
-            click.echo(line)
+            say(line)
     with Progress("larger plans"):
         tried = [] if tells_all(found.reliability) else list(extensions(known))
     if not as_json:
         for line in extension_rows(found.reliability, tried):
-            click.echo(line)
+            say(line)
     with Progress("numbers of steps") as progress:
         table = prospects(known, [*(steps or USUAL_STEPS), known.plan.steps], progress)
     if as_json:
@@ -163,6 +164,6 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
     else:
         click.echo("largest standard uncertainties by the number of steps, and the mirror that they take:")
         for line in prospect_rows(table):
-            click.echo(line)
+            say(line)
     if path is not None:
         write_whole(path, prospect_csv(table))

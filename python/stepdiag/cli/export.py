@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from stepdiag.cli.options import PATH, Writes, tell_fit
+from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import COMP_FILE, COMP_LINES, GRID, ISG_TABLE, KINEMATICS_TABLE, OutputFile, claim_folder
 
 # Those of stepdiag.export.write.FORMATS, which is slow to import; a test compares them.
@@ -91,5 +92,5 @@ def export(context: click.Context, /, calibration: Path, to: str, output: Output
     read = read_what_is_exported(calibration)
     check_fit(read, f"{calibration}", options["accept_rejected"])
     for line in export_calibration(read, to, path, ExportOptions(**options)):
-        click.echo(line)
+        say(line)
     tell_fit(context, calibration, read.fit)

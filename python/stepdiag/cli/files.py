@@ -8,6 +8,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, json_option, tell
+from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import OutputFile
 from stepdiag.progress import Progress
 
@@ -31,16 +32,16 @@ def check(context: click.Context, files: tuple[Path, ...], as_json: bool) -> Non
     from stepdiag.report.file_check import Finding, examine
     from stepdiag.report.scenario_and_run import FoundTogether, adjust_run
 
-    say = _silent if as_json else click.echo
+    tell_found = _silent if as_json else say
     found: list[tuple[Path, Finding | InvalidArgument]] = []
     for file in files:
         with Progress(f"check {file.name}"):
             finding = _found_or_refused(examine, file)
         found.append((file, finding))
         if isinstance(finding, Finding):
-            say(f"{file}: {finding.kind}: {finding.summary}")
+            tell_found(f"{file}: {finding.kind}: {finding.summary}")
             for warning in finding.warnings:
-                say(f"{file}: warning: {warning}")
+                tell_found(f"{file}: warning: {warning}")
     of_kind: dict[str, list[Path]] = {}
     for file, finding in found:
         if isinstance(finding, Finding):
@@ -54,7 +55,7 @@ def check(context: click.Context, files: tuple[Path, ...], as_json: bool) -> Non
             runs.append((run, together))
             if isinstance(together, FoundTogether):
                 for line in together.text:
-                    say(f"{run} with {scenario}: {line}")
+                    tell_found(f"{run} with {scenario}: {line}")
     results = [result for _, result in (*found, *runs)]
     sound = not any(isinstance(result, InvalidArgument) for result in results)
     untrusted = any(isinstance(r, Finding | FoundTogether) and r.fit == "rejected" for r in results)

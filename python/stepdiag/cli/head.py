@@ -9,6 +9,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import InOrder, out_file
+from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import FIGURE, OutputFile
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def check(name: str, distances: tuple[float, ...], mirror: tuple[float, float] |
     from stepdiag.head.check import check_report
 
     for line in check_report(*_prepare(name, mirror, distances, DISTANCES)):
-        click.echo(line)
+        say(line)
 
 
 @head.command(
@@ -125,7 +126,7 @@ def sensitivity(name: str, distance: float | None, tilt: tuple[float, float]) ->
         raise InvalidArgument(f"--tilt: expected two angles in µrad, got {tilt[0]:g} {tilt[1]:g}")
     made, distances = _prepare(name, None, () if distance is None else (distance,), DISTANCES[2:3])
     for line in sensitivity_report(made, distances[0], (tilt[0] * MICRORADIAN, tilt[1] * MICRORADIAN)):
-        click.echo(line)
+        say(line)
 
 
 def _prepare(

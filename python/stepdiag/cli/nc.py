@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from stepdiag.cli.options import PATH, out_file, tell
+from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import PROGRAM, OutputFile
 
 _AXES = ("X", "Y", "Z")
@@ -93,5 +94,5 @@ def nc(scenario: Path, output: OutputFile, **given: Any) -> None:
     for text in program.unapproached:
         tell("warning", text)
     for line in program.summary:
-        click.echo(line)
+        say(line)
     click.echo(f"wrote {path}")

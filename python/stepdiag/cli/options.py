@@ -9,6 +9,7 @@ from typing import Any, Final, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
+from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import FileKind, OutputFile
 
 Command = TypeVar("Command", bound=Callable[..., None])
@@ -68,7 +69,7 @@ def in_flags(message: str) -> str:
 def tell(what: str, message: str) -> None:
     """Write to standard error. A warning begins with "warning:", which scripts can search."""
     line = " ".join(in_flags(message).split())
-    click.echo(f"warning: {line}" if what == "warning" else f"stepdiag: {what}: {line}", err=True)
+    say(f"warning: {line}" if what == "warning" else f"stepdiag: {what}: {line}", err=True)
 
 
 def json_option(command: Command) -> Command:

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import click
 
 from stepdiag.cli.options import PATH, Writes
+from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import FIGURE, PLANS, OutputFile
 from stepdiag.progress import Progress
 
@@ -83,14 +84,14 @@ def plan(
     choice = choose(found, available, near, family)
     click.echo("largest standard uncertainties by measuring time, for a machine with usual errors:")
     for line in plan_rows(found, choice, available, family):
-        click.echo(line)
+        say(line)
     for line in [*left_out_rows(found), *advice(found, available, near, family)]:
-        click.echo(line)
+        say(line)
     if choice.taken is not None:
         with Progress("faults of the chosen plan"):
             told = telling(described, found, choice.taken, family)
         for line in fault_advice(*told):
-            click.echo(line)
+            say(line)
     suffix = "" if path is None else path.suffix.lower().lstrip(".")
     if path is not None and suffix == "csv":
         write_whole(path, plan_csv(found))

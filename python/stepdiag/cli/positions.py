@@ -7,6 +7,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import PATH, PointInMm, fit_warnings, json_option, tell, tell_fit
+from stepdiag.cli.terminal import say
 
 Point = tuple[float, float, float]
 HOME: Final = (0.0, 0.0, 0.0)
@@ -91,7 +92,7 @@ def positions(
         click.echo(json_text(predicted_object(calibration, predicted, file, fit_warnings(file, calibration.fit))))
     else:
         for text in predicted_report(calibration, predicted):
-            click.echo(text)
+            say(text)
     tell_fit(context, file, calibration.fit)
 
 
@@ -113,6 +114,6 @@ def _evaluate(file: Path, as_json: bool) -> None:
         click.echo(json_text(measured_object(result, file, warnings)))
     else:
         for text in measured_report(result):
-            click.echo(text)
+            say(text)
     for warning in warnings:
         tell("warning", warning)

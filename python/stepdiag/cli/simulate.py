@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from stepdiag.cli.options import PATH, Writes, out_file, tell
+from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import MEASUREMENT, OutputFile
 from stepdiag.progress import Progress
 
@@ -74,4 +75,4 @@ def demo(output: OutputFile | None, controller: str | None) -> None:
         except LinuxcncError as error:
             raise click.ClickException(str(error)) from error
     for line in lines:
-        click.echo(line)
+        say(line)

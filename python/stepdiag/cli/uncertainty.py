@@ -11,6 +11,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, tell
+from stepdiag.cli.terminal import say
 from stepdiag.cli.workers import chosen_workers, worker_options
 from stepdiag.io.outputs import CHECKPOINT, UNCERTAINTY, OutputFile
 from stepdiag.progress import Progress
@@ -204,7 +205,7 @@ def uncertainty(
     path = None if output is None else output.claim(scenario, error_map=described.truth.error_map)
     if list_inputs:
         for line in input_rows(described.known.uncertain):
-            click.echo(line)
+            say(line)
         return
     if wanted.draws:
         others = [scenario] if path is None else [scenario, path]
@@ -219,7 +220,7 @@ def uncertainty(
 
             write_uncertainty(result, path)
         for line in (*opening_rows(result), *result_rows(result)):
-            click.echo(line)
+            say(line)
     if wanted.draws and checkpoint is None:  # a checkpoint named by the user is kept: it can continue to more samples
         kept.path.unlink(missing_ok=True)
     if result.warning is not None:
