@@ -7,8 +7,9 @@ import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument
 from stepdiag.io.netcdf import NetcdfFile, open_dataset
-from stepdiag.page.figure import INK, Figures, place, values
+from stepdiag.page.figure import Figures, values
 from stepdiag.page.html import Markup, element, markup, section, table
+from stepdiag.page.look import INK
 from stepdiag.page.numbers import position, shown
 from stepdiag.parameters import KINDS, Kind, kind_of
 from stepdiag.style import SERIES
@@ -172,7 +173,7 @@ def budget_section(budget: Budget | None, figures: Figures) -> Markup:
             f"Where the largest propagated uncertainty of each family comes from (GUM), method {budget.method}, "
             f"from {budget.path.name}.",
         ),
-        place(
+        figures.place(
             "figure-budget",
             "Stacked bars: shares of the variance by group of inputs, for the most uncertain value of each family",
             "Shares of the variance of the most uncertain value of each family.",

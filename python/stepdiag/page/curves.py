@@ -7,8 +7,9 @@ from typing import Any, Final
 import numpy as np
 
 from stepdiag._core import Calibration
-from stepdiag.page.figure import BAND, BEFORE, GRID, INK, LINE, NEGATIVE, QUIET, Figures, place, value_table, values
+from stepdiag.page.figure import Figures, value_table, values
 from stepdiag.page.html import Markup, element, markup, section
+from stepdiag.page.look import BAND, BEFORE, GRID, INK, LINE, NEGATIVE, QUIET
 from stepdiag.page.numbers import COVERAGE_FACTOR, position, shown, with_interval
 from stepdiag.parameters import REPORT_UNIT, SQUARENESSES, Kind, in_report_units, kind_of
 
@@ -81,7 +82,7 @@ def _family(
             {"title": {"text": f"{name[2]} (mm)", "standoff": 6}, **_ticks(calibration.volume["XYZ".index(name[2])])},
             {"title": {"text": f"{name} ({unit})", "standoff": 6}, "range": [low - margin, high + margin]},
         )
-        panels.append(_panel(name, calibration, table_id))
+        panels.append(_panel(name, calibration, table_id, figures))
     for axis in "XYZ":
         own = [name for name in known if name[2] == axis]
         if own:
@@ -150,7 +151,7 @@ def _line(x: Any, y: Any, colour: str, dash: str, name: str, unit: str) -> dict[
     }
 
 
-def _panel(name: str, calibration: Calibration, described_by: str) -> Markup:
+def _panel(name: str, calibration: Calibration, described_by: str, figures: Figures) -> Markup:
     kind = kind_of(name)
     unit = REPORT_UNIT[kind]
     where, value, u = calibration.functions[name]
@@ -159,7 +160,7 @@ def _panel(name: str, calibration: Calibration, described_by: str) -> Markup:
     largest = with_interval(in_report_units(kind, value[worst]), in_report_units(kind, u[worst]), unit)
     caption = markup(element("strong", name), f" {what_it_is(name)}{shape}")
     label = f"{name}, {what_it_is(name)}{shape}: largest {largest} at {position(where[worst])} mm"
-    return place(f"figure-{name}", label, caption, "panel", described_by)
+    return figures.place(f"figure-{name}", label, caption, "panel", described_by)
 
 
 def _table(title: str, axis: str, names: Sequence[str], calibration: Calibration, unit: str) -> Markup:
@@ -204,7 +205,7 @@ def squareness_section(calibration: Calibration, before: Calibration | None) -> 
         element(
             "p",
             f"Dashed: the right angle. Line: the axis as found, its lean drawn {exaggeration:,.0f} times as large; the "
-            f"wedge is the 95 % interval.{' Dotted: before.' if before is not None else ''}".replace(",", " ", 0),
+            f"wedge is the 95 % interval.{' Dotted: before.' if before is not None else ''}",
         ),
         element("div", *drawings, class_="panels"),
     )

@@ -15,8 +15,9 @@ from stepdiag.objects.writer import measured
 from stepdiag.page.budget import budget_section
 from stepdiag.page.contents import Contents, ReportRequest, read_contents
 from stepdiag.page.curves import curves_section, squareness_section
-from stepdiag.page.figure import BAND, LAYOUT, Figures
+from stepdiag.page.figure import Figures
 from stepdiag.page.html import Markup, element, markup
+from stepdiag.page.look import BAND, LAYOUT
 from stepdiag.page.numbers import moment
 from stepdiag.page.residuals import residuals_section, setup_section, temperature_section
 from stepdiag.page.volume import GridErrors, drawing_of, errors_in, volume_section
@@ -69,7 +70,13 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
         _contents_list(contents),
         element("main", *sections, id="main"),
         element("footer", element("p", f"Made by stepdiag {__version__}, {moment(contents.date)}.")),
-        element("noscript", element("p", "The figures need JavaScript. Their values are in the tables.")),
+        element(
+            "noscript",
+            element(
+                "p",
+                "Without JavaScript curves are still pictures; volume and budget are in their tables alone.",
+            ),
+        ),
         *data,
     ]
     return _whole(_title(contents), calibration, body, plotly), contents

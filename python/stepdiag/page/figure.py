@@ -6,45 +6,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from stepdiag import style
 from stepdiag.page.html import Markup, element, markup, table
-from stepdiag.style import COLOUR
+from stepdiag.page.look import AXIS
+from stepdiag.page.preview import preview
 
-FONT: Final = "system-ui, 'Segoe UI', Roboto, 'Helvetica Neue', 'Noto Sans', 'Liberation Sans', Arial, sans-serif"
-INK: Final = "#1f2933"
-QUIET: Final = "#52606d"
-GRID: Final = "#e4e7eb"
-LINE: Final = COLOUR["after"]
-BEFORE: Final = COLOUR["before"]
-NEGATIVE: Final = COLOUR["backward"]
-MARK: Final = COLOUR["outlier"]
-BAND: Final = "rgba({}, {}, {}, {})".format(*bytes.fromhex(LINE[1:]), style.BAND)
 MOST_ROWS: Final = 101  # of a table on the page
-
-# What all figures share. Axes of a panel name only what is their own.
-AXIS: Final[Mapping[str, Any]] = {
-    "gridcolor": GRID,
-    "zerolinecolor": "#9aa5b1",
-    "zerolinewidth": 1,
-    "linecolor": "#9aa5b1",
-    "ticks": "outside",
-    "ticklen": 3,
-    "tickcolor": "#9aa5b1",
-    "nticks": 6,
-    "title": {"standoff": 6},
-    "automargin": True,
-    "fixedrange": True,
-}
-LAYOUT: Final[Mapping[str, Any]] = {
-    "font": {"family": FONT, "size": 12, "color": INK},
-    "margin": {"l": 46, "r": 18, "t": 8, "b": 40},
-    "paper_bgcolor": "rgba(0,0,0,0)",
-    "plot_bgcolor": "rgba(0,0,0,0)",
-    "showlegend": False,
-    "hovermode": "x unified",
-    "hoverlabel": {"bgcolor": "#ffffff", "font": {"size": 12}},
-    "dragmode": False,
-}
+# Of drawings on a wide screen, as in report.css: width and height in pixels.
+SIZES: Final[Mapping[str, tuple[int, int]]] = {"panel": (352, 210), "wide": (1104, 300), "wide low": (1104, 200)}
 
 
 @dataclass
@@ -65,13 +33,21 @@ class Figures:
         own = {"xaxis": {**AXIS, **x}, "yaxis": {**AXIS, **y}}
         self.drawings[identifier] = {"data": list(data), "layout": own | layout}
 
-
-def place(
-    identifier: str, label: str, caption: object, class_: str = "panel", described_by: str | None = None
-) -> Markup:
-    """Where a drawing comes to stand; `label` says it to those who do not see it."""
-    drawing = element("div", class_="plot", id=identifier, role="img", aria_label=label, aria_describedby=described_by)
-    return element("figure", drawing, element("figcaption", caption), class_=class_)
+    def place(
+        self, identifier: str, label: str, caption: object, class_: str = "panel", described_by: str | None = None
+    ) -> Markup:
+        """Where a drawing comes to stand, and what is there until it is drawn; `label` says it to those who do not
+        see it."""
+        drawing = element(
+            "div",
+            preview(self.drawings[identifier], *SIZES[class_]),
+            class_="plot",
+            id=identifier,
+            role="img",
+            aria_label=label,
+            aria_describedby=described_by,
+        )
+        return element("figure", drawing, element("figcaption", caption), class_=class_)
 
 
 def values(identifier: str, title: str, *tables: Markup) -> Markup:

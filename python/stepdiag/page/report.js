@@ -15,6 +15,7 @@
     if (drawn.has(div)) return;
     drawn.add(div);
     const { data, layout } = figures[div.id];
+    div.replaceChildren(); // the preview
     Plotly.newPlot(div, data, { ...common, ...layout, ...sizeOf(div) }, config);
   }
   function resize() {

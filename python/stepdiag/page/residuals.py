@@ -6,8 +6,9 @@ import numpy as np
 
 from stepdiag.io.adjustment_read import ChannelFit, FitDetails, FloatArray
 from stepdiag.page.contents import Contents
-from stepdiag.page.figure import BAND, GRID, LINE, MARK, Figures, place, value_table, values
+from stepdiag.page.figure import Figures, value_table, values
 from stepdiag.page.html import Markup, element, listed, markup, section, table
+from stepdiag.page.look import BAND, GRID, LINE, MARK
 from stepdiag.page.numbers import shown
 from stepdiag.report.setup_table import setup_table
 from stepdiag.style import SERIES
@@ -51,7 +52,7 @@ def residuals_section(contents: Contents, figures: Figures) -> Markup:
         )
         caption = markup(element("strong", name), f": rms {shown(rms)} {unit}, largest {shown(largest)} {unit}.{thin}")
         label = f"Residuals of {name}: rms {shown(rms)} {unit}, largest {shown(largest)} {unit}, {left_out} left out"
-        parts.append(place(f"figure-residual-{name}", label, caption, "wide low", "values-residuals"))
+        parts.append(figures.place(f"figure-residual-{name}", label, caption, "wide low", "values-residuals"))
     heading = ["Channel", "rms", "largest", "readings used", "left out"]
     parts.append(
         values(
@@ -295,7 +296,7 @@ def temperature_section(contents: Contents, figures: Figures) -> Markup:
     return section(
         "temperatures",
         title,
-        place(
+        figures.place(
             "figure-temperatures",
             f"Temperatures in the order of the readings; {means}",
             "Temperatures in the order of the readings.",
