@@ -87,6 +87,17 @@ def test_every_figure_has_ink(report: Seen) -> None:
         assert np.count_nonzero(coloured) > 150, identifier
 
 
+def test_curves_are_seen_before_any_script_has_run(browser: Browser, folder: Path) -> None:
+    page = browser.new_context(java_script_enabled=False).new_page()
+    page.goto((folder / "report.html").as_uri())
+    panels = page.locator(".panel .plot")
+    assert panels.count() == 18
+    for k in range(18):
+        pixels = imread(BytesIO(panels.nth(k).screenshot()))[:, :, :3]
+        assert np.count_nonzero(np.ptp(pixels, axis=2) > 0.2) > 150
+    page.close()
+
+
 def test_nothing_is_wider_than_a_small_screen(browser: Browser, folder: Path) -> None:
     seen = Seen(browser, folder / "report.html", width=400)
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= 400

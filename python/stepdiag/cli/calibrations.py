@@ -50,6 +50,7 @@ def _header_options(command: Command) -> Command:
 @click.option("--scenario", type=PATH, metavar="FILE", help="Of the page: scenario, with its [report] for the header.")
 @click.option("--run", type=PATH, metavar="FILE", help="Of the page: the run, for temperatures and residuals.")
 @click.option("--uncertainty", type=PATH, metavar="FILE", help="Of the page: uncertainty result (.nc), for the budget.")
+@click.option("--limit", type=float, metavar="UM", help="Of the page: limit of the largest error in the volume, in µm.")
 @_header_options
 @click.option("--logo", type=PATH, metavar="FILE", help="PNG or SVG picture in the header.")
 @json_option
@@ -63,6 +64,7 @@ def report(
     scenario: Path | None,
     run: Path | None,
     uncertainty: Path | None,
+    limit: float | None,
     logo: Path | None,
     as_json: bool,
     **words: str | None,
@@ -86,9 +88,9 @@ def report(
     calibration = calibrations[-1]
     path = None if functional_point is None else functional_point.claim(*calibrations)
     if output is not None:
-        _write_page(output, calibrations, scenario, run, uncertainty, logo, words)
+        _write_page(output, calibrations, scenario, run, uncertainty, limit, logo, words)
     else:
-        given = {"scenario": scenario, "run": run, "uncertainty": uncertainty, "logo": logo} | words
+        given = {"scenario": scenario, "run": run, "uncertainty": uncertainty, "limit": limit, "logo": logo} | words
         for name, value in given.items():
             if value is not None:
                 raise InvalidArgument(f"`{name}`: goes with a page (`output` report.html)")
@@ -117,6 +119,7 @@ def _write_page(
     scenario: Path | None,
     run: Path | None,
     uncertainty: Path | None,
+    limit: float | None,
     logo: Path | None,
     words: Mapping[str, str | None],
 ) -> None:
@@ -124,9 +127,11 @@ def _write_page(
     from stepdiag.page.contents import ReportRequest
     from stepdiag.page.document import report_page
     from stepdiag.page.pdf import find_browser, write_pdf
+    from stepdiag.units import MICROMETRE
 
     before = calibrations[0] if len(calibrations) == 2 else None
-    request = ReportRequest(calibrations[-1], before, scenario, run, uncertainty, words, logo)
+    tolerance = None if limit is None else limit * MICROMETRE
+    request = ReportRequest(calibrations[-1], before, scenario, run, uncertainty, tolerance, words, logo)
     path = output.claim(*request.inputs)
     if path.suffix.lower() == ".pdf":
         find_browser()

@@ -11,6 +11,7 @@ import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Measurement
 from stepdiag.calibration.comparison import Comparison, compare_calibrations
+from stepdiag.calibration.volume_change import VolumeChange, volume_change
 from stepdiag.io.adjustment_read import FitDetails, details_of, read_fit_details
 from stepdiag.io.data_files import date_of_today, read_calibration, read_measurement
 from stepdiag.io.whole_files import check_input, read_bytes
@@ -35,6 +36,7 @@ class ReportRequest:
     scenario: Path | None = None
     run: Path | None = None
     uncertainty: Path | None = None
+    limit: float | None = None  # of the largest error, mm
     words: Mapping[str, str | None] = field(default_factory=dict)
     logo: Path | None = None
 
@@ -44,6 +46,7 @@ class ReportRequest:
         words = ["stepdiag", "report", *(path.name for path in (self.before, self.calibration) if path is not None)]
         for name, path in options.items():
             words += [] if path is None else [f"--{name}", path.name]
+        words += [] if self.limit is None else ["--limit", f"{self.limit * 1e3:.15g}"]
         for name, text in self.words.items():
             words += [] if text is None else [f"--{name.replace('_', '-')}", text]
         return shlex.join([*words, "-o", output.name])
@@ -66,6 +69,7 @@ class Contents:
     details: FitDetails | None
     before: Calibration | None
     comparison: Comparison | None
+    change: VolumeChange | None
     known: Known | None
     measurement: Measurement | None
     budget: Budget | None
@@ -114,6 +118,7 @@ def read_contents(request: ReportRequest) -> Contents:
         details=details,
         before=before,
         comparison=comparison,
+        change=None if comparison is None else volume_change(comparison),
         known=known,
         measurement=measurement,
         budget=None if request.uncertainty is None else read_budget(request.uncertainty, calibration),

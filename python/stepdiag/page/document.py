@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from stepdiag._core import Calibration, InvalidArgument, __version__
+from stepdiag.calibration.volume import VolumeErrors
 from stepdiag.io.file_kind import PAGE_BEGINS
 from stepdiag.objects.report import report_object
-from stepdiag.objects.writer import measured
+from stepdiag.objects.writer import measured, number
 from stepdiag.page.budget import budget_section
 from stepdiag.page.contents import Contents, ReportRequest, read_contents
 from stepdiag.page.curves import curves_section, squareness_section
@@ -20,7 +21,7 @@ from stepdiag.page.html import Markup, element, markup
 from stepdiag.page.look import BAND, LAYOUT
 from stepdiag.page.numbers import moment
 from stepdiag.page.residuals import residuals_section, setup_section, temperature_section
-from stepdiag.page.volume import GridErrors, drawing_of, errors_in, volume_section
+from stepdiag.page.volume import ErrorInVolume, drawing_of, error_in_volume, volume_section
 from stepdiag.page.words import (
     HEADLINE,
     commands_section,
@@ -42,14 +43,14 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
     plotly = _plotly()
     contents = read_contents(request)
     calibration, figures = contents.calibration, Figures()
-    found = errors_in(calibration)
-    before = None if contents.before is None else errors_in(contents.before)
+    found = error_in_volume(calibration, limit=request.limit)
+    before = None if contents.before is None else error_in_volume(contents.before, ranking=False)
     sections = [
-        summary_section(contents, found, before),
+        summary_section(contents, found),
         curves_section(calibration, contents.before, figures),
         squareness_section(calibration, contents.before),
         volume_section(contents, found, before),
-        comparison_section(contents, found, before),
+        comparison_section(contents),
         residuals_section(contents, figures),
         setup_section(contents),
         budget_section(contents.budget, figures),
@@ -82,28 +83,28 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
     return _whole(_title(contents), calibration, body, plotly), contents
 
 
-def report_values(contents: Contents, found: GridErrors, before: GridErrors | None) -> dict[str, Any]:
+def report_values(contents: Contents, found: ErrorInVolume, before: ErrorInVolume | None) -> dict[str, Any]:
     """The values of the report at full precision: the object of `report --json`, and what the page has beside it."""
     request = contents.request
     values: dict[str, Any] = {
         **report_object(contents.calibration, Path(request.calibration.name), contents.notes),
         "format": "stepdiag report page 1",
-        "volume": _volume_values(found),
+        "volume": _volume_values(found.figures),
     }
     if request.before is not None and contents.before is not None and before is not None:
         values["before"] = {
             **report_object(contents.before, Path(request.before.name), []),
-            "volume": _volume_values(before),
+            "volume": _volume_values(before.figures),
         }
     return values
 
 
-def _volume_values(found: GridErrors) -> dict[str, Any]:
-    at, error = found.worst
+def _volume_values(figures: VolumeErrors) -> dict[str, Any]:
+    """Names and units as in the object of `volume --json`."""
+    at = [number(place) for place in figures.largest_at.tolist()]
     return {
-        "at_mm": at.tolist(),
-        **measured("um", largest=found.largest, error_there=error, rms=found.rms),
-        "grid_mm": [nodes.tolist() for nodes in found.nodes],
+        "at_mm": at,
+        **measured("um", largest=figures.largest, rms=figures.rms, components=figures.largest_components),
     }
 
 

@@ -10,11 +10,11 @@ NOT_KNOWN: Final = "not known"
 
 
 def shown(value: float, *, signed: bool = False) -> str:
-    """Three digits or so, with a true minus sign: 1234, 123, 12.3, 1.23, 0.123."""
+    """Three digits or so, with a true minus sign: 1234, 123.4, 12.3, 1.23, 0.123."""
     if not math.isfinite(value):
         return NOT_KNOWN
     size = abs(value)
-    digits = 0 if size >= 99.95 else 1 if size >= 9.995 else 2 if size >= 0.9995 or size == 0.0 else 3
+    digits = 0 if size >= 999.5 else 1 if size >= 9.995 else 2 if size >= 0.9995 or size == 0.0 else 3
     text = f"{value:+.{digits}f}" if signed else f"{value:.{digits}f}"
     return f"{size:.2g}".join(("−" if value < 0 else "", "")) if size and size < 5e-4 else text.replace("-", "−")
 

@@ -130,7 +130,7 @@
     return [trace];
   }
   function worstPoint({ view, error, factor }) {
-    if (error !== errors.error_um) return [];
+    if (!worst || error !== errors.error_um) return [];
     const moved = view === "slice" ? 0 : factor;
     const p = worst.at_mm.map((x, d) => x + moved * worst.error_um[d]);
     return [{

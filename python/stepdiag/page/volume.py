@@ -1,79 +1,62 @@
 """The error of the tool in the volume: its figures, and what the page draws in three dimensions."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from stepdiag._core import Calibration, Machine
+from stepdiag.calibration.table_sums import FloatArray
+from stepdiag.calibration.volume import Interval, VolumeErrors, volume_errors
 from stepdiag.page.contents import Contents
 from stepdiag.page.figure import value_table, values
-from stepdiag.page.html import Markup, element, section
+from stepdiag.page.html import Markup, element, section, table
 from stepdiag.page.numbers import position, shown
-from stepdiag.parameters import FUNCTIONS, SQUARENESSES
+from stepdiag.parameters import AXES
 
-FloatArray = npt.NDArray[np.float64]
 NODES: Final = 13  # of the grid along each axis
 MICRO: Final = 1e3  # µm of a mm
+MICRORADIAN: Final = 1e6  # µrad of a rad
+MOST_RANKED: Final = 5
 
 
-class GridErrors(NamedTuple):
-    """Error of the functional point on a grid: nodes along X, Y, Z (mm), and the error (nx, ny, nz, 3), mm."""
+class ErrorInVolume(NamedTuple):
+    """The error of the functional point: its figures over the volume, and on a grid that is drawn: nodes along X, Y, Z
+    (mm) and errors (nx, ny, nz, 3), mm, for which what is not determined counts as 0."""
 
+    figures: VolumeErrors
     nodes: tuple[FloatArray, FloatArray, FloatArray]
     error: FloatArray
 
-    @property
-    def size(self) -> FloatArray:
-        """(nx, ny, nz): the length of the error, mm."""
-        size: FloatArray = np.linalg.norm(self.error, axis=-1)
-        return size
 
-    @property
-    def largest(self) -> float:
-        """The largest length of the error, mm."""
-        return float(np.max(self.size))
+def error_in_volume(calibration: Calibration, *, limit: float | None = None, ranking: bool = True) -> ErrorInVolume:
+    """The figures, as `stepdiag volume` has them, and the error on a grid of NODES positions along each axis.
 
-    @property
-    def worst(self) -> tuple[FloatArray, FloatArray]:
-        """Where the error is largest, and the error there, mm."""
-        i, j, k = np.unravel_index(int(np.argmax(self.size)), self.size.shape)
-        x, y, z = self.nodes
-        return np.array([x[i], y[j], z[k]]), self.error[i, j, k]
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of the length of the error over the grid, mm."""
-        return float(np.sqrt(np.mean(self.size**2)))
-
-
-def errors_in(calibration: Calibration, count: int = NODES) -> GridErrors:
-    """The error on a grid of `count` nodes along each edge; what is not determined counts as 0."""
-    x, y, z = (np.linspace(0.0, float(edge), count) for edge in calibration.volume)
+    Raises InvalidArgument for a limit that is not positive."""
+    x, y, z = (np.linspace(0.0, float(edge), NODES) for edge in calibration.volume)
     points = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
     machine = Machine(calibration.chain, calibration.to_error_map(), calibration.tool)
-    return GridErrors((x, y, z), machine.error(points).reshape(count, count, count, 3))
+    figures = volume_errors(calibration, limit=limit, ranking=ranking)
+    return ErrorInVolume(figures, (x, y, z), machine.error(points).reshape(NODES, NODES, NODES, 3))
 
 
-def drawing_of(contents: Contents, found: GridErrors, before: GridErrors | None) -> dict[str, Any]:
+def drawing_of(contents: Contents, found: ErrorInVolume, before: ErrorInVolume | None) -> dict[str, Any]:
     """What report.js draws: nodes (mm), errors (µm) in the order x, y, z, measured lines, the worst point."""
-    edges = contents.calibration.volume
-    lines = [{"name": line, "from": start, "to": end} for line, start, end in _ends(contents.lines, edges)]
-    at, error = found.worst
+    edges, figures = contents.calibration.volume, found.figures
+    worst = {"at_mm": figures.largest_at.tolist(), "error_um": (MICRO * figures.largest_components).tolist()}
     return {
         "nodes_mm": [nodes.tolist() for nodes in found.nodes],
         "error_um": (MICRO * found.error).reshape(-1, 3).tolist(),
         "before_um": None if before is None else (MICRO * before.error).reshape(-1, 3).tolist(),
-        "lines": lines,
-        "worst": {"at_mm": at.tolist(), "error_um": (MICRO * error).tolist()},
-        "exaggeration": exaggeration(edges, found, before),
+        "lines": [{"name": line, "from": start, "to": end} for line, start, end in _ends(contents.lines, edges)],
+        "worst": None if math.isnan(figures.largest) else worst,
     }
 
 
-def exaggeration(edges: FloatArray, found: GridErrors, before: GridErrors | None) -> float:
+def exaggeration(edges: FloatArray, found: ErrorInVolume, before: ErrorInVolume | None) -> float:
     """1, 2 or 5 times a power of ten: the largest error is drawn as about a tenth of the shortest edge."""
-    largest = max(one.largest for one in (found, before) if one is not None)
+    largest = max(float(np.max(np.linalg.norm(one.error, axis=-1))) for one in (found, before) if one is not None)
     if largest <= 0.0:
         return 1.0
     wanted = 0.12 * float(np.min(edges)) / largest
@@ -91,49 +74,82 @@ def _ends(lines: Sequence[str], edges: FloatArray) -> list[tuple[str, list[float
     return ends
 
 
-def volume_section(contents: Contents, found: GridErrors, before: GridErrors | None) -> Markup:
-    """The drawing with its controls, and the errors at the corners and the centre as a table."""
+def with_ends(value: float, interval: Interval | None) -> str:
+    """A length of mm in µm, with its 95 % interval where there is one."""
+    ends = "" if interval is None else f" (95 %: {shown(MICRO * interval[0])} to {shown(MICRO * interval[1])} µm)"
+    return f"{shown(MICRO * value)} µm{ends}"
+
+
+def place_of_largest(figures: VolumeErrors) -> str:
+    """The place of the largest error."""
+    return ", ".join(f"{axis} {position(p)}" for axis, p in zip(AXES, figures.largest_at, strict=True)) + " mm"
+
+
+def why_not_known(figures: VolumeErrors) -> str:
+    """Which parameters are missing for the error in the volume."""
+    names = dict.fromkeys(name for axis in AXES for name in figures.missing.get(axis, ()))
+    return f"not known, because it needs what is not determined: {', '.join(names)}"
+
+
+def volume_section(contents: Contents, found: ErrorInVolume, before: ErrorInVolume | None) -> Markup:
+    """The figures, the drawing with its controls, and the errors at corners and middles as a table."""
     scale = exaggeration(contents.calibration.volume, found, before)
-    at, error = found.worst
-    label = (
-        f"Error of the tool in the volume, in three dimensions: largest {shown(MICRO * found.largest)} µm at "
-        f"X {position(at[0])}, Y {position(at[1])}, Z {position(at[2])} mm"
+    figures = found.figures
+    if math.isnan(figures.largest):
+        said = f"The largest error is {why_not_known(figures)}. In the picture that counts as 0."
+    else:
+        parts = zip(AXES, figures.largest_components, strict=True)
+        components = ", ".join(f"{axis} {shown(MICRO * float(e), signed=True)} µm" for axis, e in parts)
+        said = (
+            f"Largest at {place_of_largest(figures)}: {with_ends(figures.largest, figures.largest_interval)}, with components "
+            f"{components}. Root mean square over the volume: {with_ends(figures.rms, figures.rms_interval)}."
+        )
+    drawing = element(
+        "div",
+        class_="plot volume",
+        id="figure-volume",
+        role="img",
+        aria_label=f"Error of the tool in the volume, in three dimensions. {said}",
+        aria_describedby="values-volume",
     )
-    missing = [] if _all_known(contents.calibration) else ["What is not determined counts as 0 here."]
     return section(
         "volume",
         "Error of the tool in the volume",
-        element(
-            "p",
-            f"Largest at X {position(at[0])}, Y {position(at[1])}, Z {position(at[2])} mm: "
-            f"{shown(MICRO * found.largest)} µm, with components "
-            + ", ".join(
-                f"{axis} {shown(MICRO * float(e), signed=True)} µm" for axis, e in zip("XYZ", error, strict=True)
-            )
-            + f". Root mean square: {shown(MICRO * found.rms)} µm, on a grid of {NODES} positions along each axis.",
-            *(f" {sentence}" for sentence in missing),
-        ),
+        element("p", said),
         _controls(scale, before is not None, bool(contents.lines)),
         element(
             "figure",
-            element(
-                "div",
-                class_="plot volume",
-                id="figure-volume",
-                role="img",
-                aria_label=label,
-                aria_describedby="values-volume",
-            ),
+            drawing,
             element("figcaption", element("span", "The picture is being drawn.", id="volume-caption")),
             class_="wide",
         ),
-        values("values-volume", "Values in the volume", _table(found, before)),
+        _ranking(figures),
+        values("values-volume", "Values in the volume", *_figures(figures), _table(found, before)),
     )
 
 
-def _all_known(calibration: Calibration) -> bool:
-    count = len(calibration.functions) + len(calibration.squareness)
-    return count == len(FUNCTIONS) + len(SQUARENESSES) and not calibration.undetermined_slopes
+def _ranking(figures: VolumeErrors) -> Markup | None:
+    """The parameters that matter most."""
+    chosen = [one for one in figures.ranking if len(one.parameters) == 1][:MOST_RANKED]
+    if not chosen:
+        return None
+    rows = [[one.name, f"{shown(MICRO * one.largest)} µm", f"{shown(MICRO * one.rms)} µm"] for one in chosen]
+    heading = ["Without", "largest error", "root mean square"]
+    return table("What makes it: the error of the tool if one parameter were 0", heading, rows)
+
+
+def _figures(figures: VolumeErrors) -> Iterator[Markup]:
+    """Ranges, and the errors along the body diagonals."""
+    rows = [
+        [f"range of the error in {axis}", with_ends(one.value, one.interval)] for axis, one in figures.ranges.items()
+    ]
+    rows += [
+        [f"range of the error along the diagonal {line}", with_ends(one.value, one.interval)]
+        for line, one in figures.diagonals.items()
+    ]
+    for letter, tilt in figures.tilts.items():
+        rows.append([f"largest rotation about {AXES['ABC'.index(letter)]}", f"{shown(MICRORADIAN * tilt.value)} µrad"])
+    yield table("Figures of the volume", ["Figure", "value"], rows)
 
 
 def _controls(scale: float, has_before: bool, has_lines: bool) -> Markup:
@@ -197,7 +213,7 @@ def _controls(scale: float, has_before: bool, has_lines: bool) -> Markup:
     )
 
 
-def _table(found: GridErrors, before: GridErrors | None) -> Markup:
+def _table(found: ErrorInVolume, before: ErrorInVolume | None) -> Markup:
     """Corners and middles of the volume."""
     last = NODES - 1
     heading = ["X, Y, Z (mm)", "e_X (µm)", "e_Y (µm)", "e_Z (µm)", "|e| (µm)"]
@@ -210,8 +226,8 @@ def _table(found: GridErrors, before: GridErrors | None) -> Markup:
                 x, y, z = (float(nodes[n]) for nodes, n in zip(found.nodes, (i, j, k), strict=True))
                 row = [f"{position(x)}, {position(y)}, {position(z)}"]
                 row += [shown(MICRO * float(e), signed=True) for e in found.error[i, j, k]]
-                row.append(shown(MICRO * float(found.size[i, j, k])))
+                row.append(shown(MICRO * float(np.linalg.norm(found.error[i, j, k]))))
                 if before is not None:
-                    row.append(shown(MICRO * float(before.size[i, j, k])))
+                    row.append(shown(MICRO * float(np.linalg.norm(before.error[i, j, k]))))
                 rows.append(row)
     return value_table("Error of the tool at corners and middles of the volume", heading, rows)

@@ -1,5 +1,6 @@
 """The parts of a report that are words: verdict, summary, what is open, method, provenance, commands."""
 
+import math
 import shlex
 from collections.abc import Iterator
 from typing import Any, Final
@@ -9,11 +10,13 @@ import numpy as np
 from stepdiag._core import Calibration
 from stepdiag.calibration.finding_text import MEANING, NOISE_ALONE, NOT_SEEN, PROVENANCE
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
+from stepdiag.calibration.volume import VolumeErrors
+from stepdiag.calibration.volume_change import VolumeChange
 from stepdiag.page.contents import Contents
 from stepdiag.page.header import TITLES
 from stepdiag.page.html import Markup, definitions, element, listed, markup, section, table
 from stepdiag.page.numbers import COVERAGE_FACTOR, NOT_KNOWN, moment, position, shown, with_interval
-from stepdiag.page.volume import MICRO, GridErrors
+from stepdiag.page.volume import ErrorInVolume, place_of_largest, why_not_known, with_ends
 from stepdiag.parameters import FUNCTIONS, KINDS, REPORT_UNIT, SQUARENESSES, Kind, in_report_units, kind_of
 
 HEADLINE: Final = {
@@ -31,6 +34,7 @@ _CAN_BE_USED: Final = {
     None: "Not known. The file does not say how well the readings agree.",
 }
 LEAST_PROBABILITY: Final = 1e-12  # that is told
+MOST_EFFECTS: Final = 6
 MOST_REASONS: Final = 6  # that are shown at once
 SYMBOL: Final = {"accepted": "✓", "doubtful": "!", "rejected": "✕", "unchecked": "?", None: "?"}
 
@@ -107,23 +111,13 @@ def _sentence(note: str) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def summary_section(contents: Contents, found: GridErrors, before: GridErrors | None) -> Markup:
-    """Five lines that a customer understands."""
+def summary_section(contents: Contents, found: ErrorInVolume) -> Markup:
+    """A few lines that a customer understands."""
     calibration = contents.calibration
-    at, _ = found.worst
-    largest = f"{shown(MICRO * found.largest)} µm"
-    where = f"X {position(at[0])}, Y {position(at[1])}, Z {position(at[2])} mm"
-    whole = not calibration.undetermined_slopes and not _missing(calibration)
-    volume: list[Any] = [
-        "The tool is at most " if whole else "Without what was not determined, which counts as 0, the tool is at most ",
-        element("strong", largest),
-        f" away from its commanded position, at {where}; {shown(MICRO * found.rms)} µm rms over the volume.",
-    ]
-    if before is not None:
-        volume.append(f" Before: {shown(MICRO * before.largest)} µm, {shown(MICRO * before.rms)} µm rms.")
     lines: list[tuple[str, object]] = [
         ("Can it be used?", _CAN_BE_USED[calibration.fit]),
-        ("Error in the volume", markup(*volume)),
+        ("Error in the volume", _volume(contents, found.figures)),
+        *_within(found.figures),
         ("Largest errors", "; ".join(_largest(calibration)) + "."),
         ("How well known", _how_well(calibration)),
         ("Not determined", _open(calibration)),
@@ -132,6 +126,31 @@ def summary_section(contents: Contents, found: GridErrors, before: GridErrors | 
     if calibration.fit == "rejected":
         note = element("p", element("strong", "The fit is rejected: the figures below are not to be used."))
     return section("summary", "Summary", note, definitions(lines, "lines"))
+
+
+def _volume(contents: Contents, figures: VolumeErrors) -> Markup:
+    if math.isnan(figures.largest):
+        return markup(f"The largest error is {why_not_known(figures)}.")
+    parts: list[object] = [
+        "The tool is at most ",
+        element("strong", with_ends(figures.largest, figures.largest_interval)),
+        f" away from its commanded position, at {place_of_largest(figures)}; ",
+        f"{with_ends(figures.rms, figures.rms_interval)} rms over the volume.",
+    ]
+    if contents.change is not None and not math.isnan(contents.change.largest.a):
+        parts.append(f" Before: {with_ends(contents.change.largest.a, contents.change.largest.a_interval)}.")
+    return markup(*parts)
+
+
+def _within(figures: VolumeErrors) -> Iterator[tuple[str, object]]:
+    """The verdict against a limit that was given."""
+    if figures.limit is None:
+        return
+    words = {"within": "Yes.", "not within": "No.", "undecided": "It cannot be decided."}
+    said = words.get(figures.verdict or "", "Not known.")
+    why = f" {_sentence(figures.no_verdict_because)}" if figures.no_verdict_because else ""
+    rule = " By ISO 14253-1: at 95 %, one-sided, with the uncertainty of the largest error." if figures.verdict else ""
+    yield f"Within {with_ends(figures.limit, None)}?", markup(element("strong", said), why, rule)
 
 
 def largest_values(calibration: Calibration) -> dict[Kind, tuple[str, float, float, float]]:
@@ -313,37 +332,45 @@ def _probability(probability: float | None) -> str:
     return f"{probability:.2g}" if probability >= LEAST_PROBABILITY else f"below {LEAST_PROBABILITY:g}"
 
 
-def comparison_section(contents: Contents, found: GridErrors, before: GridErrors | None) -> Markup | None:
-    """Before and after, parameter by parameter."""
-    comparison = contents.comparison
-    if comparison is None or before is None:
+def comparison_section(contents: Contents) -> Markup | None:
+    """Before and after: in the volume, and parameter by parameter."""
+    comparison, change = contents.comparison, contents.change
+    if comparison is None or change is None:
         return None
     rows = []
     for difference in comparison.differences:
         kind, k = kind_of(difference.parameter), difference.largest
         unit, u = REPORT_UNIT[kind], float(difference.standard_uncertainty[k])
-        place = "" if np.isnan(difference.position[k]) else f"{position(difference.position[k])} mm"
-        probability = comparison.probability(difference)
         rows.append(
             [
                 difference.parameter.replace("_", " ") + (" shape" if difference.shape_only else ""),
                 with_interval(in_report_units(kind, float(difference.value[k])), in_report_units(kind, u), unit),
-                place,
-                _probability(probability),
+                "" if np.isnan(difference.position[k]) else f"{position(difference.position[k])} mm",
+                _probability(comparison.probability(difference)),
                 "significant" if comparison.is_significant(difference) else "",
             ]
         )
     volume = [
         [
-            "largest",
-            f"{shown(MICRO * before.largest)} µm",
-            f"{shown(MICRO * found.largest)} µm",
-        ],
-        ["root mean square", f"{shown(MICRO * before.rms)} µm", f"{shown(MICRO * found.rms)} µm"],
+            name,
+            with_ends(figure.a, figure.a_interval),
+            with_ends(figure.b, figure.b_interval),
+            with_ends(figure.change, figure.interval),
+            figure.verdict or "",
+        ]
+        for name, figure in (("largest", change.largest), ("root mean square", change.rms))
     ]
-    change = MICRO * (found.largest - before.largest)
-    way = "smaller" if change < 0 else "larger"
-    notes = [*comparison.notes]
+    effects = [
+        [
+            one.parameter,
+            with_ends(one.largest, None),
+            with_ends(one.rms, None),
+            "significant" if one.significant else "",
+        ]
+        for one in change.effects[:MOST_EFFECTS]
+    ]
+    notes = [f"no verdict: {change.no_verdict_because}"] if change.no_verdict_because else []
+    notes += [note.replace("A and B", "before and after") for note in comparison.notes]
     if comparison.only_in_a:
         notes.append(f"only before: {', '.join(comparison.only_in_a)}")
     if comparison.only_in_b:
@@ -352,13 +379,10 @@ def comparison_section(contents: Contents, found: GridErrors, before: GridErrors
     return section(
         "comparison",
         "Before and after",
-        element(
-            "p",
-            element("strong", f"The largest error in the volume is {shown(abs(change))} µm {way} than before."),
-            " The curves above have the earlier calibration as dashed lines.",
-        ),
+        element("p", element("strong", _verdict_of(change)), " The curves above show the earlier calibration dashed."),
         None if fit == "accepted" else element("p", f"The earlier calibration: {HEADLINE[fit]}.", class_="note"),
-        table("Error of the tool in the volume", ["", "before", "after"], volume),
+        table("Error of the tool in the volume", ["", "before", "after", "change", ""], volume),
+        table("Error in the volume that one difference makes alone", ["Parameter", "largest", "rms", ""], effects),
         table(
             "Largest difference of each parameter, after less before",
             ["Parameter", "difference (95 %)", "at", "probability by chance", ""],
@@ -370,5 +394,14 @@ def comparison_section(contents: Contents, found: GridErrors, before: GridErrors
             f"significant up to {comparison.limit:g}.",
             class_="note",
         ),
-        listed([f"{note[0].upper()}{note[1:]}." for note in notes]) if notes else None,
+        listed([_sentence(note) for note in notes]) if notes else None,
     )
+
+
+def _verdict_of(change: VolumeChange) -> str:
+    figure = change.largest
+    if math.isnan(figure.change):
+        return "Whether the error in the volume has changed is not known."
+    way = "smaller" if figure.change < 0.0 else "larger"
+    said = f"The largest error in the volume is {with_ends(abs(figure.change), None)} {way} than before."
+    return f"{said} {figure.verdict.capitalize()}." if figure.verdict else said

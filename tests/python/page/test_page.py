@@ -252,8 +252,22 @@ def test_what_is_not_determined_is_said_where_it_counts(here: Path) -> None:
     page = page_of(calibration=Path("short.nc"))
     for sentence in sd.read_calibration("short.nc").undetermined:
         assert sentence[1:] in page.text
-    assert "Without what was not determined, which counts as 0, the tool is at most" in page.text
+    assert "The largest error is not known, because it needs what is not determined: slope of EXX" in page.text
     assert "The slope of EXX, the slope of EYY, the slope of EZZ." in page.text
+
+
+def test_error_in_the_volume_is_that_of_the_volume_command(evaluated: Path) -> None:
+    page = page_of(calibration=Path("calibration.nc"), limit=0.02)
+    found = sd.volume_errors(sd.read_calibration("calibration.nc"))
+    said = page.values()["volume"]
+    assert said["largest_um"] == pytest.approx(1e3 * found.largest, rel=1e-15)  # the decimal point is moved
+    assert said["at_mm"] == found.largest_at.tolist()
+    drawn = json.loads(page.scripts["stepdiag-volume"])
+    np.testing.assert_array_equal(drawn["worst"]["error_um"], 1e3 * found.largest_components)
+    assert "Within 20.0 µm?" in page.text
+    for wrong in (0.0, -1.0, float("nan")):
+        with pytest.raises(InvalidArgument, match="limit: expected a positive length in mm"):
+            page_of(calibration=Path("calibration.nc"), limit=wrong)
 
 
 def test_budget_is_that_of_the_uncertainty_result(evaluated: Path) -> None:
@@ -331,6 +345,7 @@ def test_content_is_escaped_and_markup_is_not() -> None:
 NUMBERS: list[tuple[Callable[[], str], str]] = [
     (lambda: shown(1234.4), "1234"),
     (lambda: shown(-12.345), "−12.3"),
+    (lambda: shown(123.45), "123.5"),
     (lambda: shown(0.0), "0.00"),
     (lambda: shown(0.00012), "0.00012"),
     (lambda: shown(9.999), "10.0"),
