@@ -100,9 +100,13 @@ def volume_section(contents: Contents, found: ErrorInVolume, before: ErrorInVolu
     else:
         parts = zip(AXES, figures.largest_components, strict=True)
         components = ", ".join(f"{axis} {shown(MICRO * float(e), signed=True)} µm" for axis, e in parts)
+        largest, rms = (
+            with_ends(figures.largest, figures.largest_interval),
+            with_ends(figures.rms, figures.rms_interval),
+        )
         said = (
-            f"Largest at {place_of_largest(figures)}: {with_ends(figures.largest, figures.largest_interval)}, with components "
-            f"{components}. Root mean square over the volume: {with_ends(figures.rms, figures.rms_interval)}."
+            f"Largest at {place_of_largest(figures)}: {largest}, with components {components}. Root mean square over "
+            f"the volume: {rms}."
         )
     drawing = element(
         "div",
