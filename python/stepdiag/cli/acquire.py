@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, Writes, in_flags, out_file, tell
+from stepdiag.cli.options import PATH, Grouped, Writes, in_flags, out_file, tell
 from stepdiag.io.outputs import MEASUREMENT, RAW, OutputFile
 
 if TYPE_CHECKING:
@@ -32,7 +32,17 @@ class _Terminal:
             raise InvalidArgument("standard input ended before Enter was pressed; --resume continues")
 
 
-@click.command(epilog="\b\nExample: stepdiag acquire scenario.toml --source ids3010://192.168.1.1 -o run.csv")
+@click.command(
+    cls=Grouped,
+    groups={
+        "Instrument": ["source", "axes", "sign", "zero", "timeout"],
+        "When to read": ["trigger", "start", "wait_timeout", "retries"],
+        "Settling": ["settle_count", "settle_limit_um", "settle_timeout", "average", "interval_ms"],
+        "Output": ["output", "uncertainties", "raw"],
+        "Continue": ["resume", "restart_line", "restart_set_up", "from_raw"],
+    },
+    epilog="\b\nExample: stepdiag acquire scenario.toml --source ids3010://192.168.1.1 -o run.csv",
+)
 @click.argument("scenario", type=PATH, required=False)
 @click.option("--source", metavar="URL", help="The instrument: ids3010://HOST or ids3010://HOST:PORT.")
 @click.option(

@@ -6,13 +6,17 @@ from typing import Literal
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, Writes, fit_warnings, json_option, out_file, tell_fit
+from stepdiag.cli.options import PATH, Grouped, Writes, fit_warnings, json_option, out_file, tell_fit
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
 from stepdiag.progress import Progress
 
 
-@click.command(epilog="\b\nExample: stepdiag evaluate scenario.toml run.csv -o calibration.csv")
+@click.command(
+    cls=Grouped,
+    groups={"Evaluation": ["method", "reliability"], "Output": ["output", "covariance", "as_json"]},
+    epilog="\b\nExample: stepdiag evaluate scenario.toml run.csv -o calibration.csv",
+)
 @click.argument("scenario", type=PATH)
 @click.argument("run", type=PATH)
 @click.option(

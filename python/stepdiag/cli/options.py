@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -52,6 +52,24 @@ class PointInMm(click.ParamType):  # type: ignore[type-arg]
 
 def out_file(meaning: str, *kinds: FileKind) -> Callable[[Command], Command]:
     return click.option("-o", "output", required=True, type=Writes(*kinds), metavar="FILE", help=meaning)
+
+
+class Grouped(click.Command):
+    """Shows its options in groups: title -> names of parameters. Those in no group come last, as "Options"."""
+
+    def __init__(self, *arguments: Any, groups: Mapping[str, Sequence[str]], **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.groups = groups
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        left = {p.name: p for p in self.get_params(ctx) if isinstance(p, click.Option)}
+        for title, names in self.groups.items():
+            records = [left.pop(name).get_help_record(ctx) for name in names]
+            with formatter.section(title):
+                formatter.write_dl([record for record in records if record is not None])
+        records = [option.get_help_record(ctx) for option in left.values()]
+        with formatter.section("Options"):
+            formatter.write_dl([record for record in records if record is not None])
 
 
 class InOrder(click.Group):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, tell
+from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Grouped, Writes, tell
 from stepdiag.cli.terminal import say
 from stepdiag.cli.workers import chosen_workers, worker_options
 from stepdiag.io.outputs import CHECKPOINT, UNCERTAINTY, OutputFile
@@ -54,7 +54,17 @@ def _points(context: click.Context, option: click.Parameter, texts: tuple[str, .
     return result
 
 
-@click.command(epilog="\b\nExample: stepdiag uncertainty scenario.toml -n 1e6 --compare -o uncertainty.nc")
+@click.command(
+    cls=Grouped,
+    groups={
+        "Evaluation": ["method", "coverage", "list_inputs"],
+        "Monte Carlo method": ["samples", "adaptive", "digits", "seed", "compare", "joint"],
+        "Derived quantities": ["points", "volume"],
+        "Output": ["output", "covariance", "keep"],
+        "Computation": ["threads", "scheduler", "workers", "checkpoint", "resume"],
+    },
+    epilog="\b\nExample: stepdiag uncertainty scenario.toml -n 1e6 --compare -o uncertainty.nc",
+)
 @click.argument("scenario", type=PATH)
 @click.option(
     "-n",

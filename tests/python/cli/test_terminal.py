@@ -9,12 +9,18 @@ import subprocess
 import sys
 from pathlib import Path
 
+import click
 import pytest
+from click.testing import CliRunner
 from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag.cli import terminal
+from stepdiag.cli.acquire import acquire
+from stepdiag.cli.evaluate import evaluate
+from stepdiag.cli.options import Grouped
 from stepdiag.cli.terminal import WIDEST, say
+from stepdiag.cli.uncertainty import uncertainty
 
 ANSI = re.compile(r"\x1b\[[0-9;]*m")
 
@@ -149,3 +155,16 @@ def test_json_has_no_colour_on_a_terminal(tmp_path: Path) -> None:
 def test_package_is_a_command() -> None:
     ended = subprocess.run([sys.executable, "-m", "stepdiag", "--version"], capture_output=True, text=True, check=True)
     assert ended.stdout == f"stepdiag {sd.__version__}\n"
+
+
+@pytest.mark.parametrize("command", [evaluate, uncertainty, acquire], ids=lambda command: command.name)
+def test_every_option_of_a_long_help_is_in_a_group(command: Grouped) -> None:
+    grouped = [name for names in command.groups.values() for name in names]
+    options = [param.name for param in command.params if isinstance(param, click.Option)]
+    assert sorted(grouped) == sorted(filter(None, options))
+    shown = CliRunner().invoke(command, ["--help"]).output
+    for param in command.params:
+        if isinstance(param, click.Option):
+            assert len(re.findall(rf"^  {re.escape(param.opts[0])}\b", shown, re.MULTILINE)) == 1
+    titles = re.findall(r"^([A-Z][\w ]+):$", shown, re.MULTILINE)
+    assert titles == [*command.groups, "Options"]
