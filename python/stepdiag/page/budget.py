@@ -121,7 +121,7 @@ def budget_section(budget: Budget | None, figures: Figures) -> Markup:
                 ),
             ),
         )
-    named = [f"{share.kind} · {_label(share)}" for share in budget.shares]
+    named = [f"{share.kind}<br>{_label(share)}" for share in budget.shares]
     order: dict[str, float] = {}
     for share in budget.shares:
         for group, part in share.shares.items():
@@ -154,7 +154,7 @@ def budget_section(budget: Budget | None, figures: Figures) -> Markup:
         barmode="relative",
         hovermode="closest",
         showlegend=True,
-        legend={"orientation": "h", "y": -0.28, "x": 0, "traceorder": "normal"},
+        legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom", "x": 0, "traceorder": "normal"},
         margin={"l": 10, "r": 10, "t": 8, "b": 90},
     )
     rows = [

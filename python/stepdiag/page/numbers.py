@@ -6,6 +6,7 @@ from typing import Final
 
 # Half width of a two-sided 95 % interval of a normal distribution, in standard uncertainties.
 COVERAGE_FACTOR: Final = 1.959963984540054
+NBSP: Final = "\u00a0"  # no line ends between a number and its unit
 NOT_KNOWN: Final = "not known"
 
 
@@ -28,11 +29,11 @@ def with_interval(value: float, uncertainty: float, unit: str) -> str:
     """A value with its expanded uncertainty (95 %), both to two digits of the latter: 21.0 ± 1.4 µm."""
     half = COVERAGE_FACTOR * uncertainty
     if not math.isfinite(half):
-        return f"{shown(value)} {unit} (uncertainty {NOT_KNOWN})"
+        return f"{shown(value)}{NBSP}{unit} (uncertainty {NOT_KNOWN})"
     if half <= 0.0:
-        return f"{shown(value)} {unit}"
+        return f"{shown(value)}{NBSP}{unit}"
     digits = max(0, 1 - math.floor(math.log10(float(f"{half:.1e}"))))
-    return f"{value:.{digits}f} ± {half:.{digits}f} {unit}".replace("-", "−")
+    return f"{value:.{digits}f}{NBSP}±{NBSP}{half:.{digits}f}{NBSP}{unit}".replace("-", "−")
 
 
 def moment(date: str) -> str:

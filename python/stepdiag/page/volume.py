@@ -12,7 +12,7 @@ from stepdiag.calibration.volume import Interval, VolumeErrors, volume_errors
 from stepdiag.page.contents import Contents
 from stepdiag.page.figure import value_table, values
 from stepdiag.page.html import Markup, element, section, table
-from stepdiag.page.numbers import position, shown
+from stepdiag.page.numbers import NBSP, position, shown
 from stepdiag.parameters import AXES
 
 NODES: Final = 13  # of the grid along each axis
@@ -76,13 +76,15 @@ def _ends(lines: Sequence[str], edges: FloatArray) -> list[tuple[str, list[float
 
 def with_ends(value: float, interval: Interval | None) -> str:
     """A length of mm in µm, with its 95 % interval where there is one."""
-    ends = "" if interval is None else f" (95 %: {shown(MICRO * interval[0])} to {shown(MICRO * interval[1])} µm)"
-    return f"{shown(MICRO * value)} µm{ends}"
+    ends = "" if interval is None else f" (95 %: {shown(MICRO * interval[0])} to {shown(MICRO * interval[1])}{NBSP}µm)"
+    return f"{shown(MICRO * value)}{NBSP}µm{ends}"
 
 
 def place_of_largest(figures: VolumeErrors) -> str:
     """The place of the largest error."""
-    return ", ".join(f"{axis} {position(p)}" for axis, p in zip(AXES, figures.largest_at, strict=True)) + " mm"
+    return (
+        ", ".join(f"{axis}{NBSP}{position(p)}" for axis, p in zip(AXES, figures.largest_at, strict=True)) + f"{NBSP}mm"
+    )
 
 
 def why_not_known(figures: VolumeErrors) -> str:

@@ -15,7 +15,7 @@ from stepdiag.calibration.volume_change import VolumeChange
 from stepdiag.page.contents import Contents
 from stepdiag.page.header import TITLES
 from stepdiag.page.html import Markup, definitions, element, listed, markup, section, table
-from stepdiag.page.numbers import COVERAGE_FACTOR, NOT_KNOWN, moment, position, shown, with_interval
+from stepdiag.page.numbers import COVERAGE_FACTOR, NBSP, NOT_KNOWN, moment, position, shown, with_interval
 from stepdiag.page.volume import ErrorInVolume, place_of_largest, why_not_known, with_ends
 from stepdiag.parameters import FUNCTIONS, KINDS, REPORT_UNIT, SQUARENESSES, Kind, in_report_units, kind_of
 
@@ -118,7 +118,7 @@ def summary_section(contents: Contents, found: ErrorInVolume) -> Markup:
         ("Can it be used?", _CAN_BE_USED[calibration.fit]),
         ("Error in the volume", _volume(contents, found.figures)),
         *_within(found.figures),
-        ("Largest errors", "; ".join(_largest(calibration)) + "."),
+        ("Largest errors", _sentence("; ".join(_largest(calibration)))),
         ("How well known", _how_well(calibration)),
         ("Not determined", _open(calibration)),
     ]
@@ -178,7 +178,7 @@ def _largest(calibration: Calibration) -> Iterator[str]:
 
 def _how_well(calibration: Calibration) -> str:
     uncertain = [
-        f"{kind} {shown(in_report_units(kind, COVERAGE_FACTOR * u))} {REPORT_UNIT[kind]}"
+        f"{kind} {shown(in_report_units(kind, COVERAGE_FACTOR * u))}{NBSP}{REPORT_UNIT[kind]}"
         for kind, (u, _) in largest_uncertainties(calibration).items()
     ]
     if not uncertain:
@@ -264,7 +264,7 @@ def method_section(contents: Contents) -> Markup:
         ("Uncertainties", "95 % intervals are ± 1.96 standard uncertainties (GUM), of each value by itself."),
         (
             "Error in the volume",
-            "The exact pose of the functional point, less the commanded one, at the nodes of a grid.",
+            "Actual less commanded position of the functional point, by the exact pose of the machine, at all nodes.",
         ),
     ]
     return section("method", "Method", definitions(rows, "lines"))
