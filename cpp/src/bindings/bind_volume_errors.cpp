@@ -1,4 +1,5 @@
 #include "bindings.hpp"
+#include "stepdiag/uncertainty/volume_draws.hpp"
 #include "stepdiag/uncertainty/volume_errors.hpp"
 
 namespace stepdiag::bindings {
@@ -89,6 +90,41 @@ void bind_volume_errors(py::module_& m) {
         py::arg("calibration"), py::arg("points"), py::kw_only(), py::arg("tool") = std::nullopt,
         "Standard uncertainties of errors_at from the covariance of a calibration, (n, 6), mm and rad; NaN where a "
         "parameter is missing. Raises InvalidArgument without a covariance.");
+
+    py::class_<VolumeDraws>(m, "VolumeDraws",
+                            "Draws of figures over a volume from the joint normal distribution of a calibration's "
+                            "values, to first order.")
+        .def(py::init([](const Calibration& calibration, const ArrayLike& x, const ArrayLike& y, const ArrayLike& z,
+                         const std::optional<ArrayLike>& tool, const IntegerLike& seed) {
+                 const auto offset = tool ? std::optional(to_vector3(*tool, "tool")) : std::nullopt;
+                 const GridPositions grid = to_grid(x, y, z);
+                 const std::uint64_t number = to_seed(seed);
+                 py::gil_scoped_release release;
+                 return std::make_unique<VolumeDraws>(calibration, grid, offset, number);
+             }),
+             py::arg("calibration"), py::arg("x"), py::arg("y"), py::arg("z"), py::kw_only(),
+             py::arg("tool") = std::nullopt, py::arg("seed") = integer(0),
+             "On the grid of all combinations of these ascending positions (mm). Raises InvalidArgument for a "
+             "calibration without covariance.")
+        .def_property_readonly_static(
+            "names",
+            [](const py::object&) { return std::vector<std::string>(volume_figures.begin(), volume_figures.end()); },
+            "Columns of draw.")
+        .def_property_readonly(
+            "values", [](const VolumeDraws& draws) { return to_numpy_vector(draws.values()); },
+            "(15,) figures of the calibration's own values.")
+        .def(
+            "draw",
+            [](const VolumeDraws& draws, const IntegerLike& first, const IntegerLike& count) {
+                const auto begin = std::uint64_t(to_integer(first, "first", 0, std::int64_t(1) << 62));
+                const auto samples = std::size_t(to_integer(count, "count", 1, 1'000'000'000));
+                py::gil_scoped_release release;
+                const Eigen::MatrixXd figures = draws.draw(begin, samples);
+                py::gil_scoped_acquire acquire;
+                return to_numpy(figures);
+            },
+            py::arg("first"), py::arg("count"),
+            "(count, 15) mm and rad, of the draws first, first + 1, ...: the same bits on any number of threads.");
 }
 
 }  // namespace stepdiag::bindings

@@ -112,7 +112,7 @@ Machine without_parameters(const Machine& machine, const std::vector<int>& param
     return {machine.chain(), ErrorMap(std::move(table)), machine.tool()};
 }
 
-VolumeSummary summarise_volume(const Machine& machine, const GridPositions& grid) {
+void check_grid(const GridPositions& grid) {
     for (const Axis axis : all_axes) {
         const auto& positions = grid[std::size_t(index(axis))];
         bool ascends = !positions.empty();
@@ -121,6 +121,10 @@ VolumeSummary summarise_volume(const Machine& machine, const GridPositions& grid
         if (!ascends)
             throw InvalidArgument(std::string("grid: expected finite, ascending positions of ") + letter(axis));
     }
+}
+
+VolumeSummary summarise_volume(const Machine& machine, const GridPositions& grid) {
+    check_grid(grid);
     const auto order = machine.chain().order();
     std::array<std::vector<Motion>, 3> motions;
     std::array<const std::vector<double>*, 3> positions;

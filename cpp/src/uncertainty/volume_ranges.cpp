@@ -12,6 +12,7 @@
 #include <limits>
 
 #include "uncertainty/derived_parts.hpp"
+#include "uncertainty/upper_hull.hpp"
 
 namespace stepdiag {
 namespace {
@@ -42,36 +43,6 @@ AxisState between(const AxisTable& table, Index interval, double t) {
             mix(table.delta.col(interval), table.delta.col(interval + 1)),
             mix(table.theta.col(interval), table.theta.col(interval + 1))};
 }
-
-// --- largest values of piecewise linear and piecewise quadratic functions ---
-
-// Upper convex hull of the points (x_k, y_k), x ascending.
-class UpperHull {
-public:
-    UpperHull(const std::vector<double>& x, const Eigen::VectorXd& y) {
-        for (std::size_t k = 0; k < x.size(); ++k) {
-            while (x_.size() >= 2 && (y_.back() - y_[y_.size() - 2]) * (x[k] - x_.back()) <=
-                                         (y[Eigen::Index(k)] - y_.back()) * (x_.back() - x_[x_.size() - 2])) {
-                x_.pop_back();
-                y_.pop_back();
-            }
-            x_.push_back(x[k]);
-            y_.push_back(y[Eigen::Index(k)]);
-        }
-    }
-    // Largest y + slope x. `corner`: start of the search, and its result; the last result is a good start for a similar
-    // slope.
-    double support(double slope, std::size_t& corner) const {
-        const auto rises = [&](std::size_t k) { return y_[k + 1] - y_[k] + slope * (x_[k + 1] - x_[k]) > 0.0; };
-        while (corner + 1 < x_.size() && rises(corner)) ++corner;
-        while (corner > 0 && !rises(corner - 1)) --corner;
-        return y_[corner] + slope * x_[corner];
-    }
-
-private:
-    std::vector<double> x_;
-    std::vector<double> y_;
-};
 
 // Largest value of a parabola between its end points. In the middle it is higher than the chord by `sag`.
 double top_of_arc(double begin, double end, double sag) {

@@ -1,14 +1,12 @@
 #include "stepdiag/uncertainty/volumetric_accuracy.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <thread>
 
 #include "stepdiag/core/error.hpp"
-#include "stepdiag/core/random.hpp"
 #include "uncertainty/derived_parts.hpp"
+#include "uncertainty/in_blocks.hpp"
+#include "uncertainty/normal_draws.hpp"
 
 namespace stepdiag {
 namespace {
@@ -17,34 +15,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// L with L L^T = covariance. The covariance may be singular, because exactly known values (0 at home) have no variance.
-MatrixXd root_of(const MatrixXd& covariance) {
-    // Scale by the standard uncertainties, so that the order of the pivots does not depend on the units mm and rad.
-    const VectorXd u = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-    const VectorXd scale = (u.array() > 0.0).select(u.array().inverse(), 0.0);
-    const Eigen::LDLT<MatrixXd> factor(scale.asDiagonal() * covariance * scale.asDiagonal());
-    MatrixXd root = factor.matrixL();
-    root = root * factor.vectorD().cwiseMax(0.0).cwiseSqrt().asDiagonal();
-    root = factor.transpositionsP().transpose() * root;
-    return u.asDiagonal() * root;
-}
-
 void check_covariance(const Calibration& calibration) {
     if (calibration.covariance.size() == 0)
         throw InvalidArgument("calibration: expected one evaluated with full covariance");
-}
-
-// Standard normal numbers; each column is one sample.
-MatrixXd normal_numbers(std::uint64_t seed, std::uint64_t first_sample, Index count, Index samples) {
-    MatrixXd numbers(count, samples);
-    for (Index s = 0; s < samples; ++s)
-        for (Index i = 0; i < count; i += 2) {
-            const auto pair =
-                normal_pair(seed, RandomStream::monte_carlo, {first_sample + std::uint64_t(s), std::uint32_t(i / 2)});
-            numbers(i, s) = pair[0];
-            if (i + 1 < count) numbers(i + 1, s) = pair[1];
-        }
-    return numbers;
 }
 
 }  // namespace
@@ -62,7 +35,7 @@ RangeModel::RangeModel(const Calibration& calibration, const std::optional<Eigen
     check_covariance(calibration);
     auto state = std::make_shared<State>(State{VolumeRanges(calibration, tool_of(calibration, tool)),
                                                calibration_values(calibration),
-                                               root_of(calibration.covariance),
+                                               normal_root(calibration.covariance),
                                                seed,
                                                {},
                                                {}});
@@ -111,26 +84,18 @@ VolumetricAccuracy volumetric_accuracy(const Calibration& calibration, const std
     check_covariance(calibration);
     const VolumeRanges ranges(calibration, tool_of(calibration, tool));
     const VectorXd values = calibration_values(calibration);
-    const MatrixXd root = root_of(calibration.covariance);
+    const MatrixXd root = normal_root(calibration.covariance);
 
     const Index count = Index(options.samples), together = 16;
     MatrixXd drawn(count, range_count), of_noise(count, range_count);
-    std::atomic<Index> next{0};
     // The numbers of a sample depend on its index only, so the result does not depend on the threads.
-    const auto draw_blocks = [&] {
-        for (Index begin; (begin = together * next++) < count;) {
-            const Index here = std::min(together, count - begin);
-            const MatrixXd noise = root * normal_numbers(options.seed, std::uint64_t(begin), root.cols(), together);
-            for (Index s = 0; s < here; ++s) {
-                drawn.row(begin + s) = ranges.evaluate(values + noise.col(s)).transpose();
-                of_noise.row(begin + s) = ranges.evaluate(noise.col(s)).transpose();
-            }
+    in_blocks(count, together, [&](Index begin, Index end) {
+        const MatrixXd noise = root * normal_numbers(options.seed, std::uint64_t(begin), root.cols(), together);
+        for (Index s = 0; s < end - begin; ++s) {
+            drawn.row(begin + s) = ranges.evaluate(values + noise.col(s)).transpose();
+            of_noise.row(begin + s) = ranges.evaluate(noise.col(s)).transpose();
         }
-    };
-    std::vector<std::thread> others(std::max(std::thread::hardware_concurrency(), 1u) - 1);
-    for (std::thread& other : others) other = std::thread(draw_blocks);
-    draw_blocks();
-    for (std::thread& other : others) other.join();
+    });
 
     VolumetricAccuracy result;
     result.value = ranges.evaluate(values);

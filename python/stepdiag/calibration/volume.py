@@ -6,9 +6,11 @@ home every error is 0, and the straightnesses EYX, EZX and EZY are 0 at both end
 from home may be small from another reference point. docs/volume.md has the formulas.
 """
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal
+from statistics import NormalDist
+from typing import TYPE_CHECKING, Final, Literal, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +18,7 @@ import numpy.typing as npt
 from stepdiag import _core
 from stepdiag._core import Calibration, InvalidArgument, Machine
 from stepdiag.calibration.table_sums import FloatArray
+from stepdiag.display import Displayed, Facts, point_text
 from stepdiag.display import Displayed, Facts, point_text
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 from stepdiag.style import drawn
@@ -25,10 +28,15 @@ if TYPE_CHECKING:
 
 Verdict = Literal["within", "not within", "undecided"]
 Interval = tuple[float, float]
+Spread = tuple[float, float]  # bias and standard uncertainty
 
 DIAGONALS: Final = ("ppp", "npp", "pnp", "nnp")
 # The axis that a squareness belongs to: in the pose it moves this axis aside.
 SQUARENESS_OF: Final[Mapping[str, tuple[str, ...]]] = {"X": (), "Y": ("C0Y",), "Z": ("B0Z", "A0Z")}
+TWO_SIDED: Final = NormalDist().inv_cdf(0.975)
+ONE_SIDED: Final = NormalDist().inv_cdf(0.95)
+FEWEST_SAMPLES: Final = 1000
+MOST_DRAWN: Final = 51  # positions an axis; more take much longer and change little
 # Lengths that differ by less were rounded on the way, mm.
 _ROUNDING: Final = 1e-6
 
@@ -64,7 +72,7 @@ class VolumeErrors(Displayed):
     largest: float  # mm; NaN where a parameter that acts in it is not determined, as all figures
     largest_at: FloatArray  # (3,) commanded, mm
     largest_components: FloatArray  # (3,) dx, dy, dz, mm
-    largest_interval: Interval | None  # 95 %; None where the calibration has no covariance, as all intervals
+    largest_interval: Interval | None  # 95 %, with between_nodes; None without a covariance, as all intervals
     rms: float  # root of the mean of |e|^2 over the box, mm
     rms_interval: Interval | None
     ranges: Mapping[str, VolumeFigure]  # "X", "Y", "Z": largest minus smallest component, mm
@@ -72,8 +80,9 @@ class VolumeErrors(Displayed):
     tilt_ranges: Mapping[str, VolumeFigure]  # "A", "B", "C": largest minus smallest rotation, rad
     diagonals: Mapping[str, VolumeFigure]  # "ppp" ...: range of the errors along the box's body diagonal, mm
     missing: Mapping[str, tuple[str, ...]]  # "X" ... "C" -> parameters that act in it and are not determined
-    between_nodes: float  # standard uncertainty by what lies between the nodes, mm
+    between_nodes: float  # standard uncertainty of the largest error by what lies between the nodes, mm
     between_nodes_estimated: bool  # from second differences of the tables; else it was stated
+    bounds: Interval | None  # of the largest error, mm: it is above the first, and below the second, with 95 % each
     limit: float | None  # mm
     verdict: Verdict | None  # None without a limit, without a covariance, or where the largest error is not known
     no_verdict_because: str  # why there is none although there is a limit; else empty
@@ -105,6 +114,21 @@ class VolumeErrors(Displayed):
         """Draw the error in three planes through the point with the largest one (a matplotlib Figure)."""
         return drawn(self)
 
+    def _facts(self) -> Facts:
+        low, high = self.largest_interval or (float("nan"), float("nan"))
+        interval = "" if self.largest_interval is None else f", 95 % interval {low * 1e3:.3g} to {high * 1e3:.3g} µm"
+        facts = [("verdict", f"{self.verdict}, limit {self.limit * 1e3:g} µm")] if self.verdict and self.limit else []
+        facts += [("no verdict because", self.no_verdict_because)] if self.no_verdict_because else []
+        facts += [
+            ("largest", f"{self.largest * 1e3:.4g} µm at {point_text(self.largest_at)}{interval}"),
+            ("rms", f"{self.rms * 1e3:.4g} µm"),
+            ("fit", self.fit or "not known"),
+            ("box", ", ".join(f"{a:g} to {b:g}" for a, b in zip(*self.box, strict=True)) + " mm"),
+        ]
+        facts += [(f"range of {name}", f"{figure.value * 1e3:.4g} µm") for name, figure in self.ranges.items()]
+        facts += [(f"largest tilt {name}", f"{figure.value * 1e6:.4g} µrad") for name, figure in self.tilts.items()]
+        return [*facts, *((f"missing in {name}", ", ".join(which)) for name, which in self.missing.items() if which)]
+
 
 def volume_errors(
     source: Calibration | Machine,
@@ -117,44 +141,70 @@ def volume_errors(
     ranking: bool = True,
     samples: int = 10_000,
     seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
 ) -> VolumeErrors:
     """Summarise the error of the tool over a volume, with 95 % intervals where there is a covariance.
 
     tool: offset of the functional point, mm; none: the calibration's. box: (2, 3), lowest and highest commanded
     positions, mm; none: the whole volume; of a Machine it is needed. grid: at least as many positions an axis, besides
     the nodes of the tables; none: the nodes. limit: of the largest error, mm. between_nodes: standard uncertainty by
-    what lies between the nodes, mm; none: estimated. ranking: whether to compute it. samples: draws of the covariance. Raises InvalidArgument for a box
-    that is not in the volume, numbers out of range, and a limit of 0 or less."""
+    what lies between the nodes, mm; none: estimated. ranking: whether to compute it. samples: draws of the covariance.
+    progress: called with the number of draws that are done, and of all. Raises InvalidArgument for a box that is not in
+    the volume, and for numbers out of range."""
     machine, offset = _machine_of(source, tool)
     corners = _box_of(source, box)
     positions = _positions(machine, corners, grid)
+    for name, length in (("limit", limit), ("between_nodes", between_nodes)):
+        if length is not None and not (math.isfinite(length) and length >= 0.0):
+            raise InvalidArgument(f"`{name}`: expected a length of at least 0 mm, got {length:g}")
+    if limit == 0.0:
+        raise InvalidArgument("`limit`: expected a length above 0 mm, got 0")
+    if samples < FEWEST_SAMPLES:
+        raise InvalidArgument(f"samples: expected at least {FEWEST_SAMPLES}, got {samples}")
     found = _core.summarise_volume(machine, *positions)
     missing = _missing(source, offset)
-    if limit is not None and not (np.isfinite(limit) and limit > 0.0):
-        raise InvalidArgument(f"limit: expected a positive length in mm, got {limit:g}")
     known = not any(component in missing for component in AXES)
-    here = np.full(3, np.nan)
+    between, estimated = between_nodes or 0.0, False
+    if between_nodes is None and isinstance(source, Calibration) and known:
+        between, estimated = _between_nodes(source, offset, found.largest_at, found.components), True
+    values = _values(found, machine, corners, positions)
+    for name in values:
+        if not (known if name in ("largest", "rms", *DIAGONALS) else name[-1] not in missing):
+            values[name] = math.nan
+    spreads = {}
+    if isinstance(source, Calibration) and source.covariance is not None:
+        spreads = _spreads(source, offset, positions, samples, seed, progress)
+        if known:
+            along = _uncertainty_along(source, offset, found)
+            bias, u = spreads["largest"]
+            spreads["largest"] = bias, math.hypot(max(u, along), between)
+    figures = {name: VolumeFigure(value, _interval(value, spreads.get(name))) for name, value in values.items()}
+    largest = figures["largest"]
+    bounds = _interval(largest.value, spreads.get("largest"), ONE_SIDED)
+    verdict, why = _verdict(source, limit, bounds, missing)
+    nowhere = np.full(3, np.nan)
     return VolumeErrors(
         source=source,
         tool=offset,
         box=corners,
         grid=positions,
-        largest=found.largest if known else np.nan,
-        largest_at=found.largest_at if known else here,
-        largest_components=found.components if known else here,
-        largest_interval=None,
-        rms=found.rms if known else np.nan,
-        rms_interval=None,
-        ranges=_figures(AXES, found.highest - found.lowest, missing),
-        tilts=_figures("ABC", np.maximum(found.tilt_highest, -found.tilt_lowest), missing),
-        tilt_ranges=_figures("ABC", found.tilt_highest - found.tilt_lowest, missing),
-        diagonals=_diagonals(machine, corners, positions, known),
+        largest=largest.value,
+        largest_at=found.largest_at if known else nowhere,
+        largest_components=found.components if known else nowhere,
+        largest_interval=largest.interval,
+        rms=figures["rms"].value,
+        rms_interval=figures["rms"].interval,
+        ranges={axis: figures[f"range {axis}"] for axis in AXES},
+        tilts={axis: figures[f"tilt {axis}"] for axis in "ABC"},
+        tilt_ranges={axis: figures[f"range {axis}"] for axis in "ABC"},
+        diagonals={name: figures[name] for name in DIAGONALS},
         missing=missing,
-        between_nodes=0.0 if between_nodes is None else between_nodes,
-        between_nodes_estimated=between_nodes is None,
+        between_nodes=between,
+        between_nodes_estimated=estimated,
+        bounds=bounds,
         limit=limit,
-        verdict=None,
-        no_verdict_because="",
+        verdict=verdict,
+        no_verdict_because=why,
         ranking=_ranking(source, machine, positions) if known and ranking else (),
         fit=source.fit if isinstance(source, Calibration) else None,
     )
@@ -265,26 +315,128 @@ def _missing(source: Calibration | Machine, tool: FloatArray) -> dict[str, tuple
     return {component: tuple(found[component]) for component in "XYZABC" if component in found}
 
 
-def _figures(names: str, values: FloatArray, missing: Mapping[str, object]) -> dict[str, VolumeFigure]:
-    return {
-        name: VolumeFigure(float(value) if name not in missing else np.nan)
-        for name, value in zip(names, values, strict=True)
-    }
+def _values(
+    found: _core.VolumeSummary, machine: Machine, box: FloatArray, grid: tuple[FloatArray, FloatArray, FloatArray]
+) -> dict[str, float]:
+    """All figures by the names of the draws."""
+    ranges = found.highest - found.lowest
+    tilts = np.maximum(found.tilt_highest, -found.tilt_lowest)
+    tilt_ranges = found.tilt_highest - found.tilt_lowest
+    numbers = [found.largest, found.rms, *ranges, *tilts, *tilt_ranges, *_diagonals(machine, box, grid)]
+    return {name: float(value) for name, value in zip(_core.VolumeDraws.names, numbers, strict=True)}
 
 
-def _diagonals(
-    machine: Machine, box: FloatArray, grid: tuple[FloatArray, FloatArray, FloatArray], known: bool
-) -> dict[str, VolumeFigure]:
+def _thinned(positions: FloatArray) -> FloatArray:
+    """At most MOST_DRAWN of them, both ends included."""
+    if len(positions) <= MOST_DRAWN:
+        return positions
+    return positions[np.round(np.linspace(0, len(positions) - 1, MOST_DRAWN)).astype(int)]
+
+
+def _spreads(
+    calibration: Calibration,
+    tool: FloatArray,
+    grid: tuple[FloatArray, FloatArray, FloatArray],
+    samples: int,
+    seed: int,
+    progress: Callable[[int, int], None] | None,
+) -> dict[str, Spread]:
+    """Of every figure its bias and its standard uncertainty, from draws of the covariance."""
+    draws = _core.VolumeDraws(calibration, *map(_thinned, grid), tool=tool, seed=seed)
+    parts, done = [], 0
+    while done < samples:
+        count = min(1000, samples - done)
+        parts.append(draws.draw(done, count))
+        done += count
+        if progress is not None:
+            progress(done, samples)
+    drawn = np.concatenate(parts)
+    bias = drawn.mean(axis=0) - draws.values
+    # A bias is known to about half of itself: that of the true errors is not that of the errors found.
+    u = np.hypot(drawn.std(axis=0, ddof=1), 0.5 * bias)
+    return {name: (float(b), float(own)) for name, b, own in zip(_core.VolumeDraws.names, bias, u, strict=True)}
+
+
+def _uncertainty_along(calibration: Calibration, tool: FloatArray, found: _core.VolumeSummary) -> float:
+    """Standard uncertainty of the largest error at its own place, along its own direction.
+
+    Where places compete for the largest error, the largest of them scatters less than any of them, but its place does
+    not tell which one is the largest in truth."""
+    there = _core.error_at_point(calibration, found.largest_at, tool=tool).covariance[:3, :3]
+    direction = found.components / found.largest if found.largest > 0.0 else np.zeros(3)
+    return math.sqrt(max(float(direction @ there @ direction), 0.0))
+
+
+def _interval(value: float, spread: Spread | None, factor: float = TWO_SIDED) -> Interval | None:
+    """The value less its bias, plus and minus a multiple of its standard uncertainty; not below 0."""
+    if spread is None or math.isnan(value):
+        return None
+    bias, u = spread
+    return max(value - bias - factor * u, 0.0), max(value - bias + factor * u, 0.0)
+
+
+def _verdict(
+    source: Calibration | Machine, limit: float | None, bounds: Interval | None, missing: Mapping[str, object]
+) -> tuple[Verdict | None, str]:
+    """By the guard band of ISO 14253-1: a verdict is certain to 95 %; and why there is none."""
+    if limit is None:
+        return None, ""
+    if isinstance(source, Calibration) and source.fit == "rejected":
+        return None, "the fit of the calibration is rejected"
+    lacking = sorted({name for axis in AXES for name in cast(tuple[str, ...], missing.get(axis, ()))})
+    if lacking:
+        return None, f"not determined: {', '.join(lacking)}"
+    if bounds is None:
+        return None, "the calibration has no covariance, which netCDF files of evaluations contain"
+    above, below = bounds
+    return ("within" if below <= limit else "not within" if above > limit else "undecided"), ""
+
+
+def _between_nodes(calibration: Calibration, tool: FloatArray, point: FloatArray, error: FloatArray) -> float:
+    """Standard uncertainty of the error at a point, along itself, if it were anywhere between the nodes, mm.
+
+    From second differences: a function with the second derivative f" deviates from its chord over h by up to
+    f" h^2/8, on average over the interval by the root of f"^2 h^4/120."""
+    size = float(np.linalg.norm(error))
+    if size == 0.0:
+        return 0.0
+    factors = dict.fromkeys(calibration.functions, 0.0)
+    labels = [name for name, _ in calibration.covariance_labels]
+    for output, component in zip(_core.derived_at_point(calibration, point, tool=tool), error / size, strict=False):
+        for name, factor in zip(labels, output.row, strict=True):
+            if name in factors:
+                factors[name] += float(component * factor)
+    return math.sqrt(sum(factor**2 * _chord_variance(calibration, name) for name, factor in factors.items()))
+
+
+def _chord_variance(calibration: Calibration, name: str) -> float:
+    """Mean square of what a function deviates from its chords, estimated from its table; noise is taken off."""
+    position, value, u = calibration.functions[name]
+    if len(position) < 3:
+        return 0.0
+    h = np.diff(position)
+    before, after = 2.0 / (h[:-1] * (h[:-1] + h[1:])), 2.0 / (h[1:] * (h[:-1] + h[1:]))
+    weights = np.zeros((len(position) - 2, len(position)))  # of second derivatives
+    rows = np.arange(len(position) - 2)
+    weights[rows, rows], weights[rows, rows + 1], weights[rows, rows + 2] = before, -before - after, after
+    if calibration.covariance is None:
+        covariance = np.diag(np.nan_to_num(u) ** 2)
+    else:
+        own = [k for k, (label, _) in enumerate(calibration.covariance_labels) if label == name]
+        covariance = calibration.covariance[np.ix_(own, own)]
+    noise = np.sum((weights @ covariance) * weights, axis=1)
+    return max(float(np.mean((weights @ value) ** 2 - noise)), 0.0) * float(np.mean(h**4)) / 120.0
+
+
+def _diagonals(machine: Machine, box: FloatArray, grid: tuple[FloatArray, FloatArray, FloatArray]) -> Iterator[float]:
     """Ranges of the errors along the box's body diagonals: actual minus commanded distance from where they start."""
     share = np.linspace(0.0, 1.0, max(len(positions) for positions in grid))
-    found = {}
     for name in DIAGONALS:
         rising = np.array([sign == "p" for sign in name])
         start, end = np.where(rising, box[0], box[1]), np.where(rising, box[1], box[0])
         errors = _core.errors_at(machine, start + share[:, None] * (end - start))[:, :3]
         along = (errors - errors[0]) @ ((end - start) / np.linalg.norm(end - start))
-        found[name] = VolumeFigure(float(np.ptp(along)) if known else np.nan)
-    return found
+        yield float(np.ptp(along))
 
 
 def _ranking(

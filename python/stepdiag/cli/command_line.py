@@ -23,6 +23,7 @@ from stepdiag.cli.positions import positions
 from stepdiag.cli.simulate import demo, simulate
 from stepdiag.cli.study import study
 from stepdiag.cli.uncertainty import uncertainty
+from stepdiag.cli.volume import volume
 
 EPILOG = """\b
 See everything at once:
@@ -50,6 +51,7 @@ COMMANDS = {
     evaluate: "Calibrate the machine from a run.",
     plot: "Draw a calibration, a measurement and other files.",
     report: "Summarise a calibration.",
+    volume: "Report the error of the tool in the volume, and whether it is within a limit.",
     compare: "Compare two calibrations.",
     positions: "Evaluate or predict positioning tests (ISO 230-2, 230-6).",
     export: "Write a calibration for a controller.",

@@ -20,6 +20,7 @@ OBJECTS: Final = {
     "observation": ("stepdiag.objects.observation", "ObservationObject"),
     "positions": ("stepdiag.objects.positions", "PositionsObject"),
     "report": ("stepdiag.objects.report", "ReportObject"),
+    "volume": ("stepdiag.objects.volume", "VolumeObject"),
 }
 
 

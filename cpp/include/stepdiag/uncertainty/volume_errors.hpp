@@ -26,6 +26,8 @@ struct VolumeSummary {
     Eigen::Vector3d tilt_lowest, tilt_highest;  // of the components of the tilt, rad
 };
 // Throws InvalidArgument for an axis without positions, positions that are not finite or do not ascend.
+void check_grid(const GridPositions& grid);
+// Throws InvalidArgument as check_grid.
 VolumeSummary summarise_volume(const Machine& machine, const GridPositions& grid);
 
 // The machine with these parameters (indices of Term: functions, then squarenesses) set to 0.

@@ -1,0 +1,132 @@
+"""The object of `stepdiag volume --json`."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from typing_extensions import TypedDict
+
+from stepdiag._core import Calibration, __version__
+from stepdiag.calibration.volume import Interval, VolumeErrors, VolumeFigure
+from stepdiag.objects.calibration import Fit, fit_of
+from stepdiag.objects.writer import in_unit, measured
+
+
+class LengthFigure(TypedDict):
+    value_um: float | None
+    """null: a parameter that it needs is not determined"""
+    interval_um: list[float | None] | None
+    """95 %; null: the calibration has no covariance"""
+
+
+class AngleFigure(TypedDict):
+    value_urad: float | None
+    interval_urad: list[float | None] | None
+
+
+class Without(TypedDict):
+    """Errors with a parameter, or all parameters of an axis, set to 0."""
+
+    name: str
+    """A parameter, or an axis X, Y, Z."""
+    parameters: list[str]
+    largest_um: float | None
+    rms_um: float | None
+
+
+class VolumeObject(TypedDict):
+    """Result of `stepdiag volume`."""
+
+    stepdiag: str
+    format: Literal["stepdiag volume 1"]
+    fit: Fit
+    warnings: list[str]
+    file: str
+    tool_mm: list[float]
+    box_mm: list[list[float]]
+    """Lowest and highest positions of X, Y, Z."""
+    positions: list[int]
+    """Of X, Y, Z: the grid has all combinations."""
+    limit_um: float | None
+    verdict: Literal["within", "not within", "undecided"] | None
+    """At 95 %; null: no limit, or none for the reason below"""
+    no_verdict_because: str | None
+    bounds_um: list[float | None] | None
+    """The largest error is above the first with 95 %, and below the second with 95 %."""
+    largest_um: float | None
+    """null: parameters are not determined"""
+    interval_um: list[float | None] | None
+    """95 %, of the largest error, with what lies between the nodes."""
+    at_mm: list[float] | None
+    """Commanded position of the largest error."""
+    components_um: list[float | None]
+    """X, Y, Z of the largest error: actual minus nominal."""
+    rms_um: float | None
+    rms_interval_um: list[float | None] | None
+    between_nodes_um: float | None
+    """Standard uncertainty by what lies between the nodes."""
+    between_nodes_estimated: bool
+    """From second differences of the tables; false: it was stated"""
+    ranges: dict[str, LengthFigure]
+    """X, Y, Z: largest minus smallest component."""
+    tilts: dict[str, AngleFigure]
+    """A, B, C: largest absolute rotation of the tool."""
+    tilt_ranges: dict[str, AngleFigure]
+    """A, B, C: largest minus smallest rotation."""
+    diagonals: dict[str, LengthFigure]
+    """ppp, npp, pnp, nnp: range of the errors along a body diagonal of the box."""
+    missing: dict[str, list[str]]
+    """X ... C: parameters that act in it and are not determined."""
+    ranking: list[Without]
+    """Parameters, then axes; the smallest largest error first."""
+
+
+def volume_object(found: VolumeErrors, file: Path, warnings: Sequence[str]) -> VolumeObject:
+    """The errors of a calibration over a volume."""
+    assert isinstance(found.source, Calibration)
+    at: Any = None if found.missing.keys() & set("XYZ") else found.largest_at.tolist()
+    own: Any = {
+        **measured(
+            "um",
+            limit=found.limit,
+            largest=found.largest,
+            components=found.largest_components,
+            rms=found.rms,
+            between_nodes=found.between_nodes,
+        ),
+        "bounds_um": _ends(found.bounds, "um"),
+        "interval_um": _ends(found.largest_interval, "um"),
+        "rms_interval_um": _ends(found.rms_interval, "um"),
+    }
+    return {
+        "stepdiag": __version__,
+        "format": "stepdiag volume 1",
+        "fit": fit_of(found.source),
+        "warnings": list(warnings),
+        "file": str(file),
+        "tool_mm": found.tool.tolist(),
+        "box_mm": found.box.tolist(),
+        "positions": list(found.shape),
+        "verdict": found.verdict,
+        "no_verdict_because": found.no_verdict_because or None,
+        "at_mm": at,
+        "between_nodes_estimated": found.between_nodes_estimated,
+        "ranges": {name: _figure(figure, "um") for name, figure in found.ranges.items()},
+        "tilts": {name: _figure(figure, "urad") for name, figure in found.tilts.items()},
+        "tilt_ranges": {name: _figure(figure, "urad") for name, figure in found.tilt_ranges.items()},
+        "diagonals": {name: _figure(figure, "um") for name, figure in found.diagonals.items()},
+        "missing": {name: list(parameters) for name, parameters in found.missing.items()},
+        "ranking": [
+            {"name": one.name, "parameters": list(one.parameters), **measured("um", largest=one.largest, rms=one.rms)}
+            for one in found.ranking
+        ],
+        **own,
+    }
+
+
+def _ends(interval: Interval | None, unit: str) -> list[float | None] | None:
+    return None if interval is None else [in_unit(unit, end) for end in interval]
+
+
+def _figure(figure: VolumeFigure, unit: str) -> Any:
+    return {**measured(unit, value=figure.value), f"interval_{unit}": _ends(figure.interval, unit)}

@@ -1,0 +1,116 @@
+"""What `stepdiag volume` tells: the verdict, how large the error of the tool is and where, and what causes it."""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+import numpy as np
+
+from stepdiag._core import Calibration
+from stepdiag.calibration.table_sums import FloatArray
+from stepdiag.calibration.volume import Interval, VolumeContribution, VolumeErrors, VolumeFigure
+from stepdiag.units import report_value
+
+_RANKED: Final = 5  # parameters in the report; the JSON object has all
+
+
+def volume_report(found: VolumeErrors) -> Iterator[str]:
+    """Verdict first; then largest error, rms, ranges, tilts, body diagonals, what causes them, and what it refers to."""
+    yield from _verdict_rows(found)
+    if not math.isnan(found.largest):
+        place = ", ".join(f"{axis} {p:g}" for axis, p in zip("XYZ", found.largest_at, strict=True))
+        components = zip("XYZ", found.largest_components, strict=True)
+        parts = ", ".join(f"{axis} {_um(e)}" for axis, e in components)
+        yield f"largest error {_um(found.largest)} µm{_within(found.largest_interval, 'mm')}"
+        yield f"  at {place} mm: {parts} µm"
+        yield f"rms error     {_um(found.rms)} µm{_within(found.rms_interval, 'mm')}"
+    yield from _named("ranges     ", found.ranges, "mm")
+    yield from _named("largest tilts", found.tilts, "rad")
+    yield from _named("body diagonals", found.diagonals, "mm")
+    yield from _ranking_rows(found.ranking)
+    yield from _frame_rows(found)
+
+
+def _verdict_rows(found: VolumeErrors) -> Iterator[str]:
+    if found.fit == "rejected":
+        yield "not to be trusted: the fit of this calibration is rejected; do not use these values"
+    for names, parts in _by_missing(found.missing):
+        yield f"not determined: {', '.join(parts)}; no figures that need {names}"
+    if found.limit is None:
+        if found.fit != "rejected":
+            yield f"fit: {found.fit or 'not known'}"
+        return
+    limit = f"{found.limit * 1e3:g} µm"
+    if found.verdict is None:
+        yield f"no verdict on the limit of {limit}: {found.no_verdict_because}"
+        return
+    assert found.bounds is not None
+    above, below = (f"{1e3 * end:.4g} µm" for end in found.bounds)
+    yield {
+        "within": f"within {limit}: the largest error is below {below} (95 %)",
+        "not within": f"not within {limit}: the largest error is above {above} (95 %)",
+        "undecided": f"cannot be decided at {limit}: the largest error is above {above}, and below {below} (95 % each)",
+    }[found.verdict]
+    yield f"fit: {found.fit or 'not known'}"
+
+
+def _by_missing(missing: Mapping[str, tuple[str, ...]]) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Components with the same missing parameters, together."""
+    for parts in dict.fromkeys(missing.values()):
+        yield ", ".join(name for name, own in missing.items() if own == parts), parts
+
+
+def _named(title: str, figures: Mapping[str, VolumeFigure], unit: str) -> Iterator[str]:
+    """Figures with their intervals, two or three a line."""
+    cells = [
+        f"{name} {_value(figure.value, unit)}{_ends(figure.interval, unit)}"
+        for name, figure in figures.items()
+        if not math.isnan(figure.value)
+    ]
+    name = report_value(unit, 0.0)[1]
+    for k in range(0, len(cells), 3):
+        last = f" {name}" if k + 3 >= len(cells) else ","
+        yield f"{title if k == 0 else '':<14}{', '.join(cells[k : k + 3])}{last}"
+
+
+def _ranking_rows(ranking: tuple[VolumeContribution, ...]) -> Iterator[str]:
+    axes = [one for one in ranking if len(one.name) == 1]
+    for title, members in (
+        ("one axis", axes),
+        ("one parameter", [one for one in ranking if one not in axes][:_RANKED]),
+    ):
+        if members:
+            cells = ", ".join(f"{one.name} {_um(one.largest)}" for one in members)
+            yield f"largest without {title}: {cells} µm"
+
+
+def _frame_rows(found: VolumeErrors) -> Iterator[str]:
+    shape = " x ".join(str(n) for n in found.shape)
+    low, high = (_lengths(corner) for corner in found.box)
+    yield f"box {low} to {high} mm, tool offset {_lengths(found.tool)} mm, {shape} positions, approached in +"
+    if found.largest_interval is not None:
+        kind = "estimated" if found.between_nodes_estimated else "stated"
+        yield f"95 % intervals in brackets; between nodes ({kind}): standard uncertainty {_um(found.between_nodes)} µm"
+    elif isinstance(found.source, Calibration) and found.source.covariance is None:
+        yield "no intervals: the file has no covariance; evaluate writes it to netCDF (-o calibration.nc)"
+    yield "error: of the functional point, actual minus nominal; 0 at home, so it depends on that reference"
+
+
+def _um(value: float) -> str:
+    return f"{value * 1e3:.4g}"
+
+
+def _value(value: float, unit: str) -> str:
+    return f"{report_value(unit, value)[0]:.4g}"
+
+
+def _ends(interval: Interval | None, unit: str) -> str:
+    return "" if interval is None else f" [{_value(interval[0], unit)}, {_value(interval[1], unit)}]"
+
+
+def _within(interval: Interval | None, unit: str) -> str:
+    return "" if interval is None else f"{_ends(interval, unit)} µm"
+
+
+def _lengths(values: FloatArray) -> str:
+    return " ".join(f"{value:g}" for value in np.asarray(values))
