@@ -2389,7 +2389,11 @@ class VolumeDraws:
     """
     Draws of figures over a volume from the joint normal distribution of a calibration's values, to first order.
     """
-    names: typing.ClassVar[list] = ['largest', 'rms', 'range X', 'range Y', 'range Z', 'tilt A', 'tilt B', 'tilt C', 'range A', 'range B', 'range C', 'ppp', 'npp', 'pnp', 'nnp']
+    @staticmethod
+    def names() -> list[str]:
+        """
+        Columns of draw.
+        """
     def __init__(self, calibration: Calibration, x: numpy.typing.ArrayLike, y: numpy.typing.ArrayLike, z: numpy.typing.ArrayLike, *, tool: numpy.typing.ArrayLike | None = None, seed: typing.SupportsIndex = 0) -> None:
         """
         On the grid of all combinations of these ascending positions (mm). Raises InvalidArgument for a calibration without covariance.

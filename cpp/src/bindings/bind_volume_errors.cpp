@@ -106,9 +106,8 @@ void bind_volume_errors(py::module_& m) {
              py::arg("tool") = std::nullopt, py::arg("seed") = integer(0),
              "On the grid of all combinations of these ascending positions (mm). Raises InvalidArgument for a "
              "calibration without covariance.")
-        .def_property_readonly_static(
-            "names",
-            [](const py::object&) { return std::vector<std::string>(volume_figures.begin(), volume_figures.end()); },
+        .def_static(
+            "names", [] { return std::vector<std::string>(volume_figures.begin(), volume_figures.end()); },
             "Columns of draw.")
         .def_property_readonly(
             "values", [](const VolumeDraws& draws) { return to_numpy_vector(draws.values()); },

@@ -323,14 +323,15 @@ def _values(
     tilts = np.maximum(found.tilt_highest, -found.tilt_lowest)
     tilt_ranges = found.tilt_highest - found.tilt_lowest
     numbers = [found.largest, found.rms, *ranges, *tilts, *tilt_ranges, *_diagonals(machine, box, grid)]
-    return {name: float(value) for name, value in zip(_core.VolumeDraws.names, numbers, strict=True)}
+    return {name: float(value) for name, value in zip(_core.VolumeDraws.names(), numbers, strict=True)}
 
 
 def _thinned(positions: FloatArray) -> FloatArray:
     """At most MOST_DRAWN of them, both ends included."""
     if len(positions) <= MOST_DRAWN:
         return positions
-    return positions[np.round(np.linspace(0, len(positions) - 1, MOST_DRAWN)).astype(int)]
+    kept: FloatArray = positions[np.round(np.linspace(0, len(positions) - 1, MOST_DRAWN)).astype(int)]
+    return kept
 
 
 def _spreads(
@@ -354,7 +355,7 @@ def _spreads(
     bias = drawn.mean(axis=0) - draws.values
     # A bias is known to about half of itself: that of the true errors is not that of the errors found.
     u = np.hypot(drawn.std(axis=0, ddof=1), 0.5 * bias)
-    return {name: (float(b), float(own)) for name, b, own in zip(_core.VolumeDraws.names, bias, u, strict=True)}
+    return {name: (float(b), float(own)) for name, b, own in zip(_core.VolumeDraws.names(), bias, u, strict=True)}
 
 
 def _uncertainty_along(calibration: Calibration, tool: FloatArray, found: _core.VolumeSummary) -> float:
@@ -387,7 +388,7 @@ def _verdict(
     if lacking:
         return None, f"not determined: {', '.join(lacking)}"
     if bounds is None:
-        return None, "the calibration has no covariance, which netCDF files of evaluations contain"
+        return None, "the calibration has no covariance"
     above, below = bounds
     return ("within" if below <= limit else "not within" if above > limit else "undecided"), ""
 

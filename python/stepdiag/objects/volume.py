@@ -84,20 +84,7 @@ class VolumeObject(TypedDict):
 def volume_object(found: VolumeErrors, file: Path, warnings: Sequence[str]) -> VolumeObject:
     """The errors of a calibration over a volume."""
     assert isinstance(found.source, Calibration)
-    at: Any = None if found.missing.keys() & set("XYZ") else found.largest_at.tolist()
-    own: Any = {
-        **measured(
-            "um",
-            limit=found.limit,
-            largest=found.largest,
-            components=found.largest_components,
-            rms=found.rms,
-            between_nodes=found.between_nodes,
-        ),
-        "bounds_um": _ends(found.bounds, "um"),
-        "interval_um": _ends(found.largest_interval, "um"),
-        "rms_interval_um": _ends(found.rms_interval, "um"),
-    }
+    at = None if found.missing.keys() & set("XYZ") else found.largest_at.tolist()
     return {
         "stepdiag": __version__,
         "format": "stepdiag volume 1",
@@ -107,9 +94,17 @@ def volume_object(found: VolumeErrors, file: Path, warnings: Sequence[str]) -> V
         "tool_mm": found.tool.tolist(),
         "box_mm": found.box.tolist(),
         "positions": list(found.shape),
+        "limit_um": in_unit("um", found.limit),
         "verdict": found.verdict,
         "no_verdict_because": found.no_verdict_because or None,
+        "bounds_um": _ends(found.bounds, "um"),
+        "largest_um": in_unit("um", found.largest),
+        "interval_um": _ends(found.largest_interval, "um"),
         "at_mm": at,
+        "components_um": [in_unit("um", component) for component in found.largest_components],
+        "rms_um": in_unit("um", found.rms),
+        "rms_interval_um": _ends(found.rms_interval, "um"),
+        "between_nodes_um": in_unit("um", found.between_nodes),
         "between_nodes_estimated": found.between_nodes_estimated,
         "ranges": {name: _figure(figure, "um") for name, figure in found.ranges.items()},
         "tilts": {name: _figure(figure, "urad") for name, figure in found.tilts.items()},
@@ -117,10 +112,14 @@ def volume_object(found: VolumeErrors, file: Path, warnings: Sequence[str]) -> V
         "diagonals": {name: _figure(figure, "um") for name, figure in found.diagonals.items()},
         "missing": {name: list(parameters) for name, parameters in found.missing.items()},
         "ranking": [
-            {"name": one.name, "parameters": list(one.parameters), **measured("um", largest=one.largest, rms=one.rms)}
+            {
+                "name": one.name,
+                "parameters": list(one.parameters),
+                "largest_um": in_unit("um", one.largest),
+                "rms_um": in_unit("um", one.rms),
+            }
             for one in found.ranking
         ],
-        **own,
     }
 
 

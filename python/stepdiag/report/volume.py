@@ -15,18 +15,18 @@ _RANKED: Final = 5  # parameters in the report; the JSON object has all
 
 
 def volume_report(found: VolumeErrors) -> Iterator[str]:
-    """Verdict first; then largest error, rms, ranges, tilts, body diagonals, what causes them, and what it refers to."""
+    """Verdict first; then largest error, rms, ranges, tilts, diagonals, what causes them, and what they refer to."""
     yield from _verdict_rows(found)
     if not math.isnan(found.largest):
         place = ", ".join(f"{axis} {p:g}" for axis, p in zip("XYZ", found.largest_at, strict=True))
         components = zip("XYZ", found.largest_components, strict=True)
         parts = ", ".join(f"{axis} {_um(e)}" for axis, e in components)
-        yield f"largest error {_um(found.largest)} µm{_within(found.largest_interval, 'mm')}"
+        yield f"largest error {_um(found.largest)}{_ends(found.largest_interval, 'mm')} µm"
         yield f"  at {place} mm: {parts} µm"
-        yield f"rms error     {_um(found.rms)} µm{_within(found.rms_interval, 'mm')}"
-    yield from _named("ranges     ", found.ranges, "mm")
-    yield from _named("largest tilts", found.tilts, "rad")
-    yield from _named("body diagonals", found.diagonals, "mm")
+        yield f"rms error     {_um(found.rms)}{_ends(found.rms_interval, 'mm')} µm"
+    yield from _named("ranges", found.ranges, "mm")
+    yield from _named("tilts up to", found.tilts, "rad")
+    yield from _named("diagonals", found.diagonals, "mm")
     yield from _ranking_rows(found.ranking)
     yield from _frame_rows(found)
 
@@ -106,10 +106,6 @@ def _value(value: float, unit: str) -> str:
 
 def _ends(interval: Interval | None, unit: str) -> str:
     return "" if interval is None else f" [{_value(interval[0], unit)}, {_value(interval[1], unit)}]"
-
-
-def _within(interval: Interval | None, unit: str) -> str:
-    return "" if interval is None else f"{_ends(interval, unit)} µm"
 
 
 def _lengths(values: FloatArray) -> str:

@@ -5,11 +5,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from calibrations import TOOL, VOLUME, calibrate
+from calibrations import TOOL, VOLUME, calibrate, parts_of
 from refusal import refused
 from usual import ALL_CHAINS, CHAIN
 
 import stepdiag as sd
+from stepdiag import _core
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 
 # Both evaluate one pose; what is left is rounding of positions of up to 1 m.
@@ -143,7 +144,8 @@ def test_box_ends_and_nodes_are_in_the_grid() -> None:
         ({"box": [0, 0, 0]}, "box: expected the lowest and highest positions"),
         ({"tool": [0, 0]}, "tool: expected three finite lengths"),
         ({"grid": 1}, "grid: expected 2 to 1001 positions"),
-        ({"limit": 0.0}, "limit: expected a positive length"),
+        ({"limit": 0.0}, "`limit`: expected a length above 0 mm"),
+        ({"samples": 10}, "samples: expected at least 1000"),
     ],
 )
 def test_what_makes_no_sense_is_refused(arguments: dict[str, Any], message: str) -> None:
@@ -159,3 +161,126 @@ def test_grid_points_are_all_combinations() -> None:
     assert points.shape == (24, 3)
     assert points[-1].tolist() == [1.0, 2.0, 3.0]
     assert points[1].tolist() == [0.0, 0.0, 1.0]
+
+
+# --- intervals and verdicts ------------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def certain() -> sd.Calibration:
+    return calibrate(1, full_covariance=True)
+
+
+def test_draws_are_the_exact_figures_of_drawn_tables(certain: sd.Calibration) -> None:
+    found = sd.volume_errors(certain, ranking=False)
+    values = _core.VolumeDraws(certain, *found.grid).values
+    figures = [
+        found.largest,
+        found.rms,
+        *(found.ranges[a].value for a in "XYZ"),
+        *(found.tilts[a].value for a in "ABC"),
+    ]
+    figures += [*(found.tilt_ranges[a].value for a in "ABC"), *(d.value for d in found.diagonals.values())]
+    # Draws are of first order: they leave out rotations times rotations times lengths, 1e-4 * 1e-4 * 100 mm.
+    np.testing.assert_allclose(values, figures, atol=2e-6)
+
+
+def test_draws_do_not_depend_on_how_they_are_divided(certain: sd.Calibration) -> None:
+    grid = sd.volume_errors(certain, ranking=False).grid
+    draws = _core.VolumeDraws(certain, *grid, seed=3)
+    whole = draws.draw(0, 500)
+    np.testing.assert_array_equal(np.concatenate([draws.draw(0, 77), draws.draw(77, 423)]), whole)
+
+
+def test_draws_scatter_as_tables_drawn_with_numpy(certain: sd.Calibration) -> None:
+    grid = sd.volume_errors(certain, ranking=False).grid
+    drawn = _core.VolumeDraws(certain, *grid).draw(0, 4000)[:, :2]
+    values, vectors = np.linalg.eigh(certain.covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    random, parts = np.random.default_rng(1), parts_of(certain)
+    points = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, 3)
+    largest = []
+    for _ in range(1000):
+        noise, at, functions, angles = root @ random.standard_normal(len(root)), 0, {}, {}
+        for name in FUNCTIONS:
+            position, value, _ = parts["functions"][name]
+            functions[name] = (position, value + noise[at : at + len(position)])
+            at += len(position)
+        for name in SQUARENESSES:
+            angles[name] = parts["squareness"][name][0] + noise[at]
+            at += 1
+        own = sd.Machine(CHAIN, sd.ErrorMap(functions, angles), TOOL)
+        largest.append(np.linalg.norm(own.error(points), axis=1).max())
+    # Four standard deviations of a mean and of a standard deviation of 1000 draws.
+    assert np.mean(largest) == pytest.approx(drawn[:, 0].mean(), abs=4.0 * np.std(largest) / np.sqrt(1000))
+    assert np.std(largest) == pytest.approx(drawn[:, 0].std(), rel=4.0 / np.sqrt(2000))
+
+
+def test_verdict_follows_the_one_sided_bounds(certain: sd.Calibration) -> None:
+    bounds = sd.volume_errors(certain, ranking=False).bounds
+    assert bounds is not None
+    low, high = bounds
+    expected = {low * 0.999: "not within", low * 1.001: "undecided", high * 0.999: "undecided", high: "within"}
+    for limit, verdict in expected.items():
+        assert sd.volume_errors(certain, ranking=False, limit=limit).verdict == verdict
+
+
+def test_what_lies_between_the_nodes_widens_interval_and_bounds(certain: sd.Calibration) -> None:
+    narrow = sd.volume_errors(certain, ranking=False, between_nodes=0.0)
+    wide = sd.volume_errors(certain, ranking=False, between_nodes=1.0)
+    assert narrow.largest_interval is not None
+    assert wide.largest_interval is not None
+    assert wide.bounds is not None
+    half = 0.5 * (narrow.largest_interval[1] - narrow.largest_interval[0]) / 1.959964
+    middle = 0.5 * sum(narrow.largest_interval)
+    assert wide.largest_interval[1] == pytest.approx(middle + 1.959964 * np.hypot(half, 1.0), rel=1e-6)
+    assert wide.bounds[1] == pytest.approx(middle + 1.644854 * np.hypot(half, 1.0), rel=1e-6)
+    assert wide.rms_interval == narrow.rms_interval
+
+
+def test_between_nodes_of_a_parabola_is_its_mean_distance_from_its_chords() -> None:
+    """f = q p^2/2 is q t (h - t)/2 from its chord: q h^2/sqrt(120) on average."""
+    nodes, q = np.linspace(0.0, 80.0, 9), 1e-4
+    parts = parts_of(calibrate(1))
+    known = np.zeros(9)
+    functions = dict.fromkeys(FUNCTIONS, (nodes, known, known))
+    functions["EXX"] = (nodes, 0.5 * q * nodes**2, known)
+    squareness = dict.fromkeys(SQUARENESSES, (0.0, 0.0))
+    found = sd.volume_errors(sd.Calibration(**(parts | {"functions": functions, "squareness": squareness})))
+    # The largest error is along X alone. Second differences of numbers of size 1 mm are rounded to 1e-16 mm.
+    assert found.between_nodes == pytest.approx(q * 10.0**2 / np.sqrt(120.0), rel=1e-9)
+    assert found.between_nodes_estimated
+
+
+def test_without_covariance_there_are_values_and_no_verdict() -> None:
+    found = sd.volume_errors(calibrate(1), limit=1.0)
+    assert found.largest > 0.0
+    assert found.largest_interval is None
+    assert all(figure.interval is None for figure in found.ranges.values())
+    assert found.verdict is None
+    assert "no covariance" in found.no_verdict_because
+
+
+def test_rejected_fit_has_no_verdict(certain: sd.Calibration) -> None:
+    found = sd.volume_errors(certain.judged("rejected"), limit=1.0)
+    assert found.verdict is None
+    assert "rejected" in found.no_verdict_because
+
+
+def test_undetermined_parameters_leave_what_does_not_need_them() -> None:
+    parts = parts_of(calibrate(1, full_covariance=True))
+    del parts["functions"]["EXX"]
+    del parts["covariance"]
+    found = sd.volume_errors(sd.Calibration(**parts), limit=1.0)
+    assert found.missing == {"X": ("EXX",)}
+    assert np.isnan([found.largest, found.rms, found.ranges["X"].value, found.diagonals["ppp"].value]).all()
+    assert found.ranges["Y"].value > 0.0
+    assert found.tilts["A"].value > 0.0
+    assert found.ranking == ()
+    assert found.verdict is None
+    assert found.no_verdict_because == "not determined: EXX"
+
+
+def test_box_inside_has_no_larger_error_than_the_volume(certain: sd.Calibration) -> None:
+    inside = sd.volume_errors(certain, box=[[10, 10, 10], [40, 40, 40]], ranking=False)
+    whole_volume = sd.volume_errors(certain, ranking=False)
+    assert inside.largest < whole_volume.largest
+    assert inside.largest_interval is not None

@@ -1,0 +1,105 @@
+"""The command volume: its verdict in the first line, its object, its exit codes, and mistakes in a line."""
+
+from pathlib import Path
+
+import pytest
+from calibrations import calibrate, parts_of
+from json_objects import printed
+
+import stepdiag as sd
+from stepdiag.cli import main
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    sd.write_calibration(calibrate(1, full_covariance=True), "c.nc")
+    sd.write_calibration(calibrate(1), "c.csv")
+    return tmp_path
+
+
+def said(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -> list[str]:
+    assert main(["volume", *arguments]) == code
+    captured = capsys.readouterr()
+    lines = (captured.out + captured.err).splitlines()
+    assert code == 2 or max(map(len, lines)) <= 100, max(lines, key=len)
+    return lines
+
+
+def test_first_line_is_the_verdict(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert said(capsys, "c.nc", "--limit", "1000")[0].startswith("within 1000 µm: the largest error is below ")
+    assert said(capsys, "c.nc", "--limit", "1")[0].startswith("not within 1 µm: the largest error is above ")
+    largest = sd.volume_errors(sd.read_calibration("c.nc")).largest * 1e3
+    assert said(capsys, "c.nc", "--limit", f"{largest}")[0].startswith("cannot be decided at ")
+
+
+def test_report_has_at_most_fifteen_lines(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert 5 <= len(said(capsys, "c.nc", "--limit", "1000")) <= 15
+
+
+def test_file_without_covariance_has_values_and_says_why_there_is_no_verdict(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = said(capsys, "c.csv", "--limit", "1000")
+    assert lines[0].startswith("no verdict on the limit of 1000 µm: the calibration has no covariance")
+    assert any(line.startswith("largest error ") for line in lines)
+    assert any(line.startswith("no intervals: ") for line in lines)
+
+
+def test_object_has_the_values_of_the_library(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ("c.nc", "--limit", "20", "--tool", "0,0,50", "--box", "0:80,10:50,0:50", "--between-nodes", "0.5")
+    content = printed("volume", capsys, "volume", *arguments)
+    found = sd.volume_errors(
+        sd.read_calibration("c.nc"),
+        limit=0.02,
+        tool=(0, 0, 50),
+        box=[[0, 10, 0], [80, 50, 50]],
+        between_nodes=5e-4,
+    )
+    assert content["largest_um"] == pytest.approx(found.largest * 1e3, rel=1e-15)
+    assert content["at_mm"] == found.largest_at.tolist()
+    assert content["verdict"] == found.verdict
+    assert content["between_nodes_um"] == 0.5
+    assert not content["between_nodes_estimated"]
+    assert found.largest_interval is not None
+    assert content["interval_um"] == pytest.approx([end * 1e3 for end in found.largest_interval], rel=1e-12)
+    assert len(content["ranking"]) == 24
+
+
+def test_object_without_covariance_or_parameters_has_null(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    content = printed("volume", capsys, "volume", "c.csv", "--limit", "20")
+    assert content["interval_um"] is None
+    assert content["verdict"] is None
+    parts = parts_of(calibrate(1))
+    del parts["functions"]["EXX"]
+    sd.write_calibration(sd.Calibration(**parts), "m.csv")
+    content = printed("volume", capsys, "volume", "m.csv")
+    assert content["largest_um"] is content["at_mm"] is content["ranges"]["X"]["value_um"] is None
+    assert content["missing"] == {"X": ["EXX"]}
+    assert said(capsys, "m.csv")[0].startswith("not determined: EXX")
+
+
+def test_rejected_fit_is_told_first_and_ends_with_code_3(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sd.write_calibration(sd.read_calibration("c.nc").judged("rejected", ["it was dropped"]), "r.nc")
+    lines = said(capsys, "r.nc", "--limit", "1000", code=3)
+    assert lines[0].startswith("not to be trusted")
+    assert any(line.startswith("warning: r.nc: the fit is rejected") for line in lines)
+    assert printed("volume", capsys, "volume", "r.nc", "--limit", "1000", status=3)["verdict"] is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--limit", "-1"], "--limit: expected a length of at least 0 mm"),
+        (["--limit", "0"], "--limit: expected a length above 0 mm"),
+        (["--box", "0:80,0:60"], "expected ranges of X,Y,Z in mm"),
+        (["--box", "0:800,0:60,0:50"], "box: expected positions of X in the calibrated volume"),
+        (["--grid", "1"], "grid: expected 2 to 1001 positions"),
+        (["--tool", "1,2"], "expected X,Y,Z in mm"),
+        (["--between-nodes", "nan"], "--between-nodes: expected a length of at least 0 mm"),
+    ],
+)
+def test_mistakes_are_refused(
+    here: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    assert message in said(capsys, "c.nc", *arguments, code=2)[-1]
