@@ -19,7 +19,6 @@ from stepdiag import _core
 from stepdiag._core import Calibration, InvalidArgument, Machine
 from stepdiag.calibration.table_sums import FloatArray
 from stepdiag.display import Displayed, Facts, point_text
-from stepdiag.display import Displayed, Facts, point_text
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 from stepdiag.style import drawn
 
@@ -113,21 +112,6 @@ class VolumeErrors(Displayed):
     def plot(self) -> "Figure":
         """Draw the error in three planes through the point with the largest one (a matplotlib Figure)."""
         return drawn(self)
-
-    def _facts(self) -> Facts:
-        low, high = self.largest_interval or (float("nan"), float("nan"))
-        interval = "" if self.largest_interval is None else f", 95 % interval {low * 1e3:.3g} to {high * 1e3:.3g} µm"
-        facts = [("verdict", f"{self.verdict}, limit {self.limit * 1e3:g} µm")] if self.verdict and self.limit else []
-        facts += [("no verdict because", self.no_verdict_because)] if self.no_verdict_because else []
-        facts += [
-            ("largest", f"{self.largest * 1e3:.4g} µm at {point_text(self.largest_at)}{interval}"),
-            ("rms", f"{self.rms * 1e3:.4g} µm"),
-            ("fit", self.fit or "not known"),
-            ("box", ", ".join(f"{a:g} to {b:g}" for a, b in zip(*self.box, strict=True)) + " mm"),
-        ]
-        facts += [(f"range of {name}", f"{figure.value * 1e3:.4g} µm") for name, figure in self.ranges.items()]
-        facts += [(f"largest tilt {name}", f"{figure.value * 1e6:.4g} µrad") for name, figure in self.tilts.items()]
-        return [*facts, *((f"missing in {name}", ", ".join(which)) for name, which in self.missing.items() if which)]
 
 
 def volume_errors(

@@ -1,12 +1,13 @@
 """The command volume: the error of the tool in the volume, and whether it is within a limit."""
 
-import sys
 from pathlib import Path
 from typing import Any, Final
 
 import click
 
 from stepdiag.cli.options import PATH, PointInMm, fit_warnings, json_option, tell_fit
+from stepdiag.cli.terminal import say
+from stepdiag.progress import Progress
 from stepdiag.units import MICROMETRE
 
 Box = tuple[tuple[float, ...], tuple[float, ...]]
@@ -83,12 +84,7 @@ def volume(
 
     check_input(calibration)
     read = read_calibration(calibration)
-    with click.progressbar(length=1, label="draws", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
-
-        def show(done: int, total: int) -> None:
-            bar.length = total
-            bar.update(done - bar.pos)
-
+    with Progress("draws of the covariance") as progress:
         found = volume_errors(
             read,
             tool=tool,
@@ -97,7 +93,7 @@ def volume(
             limit=None if limit is None else limit * MICROMETRE,
             between_nodes=None if between_nodes is None else between_nodes * MICROMETRE,
             seed=seed,
-            progress=show,
+            progress=progress,
         )
     if as_json:
         from stepdiag.objects.volume import volume_object
@@ -106,5 +102,5 @@ def volume(
         click.echo(json_text(volume_object(found, calibration, fit_warnings(calibration, read.fit))))
     else:
         for line in volume_report(found):
-            click.echo(line)
+            say(line)
     tell_fit(context, calibration, read.fit)

@@ -47,9 +47,9 @@ def _verdict_rows(found: VolumeErrors) -> Iterator[str]:
     assert found.bounds is not None
     above, below = (f"{1e3 * end:.4g} µm" for end in found.bounds)
     yield {
-        "within": f"within {limit}: the largest error is below {below} (95 %)",
-        "not within": f"not within {limit}: the largest error is above {above} (95 %)",
-        "undecided": f"cannot be decided at {limit}: the largest error is above {above}, and below {below} (95 % each)",
+        "within": f"verdict: within {limit}: the largest error is below {below} (95 %)",
+        "not within": f"verdict: not within {limit}: the largest error is above {above} (95 %)",
+        "undecided": f"verdict: undecided at {limit}: the largest error is above {above}, below {below} (95 % each)",
     }[found.verdict]
     yield f"fit: {found.fit or 'not known'}"
 

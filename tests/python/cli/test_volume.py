@@ -27,10 +27,10 @@ def said(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -> 
 
 
 def test_first_line_is_the_verdict(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert said(capsys, "c.nc", "--limit", "1000")[0].startswith("within 1000 µm: the largest error is below ")
-    assert said(capsys, "c.nc", "--limit", "1")[0].startswith("not within 1 µm: the largest error is above ")
+    assert said(capsys, "c.nc", "--limit", "1000")[0].startswith("verdict: within 1000 µm: the largest error is below ")
+    assert said(capsys, "c.nc", "--limit", "1")[0].startswith("verdict: not within 1 µm: the largest error is above ")
     largest = sd.volume_errors(sd.read_calibration("c.nc")).largest * 1e3
-    assert said(capsys, "c.nc", "--limit", f"{largest}")[0].startswith("cannot be decided at ")
+    assert said(capsys, "c.nc", "--limit", f"{largest}")[0].startswith("verdict: undecided at ")
 
 
 def test_report_has_at_most_fifteen_lines(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
