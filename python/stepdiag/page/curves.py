@@ -91,7 +91,7 @@ def _family(
         "section",
         element("h3", title),
         element("div", *panels, class_="panels"),
-        values(table_id, f"Values of {title.lower()}", *tables),
+        values(table_id, f"Values of {title.lower()}", *tables) if tables else None,
         aria_label=title,
     )
 

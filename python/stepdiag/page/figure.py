@@ -4,11 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-import numpy as np
-
 from stepdiag.page.html import Markup, element, markup, table
 from stepdiag.page.look import AXIS
-from stepdiag.page.preview import preview
+from stepdiag.page.preview import evenly, preview
 
 MOST_ROWS: Final = 101  # of a table on the page
 # Of drawings on a wide screen, as in report.css: width and height in pixels.
@@ -31,7 +29,7 @@ class Figures:
     ) -> None:
         """A drawing with one x axis and one y axis."""
         own = {"xaxis": {**AXIS, **x}, "yaxis": {**AXIS, **y}}
-        self.drawings[identifier] = {"data": list(data), "layout": own | layout}
+        self.drawings[identifier] = {"data": [rounded(trace) for trace in data], "layout": own | layout}
 
     def place(
         self, identifier: str, label: str, caption: object, class_: str = "panel", described_by: str | None = None
@@ -50,21 +48,23 @@ class Figures:
         return element("figure", drawing, element("figcaption", caption), class_=class_)
 
 
+def rounded(content: Any) -> Any:
+    """Numbers of drawings to 4 decimals, 0.1 nm or 0.1 nrad: the page stays small. Its values are not rounded."""
+    if isinstance(content, Mapping):
+        return {key: rounded(value) for key, value in content.items()}
+    if isinstance(content, list):
+        return [rounded(value) for value in content]
+    return round(content, 4) if isinstance(content, float) else content
+
+
 def values(identifier: str, title: str, *tables: Markup) -> Markup:
     """The values of a figure, folded."""
     return element("details", element("summary", title), *tables, id=identifier, class_="values")
 
 
-def thinned(count: int) -> list[int]:
-    """Indices of at most MOST_ROWS rows, evenly, with first and last."""
-    if count <= MOST_ROWS:
-        return list(range(count))
-    return sorted({int(k) for k in np.linspace(0, count - 1, MOST_ROWS)})
-
-
 def value_table(caption: str, heading: Sequence[object], rows: Sequence[Sequence[object]]) -> Markup:
     """A table of at most MOST_ROWS rows, which says so where there are more."""
-    chosen = thinned(len(rows))
+    chosen = evenly(len(rows), MOST_ROWS)
     if len(chosen) < len(rows):
         caption += f" ({len(chosen)} of {len(rows)} rows, evenly chosen)"
     return markup(table(caption, heading, [rows[k] for k in chosen]))

@@ -27,7 +27,7 @@ def preview(drawing: Mapping[str, Any], width: int, height: int) -> Markup | Non
         return float(bottom - (y - y0) / (y1 - y0) * (bottom - top))
 
     def points(trace: Mapping[str, Any]) -> list[str]:
-        pairs = zip(trace["x"], trace["y"], strict=True)
+        pairs = [(trace["x"][k], trace["y"][k]) for k in evenly(len(trace["x"]), width)]
         return [f"{at_x(x):.1f} {at_y(y):.1f}" for x, y in pairs if y is not None]
 
     parts = [*_axis_x(layout["xaxis"], x0, x1, at_x, top, bottom), *_axis_y(layout["yaxis"], y0, y1, at_y, left, right)]
@@ -58,6 +58,13 @@ def preview(drawing: Mapping[str, Any], width: int, height: int) -> Markup | Non
         ),
     ]
     return element("svg", *parts, viewBox=f"0 0 {width} {height}", class_="preview", aria_hidden="true", fill=INK)
+
+
+def evenly(count: int, most: int) -> list[int]:
+    """At most `most` indices of `count`, evenly, with first and last."""
+    if count <= most:
+        return list(range(count))
+    return sorted({k * (count - 1) // (most - 1) for k in range(most)})
 
 
 def _range(axis: Mapping[str, Any], values: Iterable[float | None]) -> tuple[float, float]:

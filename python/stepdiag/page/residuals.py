@@ -247,6 +247,7 @@ def setup_section(contents: Contents) -> Markup:
                 "Set-up of each line",
                 heading,
                 [[cell.replace("-", "−") if k else cell for k, cell in enumerate(row)] for row in body],
+                "dense",
             )
         )
     if notes:

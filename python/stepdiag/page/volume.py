@@ -10,7 +10,7 @@ from stepdiag._core import Calibration, Machine
 from stepdiag.calibration.table_sums import FloatArray
 from stepdiag.calibration.volume import Interval, VolumeErrors, volume_errors
 from stepdiag.page.contents import Contents
-from stepdiag.page.figure import value_table, values
+from stepdiag.page.figure import rounded, value_table, values
 from stepdiag.page.html import Markup, element, section, table
 from stepdiag.page.numbers import NBSP, position, shown
 from stepdiag.parameters import AXES
@@ -19,6 +19,7 @@ NODES: Final = 13  # of the grid along each axis
 MICRO: Final = 1e3  # µm of a mm
 MICRORADIAN: Final = 1e6  # µrad of a rad
 MOST_RANKED: Final = 5
+MOST_RANKED_POINTS: Final = 1_000_000  # of the grid of nodes; the ranking of more takes seconds
 
 
 class ErrorInVolume(NamedTuple):
@@ -37,6 +38,11 @@ def error_in_volume(calibration: Calibration, *, limit: float | None = None, ran
     x, y, z = (np.linspace(0.0, float(edge), NODES) for edge in calibration.volume)
     points = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
     machine = Machine(calibration.chain, calibration.to_error_map(), calibration.tool)
+    nodes = [
+        max((len(p) for name, (p, _, _) in calibration.functions.items() if name[2] == axis), default=2)
+        for axis in AXES
+    ]
+    ranking = ranking and math.prod(nodes) <= MOST_RANKED_POINTS
     figures = volume_errors(calibration, limit=limit, ranking=ranking)
     return ErrorInVolume(figures, (x, y, z), machine.error(points).reshape(NODES, NODES, NODES, 3))
 
@@ -45,13 +51,14 @@ def drawing_of(contents: Contents, found: ErrorInVolume, before: ErrorInVolume |
     """What report.js draws: nodes (mm), errors (µm) in the order x, y, z, measured lines, the worst point."""
     edges, figures = contents.calibration.volume, found.figures
     worst = {"at_mm": figures.largest_at.tolist(), "error_um": (MICRO * figures.largest_components).tolist()}
-    return {
+    content = {
         "nodes_mm": [nodes.tolist() for nodes in found.nodes],
         "error_um": (MICRO * found.error).reshape(-1, 3).tolist(),
         "before_um": None if before is None else (MICRO * before.error).reshape(-1, 3).tolist(),
         "lines": [{"name": line, "from": start, "to": end} for line, start, end in _ends(contents.lines, edges)],
         "worst": None if math.isnan(figures.largest) else worst,
     }
+    return {key: rounded(value) for key, value in content.items()}
 
 
 def exaggeration(edges: FloatArray, found: ErrorInVolume, before: ErrorInVolume | None) -> float:
