@@ -6,7 +6,17 @@ from pathlib import Path
 import click
 
 from stepdiag._core import InvalidArgument, read_error_map
-from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Command, Writes, fit_warnings, json_option, tell, tell_fit
+from stepdiag.cli.options import (
+    NOT_TO_BE_TRUSTED,
+    PATH,
+    Command,
+    Grouped,
+    Writes,
+    fit_warnings,
+    json_option,
+    tell,
+    tell_fit,
+)
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, PAGE, PDF, OutputFile
 
@@ -23,15 +33,19 @@ _WORDS = {
 
 def _header_options(command: Command) -> Command:
     for name, meaning in reversed(_WORDS.items()):
-        option = click.option(
-            f"--{name.replace('_', '-')}", metavar="TEXT", help=f"{meaning}  [default: of the scenario]"
-        )
+        option = click.option(f"--{name.replace('_', '-')}", metavar="TEXT", help=meaning)
         command = option(command)
     return command
 
 
 @click.command(
-    epilog="\b\nExample: stepdiag report calibration.nc --scenario scenario.toml --run run.csv -o report.html"
+    cls=Grouped,
+    groups={
+        "Output": ["output", "functional_point", "as_json"],
+        "Content of a page": ["scenario", "run", "uncertainty", "limit"],
+        "Header of a page (by default that of the scenario)": [*_WORDS, "logo"],
+    },
+    epilog="\b\nExample: stepdiag report calibration.nc --scenario scenario.toml --run run.csv -o report.html",
 )
 @click.argument("calibrations", nargs=-1, required=True, type=PATH, metavar="[BEFORE] CALIBRATION")
 @click.option(
@@ -47,12 +61,12 @@ def _header_options(command: Command) -> Command:
     metavar="FILE",
     help="Also write the straightness of the functional point and that of the table (CSV).",
 )
-@click.option("--scenario", type=PATH, metavar="FILE", help="Of the page: scenario, with its [report] for the header.")
-@click.option("--run", type=PATH, metavar="FILE", help="Of the page: the run, for temperatures and residuals.")
-@click.option("--uncertainty", type=PATH, metavar="FILE", help="Of the page: uncertainty result (.nc), for the budget.")
-@click.option("--limit", type=float, metavar="UM", help="Of the page: limit of the largest error in the volume, in µm.")
+@click.option("--scenario", type=PATH, metavar="FILE", help="Scenario: header ([report]) and measured lines.")
+@click.option("--run", type=PATH, metavar="FILE", help="Run: temperatures, and residuals of a CSV calibration.")
+@click.option("--uncertainty", type=PATH, metavar="FILE", help="Uncertainty result (.nc): the budget.")
+@click.option("--limit", type=float, metavar="UM", help="Limit of the largest error in the volume, in µm.")
 @_header_options
-@click.option("--logo", type=PATH, metavar="FILE", help="PNG or SVG picture in the header.")
+@click.option("--logo", type=PATH, metavar="FILE", help="PNG or SVG picture.")
 @json_option
 @click.pass_context
 def report(
