@@ -1,15 +1,19 @@
 """Commands that calibrate a machine from a run, or report beforehand what a run would determine."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, Grouped, Writes, fit_warnings, json_option, out_file, tell_fit
+from stepdiag.cli.options import PATH, Grouped, Writes, fit_warnings, json_option, out_file, tell, tell_fit
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
+from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 from stepdiag.progress import Progress
+
+# Values of a calibration whose covariance is written unless the user decides: 32 MB. It grows with their square.
+MOST_COVARIED: Final = 2000
 
 
 @click.command(
@@ -27,7 +31,11 @@ from stepdiag.progress import Progress
     show_default=True,
     help="Method of evaluation; see above.",
 )
-@click.option("--covariance", is_flag=True, help="Also write the covariance of all values (netCDF only).")
+@click.option(
+    "--covariance/--no-covariance",
+    default=None,
+    help=f"Write the covariance of all values (netCDF only).  [default: up to {MOST_COVARIED} values]",
+)
 @click.option("--reliability", is_flag=True, help="Also report which faults of the readings would have been found.")
 @out_file("Calibration to write, CSV or netCDF (.nc, with set-ups and residuals).", CALIBRATION)
 @json_option
@@ -37,7 +45,7 @@ def evaluate(
     scenario: Path,
     run: Path,
     method: Literal["adjustment", "enhanced", "conventional"],
-    covariance: bool,
+    covariance: bool | None,
     reliability: bool,
     output: OutputFile,
     as_json: bool,
@@ -53,6 +61,8 @@ def evaluate(
     written, but must not be used. For the linear methods it is the worse of two verdicts: that of
     their own test, and that of the adjustment of the same readings. A result that no machine can
     have ([plausible] in the scenario) is an error, and nothing is written.
+
+    netCDF files (.nc) have the covariance of all values, which volume needs for its intervals.
 
     \b
     adjustment    all readings at once and exactly: the machine's errors, and how head and mirror were set up
@@ -79,13 +89,17 @@ def evaluate(
     described = read_scenario(scenario)
     path = output.claim(scenario, run, error_map=described.truth.error_map)
     known = described.known
+    values = len(FUNCTIONS) * (known.plan.steps + 1) + len(SQUARENESSES)
+    if covariance is None and is_netcdf(path) and values > MOST_COVARIED:
+        tell("note", f"no covariance of {values} values, {8e-6 * values**2:.0f} MB: `covariance` writes it")
+    with_covariance = is_netcdf(path) and values <= MOST_COVARIED if covariance is None else covariance
     measurement = read_measurement(run)
     provenance = provenance_of(known, run, method=method)
     with located(str(run)), Progress("evaluate"):
         result = (
-            adjust_scenario(known, measurement, full_covariance=covariance, reliability=reliability)
+            adjust_scenario(known, measurement, full_covariance=with_covariance, reliability=reliability)
             if method == "adjustment"
-            else evaluate_beside_adjustment(known, measurement, method=method, full_covariance=covariance)
+            else evaluate_beside_adjustment(known, measurement, method=method, full_covariance=with_covariance)
         )
     written = write_calibration(
         result.calibration if isinstance(result, JudgedEvaluation) else result,

@@ -78,11 +78,26 @@ def test_adjustment_is_the_default(here: Path) -> None:
 
 
 def test_netcdf_keeps_the_covariance_and_the_set_up(here: Path) -> None:
-    assert run("evaluate", "scenario.toml", "run.csv", "--covariance", "-o", "calibration.nc") == 0
+    assert run("evaluate", "scenario.toml", "run.csv", "-o", "calibration.nc") == 0
     with xr.open_dataset("calibration.nc") as table:
         assert table["covariance"].shape == (18 * 6 + 3,) * 2
         assert "reflector" in table["setup_quantity"].values.tolist()
         assert table.sizes["reading"] == len(sd.read_measurement("run.csv"))
+
+
+def test_covariance_of_many_values_is_written_on_demand_alone(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def written(*option: str) -> bool:
+        assert run("evaluate", "scenario.toml", "run.csv", *option, "-o", "calibration.nc") == 0
+        return sd.read_calibration("calibration.nc").covariance is not None
+
+    assert not written("--no-covariance")
+    assert "no covariance" not in capsys.readouterr().err
+    monkeypatch.setattr("stepdiag.cli.evaluate.MOST_COVARIED", 18 * 6 + 2)
+    assert not written()
+    assert "stepdiag: note: no covariance of 111 values" in capsys.readouterr().err
+    assert written("--covariance")
 
 
 def test_report_counts_lost_readings_and_lost_points(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
