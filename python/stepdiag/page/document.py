@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from stepdiag._core import Calibration, InvalidArgument, __version__
-from stepdiag.calibration.volume import VolumeErrors
 from stepdiag.io.file_kind import PAGE_BEGINS
 from stepdiag.objects.report import report_object
-from stepdiag.objects.writer import measured, number
+from stepdiag.objects.volume import volume_object
 from stepdiag.page.budget import budget_section
 from stepdiag.page.contents import Contents, ReportRequest, read_contents
 from stepdiag.page.curves import curves_section, squareness_section
@@ -21,7 +20,7 @@ from stepdiag.page.html import Markup, element, markup
 from stepdiag.page.look import BAND, LAYOUT
 from stepdiag.page.numbers import moment
 from stepdiag.page.residuals import residuals_section, setup_section, temperature_section
-from stepdiag.page.volume import ErrorInVolume, drawing_of, error_in_volume, volume_section
+from stepdiag.page.volume import ErrorInVolume, drawing_of, error_grid, error_in_volume, volume_section
 from stepdiag.page.words import (
     HEADLINE,
     commands_section,
@@ -43,8 +42,10 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
     plotly = _plotly()
     contents = read_contents(request)
     calibration, figures = contents.calibration, Figures()
-    found = error_in_volume(calibration, limit=request.limit)
-    before = None if contents.before is None else error_in_volume(contents.before, ranking=False)
+    found = error_in_volume(calibration, request.limit)
+    before = None
+    if contents.before is not None and contents.change is not None:
+        before = ErrorInVolume(contents.change.a, *error_grid(contents.before))
     sections = [
         summary_section(contents, found),
         curves_section(calibration, contents.before, figures),
@@ -89,23 +90,14 @@ def report_values(contents: Contents, found: ErrorInVolume, before: ErrorInVolum
     values: dict[str, Any] = {
         **report_object(contents.calibration, Path(request.calibration.name), contents.notes),
         "format": "stepdiag report page 1",
-        "volume": _volume_values(found.figures),
+        "volume": volume_object(found.figures, Path(request.calibration.name), []),
     }
     if request.before is not None and contents.before is not None and before is not None:
         values["before"] = {
             **report_object(contents.before, Path(request.before.name), []),
-            "volume": _volume_values(before.figures),
+            "volume": volume_object(before.figures, Path(request.before.name), []),
         }
     return values
-
-
-def _volume_values(figures: VolumeErrors) -> dict[str, Any]:
-    """Names and units as in the object of `volume --json`."""
-    at = [number(place) for place in figures.largest_at.tolist()]
-    return {
-        "at_mm": at,
-        **measured("um", largest=figures.largest, rms=figures.rms, components=figures.largest_components),
-    }
 
 
 def _title(contents: Contents) -> str:

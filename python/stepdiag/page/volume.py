@@ -31,20 +31,22 @@ class ErrorInVolume(NamedTuple):
     error: FloatArray
 
 
-def error_in_volume(calibration: Calibration, *, limit: float | None = None, ranking: bool = True) -> ErrorInVolume:
-    """The figures, as `stepdiag volume` has them, and the error on a grid of NODES positions along each axis.
+def error_in_volume(calibration: Calibration, limit: float | None) -> ErrorInVolume:
+    """The figures, as `stepdiag volume` has them, and what is drawn.
 
     Raises InvalidArgument for a limit that is not positive."""
+    functions = calibration.functions
+    nodes = [max((len(p) for name, (p, _, _) in functions.items() if name[2] == axis), default=2) for axis in AXES]
+    figures = volume_errors(calibration, limit=limit, ranking=math.prod(nodes) <= MOST_RANKED_POINTS)
+    return ErrorInVolume(figures, *error_grid(calibration))
+
+
+def error_grid(calibration: Calibration) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
+    """NODES positions of each axis (mm) and the errors there, (nx, ny, nz, 3), mm."""
     x, y, z = (np.linspace(0.0, float(edge), NODES) for edge in calibration.volume)
     points = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
     machine = Machine(calibration.chain, calibration.to_error_map(), calibration.tool)
-    nodes = [
-        max((len(p) for name, (p, _, _) in calibration.functions.items() if name[2] == axis), default=2)
-        for axis in AXES
-    ]
-    ranking = ranking and math.prod(nodes) <= MOST_RANKED_POINTS
-    figures = volume_errors(calibration, limit=limit, ranking=ranking)
-    return ErrorInVolume(figures, (x, y, z), machine.error(points).reshape(NODES, NODES, NODES, 3))
+    return (x, y, z), machine.error(points).reshape(NODES, NODES, NODES, 3)
 
 
 def drawing_of(contents: Contents, found: ErrorInVolume, before: ErrorInVolume | None) -> dict[str, Any]:
@@ -129,6 +131,7 @@ def volume_section(contents: Contents, found: ErrorInVolume, before: ErrorInVolu
         "volume",
         "Error of the tool in the volume",
         element("p", said),
+        element("p", _what_it_is(figures), class_="note"),
         _controls(scale, before is not None, bool(contents.lines)),
         element(
             "figure",
@@ -139,6 +142,20 @@ def volume_section(contents: Contents, found: ErrorInVolume, before: ErrorInVolu
         _ranking(figures),
         values("values-volume", "Values in the volume", *_figures(figures), _table(found, before)),
     )
+
+
+def _what_it_is(figures: VolumeErrors) -> str:
+    text = "Actual less commanded position of the functional point; 0 at home, so it depends on that reference."
+    if figures.largest_interval is not None:
+        kind = "estimated from the tables" if figures.between_nodes_estimated else "stated"
+        text += f" Errors between the nodes: standard uncertainty {with_ends(figures.between_nodes, None)}, {kind}."
+    elif isinstance(figures.source, Calibration) and figures.source.covariance is None:
+        text += " There is no interval, because the file of the calibration has no covariance."
+    return text
+
+
+def _microradians(value: float) -> str:
+    return shown(MICRORADIAN * value)
 
 
 def _ranking(figures: VolumeErrors) -> Markup | None:
@@ -161,7 +178,8 @@ def _figures(figures: VolumeErrors) -> Iterator[Markup]:
         for line, one in figures.diagonals.items()
     ]
     for letter, tilt in figures.tilts.items():
-        rows.append([f"largest rotation about {AXES['ABC'.index(letter)]}", f"{shown(MICRORADIAN * tilt.value)} µrad"])
+        ends = "" if tilt.interval is None else " (95 %: {} to {} µrad)".format(*map(_microradians, tilt.interval))
+        rows.append([f"largest rotation about {AXES['ABC'.index(letter)]}", f"{_microradians(tilt.value)} µrad{ends}"])
     yield table("Figures of the volume", ["Figure", "value"], rows)
 
 

@@ -146,11 +146,19 @@ def _within(figures: VolumeErrors) -> Iterator[tuple[str, object]]:
     """The verdict against a limit that was given."""
     if figures.limit is None:
         return
-    words = {"within": "Yes.", "not within": "No.", "undecided": "It cannot be decided."}
-    said = words.get(figures.verdict or "", "Not known.")
-    why = f" {_sentence(figures.no_verdict_because)}" if figures.no_verdict_because else ""
-    rule = " By ISO 14253-1: at 95 %, one-sided, with the uncertainty of the largest error." if figures.verdict else ""
-    yield f"Within {with_ends(figures.limit, None)}?", markup(element("strong", said), why, rule)
+    if figures.verdict is None or figures.bounds is None:
+        verdict, why = "Not known", _sentence(figures.no_verdict_because)
+    else:
+        above, below = (with_ends(bound, None) for bound in figures.bounds)
+        verdict, why = {
+            "within": ("Yes", f"The largest error is below {below} (95 %)."),
+            "not within": ("No", f"The largest error is above {above} (95 %)."),
+            "undecided": (
+                "Cannot be decided",
+                f"The largest error is above {above} and below {below} (95 % each).",
+            ),
+        }[figures.verdict]
+    yield f"Within {with_ends(figures.limit, None)}?", markup(element("strong", f"{verdict}."), f" {why}")
 
 
 def largest_values(calibration: Calibration) -> dict[Kind, tuple[str, float, float, float]]:
