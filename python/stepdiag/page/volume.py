@@ -60,7 +60,7 @@ def drawing_of(contents: Contents, found: ErrorInVolume, before: ErrorInVolume |
         "lines": [{"name": line, "from": start, "to": end} for line, start, end in _ends(contents.lines, edges)],
         "worst": None if math.isnan(figures.largest) else worst,
     }
-    return {key: rounded(value) for key, value in content.items()}
+    return {key: value if key == "nodes_mm" else rounded(value) for key, value in content.items()}
 
 
 def exaggeration(edges: FloatArray, found: ErrorInVolume, before: ErrorInVolume | None) -> float:

@@ -18,6 +18,7 @@ from stepdiag.page.html import Markup, definitions, element, listed, markup, sec
 from stepdiag.page.numbers import COVERAGE_FACTOR, NBSP, NOT_KNOWN, moment, position, shown, with_interval
 from stepdiag.page.volume import ErrorInVolume, place_of_largest, why_not_known, with_ends
 from stepdiag.parameters import FUNCTIONS, KINDS, REPORT_UNIT, SQUARENESSES, Kind, in_report_units, kind_of
+from stepdiag.units import MICROMETRE
 
 HEADLINE: Final = {
     "accepted": "Fit accepted",
@@ -149,7 +150,7 @@ def _within(figures: VolumeErrors) -> Iterator[tuple[str, object]]:
     if figures.verdict is None or figures.bounds is None:
         verdict, why = "Not known", _sentence(figures.no_verdict_because)
     else:
-        above, below = (with_ends(bound, None) for bound in figures.bounds)
+        above, below = (f"{bound / MICROMETRE:.4g}{NBSP}µm" for bound in figures.bounds)
         verdict, why = {
             "within": ("Yes", f"The largest error is below {below} (95 %)."),
             "not within": ("No", f"The largest error is above {above} (95 %)."),
@@ -158,7 +159,7 @@ def _within(figures: VolumeErrors) -> Iterator[tuple[str, object]]:
                 f"The largest error is above {above} and below {below} (95 % each).",
             ),
         }[figures.verdict]
-    yield f"Within {with_ends(figures.limit, None)}?", markup(element("strong", f"{verdict}."), f" {why}")
+    yield f"Within {figures.limit / MICROMETRE:.4g}{NBSP}µm?", markup(element("strong", f"{verdict}."), f" {why}")
 
 
 def largest_values(calibration: Calibration) -> dict[Kind, tuple[str, float, float, float]]:
