@@ -14,6 +14,8 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double alternative = 25.0;    // in chi-square: what is less behind the best may be it
 constexpr double gross_scatter = 25.0;  // of the square sum a reading
+constexpr double large_gain = 1000.0;   // where second order may tell
+constexpr double twin = 0.99;           // correlation of what shows the same in all other readings
 constexpr std::size_t most_exact = 20;
 constexpr std::size_t most_members = 40;  // which are near enough to what is behind them
 
@@ -89,11 +91,12 @@ AdjustmentProblem FaultSearch::handled(int without, const Candidate* instead) co
     for (int k = 0; k < int(found_.size()); ++k) {
         if (k == without) continue;
         for (const Candidate& member : found_[k].members) {
+            if (member.is_name) continue;
             if (found_[k].handling == Handling::left_out) {
                 for (const int r : hypotheses_.readings(member.hypothesis)) problem.readings()[r].outlier = k + 1;
                 continue;
             }
-            const bool known = found_[k].handling == Handling::shared && found_[k].members.size() > 1;
+            const bool known = found_[k].handling == Handling::shared && found_[k].alternatives() > 1;
             add_fault(faults, member, known ? std::abs(member.score.size) : free_unknown, k);
             if (found_[k].handling == Handling::representative) break;
         }
@@ -261,6 +264,7 @@ bool FaultSearch::correct(SolutionPointer& solution) {
 // One after the other, each as one more unknown. False: there are too many.
 bool FaultSearch::find_more(SolutionPointer& solution) {
     for (int step = 0; step < 4 * most_; ++step) {
+        explain_by_fewer(solution);
         const auto next = worst(test(*solution, solution->x()));
         if (!next) return true;
         if (int(found_.size()) == most_) return false;
@@ -296,7 +300,7 @@ bool FaultSearch::drop_or_exchange(const Solution& solution) {
             changed = true;
             continue;
         }
-        const FaultHypothesis& own = found_[k].members.front().hypothesis;
+        const FaultHypothesis own = tested.hypotheses->as_tested(found_[k].members.front().hypothesis);
         double gain = 0.0;
         for (std::size_t h = 0; h < tested.hypotheses->all().size(); ++h)
             if (tested.hypotheses->all()[h] == own) gain = tested.tests->scores()[h].gain;
@@ -307,10 +311,56 @@ bool FaultSearch::drop_or_exchange(const Solution& solution) {
     return changed;
 }
 
+// A tilt's first reading that is wrong, and a slip after it, are the same to first order; what second order makes of the
+// one that did not happen looks like a fault of distances. So each is tried with one fault less.
+void FaultSearch::explain_by_fewer(SolutionPointer& solution) {
+    for (std::size_t k = 0; k < found_.size(); ++k) {
+        const Candidate own = found_[k].members.front();
+        const FaultHypothesis tested = hypotheses_.as_tested(own.hypothesis);
+        if (own.score.gain < large_gain || !hypotheses_.differs_from_slip(tested)) continue;
+        Candidate other = own;
+        other.hypothesis = own.hypothesis == tested ? *hypotheses_.as_slip(tested) : tested;
+        other.score.size = -own.score.size;
+        for (std::size_t j = 0; j < found_.size(); ++j) {
+            if (j == k) continue;
+            const std::vector<Found> before = found_;
+            found_[k] = {{other}};
+            found_.erase(found_.begin() + int(j));
+            SolutionPointer next = solve_near(*solution);
+            const double enough = limit_ * noise(solution->square_sum(), solution->degrees_of_freedom());
+            if (next && next->square_sum() < solution->square_sum() + enough) {
+                solution = next;
+                return explain_by_fewer(solution);
+            }
+            found_ = before;
+        }
+    }
+}
+
+// Beside a tilt's first reading that may be wrong the slip that second order may tell from it.
+void FaultSearch::add_slips(std::vector<Candidate>& candidates) const {
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+        if (!hypotheses_.differs_from_slip(candidates[i].hypothesis)) continue;
+        Candidate slip{*hypotheses_.as_slip(candidates[i].hypothesis), candidates[i].score};
+        slip.score.size = -slip.score.size;
+        candidates.insert(candidates.begin() + int(++i), slip);
+    }
+}
+
+// Beside a first reading that may be wrong the slip that it may be named as, where nothing tells them apart.
+void FaultSearch::add_names(std::vector<Candidate>& members, bool large) const {
+    for (std::size_t i = 0; i < members.size(); ++i) {
+        const auto slip = hypotheses_.as_slip(members[i].hypothesis);
+        if (!slip || (large && hypotheses_.differs_from_slip(members[i].hypothesis))) continue;
+        Candidate name{*slip, members[i].score, true};
+        name.score.size = -name.score.size;
+        members.insert(members.begin() + int(++i), name);
+    }
+}
+
 // The class of a fault, were it the only one that is not known: on the problem linearised at the solution, and by exact
 // adjustments where it is so large that second order may tell.
 std::optional<FaultSearch::Found> FaultSearch::class_of(int number, const Solution& solution) const {
-    constexpr double large = 1000.0;       // of a gain
     constexpr double second_order = 0.02;  // of a large gain
     SolutionPointer rest = solution_of(handled(number));
     const Tested tested = test(*rest, carried(solution, rest->problem()));
@@ -321,12 +371,17 @@ std::optional<FaultSearch::Found> FaultSearch::class_of(int number, const Soluti
     std::vector<Candidate> members;
     for (const int h : order) {
         const double less = best - tested.tests->scores()[h].gain;
-        const bool may_be = best > large && members.size() < most_exact && less < behind + second_order * best;
+        const bool may_be = best > large_gain && members.size() < most_exact && less < behind + second_order * best;
         if (members.size() < most_members && (less < behind || may_be)) members.push_back(tested.candidate(h));
     }
-    if (best > large) adjust_exactly(members, number, solution);
-    Found found{members, Handling::shared};
-    if (is_told_by_leaving_out(members, tested)) found.handling = Handling::left_out;
+    if (best > large_gain) {
+        add_slips(members);
+        adjust_exactly(members, number, solution);
+        const std::vector<Candidate> twins = with_twins(members, tested);
+        if (is_told_by_leaving_out(twins, tested)) members = twins;
+    }
+    Found found{members, is_told_by_leaving_out(members, tested) ? Handling::left_out : Handling::shared};
+    add_names(found.members, best > large_gain);
     return found;
 }
 
@@ -357,10 +412,24 @@ void FaultSearch::adjust_exactly(std::vector<Candidate>& candidates, int number,
                      [](const Candidate& a, const Candidate& b) { return a.score.gain > b.score.gain; });
 }
 
+// Where second order tells the large fault of a reading from those of its twins, no reading controls these any more.
+std::vector<FaultSearch::Candidate> FaultSearch::with_twins(std::vector<Candidate> members,
+                                                            const Tested& tested) const {
+    const auto& all = tested.hypotheses->all();
+    const auto best = std::find(all.begin(), all.end(), members.front().hypothesis);
+    if (best == all.end() || best->kind != FaultKind::reading) return members;
+    const std::vector<double> correlation = tested.tests->correlations(int(best - all.begin()));
+    for (std::size_t h = 0; h < all.size(); ++h) {
+        const auto is_this = [&](const Candidate& member) { return member.hypothesis == all[h]; };
+        if (all[h].kind != FaultKind::reading || std::abs(correlation[h]) < twin) continue;
+        if (std::none_of(members.begin(), members.end(), is_this)) members.push_back(tested.candidate(int(h)));
+    }
+    return members;
+}
+
 // Readings that show the same in all others: without them nothing is left of the fault. One of the two of a scale line
 // takes the other with it.
 bool FaultSearch::is_told_by_leaving_out(const std::vector<Candidate>& members, const Tested& tested) const {
-    constexpr double alike = 0.99;
     std::vector<int> number;
     for (const Candidate& member : members) {
         if (member.hypothesis.kind != FaultKind::reading) return false;
@@ -371,7 +440,7 @@ bool FaultSearch::is_told_by_leaving_out(const std::vector<Candidate>& members, 
     for (std::size_t i = 0; i + 1 < number.size(); ++i) {
         const std::vector<double> correlation = tested.tests->correlations(number[i]);
         for (std::size_t j = i + 1; j < number.size(); ++j)
-            if (std::abs(correlation[number[j]]) < alike) return false;
+            if (std::abs(correlation[number[j]]) < twin) return false;
     }
     return true;
 }
@@ -447,15 +516,12 @@ std::vector<FaultClass> FaultSearch::classes(const Solution& solution, const Cal
                           std::any_of(found.members.begin(), found.members.end(), [](const Candidate& member) {
                               return member.hypothesis.kind == FaultKind::reading;
                           });
-        if (left_out || found.members.size() < 2) continue;
+        if (left_out || found.alternatives() < 2) continue;
         const SolutionPointer rest = solution_of(handled(k));
         const Tested tested = test(*rest, carried(solution, rest->problem()));
         std::vector<Eigen::VectorXd> effects;  // of what each has done
-        const auto& all = tested.hypotheses->all();
-        for (const Candidate& member : found.members) {
-            const auto number = std::find(all.begin(), all.end(), member.hypothesis) - all.begin();
-            effects.push_back(member.score.size * tested.tests->effect(int(number)));
-        }
+        for (const Candidate& member : found.members)
+            if (!member.is_name) effects.push_back(member.score.size * tested.tests->effect(member.hypothesis));
         for (const Value& value : values) {
             double low = infinity, high = -infinity;
             for (const Eigen::VectorXd& effect : effects) {

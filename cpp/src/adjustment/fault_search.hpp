@@ -11,6 +11,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <optional>
@@ -38,6 +39,7 @@ private:
     struct Candidate {
         FaultHypothesis hypothesis;
         FaultScore score;
+        bool is_name = false;  // another one of the member before, and nothing of its own
     };
     // How the members of a class are taken while the search goes on.
     enum class Handling {
@@ -49,6 +51,10 @@ private:
     struct Found {
         std::vector<Candidate> members;  // the best first
         Handling handling = Handling::representative;
+
+        auto alternatives() const {
+            return std::count_if(members.begin(), members.end(), [](const Candidate& c) { return !c.is_name; });
+        }
     };
     // The tests on the problem linearised somewhere, at its minimum there.
     struct Tested;
@@ -70,9 +76,13 @@ private:
     bool correct(SolutionPointer& solution);
     bool find_more(SolutionPointer& solution);
     bool drop_or_exchange(const Solution& solution);
+    void explain_by_fewer(SolutionPointer& solution);
+    void add_slips(std::vector<Candidate>& candidates) const;
+    void add_names(std::vector<Candidate>& members, bool large) const;
     // None where that is not significant.
     std::optional<Found> class_of(int number, const Solution& solution) const;
     void adjust_exactly(std::vector<Candidate>& candidates, int number, const Solution& solution) const;
+    std::vector<Candidate> with_twins(std::vector<Candidate> members, const Tested& tested) const;
     bool is_told_by_leaving_out(const std::vector<Candidate>& members, const Tested& tested) const;
 
     AdjustmentProblem problem_;

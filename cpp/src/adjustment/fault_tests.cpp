@@ -8,6 +8,8 @@
 namespace stepdiag {
 namespace {
 
+constexpr int none = -1;  // place
+
 // Whether an unknown takes up a constant of the channel: the distance's own, a beam's, a spot's zero, the mirror's
 // angle.
 bool has_free_constant(const LineSetup& setup, int channel) {
@@ -48,6 +50,10 @@ FaultHypotheses::FaultHypotheses(const AdjustmentProblem& problem) {
         for (int i = free && count == 2 ? 1 : 0; i < count; ++i)
             all_.push_back({FaultKind::reading, sequence, used[i]});
         for (int i = free ? 2 : 0; i < count - 1; ++i) all_.push_back({FaultKind::slip, sequence, used[i]});
+        // Of two readings the slip is the other reading's fault.
+        if (free && count > 2) first_.push_back({used[0], used[1]});
+        else first_.push_back({none, none});
+        is_tilt_.push_back(!problem.is_length(problem.readings()[readings.front()]));
         sequences_.push_back({place.first, place.second, std::move(readings)});
     }
 }
@@ -56,6 +62,22 @@ FaultHypotheses::Readings FaultHypotheses::readings(const FaultHypothesis& hypot
     const std::vector<int>& sequence = sequences_[hypothesis.sequence].readings;
     const int* first = sequence.data() + hypothesis.first;
     return {first, hypothesis.kind == FaultKind::reading ? first + 1 : sequence.data() + sequence.size()};
+}
+
+std::optional<FaultHypothesis> FaultHypotheses::as_slip(const FaultHypothesis& reading) const {
+    const auto [first, second] = first_[reading.sequence];
+    if (reading.kind != FaultKind::reading || first == none || reading.first != first) return std::nullopt;
+    return FaultHypothesis{FaultKind::slip, reading.sequence, second};
+}
+
+FaultHypothesis FaultHypotheses::as_tested(const FaultHypothesis& hypothesis) const {
+    const auto [first, second] = first_[hypothesis.sequence];
+    if (hypothesis.kind != FaultKind::slip || first == none || hypothesis.first != second) return hypothesis;
+    return {FaultKind::reading, hypothesis.sequence, first};
+}
+
+bool FaultHypotheses::differs_from_slip(const FaultHypothesis& reading) const {
+    return as_slip(reading) && is_tilt_[reading.sequence];
 }
 
 FaultTests::FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const BorderedBand& inverse,
@@ -146,8 +168,8 @@ Eigen::VectorXd FaultTests::gradient(const FaultHypothesis& hypothesis) const {
     return gradient;
 }
 
-Eigen::VectorXd FaultTests::effect(int hypothesis) const {
-    Eigen::VectorXd effect = gradient(hypotheses_->all()[hypothesis]);
+Eigen::VectorXd FaultTests::effect(const FaultHypothesis& hypothesis) const {
+    Eigen::VectorXd effect = gradient(hypothesis);
     factor_->solve(effect);
     return effect;
 }

@@ -7,6 +7,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <optional>
 #include <vector>
 
 #include "adjustment/normal_equations.hpp"
@@ -30,10 +32,10 @@ struct FaultHypothesis {
     }
 };
 
-// Every fault that is tested for, each once. Where an unknown of the set-up takes up a constant of the channel, the
-// slip before the last reading is that reading's fault, the one after the first reading the opposite of that reading's,
-// and of two readings there is only one fault. Readings that are left out take no part: make it anew after leaving one
-// out.
+// Every fault that is tested for, each once. The slip before the last reading is that reading's fault. Where an unknown
+// of the set-up takes up a constant of the channel, the slip after the first reading is the opposite of that reading's
+// fault (`as_slip`), and of two readings there is only one fault. Readings that are left out take no part: make it anew
+// after leaving one out.
 class FaultHypotheses {
 public:
     explicit FaultHypotheses(const AdjustmentProblem& problem);
@@ -50,8 +52,18 @@ public:
     };
     Readings readings(const FaultHypothesis& hypothesis) const;
 
+    // A wrong first reading, named as a slip of all later ones by as much the other way; none for other faults.
+    std::optional<FaultHypothesis> as_slip(const FaultHypothesis& reading) const;
+    // The one that is tested in its place: of a slip that as_slip gives, the reading; of others themselves.
+    FaultHypothesis as_tested(const FaultHypothesis& hypothesis) const;
+    // Whether a fault and the slip that it may be named as differ at second order: a mirror's angle, which takes up the
+    // constant of a tilt, acts on distances too.
+    bool differs_from_slip(const FaultHypothesis& reading) const;
+
 private:
     std::vector<ReadingSequence> sequences_;
+    std::vector<std::array<int, 2>> first_;  // two used places of each sequence that has a free constant
+    std::vector<bool> is_tilt_;
     std::vector<FaultHypothesis> all_;
 };
 
@@ -85,7 +97,8 @@ public:
 
     double square(int hypothesis) const;  // c.c
     // What a fault of size 1 that is not accounted for does to all unknowns: N^-1 J^T c.
-    Eigen::VectorXd effect(int hypothesis) const;
+    Eigen::VectorXd effect(const FaultHypothesis& hypothesis) const;
+    Eigen::VectorXd effect(int hypothesis) const { return effect(hypotheses_->all()[hypothesis]); }
     // Of one hypothesis with each, from one solution; 0 where nothing controls one of the two. (Where q of the other
     // one is interpolated, this is as good as that.)
     std::vector<double> correlations(int hypothesis) const { return correlations(hypothesis, effect(hypothesis)); }

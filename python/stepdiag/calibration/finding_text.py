@@ -311,7 +311,11 @@ def _doubt(found: FaultClass) -> str:
 def _treatment(found: FaultClass) -> str:
     match found.treatment:
         case "left_out":
-            return "left out" if found.told_apart else "all of these readings are left out"
+            if found.told_apart:
+                return "left out"
+            if any(fault.kind == "slip" for fault in found.members):
+                return "the single readings among these are left out, which removes the slips, too"
+            return "all of these readings are left out"
         case "estimated" if found.told_apart:
             return "its size is an unknown of the adjustment"
         case "estimated":

@@ -286,6 +286,56 @@ def test_consecutive_rows_that_are_off_are_two_slips() -> None:
     assert normalised(adjustment, table) < SOUND
 
 
+@pytest.mark.parametrize("line", ["ppp", "nnp"])
+@pytest.mark.parametrize("size", [1e-3, 9e-3])
+def test_tilts_that_are_off_from_point_1_on_are_not_taken_for_a_wrong_first_one(line: str, size: float) -> None:
+    """They act as the mirror's angle, which bends distances: a scale line must not be blamed for that."""
+    run, scenario, table = told()
+    adjustment = adjust(slipped(run, line, 1, "beta", size), scenario)
+    (found,) = adjustment.faults
+    assert (found.members[0].kind, found.members[0].line, found.members[0].point) == ("slip", line, 1)
+    assert normalised(adjustment, table) < SOUND
+    if found.told_apart:
+        assert adjustment.verdict.fit == "rejected"
+    else:  # both are unknowns, so that what they differ by is in the uncertainties
+        assert [(fault.kind, fault.point) for fault in found.members] == [("slip", 1), ("reading", 0)]
+        assert (found.treatment, adjustment.verdict.fit) == ("estimated", "accepted")
+    first = adjust(changed(run, [(line, 0, "beta", size)]), scenario)
+    assert (first.faults[0].members[0].kind, first.faults[0].members[0].point) == ("reading", 0)
+    assert first.verdict.fit == "accepted"
+    assert normalised(first, table) < SOUND
+
+
+def test_slip_from_point_1_on_is_the_same_as_a_wrong_first_distance() -> None:
+    """The constant of a line's distances is free."""
+    run, scenario, table = told()
+    slip = adjust(slipped(run, "npp", 1, "distance", 0.02), scenario)
+    reading = adjust(changed(run, [("npp", 0, "distance", -0.02)]), scenario)
+    for adjustment in (slip, reading):
+        (found,) = adjustment.faults
+        members = {(f.kind, f.line, f.point): f for f in found.members}
+        one, other = members["reading", "npp", 0], members["slip", "npp", 1]
+        assert (one.size, one.chi_square_gain) == (-other.size, other.chi_square_gain)
+        assert found.corrected
+        assert adjustment.verdict.fit == "accepted"
+        assert normalised(adjustment, table) < SOUND
+    for name, (_, value, u) in slip.calibration.functions.items():
+        assert np.max(np.abs(reading.calibration.functions[name][1] - value) - 1e-6 * u) <= 0  # both at their minimum
+
+
+def test_wrong_distances_at_twins_do_no_harm_where_second_order_tells_one_of_them() -> None:
+    """Without the one that was found, no other reading controls its twin any more."""
+    run, scenario, table = told()
+    small = adjust(changed(run, [("ppp", 7, "distance", 0.01)]), scenario)
+    (twin,) = ({(f.line, f.point) for f in small.faults[0].members if f.kind == "reading"} - {("ppp", 7)},)
+    ((line, point),) = twin
+    bad = changed(run, [("ppp", 7, "distance", 9.0), (line, point, "distance", 0.1)])
+    adjustment = adjust(bad, scenario)
+    assert {(f.line, f.point) for f in adjustment.faults[0].members} == {("ppp", 7), (line, point)}
+    assert adjustment.faults[0].treatment == "left_out"
+    assert normalised(adjustment, table) < SOUND
+
+
 def test_sound_runs_have_no_faults() -> None:
     """At the usual limit one run of 8,000 has one by chance."""
     rng = np.random.default_rng(42)
