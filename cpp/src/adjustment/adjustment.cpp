@@ -43,14 +43,12 @@ std::vector<KnownCombination> known_combinations(const Observability& observabil
     return known;
 }
 
-std::shared_ptr<Solution> find_faults(FaultSearch& faults, const Measurement& measurement, const Plan& plan) {
-    try {
-        return faults.run();
-    } catch (const InvalidArgument&) {
-        const std::string far = far_reading(measurement, plan);
-        if (far.empty()) throw;
-        throw InvalidArgument("adjustment: " + far);
-    }
+[[noreturn]] void refuse_unsolved(const Measurement& measurement, const Plan& plan) {
+    const std::string far = far_reading(measurement, plan);
+    throw InvalidArgument("adjustment: " + (!far.empty() ? far
+                                                         : "finds no machine and set-up that explain the readings; "
+                                                           "check the plan, the head, and units and signs of the "
+                                                           "readings"));
 }
 
 }  // namespace
@@ -78,7 +76,8 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     refuse_foreign_distances(measurement, plan);
 
     FaultSearch faults(of_all, options, smoothness_at_start(options));
-    const auto solution = find_faults(faults, measurement, plan);
+    const std::shared_ptr<Solution> solution = faults.run();
+    if (!solution) refuse_unsolved(measurement, plan);
     const AdjustmentProblem& problem = solution->problem();
     const Observability& observability = solution->observability();
     GaussNewton& solver = solution->solver();

@@ -6,8 +6,6 @@
 #include <unsupported/Eigen/SpecialFunctions>
 #include <utility>
 
-#include "stepdiag/core/error.hpp"
-
 namespace stepdiag {
 namespace {
 
@@ -62,10 +60,7 @@ FaultSearch::SolutionPointer FaultSearch::run() {
     if (!plain->solve_from_zero()) plain.reset();
     if (corrects && (!plain || plain->scatter() > gross_scatter)) solution = without_gross(plain);
     if (!solution) solution = plain;
-    if (!solution)
-        throw InvalidArgument(
-            "adjustment: finds no machine and set-up that explain the readings; check the plan, the head, and "
-            "units and signs of the readings");
+    if (!solution) return nullptr;
     const bool corrected = corrects && correct(solution);
     if (corrected && found_.empty()) return solution;
     if (corrects && !corrected && plain) {
@@ -311,8 +306,8 @@ bool FaultSearch::drop_or_exchange(const Solution& solution) {
     return changed;
 }
 
-// A tilt's first reading that is wrong, and a slip after it, are the same to first order; what second order makes of the
-// one that did not happen looks like a fault of distances. So each is tried with one fault less.
+// A tilt's first reading that is wrong, and a slip after it, are the same to first order; what second order makes of
+// the one that did not happen looks like a fault of distances. So each is tried with one fault less.
 void FaultSearch::explain_by_fewer(SolutionPointer& solution) {
     for (std::size_t k = 0; k < found_.size(); ++k) {
         const Candidate own = found_[k].members.front();

@@ -29,7 +29,7 @@ public:
     FaultSearch(const AdjustmentProblem& problem, const AdjustmentOptions& options,
                 const std::array<double, function_count>& smoothness);
 
-    // The adjustment with what was done about the faults. Throws InvalidArgument where none settles.
+    // The adjustment with what was done about the faults; none where no minimum is reached.
     std::shared_ptr<Solution> run();
     // What was found by then. `forms`: of which alternatives are compared.
     std::vector<FaultClass> classes(const Solution& solution, const CalibratedForms& forms,

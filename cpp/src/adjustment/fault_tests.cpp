@@ -31,6 +31,32 @@ bool has_free_constant(const LineSetup& setup, int channel) {
 
 }  // namespace
 
+FaultScore::FaultScore(double s, double q) : standard_uncertainty(1.0 / std::sqrt(q)) {
+    if (q == 0.0) return;
+    size = s / q;
+    gain = s * size;
+}
+
+FaultScore score_of(const ReadingPattern& pattern, const NormalEquations& equations, const BorderedFactor& factor,
+                    double least_share) {
+    const AdjustmentProblem& problem = equations.problem();
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(problem.size());  // J^T c
+    double s = 0.0, square = 0.0;
+    for (std::size_t k = 0; k < pattern.readings.size(); ++k) {
+        const int r = pattern.readings[k];
+        const double c = pattern.share[k] / problem.readings()[r].standard_uncertainty;
+        s += c * equations.residuals()[r];
+        square += c * c;
+        const NormalEquations::Row row = equations.row(r);
+        for (int i = 0; i < row.size; ++i)
+            if (row.unknown[i] != no_unknown) gradient[row.unknown[i]] += c * row.derivative[i];
+    }
+    Eigen::VectorXd effect = gradient;
+    factor.solve(effect);
+    const double q = square - gradient.dot(effect);
+    return {s, q > least_share * square ? q : 0.0};
+}
+
 std::string name(FaultKind kind) { return kind == FaultKind::reading ? "reading" : "slip"; }
 
 FaultHypotheses::FaultHypotheses(const AdjustmentProblem& problem) {
@@ -142,13 +168,9 @@ void FaultTests::refine(int hypothesis) {
 
 void FaultTests::set(int hypothesis, double c_r_c) {
     c_r_c_[hypothesis] = c_r_c;
-    FaultScore& score = scores_[hypothesis];
-    score = {0.0, 1.0 / std::sqrt(c_r_c), 0.0};
-    if (c_r_c == 0.0) return;
     double sum = 0.0;
     for (const int r : hypotheses_->readings(hypotheses_->all()[hypothesis])) sum += weight_[r] * residuals_[r];
-    score.size = sum / c_r_c;
-    score.gain = sum * score.size;
+    scores_[hypothesis] = FaultScore(sum, c_r_c);
 }
 
 double FaultTests::square(int hypothesis) const {

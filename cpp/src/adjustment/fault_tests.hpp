@@ -71,7 +71,21 @@ struct FaultScore {
     double size = 0.0;                  // mm or rad
     double standard_uncertainty = 0.0;  // of the size; infinite where nothing controls it
     double gain = 0.0;                  // in chi-square; 0 where nothing controls it
+
+    FaultScore() = default;
+    FaultScore(double s, double q);  // s = c.w and q; 0 where nothing controls it
 };
+
+// What each of some readings reads too much by a fault of size 1.
+struct ReadingPattern {
+    std::vector<int> readings;
+    std::vector<double> share;
+};
+
+// Of any fault, at the equations' last linearisation, with the factor there: one solution. Below this share of c.c, q
+// is what rounding and second order leave.
+FaultScore score_of(const ReadingPattern& pattern, const NormalEquations& equations, const BorderedFactor& factor,
+                    double least_share);
 
 // Of readings scores cost nothing, because the inverse is there; of slips a solution each. Where a run has more slips
 // than `most_solutions`, q is computed at evenly spaced ones of each sequence and interpolated between them, for each

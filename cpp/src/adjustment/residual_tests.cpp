@@ -8,6 +8,8 @@
 #include <tuple>
 #include <unsupported/Eigen/SpecialFunctions>
 
+#include "adjustment/fault_tests.hpp"
+
 namespace stepdiag {
 namespace {
 
@@ -106,12 +108,11 @@ std::vector<ResidualPattern> scatter_of_groups(const std::map<Group, Share>& gro
 
 // --- trends ---
 
-// The readings of one channel, on one line or on all, and how far along each of them was made, from 0 to 1.
+// The readings of one channel, on one line or on all; their shares: how far along each of them was made, from 0 to 1.
 struct Trend {
     std::string line, channel;
     FitAspect aspect;
-    std::vector<int> readings;
-    std::vector<double> along;
+    ReadingPattern pattern;
     std::vector<int> setup;
 };
 
@@ -124,39 +125,19 @@ public:
 
     const std::vector<Trend>& trends() const { return trends_; }
 
-    struct Score {
-        double size = 0.0, standard_uncertainty = 0.0, square = 0.0;  // square: 0 where nothing controls it
-    };
-    Score score(const Trend& trend) const {
-        constexpr double controlled = 1e-6;  // of c . c; below it is what rounding and second order leave
-        Eigen::VectorXd image = Eigen::VectorXd::Zero(problem_.size());
-        double s = 0.0, squares = 0.0;
-        for (std::size_t k = 0; k < trend.readings.size(); ++k) {
-            const int r = trend.readings[k];
-            const double c = trend.along[k] / problem_.readings()[r].standard_uncertainty;
-            s += c * equations_.residuals()[r];
-            squares += c * c;
-            const auto row = equations_.row(*point_of_[r], r);
-            for (int i = 0; i < row.size; ++i)
-                if (row.unknown[i] != no_unknown) image[row.unknown[i]] += c * row.derivative[i];
-        }
-        Eigen::VectorXd effect = image;
-        factor_.solve(effect);
-        const double q = squares - image.dot(effect);
-        if (!(q > controlled * squares)) return {};
-        return {s / q, 1.0 / std::sqrt(q), s * s / q};
+    FaultScore score(const Trend& trend) const {
+        constexpr double controlled = 1e-6;
+        return score_of(trend.pattern, equations_, factor_, controlled);
     }
 
 private:
     void collect(const std::vector<double>& when) {
-        point_of_.assign(problem_.readings().size(), nullptr);
         std::map<std::pair<std::string, std::string>, std::array<Trend, 2>> found;  // with time, with position
         double longest = 0.0;
         for (const AdjustedPoint& point : problem_.points()) longest = std::max(longest, std::abs(point.place.travel));
         for (const AdjustedPoint& point : problem_.points())
             for (int r = point.first_reading; r < point.end_reading; ++r) {
                 const AdjustedReading& reading = problem_.readings()[r];
-                point_of_[r] = &point;
                 if (!reading.used()) continue;
                 const std::string channel = problem_.channel_name(reading);
                 for (const std::string& line : {problem_.setups()[point.setup].line.name(), std::string()}) {
@@ -164,11 +145,11 @@ private:
                     for (Trend* trend : {&time, &position}) {
                         trend->line = line;
                         trend->channel = channel;
-                        trend->readings.push_back(r);
+                        trend->pattern.readings.push_back(r);
                         trend->setup.push_back(point.setup);
                     }
-                    time.along.push_back(when[reading.row]);
-                    position.along.push_back(longest > 0.0 ? point.place.travel / longest : 0.0);
+                    time.pattern.share.push_back(when[reading.row]);
+                    position.pattern.share.push_back(longest > 0.0 ? point.place.travel / longest : 0.0);
                 }
             }
         for (auto& entry : found) {
@@ -184,29 +165,31 @@ private:
     }
 
     static void centre(Trend& trend, bool each_setup) {
+        std::vector<double>& along = trend.pattern.share;
         std::map<int, std::pair<double, int>> sums;
         double least = INFINITY, most = -INFINITY;
-        for (std::size_t k = 0; k < trend.along.size(); ++k) {
+        for (std::size_t k = 0; k < along.size(); ++k) {
             auto& [sum, count] = sums[each_setup ? trend.setup[k] : 0];
-            sum += trend.along[k];
+            sum += along[k];
             ++count;
         }
-        for (std::size_t k = 0; k < trend.along.size(); ++k) {
+        for (std::size_t k = 0; k < along.size(); ++k) {
             const auto& [sum, count] = sums[each_setup ? trend.setup[k] : 0];
-            trend.along[k] -= sum / count;
-            least = std::min(least, trend.along[k]);
-            most = std::max(most, trend.along[k]);
+            along[k] -= sum / count;
+            least = std::min(least, along[k]);
+            most = std::max(most, along[k]);
         }
         if (most > least)  // sizes are from the first to the last
-            for (double& a : trend.along) a /= most - least;
+            for (double& a : along) a /= most - least;
     }
 
     static bool alike(const Trend& a, const Trend& b) {
         double ab = 0.0, aa = 0.0, bb = 0.0;
-        for (std::size_t k = 0; k < a.along.size(); ++k) {
-            ab += a.along[k] * b.along[k];
-            aa += a.along[k] * a.along[k];
-            bb += b.along[k] * b.along[k];
+        for (std::size_t k = 0; k < a.setup.size(); ++k) {
+            const double along_a = a.pattern.share[k], along_b = b.pattern.share[k];
+            ab += along_a * along_b;
+            aa += along_a * along_a;
+            bb += along_b * along_b;
         }
         return ab * ab > 0.99 * aa * bb;
     }
@@ -214,7 +197,6 @@ private:
     const AdjustmentProblem& problem_;
     const NormalEquations& equations_;
     const BorderedFactor& factor_;
-    std::vector<const AdjustedPoint*> point_of_;  // by reading
     std::vector<Trend> trends_;
 };
 
@@ -223,14 +205,14 @@ std::vector<ResidualPattern> trends_of_readings(const Adjustment& adjustment, co
     std::vector<ResidualPattern> patterns;
     if (freedom < fewest_freedom) return patterns;
     for (const Trend& trend : tests.trends()) {
-        const TrendTests::Score score = tests.score(trend);
-        if (score.square == 0.0) continue;
+        const FaultScore score = tests.score(trend);
+        if (score.gain == 0.0) continue;
         // Where all readings scatter more than was said, it is measured against that.
-        const double others = std::max(1.0, (adjustment.weighted_square_sum - score.square) / freedom);
+        const double others = std::max(1.0, (adjustment.weighted_square_sum - score.gain) / freedom);
         FitReason reason{FitFinding::trend, score.size, 0.0, trend.line, trend.channel};
         reason.standard_uncertainty = score.standard_uncertainty * std::sqrt(others);
         reason.aspect = trend.aspect;
-        patterns.push_back({reason, score_probability(score.square / others, freedom)});
+        patterns.push_back({reason, score_probability(score.gain / others, freedom)});
     }
     return patterns;
 }

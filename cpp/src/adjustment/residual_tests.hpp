@@ -6,9 +6,8 @@
 // 1 that add up to f, and so has tails no longer than chi-square(f): Q/f against that of all other readings is tested
 // as F, on both sides, which errs on the safe side. A factor that all uncertainties share cancels.
 //
-// Trends. Were the readings off by size times c, then the weighted residuals w have
-//   s = c . w,  q = c . c - (J^T c)^T N^-1 (J^T c),  size = s/q, known to 1/sqrt(q),
-// a score test, exact under the model: correlations of residuals and unequal redundancies are in q. Where the unknowns
+// Trends. The readings are off by a size times how far along they are: the score test of adjustment/fault_tests.hpp,
+// exact under the model: correlations of residuals and unequal redundancies are in q. Where the unknowns
 // absorb the trend (a drift linear in time of a line that is measured once, a scale), q is 0: no test, nothing is said.
 #pragma once
 

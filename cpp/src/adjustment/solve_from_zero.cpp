@@ -8,8 +8,8 @@ namespace stepdiag {
 // What is open is assumed to be at 0 first, and then, because that pulls at what is determined by its square, where
 // it came out.
 std::optional<int> solve_from_zero(GaussNewton& solver, const std::vector<bool>& determined, Eigen::VectorXd& x) {
-    // The second order of what is open may lead astray: other ways from zero then, the last of them with the open
-    // unknowns held, and whichever fits best.
+    // The second order of what is open may lead astray: then once more from zero with the open unknowns held, and
+    // whichever fits best.
     constexpr double parts[] = {1.0, 1e-4};
     constexpr double good_fit = 4.0;
     const double readings = double(solver.equations().problem().readings().size());
