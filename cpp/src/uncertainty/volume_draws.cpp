@@ -10,7 +10,6 @@
 
 #include "core/block_product.hpp"
 #include "stepdiag/core/error.hpp"
-#include "stepdiag/core/random.hpp"
 #include "stepdiag/plan/line.hpp"
 #include "uncertainty/derived_parts.hpp"
 #include "uncertainty/in_blocks.hpp"
@@ -65,21 +64,6 @@ struct VolumeDraws::State {
     double largest(const Field& field, Vector3d& low, Vector3d& high, double& mean2) const;
     double diagonal(const Field& field, std::size_t d) const;
 };
-
-namespace {
-
-// Trapezoidal rule over the positions; the weights sum to 1.
-ArrayXd trapezoidal(const ArrayXd& p) {
-    const Index n = p.size();
-    if (n == 1) return ArrayXd::Ones(1);
-    ArrayXd w = ArrayXd::Zero(n);
-    const ArrayXd half = (p.tail(n - 1) - p.head(n - 1)) / (2.0 * (p[n - 1] - p[0]));
-    w.head(n - 1) += half;
-    w.tail(n - 1) += half;
-    return w;
-}
-
-}  // namespace
 
 Index VolumeDraws::State::first(std::size_t r) const {
     Index at = 0;
@@ -222,7 +206,8 @@ VolumeDraws::VolumeDraws(const Calibration& calibration, const GridPositions& gr
     for (std::size_t r = 0; r < 3; ++r) {
         const auto& positions = grid[std::size_t(index(order[r]))];
         s.position[r] = Eigen::Map<const ArrayXd>(positions.data(), Index(positions.size()));
-        s.weight[r] = trapezoidal(s.position[r]);
+        const std::vector<double> weights = trapezoidal_weights(positions);
+        s.weight[r] = Eigen::Map<const ArrayXd>(weights.data(), Index(weights.size()));
         for (const double p : positions)
             for (int c = 0; c < 6; ++c) {
                 auto& row = rows.emplace_back();

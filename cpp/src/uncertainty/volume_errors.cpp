@@ -36,19 +36,6 @@ Vector3<double> tilt_of(const Matrix3<double>& one, const Matrix3<double>& rest)
     return rotation_vector(0.5 * (r.row2.y - r.row1.z), 0.5 * (r.row0.z - r.row2.x), 0.5 * (r.row1.x - r.row0.y));
 }
 
-std::vector<double> trapezoidal_weights(const std::vector<double>& positions) {
-    const std::size_t n = positions.size();
-    const double length = positions.back() - positions.front();
-    if (n == 1) return {1.0};
-    std::vector<double> weights(n, 0.0);
-    for (std::size_t k = 0; k + 1 < n; ++k) {
-        const double half = (positions[k + 1] - positions[k]) / (2.0 * length);
-        weights[k] += half;
-        weights[k + 1] += half;
-    }
-    return weights;
-}
-
 // What one position of the axis nearest to the workpiece contributes.
 struct Slab {
     double largest2 = -1.0, weighted2 = 0.0;
@@ -121,6 +108,19 @@ void check_grid(const GridPositions& grid) {
         if (!ascends)
             throw InvalidArgument(std::string("grid: expected finite, ascending positions of ") + letter(axis));
     }
+}
+
+std::vector<double> trapezoidal_weights(const std::vector<double>& positions) {
+    const std::size_t n = positions.size();
+    const double length = positions.back() - positions.front();
+    if (n == 1) return {1.0};
+    std::vector<double> weights(n, 0.0);
+    for (std::size_t k = 0; k + 1 < n; ++k) {
+        const double half = (positions[k + 1] - positions[k]) / (2.0 * length);
+        weights[k] += half;
+        weights[k + 1] += half;
+    }
+    return weights;
 }
 
 VolumeSummary summarise_volume(const Machine& machine, const GridPositions& grid) {

@@ -27,6 +27,8 @@ struct VolumeSummary {
 };
 // Throws InvalidArgument for an axis without positions, positions that are not finite or do not ascend.
 void check_grid(const GridPositions& grid);
+// Of the trapezoidal rule over ascending positions; they sum to 1.
+std::vector<double> trapezoidal_weights(const std::vector<double>& positions);
 // Throws InvalidArgument as check_grid.
 VolumeSummary summarise_volume(const Machine& machine, const GridPositions& grid);
 
