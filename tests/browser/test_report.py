@@ -137,7 +137,7 @@ def test_slider_moves_the_grid_and_the_keyboard_reaches_it(report: Seen) -> None
     page.keyboard.press("End")
     page.wait_for_timeout(200)
     np.testing.assert_allclose(
-        (grid_of(page) - commanded)[:, known], 2.0 * moved[:, known], rtol=0.0, atol=1e-8 * factor
+        (grid_of(page) - commanded)[:, known], 4.0 * moved[:, known], rtol=0.0, atol=1e-8 * factor
     )
 
 

@@ -8,6 +8,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from stepdiag._core import Calibration, InvalidArgument, __version__
 from stepdiag.io.file_kind import PAGE_BEGINS
 from stepdiag.objects.report import report_object
@@ -42,10 +44,13 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
     plotly = _plotly()
     contents = read_contents(request)
     calibration, figures = contents.calibration, Figures()
-    found = error_in_volume(calibration, request.limit)
-    before = None
-    if contents.before is not None and contents.change is not None:
-        before = ErrorInVolume(contents.change.a, *error_grid(contents.before))
+    change, before = contents.change, None
+    if contents.before is not None and change is not None:
+        before = ErrorInVolume(change.a, *error_grid(contents.before))
+    if change is not None and request.limit is None and np.array_equal(change.tool, calibration.tool):
+        found = ErrorInVolume(change.b, *error_grid(calibration))  # there already; without its ranking
+    else:
+        found = error_in_volume(calibration, request.limit)
     sections = [
         summary_section(contents, found),
         curves_section(calibration, contents.before, figures),

@@ -165,7 +165,7 @@
     if (drawn.has(volume)) return Promise.resolve();
     drawn.add(volume);
     tell();
-    const scene = { xaxis: axis3d(0), yaxis: axis3d(1), zaxis: axis3d(2), aspectmode: "data", camera: { eye: { x: -1.15, y: -1.48, z: 0.77 }, center: { x: 0, y: 0, z: -0.08 } }, dragmode: "orbit" };
+    const scene = { xaxis: axis3d(0), yaxis: axis3d(1), zaxis: axis3d(2), aspectmode: "data", camera: { eye: { x: -1.15, y: -1.48, z: 0.77 }, center: { x: 0, y: 0, z: -0.13 } }, dragmode: "orbit" };
     const layout = { ...common, ...sizeOf(volume), margin: { l: 0, r: 0, t: 0, b: 0 }, scene, hovermode: "closest", uirevision: "same" };
     return Plotly.newPlot(volume, traces(), layout, { ...config, displayModeBar: false });
   }

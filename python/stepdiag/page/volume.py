@@ -203,7 +203,7 @@ def _controls(scale: float, has_before: bool, has_lines: bool) -> Markup:
                 type="range",
                 id="exaggeration",
                 min=0,
-                max=f"{2 * scale:g}",
+                max=f"{4 * scale:g}",
                 step=f"{scale / 50:g}",
                 value=f"{scale:g}",
             ),
