@@ -31,7 +31,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         assert main(["uncertainty", "scenario.toml", "-o", "uncertainty.nc"]) == 0
         sd.read_calibration("calibration.nc").judged("rejected", ["the readings contradict"]).write("judged.csv")
         files = ["--scenario", "scenario.toml", "--run", "run.csv", "--uncertainty", "uncertainty.nc"]
-        assert main(["report", "judged.csv", "calibration.nc", *files, "-o", "report.html"]) == 0
+        assert main(["report", "judged.csv", "calibration.nc", *files, "-o", "report.html"]) == 3, "as one is rejected"
         assert main(["report", "judged.csv", "-o", "rejected.html"]) == 3
         yield folder
 

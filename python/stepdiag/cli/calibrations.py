@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from stepdiag._core import InvalidArgument, read_error_map
+from stepdiag._core import Calibration, InvalidArgument, read_error_map
 from stepdiag.cli.options import (
     NOT_TO_BE_TRUSTED,
     PATH,
@@ -101,8 +101,9 @@ def report(
         raise InvalidArgument(f"expected one calibration, or an earlier one before it, got {len(calibrations)}")
     calibration = calibrations[-1]
     path = None if functional_point is None else functional_point.claim(*calibrations)
+    before = None
     if output is not None:
-        _write_page(output, calibrations, scenario, run, uncertainty, limit, logo, words)
+        before = _write_page(output, calibrations, scenario, run, uncertainty, limit, logo, words)
     else:
         given = {"scenario": scenario, "run": run, "uncertainty": uncertainty, "limit": limit, "logo": logo} | words
         for name, value in given.items():
@@ -124,7 +125,12 @@ def report(
     else:
         for line in calibration_report(read):
             say(line)
+    if before is not None:
+        for warning in fit_warnings(calibrations[0], before.fit):
+            tell("warning", warning)
     tell_fit(context, calibration, read.fit)
+    if before is not None and before.fit == "rejected":
+        context.exit(NOT_TO_BE_TRUSTED)
 
 
 def _write_page(
@@ -136,7 +142,8 @@ def _write_page(
     limit: float | None,
     logo: Path | None,
     words: Mapping[str, str | None],
-) -> None:
+) -> Calibration | None:
+    """Write the page; the calibration before, if there is one."""
     from stepdiag.io.whole_files import write_whole
     from stepdiag.page.contents import ReportRequest
     from stepdiag.page.document import report_page
@@ -156,6 +163,7 @@ def _write_page(
         write_pdf(page, path)
     else:
         write_whole(path, page)
+    return contents.before
 
 
 @click.command(epilog="\b\nExample: stepdiag compare before.csv after.nc -o differences.csv")

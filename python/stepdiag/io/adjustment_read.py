@@ -13,6 +13,7 @@ from stepdiag.io.adjustment_table import adjustment_table
 from stepdiag.io.data_files import is_netcdf
 from stepdiag.io.labelled_tables import channel_units
 from stepdiag.io.netcdf import NetcdfFile, open_dataset
+from stepdiag.setup_quantities import SETUP_QUANTITIES
 
 FloatArray = npt.NDArray[np.float64]
 _ENDING = "_residual"
@@ -125,7 +126,14 @@ def _setup(file: NetcdfFile) -> list[SetupEntry]:
         file.numbers("setup_u", along, None, missing=True).tolist(),
         file.numbers("setup_prior", along, None, infinite=True).tolist(),
     )
-    return [SetupEntry(*row) for row in zip(*columns, strict=True)]
+    found = [SetupEntry(*row) for row in zip(*columns, strict=True)]
+    for entry in found:
+        quantity = SETUP_QUANTITIES.get(entry.quantity)
+        if quantity is None:
+            raise file.fail("setup_quantity", f'expected one of {", ".join(SETUP_QUANTITIES)}, got "{entry.quantity}"')
+        if entry.component < 0 or not (quantity.of_beams or entry.component < max(1, len(quantity.components))):
+            raise file.fail("setup_component", f"expected a component of {entry.quantity}, got {entry.component}")
+    return found
 
 
 def _faults(file: NetcdfFile) -> list[FaultEntry]:

@@ -79,7 +79,7 @@ def _family(
         figures.add(
             f"figure-{name}",
             list(_traces(name, calibration, before)),
-            {"title": {"text": f"{name[2]} (mm)", "standoff": 6}, **_ticks(calibration.volume["XYZ".index(name[2])])},
+            {"title": {"text": f"{name[2]} (mm)", "standoff": 6}, **_travel(name, calibration)},
             {"title": {"text": f"{name} ({unit})", "standoff": 6}, "range": [low - margin, high + margin]},
         )
         panels.append(_panel(name, calibration, table_id, figures))
@@ -96,13 +96,13 @@ def _family(
     )
 
 
-def _ticks(edge: float) -> dict[str, Any]:
-    """From home to the end of travel, where a round step divides it."""
-    for count in (4, 5, 3, 6, 2):
-        step = edge / count
-        if step in (m * 10.0**n for m in (1.0, 2.0, 2.5, 5.0) for n in range(-3, 6)):
-            return {"tickvals": [k * step for k in range(count + 1)], "range": [0.0, float(edge)]}
-    return {"range": [0.0, float(edge)]}
+def _travel(name: str, calibration: Calibration) -> dict[str, Any]:
+    """Range and ticks of a position: from home to the end of travel, or as far as the table goes."""
+    edge, nodes = float(calibration.volume["XYZ".index(name[2])]), calibration.functions[name][0]
+    round_steps = [m * 10.0**n for m in (1.0, 2.0, 2.5, 5.0) for n in range(-3, 6)]
+    counts = [count for count in (4, 5, 3, 6, 2) if edge / count in round_steps]
+    ticks = {"tickvals": [k * edge / counts[0] for k in range(counts[0] + 1)]} if counts else {}
+    return ticks | {"range": [min(0.0, float(nodes[0])), max(edge, float(nodes[-1]))]}
 
 
 def _reach(kind: Kind, names: Sequence[str], calibration: Calibration | None) -> Iterator[float]:

@@ -233,7 +233,9 @@ def setup_section(contents: Contents) -> Markup:
             title,
             _missing(contents, "set-up") if details is None else element("p", "The set-up was taken as known."),
         )
-    rows, notes = setup_table(details.setup, list(dict.fromkeys([*contents.lines, *details.line])))
+    rows, notes = setup_table(
+        details.setup, list(dict.fromkeys([*contents.lines, *details.line, *(one.line for one in details.setup)]))
+    )
     parts: list[Any] = [
         element(
             "p", "How laser head and mirror stood on each line. 12.3(45) is 12.3 with a standard uncertainty of 4.5."

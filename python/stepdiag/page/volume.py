@@ -1,6 +1,7 @@
 """The error of the tool in the volume: its figures, and what the page draws in three dimensions."""
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
@@ -76,7 +77,7 @@ def exaggeration(edges: FloatArray, found: ErrorInVolume, before: ErrorInVolume 
 def _ends(lines: Sequence[str], edges: FloatArray) -> list[tuple[str, list[float], list[float]]]:
     """From where to where each line goes, by its name (docs/conventions.md)."""
     ends = []
-    for line in lines:
+    for line in filter(re.compile("[pn0]{3}").fullmatch, lines):
         start = [float(edge) if sign == "n" else 0.0 for sign, edge in zip(line, edges, strict=True)]
         end = [float(edge) if sign == "p" else 0.0 for sign, edge in zip(line, edges, strict=True)]
         ends.append((line, start, end))

@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -51,15 +51,13 @@ def header_block(contents: Contents) -> Markup:
         ("Report made", moment(contents.date)),
     ]
     logo = element("img", src=contents.header.logo, alt="Logo", class_="logo") if contents.header.logo else None
-    what = " and ".join(
-        filter(None, (words.get("machine"), words.get("serial_number") and f"no. {words['serial_number']}"))
-    )
+    number = f"no. {words['serial_number']}" if "serial_number" in words else ""
     return element(
         "header",
         element(
             "div",
             element("p", "Calibration report", class_="kind"),
-            element("h1", what.replace(" and no.", ", no.") or "Three-axis machine tool"),
+            element("h1", ", ".join(filter(None, (words.get("machine"), number))) or "Three-axis machine tool"),
             element("p", "Geometric errors by the laser step-diagonal method", class_="subject"),
         ),
         logo,
@@ -365,7 +363,7 @@ def comparison_section(contents: Contents) -> Markup | None:
             with_ends(figure.a, figure.a_interval),
             with_ends(figure.b, figure.b_interval),
             with_ends(figure.change, figure.interval),
-            figure.verdict or "",
+            "" if "rejected" in (comparison.a.fit, comparison.b.fit) else figure.verdict or "",
         ]
         for name, figure in (("largest", change.largest), ("root mean square", change.rms))
     ]
@@ -388,7 +386,11 @@ def comparison_section(contents: Contents) -> Markup | None:
     return section(
         "comparison",
         "Before and after",
-        element("p", element("strong", _verdict_of(change)), " The curves above show the earlier calibration dashed."),
+        element(
+            "p",
+            element("strong", _verdict_of(change, (comparison.a.fit, comparison.b.fit))),
+            " The curves above show the earlier calibration dashed.",
+        ),
         None if fit == "accepted" else element("p", f"The earlier calibration: {HEADLINE[fit]}.", class_="note"),
         table("Error of the tool in the volume", ["", "before", "after", "change", ""], volume),
         table("Error in the volume that one difference makes alone", ["Parameter", "largest", "rms", ""], effects),
@@ -407,8 +409,10 @@ def comparison_section(contents: Contents) -> Markup | None:
     )
 
 
-def _verdict_of(change: VolumeChange) -> str:
+def _verdict_of(change: VolumeChange, fits: Collection[str | None]) -> str:
     figure = change.largest
+    if "rejected" in fits:
+        return "A fit is rejected: these figures do not tell whether the machine has changed."
     if math.isnan(figure.change):
         return "Whether the error in the volume has changed is not known."
     way = "smaller" if figure.change < 0.0 else "larger"

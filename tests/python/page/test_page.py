@@ -1,5 +1,6 @@
 """The report as a page: one file, its values those of the calibration, everything of files escaped."""
 
+import importlib.util
 import json
 import re
 from collections.abc import Callable
@@ -296,6 +297,26 @@ def test_header_is_that_of_the_scenario_unless_a_flag_says_otherwise(evaluated: 
             page_of(calibration=Path("calibration.nc"), scenario=Path("scenario.toml"))
 
 
+def test_damaged_details_of_a_file_are_refused_by_name(evaluated: Path) -> None:
+    import xarray as xr
+
+    with xr.open_dataset("calibration.nc") as file:
+        table = file.load()
+    for name, value, message in (
+        ("setup_quantity", "other", "setup_quantity: expected one of reflector"),
+        ("setup_component", 7, "setup_component: expected a component of "),
+        ("reading_line", "<b>", ""),
+    ):
+        changed = table.copy(deep=True)
+        changed[name][...] = value
+        changed.to_netcdf("changed.nc")
+        if message:
+            with pytest.raises(InvalidArgument, match=f"changed.nc: {message}"):
+                page_of(calibration=Path("changed.nc"))
+        else:
+            assert not page_of(calibration=Path("changed.nc")).all("b")
+
+
 def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     capsys.readouterr()
     assert main(arguments) == 2
@@ -307,7 +328,8 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 def test_without_plotly_one_line_says_how_to_install_it(
     evaluated: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    find = importlib.util.find_spec
+    monkeypatch.setattr("importlib.util.find_spec", lambda name, *of: None if name == "plotly" else find(name, *of))
     said = refused(["report", "calibration.nc", "-o", "report.html"], capsys)
     assert said == "stepdiag: error: a report as a page needs Plotly: pip install 'stepdiag[report]'\n"
     assert not Path("report.html").exists()
@@ -332,8 +354,13 @@ def test_options_of_the_page_are_refused_without_one(evaluated: Path, capsys: py
 
 def test_rejected_calibration_ends_with_status_three_and_is_written(evaluated: Path) -> None:
     sd.read_calibration("calibration.nc").judged("rejected", ["x"]).write("judged.csv")
-    assert main(["report", "judged.csv", "-o", "report.html"]) == 3
-    assert Path("report.html").is_file()
+    for calibrations in (["judged.csv"], ["judged.csv", "calibration.nc"], ["calibration.nc", "judged.csv"]):
+        assert main(["report", *calibrations, "-o", "report.html"]) == 3
+        page = Page(Path("report.html").read_text())
+        if len(calibrations) == 2:
+            assert "A fit is rejected: these figures do not tell whether the machine has changed." in page.text
+            assert "Improved" not in page.text
+            assert "Worse" not in page.text
 
 
 def test_content_is_escaped_and_markup_is_not() -> None:
