@@ -74,7 +74,8 @@ INPUTS = {
     *{(name, "scenario") for name in ("simulate", "evaluate", "observe", "plan", "uncertainty", "nc")},
     *{("acquire", "scenario"), ("acquire", "from_raw"), ("twin", "scenario"), ("init", "scenario"), ("study", "file")},
     *{("report", name) for name in ("calibrations", "scenario", "run", "uncertainty", "logo")},
-    *{("evaluate", "run"), ("compare", "a"), ("compare", "b"), ("export", "calibration"), ("positions", "file")},
+    *{("evaluate", "run"), ("compare", "a"), ("compare", "b"), ("positions", "file")},
+    *{("export", "calibration"), ("volume", "calibration")},
     *{("check", "files"), ("head show", "name"), ("head check", "name"), ("head sensitivity", "name")},
     *{("plot", "files"), ("plot", "truth"), ("plot", "scenario")},
 }

@@ -309,6 +309,7 @@ def test_damaged_details_of_a_file_are_refused_by_name(evaluated: Path) -> None:
     ):
         changed = table.copy(deep=True)
         changed[name][...] = value
+        changed[name].encoding.clear()
         changed.to_netcdf("changed.nc")
         if message:
             with pytest.raises(InvalidArgument, match=f"changed.nc: {message}"):
