@@ -71,12 +71,13 @@ class VolumeChange(Displayed):
 def volume_change(comparison: Comparison) -> VolumeChange:
     """Compute the largest error and the rms over the volume by A and by B, with verdicts and the parameters' effects.
 
-    Both with the tool offset of A. The interval of B - A follows from those of A and B, taken as independent (method of
+    Both with the tool offset of A. What lies between the nodes is left out: it is much the same before and after. The
+    interval of B - A follows from those of A and B, taken as independent (method of
     variance estimates recovery, Zou and Donner 2008): value -/+ sqrt(of the squared distances to the ends of the
     intervals that make it smaller/larger). The verdict is "improved" or "worse" where that interval excludes 0. There
     is none without covariances, for evaluations of the same run, and against an error map."""
     one, other = comparison.a, comparison.b
-    a, b = (volume_errors(each, tool=one.tool, ranking=False) for each in (one, other))
+    a, b = (volume_errors(each, tool=one.tool, between_nodes=0.0, ranking=False) for each in (one, other))
     reason = _no_verdict(comparison, a, b)
     return VolumeChange(
         one.tool,

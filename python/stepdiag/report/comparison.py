@@ -119,8 +119,11 @@ def _rules(comparison: Comparison) -> Iterator[str]:
             f"probability: that chance makes any of the {comparison.count} values differ so, at most (Bonferroni); "
             f"significant up to {comparison.limit:g}"
         )
-        yield "u = sqrt(u_A^2 + u_B^2), as if A and B were independent: two evaluations of one run are not,"
-        yield "and then differ by less than u says"
+        if comparison.agreement is not None:
+            yield "u: that of the calibration; the error map is taken as exact"
+        else:
+            yield "u = sqrt(u_A^2 + u_B^2), as if A and B were independent: two evaluations of one run are not,"
+            yield "and then differ by less than u says"
     else:
         yield "significance: not known, because one of the two has no standard uncertainties"
     for which in "AB":
