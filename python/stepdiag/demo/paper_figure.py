@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from stepdiag._core import ErrorMap
 from stepdiag.demo.paper_cases import POSITIONING, Result
-from stepdiag.style import COLOUR, own_style, save
+from stepdiag.style import COLOUR, axis_label, own_style, save
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -37,20 +37,27 @@ PANELS: Mapping[str, tuple[str, str, Sequence[str], Sequence[str]]] = {
     "1a": ("kinematic errors only", "1a", POSITIONING, ALL),
     "1b": ("reflector 100, 300 µrad", "1b", POSITIONING, ALL),
     "1c": ("laser 700, 1000 µrad", "1c", POSITIONING, ALL),
-    "1d": ("laser, mirror 700, 1000 µrad", "1d", POSITIONING, ALL),
-    "2a": ("as 1a", "1a", STRAIGHTNESS, ALL),
-    "2b": ("as 1b", "1b", STRAIGHTNESS, ALL),
-    "2c": ("as 1c", "1c", STRAIGHTNESS, ALL),
-    "2d": ("as 1d", "1d", STRAIGHTNESS, ALL),
+    "1d": ("as 1c, the mirror follows", "1d", POSITIONING, ALL),
+    "2": ("straightness of 1a; hardly different in 1b to 1d", "1a", STRAIGHTNESS, ALL),
     "3a": ("PSD displaced by 1.5, 2 mm", "3", POSITIONING, ("enhanced", "adjustment")),
     "3b": ("as 3a", "3", ANGLES, ("enhanced", "adjustment")),
 }
 DEFINED = ("3a", "3b")  # traced, with what the definition of the readings gives beside it
+# Panels of what the methods leave, which lines on the truth cannot show: title, case.
+LEFT: Mapping[str, tuple[str, str]] = {
+    "1a left": ("what 1a leaves", "1a"),
+    "1b left": ("what 1b leaves", "1b"),
+    "1c left": ("what 1c leaves", "1c"),
+    "1d left": ("what 1d leaves", "1d"),
+}
+SMALLEST = 1e-12  # µm: a deviation of 0 is drawn there
+MARKS: Mapping[str, str] = {"conventional": "s", "enhanced": "o", "adjustment": "D"}
 YLABEL = {
     "1a": "positioning (µm)",
-    "2a": "straightness (µm)",
+    "1a left": "largest deviation (µm)",
+    "2": "straightness (µm)",
     "3a": "positioning (µm)",
-    "3b": "rotation (µrad)",
+    "3b": "angles (µrad)",
     "4": "ripple, shifted (µm)",
 }
 
@@ -59,20 +66,24 @@ def draw_figure(results: Sequence[Result]) -> dict[str, bytes]:
     """The figure as files, figure.png and figure.svg. Same results give the same bytes."""
     by_name = {result.case.name: result for result in results}
     with own_style():
-        figure = Figure(figsize=(10.0, 8.0), layout="constrained")
-        panels = figure.subplot_mosaic([["1a", "1b", "1c", "1d"], ["2a", "2b", "2c", "2d"], ["3a", "3b", "4", "4"]])
+        figure = Figure(figsize=(10.0, 10.4), layout="constrained")
+        rows: list[Any] = [["1a", "1b", "1c", "1d"], list(LEFT), ["2", "2", "3a", "3b"], ["4"] * 4]
+        panels = figure.subplot_mosaic(rows, height_ratios=[1.0, 0.72, 1.0, 0.8])
         for name, (title, case, functions, methods) in PANELS.items():
             draw_functions(panels[name], by_name[case], functions, methods)
             set_title(panels[name], name, title)
+        for name, (title, case) in LEFT.items():
+            draw_left(panels[name], by_name[case])
+            panels[name].set_title(title)
         for name in DEFINED:
             draw_definition(panels[name], by_name["3d"], PANELS[name][2])
         draw_screw(panels["4"], by_name["4"])
         set_title(panels["4"], "4", "screw error of 10 mm pitch: right at the nodes, unseen between them")
         for name, label in YLABEL.items():
             panels[name].set_ylabel(label)
-        for name in ("3a", "3b", "4"):
-            panels[name].set_xlabel("position (mm)")
-        figure.legend(handles=legend_handles(), loc="outside upper center", ncols=5, handlelength=3.0)
+        for name in ("1a", "1b", "1c", "1d", "2", "3a", "3b", "4"):
+            panels[name].set_xlabel(axis_label("position", "mm"))
+        figure.legend(handles=legend_handles(), loc="outside upper center", ncols=4, handlelength=3.0)
         return {"figure.png": save(figure, "png"), "figure.svg": save(figure, "svg")}
 
 
@@ -82,7 +93,12 @@ def set_title(axes: Axes, name: str, title: str) -> None:
 
 def legend_handles() -> list[Any]:
     styles = {"truth": TRUTH, **METHODS, "enhanced, by definition of the readings (3a, 3b)": DOTS}
-    return [Line2D([], [], label=name, **{"color": "black", **style}) for name, style in styles.items()]
+    lines = [Line2D([], [], label=name, **{"color": "black", **style}) for name, style in styles.items()]
+    marks = [
+        Line2D([], [], linestyle="none", marker=marker, color=COLOUR[method], markersize=4.5, label=f"{method} leaves")
+        for method, marker in MARKS.items()
+    ]
+    return [*lines, *marks]
 
 
 def draw_functions(axes: Axes, result: Result, names: Sequence[str], methods: Sequence[str]) -> None:
@@ -96,6 +112,22 @@ def draw_functions(axes: Axes, result: Result, names: Sequence[str], methods: Se
             if function is not None:
                 axes.plot(function[0], function[1] * scale, **{"color": COLOUR[name[2]], **METHODS[method]})
     name_functions(axes, names)
+
+
+def draw_left(axes: Axes, result: Result) -> None:
+    """Draw the largest deviation from the truth of each function, by method, on a logarithmic axis."""
+    names = [*POSITIONING, *STRAIGHTNESS]
+    for method, marker in MARKS.items():
+        functions = result.calibrations[method].functions
+        for k, name in enumerate(names):
+            if name in functions:
+                position, value, _ = functions[name]
+                left = 1e3 * float(np.max(np.abs(value - result.truth.function(name, position))))
+                axes.plot(k, max(left, SMALLEST), marker, color=COLOUR[method], markersize=4.5)
+    axes.set_yscale("log")
+    axes.set_ylim(1e-10, 1e4)
+    axes.set_xticks(range(len(names)), names, size=6.5)
+    axes.grid(axis="x", visible=False)
 
 
 def draw_definition(axes: Axes, result: Result, names: Sequence[str]) -> None:

@@ -23,7 +23,7 @@ FloatArray = npt.NDArray[np.float64]
 COVERAGE_FACTOR: Final = 1.959963984540054  # of 95 %, normal distribution
 WIDTH: Final = 13.4
 MOST_COLUMNS: Final = 7  # lines beside each other
-PANEL_HEIGHT: Final = 1.95
+PANEL_HEIGHT: Final = 1.75
 _READING: Final = re.compile(r"distance|alpha|beta|spot_[xy]|d\d+")
 _POINTS: Final[Mapping[str, Any]] = {"linewidth": 0.7, "marker": ".", "markersize": 2.5}
 
@@ -57,7 +57,7 @@ def draw_measurement(measurement: Measurement, adjustment: Adjustment | None = N
     with own_style():
         height = 0.35 + PANEL_HEIGHT * len(values) * blocks
         page = Page(_heading(measurement, adjustment, name), WIDTH, height, _notes(adjustment))
-        grid = page.grid(len(values) * blocks, columns, wspace=0.14, hspace=0.55)
+        grid = page.grid(len(values) * blocks, columns, wspace=0.14, hspace=0.6)
         first: dict[str, Axes] = {}
         panels: dict[tuple[str, str], Axes] = {}
         for k, line in enumerate(lines):

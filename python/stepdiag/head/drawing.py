@@ -54,9 +54,9 @@ def draw_head(head: _core.Head, distance: float, suffix: str) -> bytes:
     width, height_x, height_y = (high - low)[[2, 0, 1]]
     scale = min(5.5 / width, 6.5 / (height_x + height_y))  # inches per mm
     with own_style():
-        figure = Figure(figsize=(width * scale + 4.5, (height_x + height_y) * scale + 1.6), layout="constrained")
+        figure = Figure(figsize=(width * scale + 5.7, (height_x + height_y) * scale + 1.6), layout="constrained")
         panels = figure.subplots(
-            2, 2, width_ratios=(width * scale, 3.0), height_ratios=(height_x, height_y), sharex="col"
+            2, 2, width_ratios=(width * scale, 4.2), height_ratios=(height_x, height_y), sharex="col"
         )
         for view, (large, whole) in zip(VIEWS, panels, strict=True):
             for axes in (large, whole):
@@ -71,6 +71,7 @@ def draw_head(head: _core.Head, distance: float, suffix: str) -> bytes:
             whole.plot([distance, distance], [-half, half], color=DARK, linewidth=3.0, solid_capstyle="butt", zorder=6)
             whole.set(xlim=(low[2], distance + 0.05 * (distance - low[2])))
             whole.set(ylim=(min(low[view.axis], -1.1 * half), max(high[view.axis], 1.1 * half)))
+            whole.set_aspect("equal", anchor="C")
         for axes, title in zip(
             panels[0], (f"{plain(design.name)}: the head", f"the mirror at {distance:g} mm"), strict=True
         ):
@@ -152,7 +153,7 @@ def _draw_detectors(axes: Axes, view: View, design: _core.HeadDesign, outlines: 
 
 
 def _colour(beam: int) -> str:
-    return series(beam)[0]
+    return series(beam + 1)[0]  # the first one is as dark as mirrors
 
 
 def _excess(design: _core.HeadDesign, beam: int) -> float:
