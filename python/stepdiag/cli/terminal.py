@@ -2,9 +2,7 @@
 
 import os
 import re
-import shutil
 import sys
-import textwrap
 from typing import Any, Final
 
 import click
@@ -61,6 +59,9 @@ def _painted(line: str) -> str:
 
 def _wrapped(line: str) -> list[str]:
     """Sentences in lines of the terminal's width, at most 100; rows of tables, which have gaps, as they are."""
+    import shutil  # slow, as textwrap
+    import textwrap
+
     width = min(shutil.get_terminal_size().columns, WIDEST)
     if len(line) <= width or re.search(r"\S {2,}\S", line):
         return [line]

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +26,7 @@ from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 from stepdiag.style import BAND, COLOUR, own_style
 
 FloatArray = npt.NDArray[np.float64]
+_PARAMETER: Final = re.compile(r"\b(E[XYZABC][XYZ]|C0Y|B0Z|A0Z|rotations)\b")
 NEGATIVE: Any = {"linestyle": (0, (1, 1)), "linewidth": 1.0, "marker": "", "alpha": 0.9}
 
 
@@ -36,7 +37,7 @@ def draw_calibration(calibration: Calibration, truth: ErrorMap | None = None, na
     hatched; of those that are partly determined the known part is drawn. A rejected fit is marked
     in the heading and in every panel."""
     with own_style():
-        page = Page(_heading(calibration, name), WIDTH, HEIGHT, _notes(calibration))
+        page = Page(_heading(calibration, name), WIDTH, HEIGHT, undetermined_notes(calibration))
         panels = ParameterPanels(page, calibration.volume, "")
         for parameter in FUNCTIONS:
             if parameter in calibration.functions:
@@ -69,8 +70,11 @@ def _heading(calibration: Calibration, name: str) -> Heading:
     return Heading(name, ", ".join([*made, *machine, *fit]), calibration.fit, reasons)
 
 
-def _notes(calibration: Calibration) -> list[str]:
-    return [f"undetermined: {sentence}" for sentence in calibration.undetermined]
+def undetermined_notes(calibration: Calibration) -> list[str]:
+    """What is said of undetermined parameters; set-ups are counted."""
+    notes = [f"undetermined: {text}" for text in calibration.undetermined if _PARAMETER.search(text)]
+    others = len(calibration.undetermined) - len(notes)
+    return notes + [f"undetermined: {others} more about set-ups, which the report lists"] * (others > 0)
 
 
 def _draw_function(panels: ParameterPanels, calibration: Calibration, parameter: str) -> None:
@@ -95,7 +99,7 @@ def with_gaps(
     calibration: Calibration, parameter: str, position: FloatArray, value: FloatArray, u: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """A table with NaN at nodes of the axis where a finding says that the parameter is not determined."""
-    if not any(re.search(rf"\b{parameter} at \d+ of its positions", text) for text in calibration.undetermined):
+    if not _partial(calibration, parameter):
         return position, value, u
     tables = [table[0] for name, table in calibration.functions.items() if name[2] == parameter[2]]
     nodes = np.unique(np.concatenate(tables))
@@ -103,6 +107,11 @@ def with_gaps(
     values, uncertainties = np.full((2, len(nodes)), np.nan)
     values[place], uncertainties[place] = value, u
     return nodes, values, uncertainties
+
+
+def _partial(calibration: Calibration, parameter: str = r"\w+") -> bool:
+    """Whether a finding says that a parameter is determined at some of its positions only."""
+    return any(re.search(rf"\b{parameter} at \d+ of its positions", text) for text in calibration.undetermined)
 
 
 def _draw_truth(panels: ParameterPanels, calibration: Calibration, parameter: str, truth: ErrorMap) -> None:
@@ -128,7 +137,9 @@ def _handles(calibration: Calibration, truth: ErrorMap | None) -> Iterator[Any]:
         yield Line2D([], [], color=colour, label="approached in - direction", linestyle=(0, (1, 1)), linewidth=1.0)
     if truth is not None:
         yield Line2D([], [], label="truth", **TRUTH)
-    if calibration.undetermined:
+    if len(calibration.functions) + len(calibration.squareness) < len(FUNCTIONS) + len(SQUARENESSES) or _partial(
+        calibration
+    ):
         yield Patch(label="not determined", **HATCH)
 
 

@@ -25,7 +25,11 @@ WIDTH: Final = 13.4
 MOST_COLUMNS: Final = 7  # lines beside each other
 PANEL_HEIGHT: Final = 1.75
 _READING: Final = re.compile(r"distance|alpha|beta|spot_[xy]|d\d+")
-_POINTS: Final[Mapping[str, Any]] = {"linewidth": 0.7, "marker": ".", "markersize": 2.5}
+_POINTS: Final[Mapping[str, Mapping[str, Any]]] = {
+    "forward": {"linewidth": 0.7, "marker": ".", "markersize": 2.5, "color": COLOUR["forward"]},
+    # Dashes, because it often lies on the other one.
+    "backward": {"linewidth": 1.1, "linestyle": (0, (2, 2)), "color": COLOUR["backward"]},
+}
 
 
 @dataclass(frozen=True)
@@ -145,10 +149,10 @@ def _draw_line(
     for run in np.unique(measurement.run[line.rows]):
         own = measurement.run[line.rows] == run
         rows, along = line.rows[own], line.along[own]
-        colour = COLOUR["backward" if (direction[rows] == "backward").all() else "forward"]
-        axes.plot(along, value[rows], color=colour, **_POINTS)
+        style = _POINTS["backward" if (direction[rows] == "backward").all() else "forward"]
+        axes.plot(along, value[rows], **style)
         if band is not None and np.isfinite(band[rows]).any():
-            axes.fill_between(along, -band[rows], band[rows], color=colour, alpha=BAND, linewidth=0.0, zorder=1)
+            axes.fill_between(along, -band[rows], band[rows], color=style["color"], alpha=BAND, linewidth=0.0, zorder=1)
         lost = along[is_lost[rows]]
         axes.plot(lost, np.full(len(lost), 0.03), "|", color="#777777", transform=axes.get_xaxis_transform())
     axes.axhline(0.0, color="#777777", linewidth=0.6, zorder=0.8)
@@ -207,7 +211,7 @@ def _heading(measurement: Measurement, adjustment: Adjustment | None, name: str)
     if adjustment is None:
         return Heading(f"{name}: readings", facts)
     facts += (
-        f"; {len(adjustment.outliers)} readings left out, {len(adjustment.faults)} classes of faults; "
+        f"; readings left out: {len(adjustment.outliers)}, classes of faults: {len(adjustment.faults)}; "
         f"variance factor {adjustment.variance_factor:.3g} with {adjustment.degrees_of_freedom} degrees of freedom"
     )
     verdict = adjustment.verdict
@@ -224,7 +228,7 @@ def _handles(
     directions = set(measurement.direction)
     for direction in ("forward", "backward"):
         if direction in directions:
-            yield Line2D([], [], color=COLOUR[direction], label=direction, **_POINTS)
+            yield Line2D([], [], label=direction, **_POINTS[direction])
     if adjustment is not None:
         yield Patch(facecolor=COLOUR["forward"], alpha=BAND, label="95 % of residuals (1.96 u)")
     if any(np.isnan(value).any() for value in values.values()):

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from stepdiag._core import Adjustment, InvalidArgument, Measurement
 from stepdiag.calibration.finding_text import combination_text
-from stepdiag.figures.calibration import with_gaps
+from stepdiag.figures.calibration import undetermined_notes, with_gaps
 from stepdiag.figures.page import SMALL, Heading, Page
 from stepdiag.figures.parameter_panels import HATCH, HEIGHT, WIDTH, ParameterPanels, scaled
 from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, kind_of, units_of
@@ -83,7 +83,7 @@ def draw_observation(run: Measurement, found: Adjustment, known: Known, name: st
     tables = {p: with_gaps(calibration, p, *table) for p, table in calibration.functions.items()}
     curves = {parameter: (position, u) for parameter, (position, _, u) in tables.items()}
     curves |= {p: (np.array([np.nan]), np.array([u])) for p, (_, u) in calibration.squareness.items()}
-    notes = [f"undetermined: {sentence}" for sentence in calibration.undetermined]
+    notes = undetermined_notes(calibration)
     notes += [f"known: {combination_text(combination, value=False)}" for combination in found.combinations]
     with own_style():
         page = Page(Heading(f"{name}: what the plan determines, and how well", facts), WIDTH, HEIGHT, notes)

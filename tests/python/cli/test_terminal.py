@@ -15,7 +15,6 @@ from click.testing import CliRunner
 from small_scenario import SCENARIO
 
 import stepdiag as sd
-from stepdiag.cli import terminal
 from stepdiag.cli.acquire import acquire
 from stepdiag.cli.evaluate import evaluate
 from stepdiag.cli.options import Grouped
@@ -101,7 +100,7 @@ def test_colour_is_as_the_environment_wishes(
 
 @pytest.mark.parametrize("columns", [40, 80, 100, 250])
 def test_sentence_fits_the_terminal_and_a_table_stays(monkeypatch: pytest.MonkeyPatch, columns: int) -> None:
-    monkeypatch.setattr(terminal.shutil, "get_terminal_size", lambda: os.terminal_size((columns, 24)))
+    monkeypatch.setenv("COLUMNS", str(columns))
     sentence = "note: " + " ".join(["word"] * 60)
     lines = said(monkeypatch, sentence).splitlines()
     assert max(map(len, lines)) <= min(columns, WIDEST)

@@ -87,12 +87,14 @@ def test_undetermined_parameters_are_marked_and_named() -> None:
     parts = parts_of(calibrate(1))
     del parts["functions"]["EXX"], parts["squareness"]["C0Y"]
     sentences = ["EXX: add the line p00", "C0Y: add body diagonals"]
-    partial = sd.Calibration(**parts | {"undetermined": sentences})
+    setup = "reflector tilt about local x on ppp: give a prior, or take it as fixed"
+    partial = sd.Calibration(**parts | {"undetermined": [*sentences, setup]})
     figure = draw_calibration(partial)
     assert [text.get_text() for text in panel(figure, "EXX").texts] == ["not determined"]
     assert [text.get_text() for text in panel(figure, "squarenesses").texts] == ["not determined"]
     assert not panel(figure, "EYY").texts
     assert [f"undetermined: {sentence}" in texts(figure) for sentence in sentences] == [True, True]
+    assert "undetermined: 1 more about set-ups, which the report lists" in texts(figure)
 
 
 def test_curve_ends_where_positions_are_not_determined() -> None:
