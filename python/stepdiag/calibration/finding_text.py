@@ -273,7 +273,7 @@ def fault_rows(faults: Sequence[FaultClass]) -> Iterator[str]:
 
 
 def fault_text(found: FaultClass) -> str:
-    """What may have happened, what was done about it, and what would tell; without a full stop."""
+    """What may have happened, whether the readings tell which, and what was done about it; without a full stop."""
     shown = 4
     best, *others = found.members
     texts = [_fault(best), *map(_alternative, others[: shown - 1])]
@@ -370,9 +370,10 @@ def _trend(reason: FitReason) -> str:
 
 def _prior_scatter(reason: FitReason) -> str:
     unit = report_unit(reason.channel)
+    name = reason.channel.replace("_", " ")
     return (
-        f"the {reason.channel.replace('_', ' ')} found is larger than its prior: about {reason.value / unit.native:.2g} "
-        f"{unit.name} by line, where {SETUP_QUANTITIES[reason.channel].key} in [adjustment] is "
+        f"the {name} found is larger than its prior: about {reason.value / unit.native:.2g} {unit.name} by line, where "
+        f"{SETUP_QUANTITIES[reason.channel].key} in [adjustment] is "
         f"{reason.limit / unit.native:.2g} {unit.name}"
     )
 

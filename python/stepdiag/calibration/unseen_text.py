@@ -39,7 +39,7 @@ def unseen_rows(calibration: Calibration) -> Iterator[str]:
     for sentence in calibration.unseen_faults:
         yield f"unseen: {sentence}"
     if calibration.unseen_faults:
-        yield "        (one fault at a time; larger ones are found with 99 %; stepdiag observe says which plan finds more)"
+        yield "  (one at a time; larger ones are found with 99 %; stepdiag observe names the plan that would tell more)"
 
 
 def _text(fault: UnseenFault, calibration: Calibration) -> tuple[bool, str]:
@@ -56,9 +56,10 @@ def _text(fault: UnseenFault, calibration: Calibration) -> tuple[bool, str]:
     ]
     if not fault.controlled:
         any_size = ", ".join(kind for kind in beyond if math.isinf(fault.hidden[kind]))
-        elsewhere = f"; elsewhere one {below}" if fault.size > 0.0 else ""
-        with_up_to = f", with up to {_list(shown)}" if elsewhere and shown else ""
-        return True, f"{name} of any size may stay unseen where no other reading controls it ({any_size}){elsewhere}{with_up_to}"
+        text = f"{name} of any size may stay unseen where no other reading controls it ({any_size})"
+        if fault.size > 0.0:
+            text += f"; elsewhere one {below}" + (f", with up to {_list(shown)}" if shown else "")
+        return True, text
     if shown:
         return True, f"{name} {below} may stay unseen, with up to {_list(shown)}"
     return False, f"{name} {below} may stay unseen, with less than {_WITHIN:g} times the largest standard uncertainties"

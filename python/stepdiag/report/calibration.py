@@ -8,8 +8,8 @@ import numpy as np
 from stepdiag._core import Calibration
 from stepdiag.calibration.finding_text import fit_rows, provenance_rows
 from stepdiag.calibration.functional_point import functional_point_straightness
-from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.calibration.unseen_text import unseen_rows
+from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.comparison import decimal
 from stepdiag.report.evaluation import reversal_rows, undetermined_rows

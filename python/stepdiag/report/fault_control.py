@@ -2,14 +2,15 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from stepdiag._core import FaultControl
 from stepdiag.calibration.unseen_text import FAULT_NAMES, FAULT_UNITS
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units
-from stepdiag.planning.fault_control import Extension, tells_all
 from stepdiag.units import report_value
 
+if TYPE_CHECKING:
+    from stepdiag.planning.fault_control import Extension
 
 ROUNDING: Final = 1e-6  # µm or µrad for each µm or µrad of a fault
 
@@ -32,8 +33,10 @@ def control_rows(controls: Sequence[FaultControl]) -> Iterator[str]:
             yield f"  {name(c)} not told from a twin: by {_unit(c)} of it {_shared(c)}"
 
 
-def extension_rows(own: Sequence[FaultControl], tried: Iterable[Extension]) -> Iterator[str]:
+def extension_rows(own: Sequence[FaultControl], tried: "Iterable[Extension]") -> Iterator[str]:
     """What would tell apart or control what the plan does not; nothing where it does."""
+    from stepdiag.planning.fault_control import tells_all  # reports of evaluations need none of that room
+
     if tells_all(own):
         return
     for extension in tried:

@@ -69,8 +69,8 @@ def drift_rows(measurement: Measurement, known: Known) -> Iterator[str]:
     size = f"about {effects[worst] * MICRO:.2g} µrad of {worst}"
     if is_timed and choice != "fixed":
         yield (
-            f"drift: squarenesses assume that no line's distances drift by more than {pace:g} µm/h (drift_um_per_h, one "
-            f"standard deviation); that is {size}, in the uncertainties; {FOURFOLD * pace:g} µm/h would be "
+            f"drift: squarenesses assume that the distances of a line drift by at most {pace:g} µm/h (1 sigma, "
+            f"drift_um_per_h); that is {size}, in the uncertainties; {FOURFOLD * pace:g} µm/h would be "
             f"{FOURFOLD * effects[worst] * MICRO:.2g} µrad, and single runs hardly show it"
         )
     else:
