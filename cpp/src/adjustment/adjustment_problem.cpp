@@ -105,8 +105,8 @@ LineReadings line_readings(const Measurement& measurement, const Line& line, con
     return readings;
 }
 
-// Where no point stands beside a line, only priors know how laser and mirror stand there. Their difference has twice the
-// variance of either; where the tilts of such lines show more than is usual, that is what both are taken for.
+// Where no point stands beside a line, only priors know how laser and mirror stand there. Their difference has twice
+// the variance of either; where the tilts of such lines show more than is usual, that is what both are taken for.
 double usual_angle(const Plan& plan, const std::map<std::string, LineReadings>& told) {
     const double usual = record(SetupQuantity::laser).usual;
     double squares = 0.0;
@@ -150,7 +150,8 @@ void AdjustmentProblem::collect_setups(const Measurement& measurement, const Adj
     for (const Station& station : measurement.stations())
         if (const std::string line = station.line.name(); plan_.contains(station.line) && told.count(line) == 0)
             told.emplace(line, line_readings(measurement, station.line, plan_, heads_->of(line)));
-    const double usual = kind_ == HeadLayout::multi_beam ? record(SetupQuantity::laser).usual : usual_angle(plan_, told);
+    const double usual =
+        kind_ == HeadLayout::multi_beam ? record(SetupQuantity::laser).usual : usual_angle(plan_, told);
     for (auto& entry : told) entry.second.usual_angle = usual;
     for (const auto& entry : rows_by_pass(measurement)) {
         const std::vector<std::size_t>& rows = entry.second;

@@ -24,8 +24,8 @@ double upper_tail(double t, const std::array<double, 3>& sums) {
 
 std::vector<ResidualPattern> prior_scatter(const AdjustmentProblem& problem, const Eigen::VectorXd& x,
                                            const BorderedBand& inverse) {
-    constexpr double told = 1e-3;       // of all values' variance; below it second order and rounding may be as much
-    constexpr std::size_t most = 500;   // values: time grows with the third power
+    constexpr double told = 1e-3;      // of all values' variance; below it second order and rounding may be as much
+    constexpr std::size_t most = 500;  // values: time grows with the third power
     struct Value {
         int unknown;
         double prior;
@@ -60,7 +60,8 @@ std::vector<ResidualPattern> prior_scatter(const AdjustmentProblem& problem, con
         const double factor = std::sqrt(std::max(0.0, 1.0 + (t - sums[0]) / sums[1]));
         found.push_back({{FitFinding::prior_scatter, factor * usual, usual, "", name(quantity)}, upper_tail(t, sums)});
     }
-    for (ResidualPattern& pattern : found) pattern.probability = std::min(1.0, double(found.size()) * pattern.probability);
+    for (ResidualPattern& pattern : found)
+        pattern.probability = std::min(1.0, double(found.size()) * pattern.probability);
     return found;
 }
 

@@ -159,7 +159,7 @@ std::string name(FitAspect aspect);  // "" of the whole, "second_half", ...
 
 struct FitReason {
     FitFinding finding;
-    double value;              // of a trend mm or rad
+    double value;  // of a trend mm or rad
     double limit;  // of an uneven misfit that of the other readings; of noise, trends, prior_scatter what is expected
     std::string line = {};     // of an uneven misfit, a trend or a prior; empty: all
     std::string channel = {};  // of an uneven misfit or a trend: "distance", ..., empty: all; of priors: the quantity
@@ -223,7 +223,7 @@ struct UnseenFault {
     std::string channel;  // as in FaultControl
     // Any fault of this kind is found from this size on with 99 %; mm or rad; of those that are controlled at all.
     double size = 0.0;
-    bool controlled = true;     // all that were looked at are; false: some may have any size
+    bool controlled = true;  // all that were looked at are; false: some may have any size
     // Largest change of a calibrated value by a fault just not found; infinite: of one that nothing controls.
     double positioning = 0.0, straightness = 0.0, angle = 0.0, squareness = 0.0;
 };
