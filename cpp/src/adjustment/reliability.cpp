@@ -216,7 +216,7 @@ public:
     }
 
 private:
-    static constexpr int slips_computed = 60;
+    static constexpr int slips_computed = 200;
     static constexpr int most_uncontrolled = 20;  // of a kind, evenly spaced
     static constexpr double nothing = 1e-4;       // of a value's standard uncertainty: rounding
     using Place = std::pair<int, int>;            // kind of fault and family
@@ -225,18 +225,17 @@ private:
         int hypothesis = 0, value = 0;
     };
 
-    // Of each function and squareness the value that is known worst, and the end of a positioning error.
+    // Of each function and squareness the value that is known worst, and some that are spread evenly, both ends too.
     std::set<int> first_columns() const {
-        std::map<int, int> worst;
+        constexpr int spread = 4;
         std::set<int> columns;
-        for (int v = 0; v < int(values_.size()); ++v) {
-            const CalibratedValue& value = values_[v];
-            const auto [found, is_new] = worst.try_emplace(value.table, v);
-            if (value.standard_uncertainty > values_[found->second].standard_uncertainty) found->second = v;
-            const bool last = v + 1 == int(values_.size()) || values_[v + 1].table != value.table;
-            if (last && value.family == 0) columns.insert(v);
+        for (int first = 0, end; first < int(values_.size()); first = end) {
+            int worst = first;
+            for (end = first; end < int(values_.size()) && values_[end].table == values_[first].table; ++end)
+                if (values_[end].standard_uncertainty > values_[worst].standard_uncertainty) worst = end;
+            columns.insert(worst);
+            for (int k = 0; k < spread; ++k) columns.insert(first + k * (end - 1 - first) / (spread - 1));
         }
-        for (const auto& [table, v] : worst) columns.insert(v);
         return columns;
     }
 
