@@ -102,8 +102,10 @@ from stepdiag._core import (
     with_covariance,
     word_findings_with,
     word_reasons_with,
+    word_unseen_faults_with,
 )
 from stepdiag.calibration.finding_text import reason_texts, undetermined_text
+from stepdiag.calibration.unseen_text import unseen_texts
 from stepdiag.figures import methods
 from stepdiag.io import displays, to_xarray
 
@@ -431,6 +433,7 @@ displays.attach()
 methods.attach()
 word_findings_with(undetermined_text)  # the extension's findings are worded here
 word_reasons_with(reason_texts)
+word_unseen_faults_with(unseen_texts)
 
 
 def __getattr__(name: str) -> Any:

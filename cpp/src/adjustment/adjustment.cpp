@@ -5,6 +5,7 @@
 
 #include "adjustment/adjustment_result.hpp"
 #include "adjustment/fault_search.hpp"
+#include "adjustment/prior_scatter.hpp"
 #include "adjustment/reliability.hpp"
 #include "adjustment/smoothness.hpp"
 #include "adjustment/verdict.hpp"
@@ -107,9 +108,11 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     result.degrees_of_freedom = solution->degrees_of_freedom();
     if (result.degrees_of_freedom > 0)
         result.chi_square_probability = chi_square_probability(result.weighted_square_sum, result.degrees_of_freedom);
-    result.verdict = judge(result, residual_patterns(result, measurement, solver.equations(), solver.factor()));
-    if (options.reliability)
-        result.reliability = reliability(solver, inverse, forms, std::sqrt(std::max(1.0, result.variance_factor())));
+    const auto patterns = residual_patterns(result, measurement, solver.equations(), solver.factor());
+    result.verdict = judge(result, patterns, prior_scatter(problem, x, inverse));
+    const double noise = std::sqrt(std::max(1.0, result.variance_factor()));
+    result.unseen = unseen_faults(solver, inverse, forms, noise);
+    if (options.reliability) result.reliability = reliability(solver, inverse, forms, noise);
     if (options.scale_uncertainty) scale_uncertainties(result);
     result.calibration.fit = result.verdict.fit;
     if (result.degrees_of_freedom > 0) result.calibration.variance_factor = result.variance_factor();

@@ -96,11 +96,28 @@ LineReadings line_readings(const Measurement& measurement, const Line& line, con
         for (const Channel* tilt : tilts) readings.tilts = readings.tilts || tilt->value[row].has_value();
         readings.times = readings.times && time->value[row].has_value();
     }
-    if (plan.is_scale_line(line)) readings.tilt = usual_tilt(measurement, rows, head);
+    readings.tilt = usual_tilt(measurement, rows, head);
+    if (!plan.is_scale_line(line))  // or by the last one, so that one wrong reading has no part in it
+        readings.tilt = std::min(readings.tilt, usual_tilt(measurement, {rows.rbegin(), rows.rend()}, head));
     const LateralExcursion beside = plan.lateral_excursion(line);
     const double rounding = 1e-12 * plan.volume().norm();
     for (int c = 0; c < 2; ++c) readings.beside[c] = beside.highest[c] - beside.lowest[c] > rounding;
     return readings;
+}
+
+// Where no point stands beside a line, only priors know how laser and mirror stand there. Their difference has twice
+// the variance of either; where the tilts of such lines show more than is usual, that is what both are taken for.
+double usual_angle(const Plan& plan, const std::map<std::string, LineReadings>& told) {
+    const double usual = record(SetupQuantity::laser).usual;
+    double squares = 0.0;
+    int count = 0;
+    for (const auto& [line, readings] : told) {
+        const bool alone = !readings.beside[0] || !readings.beside[1];
+        if (plan.is_scale_line(Line::parse(line)) || !readings.tilts || !alone) continue;
+        squares += readings.tilt * readings.tilt;  // of two components
+        ++count;
+    }
+    return count == 0 ? usual : std::max(usual, std::sqrt(squares / (4.0 * count)));
 }
 
 }  // namespace
@@ -130,6 +147,12 @@ void AdjustmentProblem::collect_setups(const Measurement& measurement, const Adj
     setup_of_row_.resize(measurement.size());
     std::map<std::string, int> current;  // set-up by line
     std::map<std::string, LineReadings> told;
+    for (const Station& station : measurement.stations())
+        if (const std::string line = station.line.name(); plan_.contains(station.line) && told.count(line) == 0)
+            told.emplace(line, line_readings(measurement, station.line, plan_, heads_->of(line)));
+    const double usual =
+        kind_ == HeadLayout::multi_beam ? record(SetupQuantity::laser).usual : usual_angle(plan_, told);
+    for (auto& entry : told) entry.second.usual_angle = usual;
     for (const auto& entry : rows_by_pass(measurement)) {
         const std::vector<std::size_t>& rows = entry.second;
         const Line line = measurement.stations()[rows.front()].line;
@@ -142,10 +165,7 @@ void AdjustmentProblem::collect_setups(const Measurement& measurement, const Adj
             const bool scale = plan_.is_scale_line(line);
             const Eigen::Vector3d origin = planned.front().commanded + tool_ - head.standoff * frame.col(2);
             LineSetup setup{entry.first.first, line, scale, ChannelModel(kind_, head, frame, origin), {}, {}, {}};
-            auto readings = told.find(line.name());
-            if (readings == told.end())
-                readings = told.emplace(line.name(), line_readings(measurement, line, plan_, head)).first;
-            setup.prior = setup_priors(options, line.name(), scale, readings->second, setup.model);
+            setup.prior = setup_priors(options, line.name(), scale, told.at(line.name()), setup.model);
             setup.unknown.assign(setup.prior.size(), no_unknown);
             current[line.name()] = int(setups_.size());
             setups_.push_back(std::move(setup));

@@ -192,13 +192,9 @@ void BorderedFactor::factorize_corner() {
     for (; k < border; ++k) held_.push_back(int(six) * l_.blocks() + order_[k]);
 }
 
-void BorderedFactor::solve(Eigen::Ref<VectorXd> right_hand_side) const {
-    const Index unknowns = six * l_.blocks(), border = l_.border_;
-    AlignedNumbers band(unknowns + lanes), rest(border);
-    double* x = band.data();
-    Eigen::Map<VectorXd> y(rest.data(), border);
-    std::copy_n(right_hand_side.data(), unknowns, x);
-    y = right_hand_side.tail(border);
+// L^-1 of a right side: its band in place, what belongs to the border returned.
+VectorXd BorderedFactor::divide(double* x, double* border_part) const {
+    const Index border = l_.border_;
     for (int column = 0; column < l_.blocks(); ++column) {
         const auto l = l_.block(column, column);
         double* own = x + six * column;
@@ -207,14 +203,32 @@ void BorderedFactor::solve(Eigen::Ref<VectorXd> right_hand_side) const {
             own[i] = l(i, i) == 0.0 ? 0.0 : own[i] * l(i, i);
         }
         subtract_columns(six * (l_.reach(column) - column), l_.view(column + 1, column), own, own + six);
-        subtract_columns(border, l_.border_view(column), own, y.data());
+        subtract_columns(border, l_.border_view(column), own, border_part);
     }
-
-    const auto corner = corner_factor();
     VectorXd determined(corner_rank_);
-    for (int i = 0; i < corner_rank_; ++i) determined[i] = y[order_[i]];
-    corner.triangularView<Eigen::Lower>().solveInPlace(determined);
-    corner.transpose().triangularView<Eigen::Upper>().solveInPlace(determined);
+    for (int i = 0; i < corner_rank_; ++i) determined[i] = border_part[order_[i]];
+    corner_factor().triangularView<Eigen::Lower>().solveInPlace(determined);
+    return determined;
+}
+
+double BorderedFactor::inverse_square(const VectorXd& v) const {
+    const Index unknowns = six * l_.blocks(), border = l_.border_;
+    AlignedNumbers band(unknowns + lanes), rest(border);
+    std::copy_n(v.data(), unknowns, band.data());
+    std::copy_n(v.data() + unknowns, border, rest.data());
+    const VectorXd determined = divide(band.data(), rest.data());
+    return determined.squaredNorm() + Eigen::Map<const VectorXd>(band.data(), unknowns).squaredNorm();
+}
+
+void BorderedFactor::solve(Eigen::Ref<VectorXd> right_hand_side) const {
+    const Index unknowns = six * l_.blocks(), border = l_.border_;
+    AlignedNumbers band(unknowns + lanes), rest(border);
+    double* x = band.data();
+    Eigen::Map<VectorXd> y(rest.data(), border);
+    std::copy_n(right_hand_side.data(), unknowns, x);
+    y = right_hand_side.tail(border);
+    VectorXd determined = divide(x, y.data());
+    corner_factor().transpose().triangularView<Eigen::Upper>().solveInPlace(determined);
     y.setZero();
     for (int i = 0; i < corner_rank_; ++i) y[order_[i]] = determined[i];
 

@@ -97,6 +97,8 @@ public:
 
     // In place. Held unknowns are 0, whatever is on the right.
     void solve(Eigen::Ref<Eigen::VectorXd> right_hand_side) const;
+    // v^T N^-1 v = |L^-1 v|^2 without the held unknowns, in half the time of a solution.
+    double inverse_square(const Eigen::VectorXd& v) const;
 
     // L itself: the band with the reciprocals of its pivots, 0 of held ones, and below it the border's rows; the corner
     // as far as it has rank, its rows and columns being these of the border, in this order.
@@ -114,6 +116,7 @@ private:
     using Corner = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
     Corner schur();  // all of it
 
+    Eigen::VectorXd divide(double* band, double* border) const;
     void factorize();
     void eliminate(int column, int first);
     void reduce_corner(int first, int count);

@@ -162,7 +162,9 @@ void FaultTests::test_slips(int most_solutions) {
 
 void FaultTests::refine(int hypothesis) {
     if (exact_[hypothesis]) return;
-    set(hypothesis, controlled(hypothesis, effect(hypothesis)));
+    const double all = square(hypothesis);
+    const double q = all - factor_->inverse_square(gradient(hypotheses_->all()[hypothesis]));
+    set(hypothesis, q < controlled_share * all ? 0.0 : q);
     exact_[hypothesis] = true;
 }
 

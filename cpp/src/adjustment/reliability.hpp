@@ -13,4 +13,8 @@ namespace stepdiag {
 std::vector<FaultControl> reliability(const GaussNewton& solver, const BorderedBand& inverse,
                                       const CalibratedForms& forms, double noise = 1.0);
 
+// What faults of each kind may do unseen: the worst places only, so that every adjustment can say it.
+std::vector<UnseenFault> unseen_faults(const GaussNewton& solver, const BorderedBand& inverse,
+                                       const CalibratedForms& forms, double noise = 1.0);
+
 }  // namespace stepdiag

@@ -54,14 +54,14 @@ std::vector<PriorUncertainty> setup_priors(const AdjustmentOptions& options, con
     const bool beams_unknown = model.kind() == HeadLayout::multi_beam &&
                                given(SetupQuantity::beam_constants).value_or(free_unknown) != fixed_unknown;
     const bool tilts_tell = readings.tilts && !beams_unknown;
-    const PriorUncertainty usual_angle = record(SetupQuantity::laser).usual;
+    const PriorUncertainty usual_angle = readings.usual_angle;
 
     std::vector<PriorUncertainty> priors(model.setup_size(), fixed_unknown);
     for (int q = 0; q < adjusted_quantity_count; ++q) {
         const SetupQuantity quantity{q};
         const SetupQuantityRecord& of = record(quantity);
         PriorUncertainty usual = is_scale_line ? of.scale_line_prior : of.prior;
-        if (quantity == SetupQuantity::laser && !is_scale_line && beams_unknown) usual = usual_angle;
+        if (quantity == SetupQuantity::laser && !is_scale_line && beams_unknown) usual = of.usual;
         if (quantity == SetupQuantity::drift && !readings.times) usual = fixed_unknown;
         const PriorUncertainty prior = std::min(given(quantity).value_or(usual), of.broadest);
         const auto [first, count] = setup::columns(quantity, model.beams());

@@ -15,7 +15,9 @@ struct LineReadings {
     bool tilts;                  // the run has tilts, spots or beams on this line
     bool times;                  // of every reading
     std::array<bool, 2> beside;  // whether points stand beside the line, along local x and y
-    double tilt = 0.0;           // of a scale line: about that of the mirror against the beam, rad
+    double tilt = 0.0;           // about that of the mirror against the beam, rad
+    // How far laser and mirror of the run's lines usually stand from where they belong, as far as their tilts show it.
+    double usual_angle = record(SetupQuantity::laser).usual;
 };
 
 // Standard uncertainty of each column (setup::Column) of a line's set-up. With D = mirror - laser, the angle that a

@@ -14,6 +14,7 @@ constexpr double rejected_below = 3e-4;  // probability of a sound run's misfit
 constexpr double pattern_below = 1e-2;
 constexpr double pattern_alone_below = 3e-3;
 constexpr double farthest_prior = 5.0;
+constexpr double prior_scatter_rejected_below = 1e-6;  // as of a single value beyond five
 
 double noise_factor(const Adjustment& adjustment) { return std::sqrt(adjustment.variance_factor()); }
 
@@ -76,6 +77,7 @@ std::string name(FitFinding finding) {
         case FitFinding::uneven_misfit: return "uneven_misfit";
         case FitFinding::trend: return "trend";
         case FitFinding::prior: return "prior";
+        case FitFinding::prior_scatter: return "prior_scatter";
         case FitFinding::fault: return "fault";
         case FitFinding::alternatives: return "alternatives";
         case FitFinding::scaled: return "scaled";
@@ -95,7 +97,8 @@ std::string name(FitAspect aspect) {
     return "";
 }
 
-Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& patterns) {
+Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& patterns,
+              const std::vector<ResidualPattern>& prior_scatter) {
     std::vector<FitReason> reasons;
     judge_faults(adjustment, reasons);
     if (reasons.empty() && adjustment.degrees_of_freedom <= 0)
@@ -104,6 +107,7 @@ Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& 
     compare_with_stated_noise(adjustment, reasons);
     if (!(probability >= rejected_below)) take_patterns(patterns, pattern_below, reasons);
     compare_with_priors(adjustment, reasons);
+    if (reasons.empty()) take_patterns(prior_scatter, prior_scatter_rejected_below, reasons);
     if (!reasons.empty()) return {Fit::rejected, reasons};
 
     if (!(probability >= doubtful_below)) {
@@ -113,6 +117,7 @@ Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& 
         take_patterns(patterns, pattern_alone_below, reasons);
         if (probability > doubtful_above) reasons.push_back(noise(FitFinding::no_misfit, adjustment));
     }
+    take_patterns(prior_scatter, pattern_alone_below, reasons);
     return {reasons.empty() ? Fit::accepted : Fit::doubtful, reasons};
 }
 

@@ -5,8 +5,10 @@
 
 namespace stepdiag {
 
-// From what the adjustment found, its own verdict not counted, and the patterns of its residuals.
-Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& patterns);
+// From what the adjustment found, its own verdict not counted, the patterns of its residuals, and the set-up quantities
+// that scatter more than their priors.
+Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& patterns,
+              const std::vector<ResidualPattern>& prior_scatter);
 
 // AdjustmentOptions::scale_uncertainty, of an adjustment with its verdict.
 void scale_uncertainties(Adjustment& adjustment);

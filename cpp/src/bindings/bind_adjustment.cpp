@@ -65,9 +65,13 @@ Slips to_slips(const std::string& slips) {
     throw InvalidArgument("adjustment slips: expected \"report\" or \"estimate\", got \"" + slips + "\"");
 }
 
-// The function of the package that makes sentences of a verdict's reasons.
+// The functions of the package that make sentences of a verdict's reasons, and of faults that may be unseen.
 py::object& reason_wording() {
     static py::object& words = *new py::object(py::none());  // outlives the interpreter
+    return words;
+}
+py::object& unseen_wording() {
+    static py::object& words = *new py::object(py::none());
     return words;
 }
 
@@ -241,7 +245,7 @@ void bind_result(py::module_& m) {
                       "Of the value of a misfit, no_misfit, trend, scaled; else 0.")
         .def_readonly("line", &FitReason::line, "Of an uneven misfit, a trend or a prior; empty: all.")
         .def_readonly("channel", &FitReason::channel,
-                      "Of an uneven misfit or a trend; empty: all. Of a prior the set-up quantity.")
+                      "Of an uneven misfit or a trend; empty: all. Of a prior or prior_scatter the set-up quantity.")
         .def_readonly("component", &FitReason::component, "Of a prior: as of SetupEstimate.")
         .def_readonly("fault", &FitReason::fault, "Of a fault or alternatives: its class, from 1; else 0.")
         .def_readonly("parameter", &FitReason::parameter, "Of alternatives; else empty.")
@@ -310,6 +314,26 @@ void bind_result(py::module_& m) {
                                "Kind of parameter -> by how much it differs, by the size of a fault, if its twin was "
                                "it; in mm or rad each.");
 
+    py::class_<UnseenFault>(
+        m, "UnseenFault",
+        "What the faults of one kind may do to a calibration without being seen, one at a time: the worst of them.")
+        .def_property_readonly(
+            "kind", [](const UnseenFault& f) { return name(f.kind); }, "As of FaultControl.")
+        .def_readonly("channel", &UnseenFault::channel, "\"distance\", \"tilt\" or \"spot\".")
+        .def_readonly("size", &UnseenFault::size,
+                      "From here on all that are controlled are found with 99 %; mm or rad; 0: none is controlled.")
+        .def_readonly("controlled", &UnseenFault::controlled, "Whether all are; otherwise some may have any size.")
+        .def_property_readonly(
+            "hidden",
+            [](const UnseenFault& f) {
+                return std::map<std::string, double>{{"positioning", f.positioning},
+                                                     {"straightness", f.straightness},
+                                                     {"angle", f.angle},
+                                                     {"squareness", f.squareness}};
+            },
+            "Kind of parameter -> largest effect of a fault just not found, mm or rad; infinite: of one that nothing "
+            "controls.");
+
     using Result = AdjustmentOfRun;
     py::class_<Result>(m, "Adjustment", "What an adjustment found: calibration, set-ups, and how the readings fit.")
         .def_property_readonly("calibration", [](const Result& r) { return r.adjustment.calibration; })
@@ -359,6 +383,9 @@ void bind_result(py::module_& m) {
             "Classes of faults that were found, and what was done about them.")
         .def_property_readonly(
             "reliability", [](const Result& r) { return r.adjustment.reliability; }, "If it was asked for.")
+        .def_property_readonly(
+            "unseen", [](const Result& r) { return r.adjustment.unseen; },
+            "By kind of fault, what may be in it unseen.")
         .def_property_readonly("verdict", [](const Result& r) { return r.adjustment.verdict; })
         .def_property_readonly("weighted_square_sum", [](const Result& r) { return r.adjustment.weighted_square_sum; })
         .def_property_readonly("variance_factor", [](const Result& r) { return r.adjustment.variance_factor(); })
@@ -403,6 +430,7 @@ AdjustmentOfRun adjust_run(const Measurement& measurement, const Plan& plan, con
 Calibration worded(const Adjustment& adjustment) {
     Calibration calibration = worded(adjustment.calibration);
     calibration.fit_reasons = reason_wording()(adjustment.verdict.reasons).cast<std::vector<std::string>>();
+    calibration.unseen_faults = unseen_wording()(adjustment.unseen, calibration).cast<std::vector<std::string>>();
     return calibration;
 }
 
@@ -415,6 +443,12 @@ void bind_adjustment(py::module_& m) {
             reason_wording() = words;
         },
         py::arg("words"), "Sets the function that makes sentences of the reasons of a verdict; the package does so.");
+    m.def(
+        "word_unseen_faults_with",
+        [](const py::typing::Callable<std::vector<std::string>(const std::vector<UnseenFault>&, const Calibration&)>&
+               words) { unseen_wording() = words; },
+        py::arg("words"),
+        "Sets the function that makes sentences of what faults may be unseen in a calibration; the package does so.");
     m.def("adjust", &adjust_run, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
           py::arg("tool") = zeros(3), py::arg("options") = std::nullopt,
           "The exact adjustment of all readings of a run, with the set-up of every line among the unknowns. "

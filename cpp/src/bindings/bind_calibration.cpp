@@ -63,7 +63,8 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
                              const Arrays& reversal_negative_uncertainty, const Names& undetermined_reversal_constants,
                              const std::string& date, const std::optional<std::string>& fit,
                              const std::optional<double>& variance_factor, const Names& fit_reasons,
-                             const std::optional<double>& uncertainty_scaled, const Texts& provenance) {
+                             const std::optional<double>& uncertainty_scaled, const Texts& provenance,
+                             const Names& unseen_faults) {
     Calibration calibration{method, to_chain(chain), to_vector3(volume, "volume"), to_vector3(tool, "tool"), {}, {},
                             {},     undetermined};
     for (const auto& [name, table] : functions)
@@ -97,6 +98,7 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
     calibration.fit_reasons = fit_reasons;
     calibration.uncertainty_scaled = uncertainty_scaled;
     calibration.provenance = provenance;
+    calibration.unseen_faults = unseen_faults;
     check(calibration);
     return calibration;
 }
@@ -120,7 +122,7 @@ void bind_calibration(py::module_& m) {
              py::arg("reversal_negative_uncertainty") = Arrays{}, py::arg("undetermined_reversal_constants") = Names{},
              py::arg("date") = "", py::arg("fit") = std::nullopt, py::arg("variance_factor") = std::nullopt,
              py::arg("fit_reasons") = Names{}, py::arg("uncertainty_scaled") = std::nullopt,
-             py::arg("provenance") = Texts{},
+             py::arg("provenance") = Texts{}, py::arg("unseen_faults") = Names{},
              "A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: "
              "name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises "
              "InvalidArgument naming the parameter for what is none: nodes that do not "
@@ -133,6 +135,8 @@ void bind_calibration(py::module_& m) {
         .def_readonly("variance_factor", &Calibration::variance_factor,
                       "Of the fit: 1 is expected; None where nothing controls the readings, or it is not known.")
         .def_readonly("fit_reasons", &Calibration::fit_reasons, "Why that verdict, a sentence each.")
+        .def_readonly("unseen_faults", &Calibration::unseen_faults,
+                      "How large faults of readings may be in it unseen, and what they then do, a sentence each.")
         .def_readonly("uncertainty_scaled", &Calibration::uncertainty_scaled,
                       "What all uncertainties were multiplied by, beyond what follows from those of the readings "
                       "(scale_uncertainty); None: by nothing.")

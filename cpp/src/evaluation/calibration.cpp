@@ -126,6 +126,7 @@ void check(const Calibration& calibration) {
     check_provenance(calibration.provenance);
     for (const std::string& sentence : calibration.undetermined) check_one_line(sentence, "undetermined");
     for (const std::string& sentence : calibration.fit_reasons) check_one_line(sentence, "fit_reasons");
+    for (const std::string& sentence : calibration.unseen_faults) check_one_line(sentence, "unseen_faults");
     for (int i = 0; i < function_count; ++i) {
         const std::string name = FunctionId::at(i).name();
         if (const auto& f = calibration.functions[i])
@@ -249,6 +250,8 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
     for (const auto& [key, factor] : factors(calibration))
         if (factor) table.header[key] = format_decimal(*factor, 0);
     if (!calibration.fit_reasons.empty()) table.header["fit_reasons"] = join(calibration.fit_reasons, sentence_break);
+    if (!calibration.unseen_faults.empty())
+        table.header["unseen_faults"] = join(calibration.unseen_faults, sentence_break);
     if (calibration.method == "conventional" || calibration.method == "enhanced")
         table.header["uncertainties"] = "of the noise of the readings alone";
     if (!slopes.empty()) table.header["undetermined_slopes"] = join(slopes, " ");
@@ -278,6 +281,7 @@ Calibration read_calibration(const std::string& path) {
                             {}};
     calibration.undetermined = split(optional_value("undetermined"), sentence_break);
     calibration.fit_reasons = split(optional_value("fit_reasons"), sentence_break);
+    calibration.unseen_faults = split(optional_value("unseen_faults"), sentence_break);
     calibration.date = optional_value("date");
     for (const char* key : provenance_keys)
         if (std::string text = optional_value(key); !text.empty()) calibration.provenance[key] = std::move(text);

@@ -6,7 +6,7 @@
 
 namespace stepdiag {
 
-double chi_square_probability(double square_sum, int freedom) {
+double chi_square_probability(double square_sum, double freedom) {
     return Eigen::numext::igammac(0.5 * freedom, 0.5 * square_sum);
 }
 

@@ -12,7 +12,7 @@ inline constexpr double doubtful_below = 1e-2;       // probability of a misfit 
 inline constexpr double doubtful_above = 1.0 - 1e-3;
 
 // Of a square sum larger than this one.
-double chi_square_probability(double square_sum, int freedom);
+double chi_square_probability(double square_sum, double freedom);
 
 // Where nothing but noise is tested: whether by one factor it is larger or smaller than stated.
 Fit fit_of_noise(double square_sum, int freedom);

@@ -198,14 +198,24 @@ private:
     std::size_t one_of_, seen_ = 0;
 };
 
-// Sums of `right_sides`, a row of coefficients each.
-template <class Number>
-void add_contradictions(const Eigen::MatrixXd& contradictions, const std::vector<Number>& right_sides,
-                        Thinning& thinning, std::vector<Number>& out) {
+// Sums of right sides, a row of coefficients each. `right_sides`: makes them, where any is taken. A share of a few
+// readings has right sides of 0 nearly everywhere, which are left out of the sums.
+template <class Number, class RightSides>
+void add_contradictions(const Eigen::MatrixXd& contradictions, const RightSides& right_sides, Thinning& thinning,
+                        std::vector<Number>& out) {
+    std::vector<Number> sides;
+    std::vector<Eigen::Index> some;
+    bool made = false;
     for (Eigen::Index i = 0; i < contradictions.rows(); ++i) {
         if (!thinning.takes()) continue;
+        if (!made) {
+            sides = right_sides();
+            for (std::size_t j = 0; j < sides.size(); ++j)
+                if (!(sides[j] == 0.0).all()) some.push_back(Eigen::Index(j));
+            made = true;
+        }
         Number sum = Number::Zero();
-        for (std::size_t j = 0; j < right_sides.size(); ++j) sum += contradictions(i, Eigen::Index(j)) * right_sides[j];
+        for (const Eigen::Index j : some) sum += contradictions(i, j) * sides[std::size_t(j)];
         out.push_back(sum);
     }
 }
@@ -215,12 +225,16 @@ template <class Number>
 void add_contradictions(const AxisSystem& system, const std::vector<Number>& readings, const std::vector<int>& channels,
                         const std::vector<Pass>& passes, Thinning& thinning, std::vector<Number>& out) {
     for (const StepSystem& interval : system.intervals) {
-        std::vector<Number> increments;
-        for (const Step& step : interval.steps)
-            for (const int c : channels) {
-                const std::size_t from = values_per_reading * (passes[step.pass].first_reading + step.point) + c;
-                increments.push_back(step.sign * (readings[from + values_per_reading] - readings[from]));
-            }
+        const auto increments = [&] {
+            std::vector<Number> all;
+            all.reserve(interval.steps.size() * channels.size());
+            for (const Step& step : interval.steps)
+                for (const int c : channels) {
+                    const std::size_t from = values_per_reading * (passes[step.pass].first_reading + step.point) + c;
+                    all.push_back(step.sign * (readings[from + values_per_reading] - readings[from]));
+                }
+            return all;
+        };
         add_contradictions<Number>(interval.solution->contradictions, increments, thinning, out);
     }
 }

@@ -36,7 +36,7 @@ public:
 
     template <class Number>
     void add_contradictions(const std::vector<Number>& lengths, Thinning& thinning, std::vector<Number>& out) const {
-        stepdiag::add_contradictions<Number>(contradictions_, right_sides(lengths), thinning, out);
+        stepdiag::add_contradictions<Number>(contradictions_, [&] { return right_sides(lengths); }, thinning, out);
     }
 
     template <class Number>

@@ -16,7 +16,7 @@ from stepdiag._core import (
     Undetermined,
 )
 from stepdiag.parameters import kind_of, units_of
-from stepdiag.setup_quantities import SETUP_QUANTITIES, component_name
+from stepdiag.setup_quantities import SETUP_QUANTITIES, component_name, report_unit
 from stepdiag.units import MICRO, report_value
 
 if TYPE_CHECKING:
@@ -242,6 +242,8 @@ def reason_text(reason: FitReason) -> str:
                 f"{name} of line {reason.line} is {reason.value:.3g} standard uncertainties from what [adjustment] "
                 f"takes it for (at most {reason.limit:g} is credible)"
             )
+        case "prior_scatter":
+            return _prior_scatter(reason)
         case "misfit" | "no_misfit":
             return f"the noise is about {noise} what is stated"
         case "scaled":
@@ -271,7 +273,7 @@ def fault_rows(faults: Sequence[FaultClass]) -> Iterator[str]:
 
 
 def fault_text(found: FaultClass) -> str:
-    """What may have happened, what was done about it, and what would tell; without a full stop."""
+    """What may have happened, whether the readings tell which, and what was done about it; without a full stop."""
     shown = 4
     best, *others = found.members
     texts = [_fault(best), *map(_alternative, others[: shown - 1])]
@@ -367,6 +369,16 @@ def _trend(reason: FitReason) -> str:
     return (
         f"{_signal(reason)} runs with {reason.aspect.replace('_', ' ')} by {size:+.3g} ± {uncertainty:.2g} {unit} from "
         "its first reading to its last, beyond what set-up and machine explain"
+    )
+
+
+def _prior_scatter(reason: FitReason) -> str:
+    unit = report_unit(reason.channel)
+    name = reason.channel.replace("_", " ")
+    return (
+        f"the {name} found is larger than its prior: about {reason.value / unit.native:.2g} {unit.name} by line, where "
+        f"{SETUP_QUANTITIES[reason.channel].key} in [adjustment] is "
+        f"{reason.limit / unit.native:.2g} {unit.name}"
     )
 
 

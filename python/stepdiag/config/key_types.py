@@ -38,7 +38,7 @@ READING_MODEL: Final = '"chief_ray" or "coupled_mode"'
 class Section(BaseModel):
     """Keys are typed strictly (an integer may stand for a float), finite, and no other is accepted."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, defer_build=True)
 
     # Of alternatives for one table, the key that says which it is.
     tag: ClassVar[str] = ""

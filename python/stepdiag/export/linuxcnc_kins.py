@@ -80,6 +80,7 @@ def _with_tool(calibration: Calibration, tool: FloatArray) -> Calibration:
         fit=calibration.fit,
         variance_factor=calibration.variance_factor,
         fit_reasons=calibration.fit_reasons,
+        unseen_faults=calibration.unseen_faults,
         uncertainty_scaled=calibration.uncertainty_scaled,
         provenance=calibration.provenance,
     )

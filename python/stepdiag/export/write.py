@@ -55,6 +55,7 @@ def read_what_is_exported(path: Path) -> Calibration:
         fit=calibration.fit,
         variance_factor=calibration.variance_factor,
         fit_reasons=calibration.fit_reasons,
+        unseen_faults=calibration.unseen_faults,
         uncertainty_scaled=calibration.uncertainty_scaled,
     )
 

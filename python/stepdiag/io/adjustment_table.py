@@ -1,5 +1,6 @@
 """An adjustment as a labelled table: its calibration's, and how set-ups and readings fit."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -89,131 +90,122 @@ def _readings(adjustment: Adjustment) -> dict[str, Any]:
 
 
 def _labels(measurement: Measurement) -> dict[str, Any]:
-    return {
-        "reading_run": ("reading", measurement.run, {"long_name": "run of the reading"}),
-        "reading_line": ("reading", np.asarray(measurement.line, dtype=str), {"long_name": "line of the reading"}),
-        "reading_point": ("reading", measurement.point, {"long_name": "point of the reading on its line"}),
-        "reading_direction": (
-            "reading",
-            np.asarray(measurement.direction, dtype=str),
-            {"long_name": "direction of travel"},
-        ),
-    }
+    return _columns(
+        "reading",
+        {
+            "run": (measurement.run, "run of the reading"),
+            "line": (measurement.line, "line of the reading"),
+            "point": (measurement.point, "point of the reading on its line"),
+            "direction": (measurement.direction, "direction of travel"),
+        },
+    )
 
 
 def _setup(setup: list[SetupEstimate]) -> dict[str, Any]:
     own_units = "in setup_units"
-    values = [np.nan if unknown.value is None else unknown.value for unknown in setup]
-    return {
-        "setup_run": ("setup", [unknown.run for unknown in setup], {"long_name": "first run that has this set-up"}),
-        "setup_line": ("setup", np.array([unknown.line for unknown in setup]), {"long_name": "line of the set-up"}),
-        "setup_quantity": (
-            "setup",
-            np.array([unknown.quantity for unknown in setup]),
-            {"long_name": "what is unknown"},
-        ),
-        "setup_component": (
-            "setup",
-            [unknown.component for unknown in setup],
-            {
-                "long_name": "component",
-                "comment": "0 or 1 of pairs, along or about local x, y; of beams: 1 for d2, ...",
-            },
-        ),
-        "setup_units": (
-            "setup",
-            np.array([SETUP_QUANTITIES[unknown.quantity].unit for unknown in setup]),
-            {"long_name": "units of value, standard uncertainty and prior"},
-        ),
-        "setup_value": (
-            "setup",
-            np.array(values),
-            {"long_name": "value found", "comment": f"{own_units}; missing where it is not determined"},
-        ),
-        "setup_u": (
-            "setup",
-            np.array([unknown.standard_uncertainty for unknown in setup]),
-            {"long_name": "standard uncertainty of the value found", "comment": own_units},
-        ),
-        "setup_prior": (
-            "setup",
-            np.array([unknown.prior for unknown in setup]),
-            {
-                "long_name": "standard uncertainty with which it was known to be 0",
-                "comment": f"{own_units}; infinite: free, 0: fixed at 0; "
-                "a free lateral offset, roll or gain has 1 m, 1 rad, 1",
-            },
-        ),
-    }
+    return _columns(
+        "setup",
+        {
+            "run": ([one.run for one in setup], "first run that has this set-up"),
+            "line": ([one.line for one in setup], "line of the set-up"),
+            "quantity": ([one.quantity for one in setup], "what is unknown"),
+            "component": (
+                [one.component for one in setup],
+                "component",
+                {"comment": "0 or 1 of pairs, along or about local x, y; of beams: 1 for d2, ..."},
+            ),
+            "units": (
+                [SETUP_QUANTITIES[one.quantity].unit for one in setup],
+                "units of value, standard uncertainty and prior",
+            ),
+            "value": (
+                [np.nan if one.value is None else one.value for one in setup],
+                "value found",
+                {"comment": f"{own_units}; missing where it is not determined"},
+            ),
+            "u": (
+                [one.standard_uncertainty for one in setup],
+                "standard uncertainty of the value found",
+                {"comment": own_units},
+            ),
+            "prior": (
+                [one.prior for one in setup],
+                "standard uncertainty with which it was known to be 0",
+                {
+                    "comment": f"{own_units}; infinite: free, 0: fixed at 0; "
+                    "a free lateral offset, roll or gain has 1 m, 1 rad, 1"
+                },
+            ),
+        },
+    )
 
 
 def _outliers(outliers: list[Outlier]) -> dict[str, Any]:
-    return {
-        "outlier_row": (
-            "outlier",
-            [outlier.row for outlier in outliers],
-            {"long_name": "row of the measurement, from 0"},
-        ),
-        "outlier_number": (
-            "outlier",
-            [outlier.number for outlier in outliers],
-            {"long_name": "number of its class of faults", "comment": "from 1"},
-        ),
-        "outlier_run": ("outlier", [outlier.run for outlier in outliers], {"long_name": "run"}),
-        "outlier_line": ("outlier", np.array([outlier.line for outlier in outliers]), {"long_name": "line"}),
-        "outlier_point": ("outlier", [outlier.point for outlier in outliers], {"long_name": "point on its line"}),
-        "outlier_channel": ("outlier", np.array([outlier.channel for outlier in outliers]), {"long_name": "channel"}),
-        "outlier_residual": (
-            "outlier",
-            np.array([outlier.residual for outlier in outliers]),
-            {"long_name": "read minus adjusted", "comment": "mm or rad, as the channel"},
-        ),
-        "outlier_normalised_residual": (
-            "outlier",
-            np.array([outlier.normalised for outlier in outliers]),
-            {"units": "1", "long_name": "residual by its own standard uncertainty"},
-        ),
-    }
+    return _columns(
+        "outlier",
+        {
+            "row": ([one.row for one in outliers], "row of the measurement, from 0"),
+            "number": ([one.number for one in outliers], "number of its class of faults", {"comment": "from 1"}),
+            "run": ([one.run for one in outliers], "run"),
+            "line": ([one.line for one in outliers], "line"),
+            "point": ([one.point for one in outliers], "point on its line"),
+            "channel": ([one.channel for one in outliers], "channel"),
+            "residual": (
+                [one.residual for one in outliers],
+                "read minus adjusted",
+                {"comment": "mm or rad, as the channel"},
+            ),
+            "normalised_residual": (
+                [one.normalised for one in outliers],
+                "residual by its own standard uncertainty",
+                {"units": "1"},
+            ),
+        },
+    )
 
 
 def _faults(faults: list[FaultClass]) -> dict[str, Any]:
     number, treatment, members = zip(
         *((k, found.treatment, fault) for k, found in enumerate(faults, 1) for fault in found.members), strict=True
     )
-    own_units = "mm or rad, as the channel"
-    return {
-        "fault_class": (
-            "fault",
-            list(number),
-            {
-                "long_name": "number of its class",
-                "comment": "from 1; the readings do not tell which of a class happened",
-            },
-        ),
-        "fault_treatment": ("fault", np.array(treatment), {"long_name": "what was done about its class"}),
-        "fault_kind": (
-            "fault",
-            np.array([fault.kind for fault in members]),
-            {"long_name": "kind", "comment": "slip: an offset of the channel from this reading of the line on"},
-        ),
-        "fault_row": ("fault", [fault.row for fault in members], {"long_name": "row of the measurement, from 0"}),
-        "fault_run": ("fault", [fault.run for fault in members], {"long_name": "run"}),
-        "fault_line": ("fault", np.array([fault.line for fault in members]), {"long_name": "line"}),
-        "fault_point": ("fault", [fault.point for fault in members], {"long_name": "point on its line"}),
-        "fault_channel": ("fault", np.array([fault.channel for fault in members]), {"long_name": "channel"}),
-        "fault_size": (
-            "fault",
-            np.array([fault.size for fault in members]),
-            {"long_name": "what was read too much, were it this one", "comment": own_units},
-        ),
-        "fault_u": (
-            "fault",
-            np.array([fault.standard_uncertainty for fault in members]),
-            {"long_name": "standard uncertainty of the size", "comment": own_units},
-        ),
-        "fault_chi_square_gain": (
-            "fault",
-            np.array([fault.chi_square_gain for fault in members]),
-            {"units": "1", "long_name": "what it takes off chi-square"},
-        ),
-    }
+    own_units = {"comment": "mm or rad, as the channel"}
+    return _columns(
+        "fault",
+        {
+            "class": (
+                number,
+                "number of its class",
+                {"comment": "from 1; the readings do not tell which of a class happened"},
+            ),
+            "treatment": (treatment, "what was done about its class"),
+            "kind": (
+                [fault.kind for fault in members],
+                "kind",
+                {"comment": "slip: an offset of the channel from this reading of the line on"},
+            ),
+            "row": ([fault.row for fault in members], "row of the measurement, from 0"),
+            "run": ([fault.run for fault in members], "run"),
+            "line": ([fault.line for fault in members], "line"),
+            "point": ([fault.point for fault in members], "point on its line"),
+            "channel": ([fault.channel for fault in members], "channel"),
+            "size": ([fault.size for fault in members], "what was read too much, were it this one", own_units),
+            "u": ([fault.standard_uncertainty for fault in members], "standard uncertainty of the size", own_units),
+            "chi_square_gain": (
+                [fault.chi_square_gain for fault in members],
+                "what it takes off chi-square",
+                {"units": "1"},
+            ),
+        },
+    )
+
+
+def _columns(dimension: str, columns: Mapping[str, tuple[Any, ...]]) -> dict[str, Any]:
+    """Variables DIMENSION_NAME of columns NAME: values, long name and, if there are any, more attributes."""
+    variables = {}
+    for name, (values, long_name, *attributes) in columns.items():
+        variables[f"{dimension}_{name}"] = (
+            dimension,
+            np.asarray(values),
+            {**dict(*attributes), "long_name": long_name},
+        )
+    return variables

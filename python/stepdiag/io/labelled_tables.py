@@ -124,6 +124,7 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
     if calibration.uncertainty_scaled is not None:
         verdict["uncertainty_scaled"] = calibration.uncertainty_scaled
     verdict["fit_reasons"] = "\n".join(calibration.fit_reasons)
+    verdict["unseen_faults"] = "\n".join(calibration.unseen_faults)
     return xr.Dataset(
         variables,
         coordinates,

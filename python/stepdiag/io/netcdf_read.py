@@ -87,6 +87,7 @@ def read_calibration_netcdf(path: Path) -> Calibration:
             "fit": file.text("fit", "") or None,
             "variance_factor": file.number("variance_factor"),
             "fit_reasons": list(filter(None, file.text("fit_reasons", "").split("\n"))),
+            "unseen_faults": list(filter(None, file.text("unseen_faults", "").split("\n"))),
             "uncertainty_scaled": file.number("uncertainty_scaled"),
         }
         with located(str(path)):

@@ -27,6 +27,8 @@ class Fit(TypedDict):
     variance_factor: float | None
     uncertainties_multiplied_by: float | None
     """What all standard uncertainties were multiplied by; null: by nothing."""
+    unseen_faults: list[str]
+    """How large faults of readings may be in it unseen, and what they then do, a sentence each."""
     noise_alone: bool
     """Whether the standard uncertainties are of noise alone, as those of linear methods are."""
 
@@ -151,6 +153,7 @@ def fit_of(calibration: Calibration) -> Fit:
         "reasons": list(calibration.fit_reasons),
         "variance_factor": number(calibration.variance_factor),
         "uncertainties_multiplied_by": number(calibration.uncertainty_scaled),
+        "unseen_faults": list(calibration.unseen_faults),
         "noise_alone": calibration.method in NOISE_ALONE,
     }
 

@@ -8,6 +8,7 @@ import numpy as np
 from stepdiag._core import Calibration
 from stepdiag.calibration.finding_text import fit_rows, provenance_rows
 from stepdiag.calibration.functional_point import functional_point_straightness
+from stepdiag.calibration.unseen_text import unseen_rows
 from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.comparison import decimal
@@ -34,6 +35,7 @@ def calibration_report(calibration: Calibration) -> Iterator[str]:
             largest = _largest(kind, [(value, place) for value, _, place in values])
             uncertain = _largest(kind, [(u, place) for _, u, place in values])
             yield f"{kind:<14}{largest:<32}{uncertain}"
+    yield from unseen_rows(calibration)
     yield from reversal_rows(calibration)
     yield "signs: actual less commanded; rotations and squarenesses by the right-hand rule"
     yield f"reference: {calibration.straightness_reference}"

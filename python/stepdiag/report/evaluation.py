@@ -8,6 +8,7 @@ import numpy as np
 from stepdiag._core import Adjustment, Calibration, Measurement, straightness_reference
 from stepdiag.calibration.finding_text import NOISE_ALONE, combination_text, fault_rows, fit_rows, verdict_rows
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
+from stepdiag.calibration.unseen_text import unseen_rows
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.fault_control import control_rows
 from stepdiag.report.prior_effects import cosine_rows, drift_rows
@@ -49,6 +50,7 @@ def _adjusted(adjustment: Adjustment, measurement: Measurement, known: Known) ->
     yield from _what_was_done(calibration, measurement, known)
     yield from fault_rows(adjustment.faults)
     yield from uncertainty_rows(calibration)
+    yield from unseen_rows(calibration)
     yield from reversal_rows(calibration)
     rows = list(setup_rows(adjustment.setup, [*known.plan.lines, *known.plan.scale_lines]))
     if rows:

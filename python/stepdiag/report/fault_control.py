@@ -2,22 +2,15 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from stepdiag._core import FaultControl
+from stepdiag.calibration.unseen_text import FAULT_NAMES, FAULT_UNITS
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units
-from stepdiag.planning.fault_control import Extension, tells_all
 from stepdiag.units import report_value
 
-NAMES: Final = {
-    ("reading", "distance"): "wrong distance",
-    ("slip", "distance"): "slip of distances",
-    ("reading", "tilt"): "wrong tilt",
-    ("slip", "tilt"): "slip of tilts",
-    ("reading", "spot"): "wrong spot",
-    ("slip", "spot"): "slip of spots",
-}
-_UNITS: Final = {"distance": "mm", "tilt": "rad", "spot": "mm"}
+if TYPE_CHECKING:
+    from stepdiag.planning.fault_control import Extension
 
 ROUNDING: Final = 1e-6  # µm or µrad for each µm or µrad of a fault
 
@@ -40,8 +33,10 @@ def control_rows(controls: Sequence[FaultControl]) -> Iterator[str]:
             yield f"  {name(c)} not told from a twin: by {_unit(c)} of it {_shared(c)}"
 
 
-def extension_rows(own: Sequence[FaultControl], tried: Iterable[Extension]) -> Iterator[str]:
+def extension_rows(own: Sequence[FaultControl], tried: "Iterable[Extension]") -> Iterator[str]:
     """What would tell apart or control what the plan does not; nothing where it does."""
+    from stepdiag.planning.fault_control import tells_all  # reports of evaluations need none of that room
+
     if tells_all(own):
         return
     for extension in tried:
@@ -54,7 +49,7 @@ def extension_rows(own: Sequence[FaultControl], tried: Iterable[Extension]) -> I
 
 def name(control: FaultControl) -> str:
     """What happened, in words."""
-    return NAMES[control.kind, control.channel]
+    return FAULT_NAMES[control.kind, control.channel]
 
 
 def told_apart(control: FaultControl) -> str:
@@ -66,12 +61,12 @@ def told_apart(control: FaultControl) -> str:
 
 
 def _size(control: FaultControl, size: float) -> str:
-    value, unit = report_value(_UNITS[control.channel], size)
+    value, unit = report_value(FAULT_UNITS[control.channel], size)
     return f"{value:.3g} {unit}" if control.count else "-"
 
 
 def _unit(control: FaultControl) -> str:
-    return report_value(_UNITS[control.channel], 1.0)[1]
+    return report_value(FAULT_UNITS[control.channel], 1.0)[1]
 
 
 def _hidden(control: FaultControl, kind: Kind) -> str:
@@ -80,7 +75,7 @@ def _hidden(control: FaultControl, kind: Kind) -> str:
 
 
 def _shared(control: FaultControl) -> str:
-    scale = report_value(_UNITS[control.channel], 1.0)[0]
+    scale = report_value(FAULT_UNITS[control.channel], 1.0)[0]
     shares = [(kind, in_report_units(kind, control.shared[kind]) / scale) for kind in KINDS]
     said = [f"{kind} {share:.2g} {REPORT_UNIT[kind]}" for kind, share in shares if share > ROUNDING]
     return ", ".join(said) or "nothing"

@@ -13,6 +13,7 @@ from stepdiag.scenario.known import Known
 from stepdiag.setup_quantities import SETUP_QUANTITIES
 from stepdiag.units import HOUR, MICRO, MICROMETRE, UNITS
 
+FOURFOLD: Final = 4.0  # a machine that has not warmed up, against the default
 SQUARENESS_OF: Final[Mapping[str, str]] = {"XY": "C0Y", "XZ": "B0Z", "YZ": "A0Z"}
 
 
@@ -67,7 +68,11 @@ def drift_rows(measurement: Measurement, known: Known) -> Iterator[str]:
     worst = max(effects, key=lambda name: effects[name])
     size = f"about {effects[worst] * MICRO:.2g} µrad of {worst}"
     if is_timed and choice != "fixed":
-        yield f"drift: {pace:g} µm/h of each line's distances (drift_um_per_h) are in the uncertainties: {size}"
+        yield (
+            f"drift: squarenesses assume that the distances of a line drift by at most {pace:g} µm/h (1 sigma, "
+            f"drift_um_per_h); that is {size}, in the uncertainties; {FOURFOLD * pace:g} µm/h would be "
+            f"{FOURFOLD * effects[worst] * MICRO:.2g} µrad, and single runs hardly show it"
+        )
     else:
         yield f"drift: not in the uncertainties; {pace:g} µm/h of each line's distances would be {size}"
 

@@ -20,7 +20,6 @@ from stepdiag.config.scenario_head_keys import (
 )
 from stepdiag.config.scenario_keys import KnownKeys
 from stepdiag.config.toml_text import located
-from stepdiag.head.description import components, find_head, read_head_design
 from stepdiag.units import MICRORADIAN
 
 Triple = tuple[float, float, float]
@@ -170,6 +169,9 @@ def _described(keys: HeadKeys, place: str, path: Path) -> DescribedHead:
     _check_layout(keys, where)
     if keys.description is None:
         return DescribedHead(place, nominal, None)
+    # Here, because the keys of bodies take a sixth of a command's time that most scenarios do not need.
+    from stepdiag.head.description import components, find_head, read_head_design
+
     with located(f"{where}.description"):
         design = read_head_design(find_head(keys.description, path.parent))
     known = components(design)

@@ -9,7 +9,6 @@ from typing import Final, Literal
 
 from stepdiag import _core
 from stepdiag.config.key_types import Section
-from stepdiag.head.description import find_head
 from stepdiag.io.whole_files import read_bytes
 from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.known import Known
@@ -43,8 +42,7 @@ def provenance_of(
         options: the scenario's keys for the evaluation that differ from the defaults, or "default".
     """
     known = scenario.known
-    names = dict.fromkeys(head.keys.description for head in known.described.values())
-    heads = [_sha256(find_head(name, known.path.parent)) for name in names if name is not None]
+    heads = _heads_sha256(known)
     sections = _OF_ADJUSTMENT if method == "adjustment" else _ALWAYS
     options = [text for section in sections for text in _chosen(section, getattr(known.keys, section))]
     found = {
@@ -55,6 +53,16 @@ def provenance_of(
         "options": "; ".join(options) or "default",
     }
     return {key: text for key, text in found.items() if text}
+
+
+def _heads_sha256(known: Known) -> list[str]:
+    names = dict.fromkeys(head.keys.description for head in known.described.values())
+    names.pop(None, None)
+    if not names:
+        return []
+    from stepdiag.head.description import find_head  # slow
+
+    return [_sha256(find_head(name, known.path.parent)) for name in names if name is not None]
 
 
 def _sha256(path: Path) -> str:

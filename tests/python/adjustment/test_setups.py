@@ -132,12 +132,16 @@ def reversed_run(
 
 
 # Constants of straightnesses are not determined (of EXY and EYX only X EXY + Y EYX): what they are taken to be instead,
-# some 10 um, is seen in second order, by 2 mrad and less. mm, rad
-OPEN_CONSTANTS = (2e-4, 5e-8)
+# some 10 um, is seen in second order, by 2 mrad and less. Of lengths (mm), of angles (rad), and as a share of standard
+# uncertainties.
+OPEN_CONSTANTS = (3e-5, 5e-8, 5e-3)
+# Spots tell the mirrors' angles of scale lines, which are unknowns, by their change along the line alone. With these
+# angles fixed the error is 1.4e-6 mm, so it is they that see the constants.
+OPEN_CONSTANTS_OF_SPOTS = (2e-4, 5e-8, 1e-2)
 
 
 def assert_reversal(
-    adjustment: sd.Adjustment, dense: DenseAdjustment, table: reference.ErrorTable, limit: tuple[float, float]
+    adjustment: sd.Adjustment, dense: DenseAdjustment, table: reference.ErrorTable, limit: tuple[float, float, float]
 ) -> int:
     """Every reversal error that is claimed is right; returns how many functions have one."""
     calibration = adjustment.calibration
@@ -147,9 +151,9 @@ def assert_reversal(
         truth = np.array(table.functions[name][1]) - np.array(table.negative[name][1])
         expected = truth[k] - (truth[0] if name in calibration.undetermined_reversal_constants else 0.0)
         assert abs(value[at] - expected) <= limit[name[1] in "ABC"], (name, k, value[at], expected)
-        # What is not determined is held in another way there, and is seen in second order: 0.1 mm, times 100 urad.
+        # What is not determined is held in another way there, and is seen in second order.
         expected_deviation = dense.standard_uncertainty(weights)
-        assert u[at] == pytest.approx(expected_deviation, rel=2e-2, abs=1e-15), (name, k)
+        assert u[at] == pytest.approx(expected_deviation, rel=limit[2], abs=1e-15), (name, k)
     return len(calibration.reversal)
 
 
@@ -162,10 +166,11 @@ def test_reversal_of_every_function_is_recovered(layout: str) -> None:
     adjustment = adjust(run, scenario)
     assert_rank(adjustment, dense)
     assert is_complete(adjustment.calibration)
-    assert assert_reversal(adjustment, dense, table, OPEN_CONSTANTS) == 18
+    limit = OPEN_CONSTANTS_OF_SPOTS if layout == "psd" else OPEN_CONSTANTS
+    assert assert_reversal(adjustment, dense, table, limit) == 18
     error = distance_from(adjustment, table)
-    assert error.position <= OPEN_CONSTANTS[0]
-    assert error.angle <= OPEN_CONSTANTS[1]
+    assert error.position <= limit[0]
+    assert error.angle <= limit[1]
 
 
 @pytest.mark.parametrize(

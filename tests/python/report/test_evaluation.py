@@ -122,7 +122,8 @@ def test_drift_has_a_word_on_squareness(tmp_path: Path, capsys: pytest.CaptureFi
     assert "drift:" not in report(tmp_path, capsys, NOISY, run)
     timed = simulated(tmp_path, untimed)
     said = report(tmp_path, capsys, untimed, timed)
-    assert f"are in the uncertainties: about {size:.2g} µrad of A0Z" in said
+    assert f"drift by at most 5 µm/h (1 sigma, drift_um_per_h); that is about {size:.2g} µrad of A0Z" in said
+    assert f"; 20 µm/h would be {4 * size:.2g} µrad, and single runs hardly show it" in said
     fixed = untimed + '[adjustment]\ndrift_um_per_h = "fixed"\n'
     assert words in report(tmp_path, capsys, fixed, timed)
 

@@ -141,6 +141,7 @@ enum class FitFinding {
     uneven_misfit,  // root of the variance factor of one group of readings, where it differs from that of the others
     trend,          // residuals of one channel run with time or position: from the first reading to the last
     prior,          // distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2)
+    prior_scatter,  // standard deviation of all values of a set-up quantity, as far as the readings tell it
     fault,          // gain in chi-square of a fault that was found and not corrected
     alternatives,   // what alternative faults make of one parameter differs by this much, mm or rad
     scaled,         // root of the variance factor, by which the uncertainties were multiplied (scale_uncertainty)
@@ -160,10 +161,10 @@ std::string name(FitAspect aspect);  // "" of the whole, "second_half", ...
 
 struct FitReason {
     FitFinding finding;
-    double value;              // of a trend mm or rad
-    double limit;              // of an uneven misfit that of the other readings; of noise and trends what is expected
+    double value;  // of a trend mm or rad
+    double limit;  // of an uneven misfit that of the other readings; of noise, trends, prior_scatter what is expected
     std::string line = {};     // of an uneven misfit, a trend or a prior; empty: all
-    std::string channel = {};  // of an uneven misfit or a trend: "distance", ..., empty: all; of a prior: the quantity
+    std::string channel = {};  // of an uneven misfit or a trend: "distance", ..., empty: all; of priors: the quantity
     int component = 0;         // of a prior
     double standard_uncertainty = 0.0;  // of the value of a misfit, no_misfit, trend, scaled
     int run = -1;                       // of an uneven misfit: this run alone; -1: all
@@ -217,6 +218,18 @@ struct FaultControl {
     Effect positioning = {}, straightness = {}, angle = {}, squareness = {};
 };
 
+// What the faults of one kind may do to a calibration without being seen, one at a time, to first order: the worst of
+// them, as found by looking where they have most effect and from there at what affects that value most.
+struct UnseenFault {
+    FaultKind kind;
+    std::string channel;  // as in FaultControl
+    // Any fault of this kind is found from this size on with 99 %; mm or rad; of those that are controlled at all.
+    double size = 0.0;
+    bool controlled = true;  // all that were looked at are; false: some may have any size
+    // Largest change of a calibrated value by a fault just not found; infinite: of one that nothing controls.
+    double positioning = 0.0, straightness = 0.0, angle = 0.0, squareness = 0.0;
+};
+
 struct Adjustment {
     Calibration calibration;  // carries fit and variance factor
     std::vector<SetupEstimate> setup;
@@ -230,6 +243,7 @@ struct Adjustment {
     std::vector<FaultClass> faults = {};
     Verdict verdict = {};
     std::vector<FaultControl> reliability = {};  // if it was asked for
+    std::vector<UnseenFault> unseen = {};
 
     double variance_factor() const;             // weighted_square_sum/degrees_of_freedom; 1 without freedom
     std::vector<std::size_t> outliers() const;  // readings that were left out: into `residuals`, by their number

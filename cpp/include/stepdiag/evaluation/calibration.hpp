@@ -73,6 +73,8 @@ struct Calibration {
     std::optional<double> variance_factor = {};  // of that fit; none where nothing controls the readings
     // Why that verdict, in words, one sentence each, as files hold them; an evaluation leaves the words to its caller.
     std::vector<std::string> fit_reasons = {};
+    // How large faults of readings may be in it unseen, and what they then do; likewise in words.
+    std::vector<std::string> unseen_faults = {};
     // What all uncertainties were multiplied by beyond what follows from those of the readings; none: by nothing.
     std::optional<double> uncertainty_scaled = {};
 
@@ -105,10 +107,10 @@ bool is_anything_determined(const Calibration& calibration);
 ParameterTable to_parameter_table(const Calibration& calibration);
 
 // CSV with format, chain, volume_mm, tool_mm, method, date, fit, variance_factor, uncertainty_scaled, fit_reasons,
-// straightness_reference, provenance_keys, undetermined_slopes, undetermined_reversal_constants and undetermined in the
-// leading lines; not kept are the covariance and the uncertainty of a reversal error, which is not that of its two
-// tables. Reading throws
-// InvalidArgument naming file and line, also where chain, volume or tool is missing.
+// unseen_faults, straightness_reference, provenance_keys, undetermined_slopes, undetermined_reversal_constants and
+// undetermined in the leading lines; not kept are the covariance and the uncertainty of a reversal error, which is not
+// that of its two tables. Reading throws InvalidArgument naming file and line, also where chain, volume or tool is
+// missing.
 void write_calibration(const Calibration& calibration, const std::string& path);
 Calibration read_calibration(const std::string& path);
 
