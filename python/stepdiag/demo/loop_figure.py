@@ -39,7 +39,7 @@ def draw_errors(axes: Axes, outcomes: list[LoopOutcome]) -> None:
             label = f"{outcome.case.name}, {WORDS[kind]}"
             draw_shares(axes, lengths(points.after), color=colour, linestyle=DASHES[kind], label=label)
     before = outcomes[0].points["random"].before
-    draw_shares(axes, lengths(before), color=COLOUR["before"], linestyle="-", label="before")
+    draw_shares(axes, lengths(before), color=COLOUR["truth"], linestyle=":", label="before")
     axes.set_xscale("log")
     axes.set_xlim(left=SMALLEST)
     axes.set_xlabel(axis_label("error of the functional point", "µm"))
