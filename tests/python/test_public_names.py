@@ -40,8 +40,10 @@ def test_type_checkers_see_what_is_loaded_later() -> None:
         "reason_texts",
         "to_xarray",
         "undetermined_text",
+        "unseen_texts",
         "word_findings_with",
         "word_reasons_with",
+        "word_unseen_faults_with",
     }
     assert sd.__all__ == sorted(sd.__all__)
 

@@ -5,7 +5,6 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from stepdiag._core import Calibration, UnseenFault
-from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.parameters import KINDS, REPORT_UNIT, in_report_units
 from stepdiag.units import report_value
 
@@ -44,6 +43,8 @@ def unseen_rows(calibration: Calibration) -> Iterator[str]:
 
 def _text(fault: UnseenFault, calibration: Calibration) -> tuple[bool, str]:
     """Whether it matters, and the sentence."""
+    from stepdiag.calibration.largest_by_kind import largest_uncertainties  # numpy, for which an import does not wait
+
     name = f"a {FAULT_NAMES[fault.kind, fault.channel]}"
     value, unit = report_value(FAULT_UNITS[fault.channel], fault.size)
     below = f"below {value:.3g} {unit}"
