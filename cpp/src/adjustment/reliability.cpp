@@ -216,7 +216,7 @@ public:
     }
 
 private:
-    static constexpr int slips_computed = 200;
+    static constexpr int slips_computed = 100;    // of others the uncertainty is interpolated, some 20 % at worst
     static constexpr int most_uncontrolled = 20;  // of a kind, evenly spaced
     static constexpr double nothing = 1e-4;       // of a value's standard uncertainty: rounding
     using Place = std::pair<int, int>;            // kind of fault and family
@@ -225,9 +225,9 @@ private:
         int hypothesis = 0, value = 0;
     };
 
-    // Of each function and squareness the value that is known worst, and some that are spread evenly, both ends too.
+    // Of each function and squareness the value that is known worst, and both ends.
     std::set<int> first_columns() const {
-        constexpr int spread = 4;
+        constexpr int spread = 2;
         std::set<int> columns;
         for (int first = 0, end; first < int(values_.size()); first = end) {
             int worst = first;
