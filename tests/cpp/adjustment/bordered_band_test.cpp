@@ -105,6 +105,8 @@ void expect_dense_answers(const BorderedBand& matrix, const BorderedFactor& fact
     factor.solve(x);
     EXPECT_LE((x - inverse * right).lpNorm<Eigen::Infinity>(), tolerance * right.lpNorm<1>());
     for (const int i : factor.held()) EXPECT_EQ(x[i], 0.0);
+    EXPECT_NEAR(factor.inverse_square(right), right.dot(inverse * right),
+                tolerance * right.lpNorm<1>() * right.lpNorm<1>());
 
     const BorderedBand selected = factor.selected_inverse();
     for (int j = 0; j < matrix.blocks(); ++j) {
