@@ -7,6 +7,15 @@ from stepdiag.units import REPORT_UNITS, report_value
 AXES: Final = "XYZ"
 FUNCTIONS: Final = tuple(f"E{component}{axis}" for axis in AXES for component in "XYZABC")
 SQUARENESSES: Final = ("C0Y", "B0Z", "A0Z")
+# By the second letter of a function.
+COMPONENT_MEANING: Final = {
+    "X": "displacement along X",
+    "Y": "displacement along Y",
+    "Z": "displacement along Z",
+    "A": "rotation about X",
+    "B": "rotation about Y",
+    "C": "rotation about Z",
+}
 
 Kind = Literal["positioning", "straightness", "angle", "squareness"]
 KINDS: Final[tuple[Kind, ...]] = ("positioning", "straightness", "angle", "squareness")

@@ -39,27 +39,43 @@ def largest_deviations(calibration: Calibration, truth: ErrorMap) -> dict[Kind, 
     return {kind: largest[kind] for kind in KINDS if kind in largest}
 
 
-def largest_values(calibration: Calibration) -> dict[Kind, tuple[float, str]]:
-    """The largest value of each kind, mm or rad, and the parameter and place that has it."""
-    return _largest(calibration, 0)
+@dataclass(frozen=True)
+class LargestEntry:
+    """The entry of a calibration with the largest value, or standard uncertainty, of its kind; mm or rad."""
+
+    parameter: str
+    position: float | None  # mm; none for a squareness
+    value: float
+    standard_uncertainty: float  # NaN where it is not known
+
+    @property
+    def place(self) -> str:
+        return self.parameter if self.position is None else f"{self.parameter} at {self.position:g} mm"
+
+
+def largest_entries(calibration: Calibration, *, uncertainty: bool = False) -> dict[Kind, LargestEntry]:
+    """The entry of each kind with the largest value, or with the largest standard uncertainty.
+
+    A kind of which no such number is known is absent."""
+    largest: dict[Kind, LargestEntry] = {}
+    sizes: dict[Kind, float] = {}
+
+    def note(entry: LargestEntry) -> None:
+        kind = kind_of(entry.parameter)
+        size = abs(entry.standard_uncertainty if uncertainty else entry.value)
+        if np.isfinite(size) and (kind not in sizes or size > sizes[kind]):
+            largest[kind], sizes[kind] = entry, size
+
+    for name, (position, value, u) in calibration.functions.items():
+        known = np.nan_to_num(np.abs(u if uncertainty else value), nan=-1.0)
+        k = int(np.argmax(known))
+        note(LargestEntry(name, float(position[k]), float(value[k]), float(u[k])))
+    for name, (angle, u_angle) in calibration.squareness.items():
+        note(LargestEntry(name, None, angle, u_angle))
+    return {kind: largest[kind] for kind in KINDS if kind in largest}
 
 
 def largest_uncertainties(calibration: Calibration) -> dict[Kind, tuple[float, str]]:
     """The largest standard uncertainty of each kind, mm or rad, and the parameter and place that has it."""
-    return _largest(calibration, 1)
-
-
-def _largest(calibration: Calibration, column: int) -> dict[Kind, tuple[float, str]]:
-    largest: dict[Kind, tuple[float, str]] = {}
-
-    def note(name: str, size: float, where: str) -> None:
-        kind = kind_of(name)
-        if np.isfinite(size) and (kind not in largest or abs(size) > abs(largest[kind][0])):
-            largest[kind] = size, f"{name}{where}"
-
-    for name, (position, *columns) in calibration.functions.items():
-        worst = int(np.argmax(np.abs(columns[column])))
-        note(name, float(columns[column][worst]), f" at {position[worst]:g} mm")
-    for name, pair in calibration.squareness.items():
-        note(name, pair[column], "")
-    return {kind: largest[kind] for kind in KINDS if kind in largest}
+    entries = largest_entries(calibration, uncertainty=True)
+    return {kind: (entry.standard_uncertainty, entry.place) for kind, entry in entries.items()}

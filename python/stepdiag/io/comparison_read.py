@@ -12,6 +12,7 @@ import numpy as np
 from stepdiag._core import InvalidArgument
 from stepdiag.calibration.comparison import Difference, significance_threshold
 from stepdiag.calibration.table_sums import FloatArray
+from stepdiag.io.csv_text import finite_number
 from stepdiag.io.data_files import is_netcdf
 from stepdiag.io.whole_files import read_text
 from stepdiag.parameters import units_of
@@ -94,7 +95,10 @@ def _read_csv(path: Path) -> StoredComparison:
         expected = "um" if units_of(name[:3]) == "mm" else "urad"
         if unit != expected:
             raise InvalidArgument(f"{where}: unit: expected {expected} for {name}, got {unit!r}")
-        position, value, u = (_number(row, key, where) for key in ("position_mm", "difference", "standard_uncertainty"))
+        position, value, u = (
+            finite_number(row[key], f"{where}: {key}") if row[key] else np.nan
+            for key in ("position_mm", "difference", "standard_uncertainty")
+        )
         if np.isnan(value):
             raise InvalidArgument(f"{where}: difference: expected a number, got an empty field")
         shape_only = row["shape_only"] == "true"
@@ -107,20 +111,6 @@ def _read_csv(path: Path) -> StoredComparison:
     if len(volume) != 3:
         raise InvalidArgument(f"{path}: volume_mm: expected three numbers, got {leading.get('volume_mm', 'none')}")
     return _checked(path, differences, volume, leading, {key: leading.get(key, "") for key in _MADE})
-
-
-def _number(row: dict[str, str], key: str, where: str) -> float:
-    """A number of a row; NaN for an empty field."""
-    field = row[key] or ""
-    if not field:
-        return np.nan
-    try:
-        number = float(field)
-    except ValueError:
-        number = np.nan
-    if not np.isfinite(number):
-        raise InvalidArgument(f"{where}: {key}: expected a finite number, got {field!r}")
-    return number
 
 
 def _of_rows(name: str, rows: Sequence[tuple[float, float, float, bool]]) -> Difference:

@@ -5,6 +5,8 @@ import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
+from stepdiag._core import InvalidArgument
+
 
 def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]], leading: Mapping[str, str] | None = None) -> str:
     """The file. None and NaN are empty fields; a key without value has no line."""
@@ -20,3 +22,14 @@ def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]], leading: 
 def lengths(values: Iterable[float]) -> str:
     """Numbers, each read back to the same bits."""
     return " ".join(repr(float(value)) for value in values)
+
+
+def finite_number(field: str, where: str) -> float:
+    """A number of a field; raises InvalidArgument, with where it stands, for any other text."""
+    try:
+        number = float(field)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise InvalidArgument(f"{where}: expected a finite number, got {field!r}")
+    return number

@@ -22,7 +22,7 @@ class ParameterValues(NamedTuple):
 
 
 def _calibration(calibration: Calibration) -> Facts:
-    from stepdiag.calibration.largest_by_kind import largest_uncertainties, largest_values
+    from stepdiag.calibration.largest_by_kind import largest_entries, largest_uncertainties
 
     count = len(calibration.functions) + len(calibration.squareness)
     facts = [
@@ -31,10 +31,9 @@ def _calibration(calibration: Calibration) -> Facts:
         ("machine", f"{calibration.chain}, {lengths_text(calibration.volume)}"),
         ("parameters", f"{count} of 21"),
     ]
-    uncertainties = largest_uncertainties(calibration)
-    for kind, (value, where) in largest_values(calibration).items():
-        facts.append((f"largest {kind}", _sized(kind, value, where)))
-    for kind, (u, where) in uncertainties.items():
+    for kind, entry in largest_entries(calibration).items():
+        facts.append((f"largest {kind}", _sized(kind, entry.value, entry.place)))
+    for kind, (u, where) in largest_uncertainties(calibration).items():
         facts.append((f"largest u of {kind}", _sized(kind, u, where)))
     facts += [("because", reason) for reason in calibration.fit_reasons]
     facts += [("undetermined", sentence) for sentence in calibration.undetermined]

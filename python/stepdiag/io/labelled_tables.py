@@ -8,16 +8,8 @@ import xarray as xr
 
 from stepdiag._core import Calibration, Measurement
 from stepdiag.calibration.functional_point import functional_point_straightness
-from stepdiag.parameters import units_of
+from stepdiag.parameters import COMPONENT_MEANING, units_of
 
-_COMPONENT = {
-    "X": "displacement along X",
-    "Y": "displacement along Y",
-    "Z": "displacement along Z",
-    "A": "rotation about X",
-    "B": "rotation about Y",
-    "C": "rotation about Z",
-}
 _SQUARENESS = {"C0Y": "squareness of Y to X", "B0Z": "squareness of Z to X", "A0Z": "squareness of Z to Y"}
 _CHANNEL = {
     "distance": ("mm", "distance from reference plane to mirror"),
@@ -84,7 +76,7 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
         axis = position_axis(coordinates, name, position)
         attributes = {
             "units": units_of(name),
-            "long_name": f"{_COMPONENT[name[1]]} of axis {name[2]}",
+            "long_name": f"{COMPONENT_MEANING[name[1]]} of axis {name[2]}",
             "slope_determined": str(name not in calibration.undetermined_slopes).lower(),
         }
         variables[name] = (axis, value, attributes)
@@ -93,7 +85,7 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
         axis = position_axis(coordinates, f"{name}_reversal", position)
         attributes = {
             "units": units_of(name),
-            "long_name": f"reversal error of the {_COMPONENT[name[1]]} of axis {name[2]}",
+            "long_name": f"reversal error of the {COMPONENT_MEANING[name[1]]} of axis {name[2]}",
             "constant_determined": str(name not in calibration.undetermined_reversal_constants).lower(),
         }
         variables[f"{name}_reversal"] = (axis, value, attributes)
@@ -106,7 +98,7 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
                 _uncertainty_of(attributes | {"long_name": f"{name} approached in - direction"}),
             )
     for name, (_, value, uncertainty) in functional_point_straightness(calibration).items():
-        moved = f"{_COMPONENT[name[1]]} of the functional point, moved by {name[2]} alone"
+        moved = f"{COMPONENT_MEANING[name[1]]} of the functional point, moved by {name[2]} alone"
         attributes = {"units": "mm", "long_name": moved}
         axis = variables[name][0]
         variables[f"{name}_functional_point"] = (axis, value, attributes)

@@ -9,8 +9,9 @@ from typing_extensions import TypedDict
 
 from stepdiag._core import Calibration, Undetermined
 from stepdiag.calibration.finding_text import NOISE_ALONE
+from stepdiag.calibration.largest_by_kind import largest_entries
 from stepdiag.objects.writer import measured, number
-from stepdiag.parameters import FUNCTIONS, KINDS, SQUARENESSES, Kind, kind_of, units_of
+from stepdiag.parameters import FUNCTIONS, SQUARENESSES, Kind, units_of
 
 Array = npt.NDArray[np.float64]
 Tables = tuple[Array, Array, Array]  # positions, values, standard uncertainties
@@ -219,18 +220,12 @@ def findings_of(findings: Sequence[Undetermined], texts: Sequence[str]) -> list[
 def largest_of(calibration: Calibration, *, uncertainty: bool = False) -> list[Any]:
     """The largest value of each kind that has values, or its largest standard uncertainty."""
     what = "standard_uncertainty" if uncertainty else "value"
-    largest: dict[Kind, tuple[float, str, float | None]] = {}
-    entries = [
-        (name, p, (u if uncertainty else value))
-        for name, (position, values, uncertainties) in calibration.functions.items()
-        for p, value, u in zip(position.tolist(), values.tolist(), uncertainties.tolist(), strict=True)
-    ]
-    entries += [(name, None, pair[uncertainty]) for name, pair in calibration.squareness.items()]
-    for name, position, size in entries:
-        kind = kind_of(name)
-        if np.isfinite(size) and (kind not in largest or abs(size) > abs(largest[kind][0])):
-            largest[kind] = size, name, position
     return [
-        {"kind": kind, "parameter": name, "position_mm": position, **measured(unit_key(name), **{what: size})}
-        for kind, (size, name, position) in sorted(largest.items(), key=lambda item: KINDS.index(item[0]))
+        {
+            "kind": kind,
+            "parameter": entry.parameter,
+            "position_mm": entry.position,
+            **measured(unit_key(entry.parameter), **{what: getattr(entry, what)}),
+        }
+        for kind, entry in largest_entries(calibration, uncertainty=uncertainty).items()
     ]

@@ -11,28 +11,20 @@ from stepdiag.page.figure import Figures, value_table, values
 from stepdiag.page.html import Markup, element, markup, section
 from stepdiag.page.look import BAND, BEFORE, GRID, INK, LINE, NEGATIVE, QUIET
 from stepdiag.page.numbers import COVERAGE_FACTOR, position, shown, with_interval
-from stepdiag.parameters import REPORT_UNIT, SQUARENESSES, Kind, in_report_units, kind_of
+from stepdiag.parameters import COMPONENT_MEANING, REPORT_UNIT, SQUARENESSES, Kind, in_report_units, kind_of
 
 FAMILIES: Final[tuple[tuple[Kind, str, tuple[str, ...]], ...]] = (
     ("positioning", "Positioning", ("EXX", "EYY", "EZZ")),
     ("straightness", "Straightness", ("EYX", "EXY", "EXZ", "EZX", "EZY", "EYZ")),
     ("angle", "Angular errors", ("EAX", "EAY", "EAZ", "EBX", "EBY", "EBZ", "ECX", "ECY", "ECZ")),
 )
-MEANING: Final = {
-    "X": "displacement along X",
-    "Y": "displacement along Y",
-    "Z": "displacement along Z",
-    "A": "rotation about X",
-    "B": "rotation about Y",
-    "C": "rotation about Z",
-}
 # Which axes form the angle, in whose plane it is drawn, and the sign of the second axis' lean to the first one.
 _CORNER: Final = {"C0Y": ("X", "Y", -1.0), "B0Z": ("X", "Z", 1.0), "A0Z": ("Y", "Z", -1.0)}
 
 
 def what_it_is(name: str) -> str:
     """The meaning of an error function: "displacement along Y of axis X"."""
-    return f"{MEANING[name[1]]} of axis {name[2]}"
+    return f"{COMPONENT_MEANING[name[1]]} of axis {name[2]}"
 
 
 def curves_section(calibration: Calibration, before: Calibration | None, figures: Figures) -> Markup:

@@ -9,7 +9,7 @@ import numpy as np
 
 from stepdiag._core import Calibration
 from stepdiag.calibration.finding_text import MEANING, NOISE_ALONE, NOT_SEEN, PROVENANCE
-from stepdiag.calibration.largest_by_kind import largest_uncertainties
+from stepdiag.calibration.largest_by_kind import largest_entries, largest_uncertainties
 from stepdiag.calibration.volume import VolumeErrors
 from stepdiag.calibration.volume_change import VolumeChange
 from stepdiag.page.contents import Contents
@@ -17,7 +17,7 @@ from stepdiag.page.header import TITLES
 from stepdiag.page.html import Markup, definitions, element, listed, markup, section, table
 from stepdiag.page.numbers import COVERAGE_FACTOR, NBSP, NOT_KNOWN, moment, position, shown, with_interval
 from stepdiag.page.volume import ErrorInVolume, place_of_largest, why_not_known, with_ends
-from stepdiag.parameters import FUNCTIONS, KINDS, REPORT_UNIT, SQUARENESSES, Kind, in_report_units, kind_of
+from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, in_report_units, kind_of
 from stepdiag.units import MICROMETRE
 
 HEADLINE: Final = {
@@ -131,9 +131,9 @@ def _volume(contents: Contents, figures: VolumeErrors) -> Markup:
     if math.isnan(figures.largest):
         return markup(f"The largest error is {why_not_known(figures)}.")
     parts: list[object] = [
-        "The tool is at most ",
+        "The largest distance of the tool from its commanded position is ",
         element("strong", with_ends(figures.largest, figures.largest_interval)),
-        f" away from its commanded position, at {place_of_largest(figures)}; ",
+        f", at {place_of_largest(figures)}; ",
         f"{with_ends(figures.rms, figures.rms_interval)} rms over the volume.",
     ]
     if contents.change is not None and not math.isnan(contents.change.largest.a):
@@ -160,27 +160,10 @@ def _within(figures: VolumeErrors) -> Iterator[tuple[str, object]]:
     yield f"Within {figures.limit / MICROMETRE:.4g}{NBSP}µm?", markup(element("strong", f"{verdict}."), f" {why}")
 
 
-def largest_values(calibration: Calibration) -> dict[Kind, tuple[str, float, float, float]]:
-    """By kind the parameter with the largest value, its position (NaN of a squareness), value and u, native units."""
-    found: dict[Kind, tuple[str, float, float, float]] = {}
-    for name, (where, value, u) in calibration.functions.items():
-        k = int(np.argmax(np.abs(value)))
-        if abs(value[k]) > abs(found.get(kind_of(name), ("", 0.0, 0.0, 0.0))[2]) or kind_of(name) not in found:
-            found[kind_of(name)] = name, float(where[k]), float(value[k]), float(u[k])
-    for name, (angle, u_angle) in calibration.squareness.items():
-        if "squareness" not in found or abs(angle) > abs(found["squareness"][2]):
-            found["squareness"] = name, float("nan"), angle, u_angle
-    return found
-
-
 def _largest(calibration: Calibration) -> Iterator[str]:
-    values = largest_values(calibration)
-    for kind in KINDS:
-        if kind in values:
-            name, where, value, u = values[kind]
-            place = name if np.isnan(where) else f"{name} at {position(where)} mm"
-            figure, wide = in_report_units(kind, value), in_report_units(kind, u)
-            yield f"{kind} {with_interval(figure, wide, REPORT_UNIT[kind])} ({place})"
+    for kind, entry in largest_entries(calibration).items():
+        figure, wide = (in_report_units(kind, number) for number in (entry.value, entry.standard_uncertainty))
+        yield f"{kind} {with_interval(figure, wide, REPORT_UNIT[kind])} ({entry.place})"
 
 
 def _how_well(calibration: Calibration) -> str:
@@ -215,9 +198,9 @@ def open_section(calibration: Calibration) -> Markup:
     """What was not determined, and why."""
     title = "What was not determined"
     missing = _missing(calibration)
-    if not calibration.undetermined and not missing:
-        return section("open", title, element("p", "Nothing: the readings determine all 21 parameters."))
     parts: list[Any] = []
+    if not calibration.undetermined and not missing:
+        parts.append(element("p", "Nothing: the readings determine all 21 parameters."))
     if calibration.undetermined:
         parts.append(listed([f"{text[0].upper()}{text[1:]}." for text in calibration.undetermined]))
     if missing:
@@ -229,6 +212,9 @@ def open_section(calibration: Calibration) -> Markup:
                 f"Of {', '.join(calibration.undetermined_slopes)} only the shape is known, given with 0 at both ends.",
             )
         )
+    if calibration.unseen_faults:
+        parts.append(element("h3", "Faults of readings that no fit would show"))
+        parts.append(listed([f"{text[0].upper()}{text[1:]}." for text in calibration.unseen_faults]))
     return section("open", title, *parts)
 
 

@@ -11,6 +11,7 @@ from typing import Final
 
 from stepdiag._core import InvalidArgument
 from stepdiag.display import Displayed, Facts
+from stepdiag.io.csv_text import finite_number
 from stepdiag.io.file_kind import head_of
 from stepdiag.io.whole_files import read_text
 from stepdiag.units import MICROMETRE
@@ -93,7 +94,7 @@ def read_positions(path: str | PathLike[str]) -> PositionReadings:
         if len(fields) != len(columns):
             raise InvalidArgument(f"{where}: expected {len(columns)} fields, got {len(fields)}")
         row = {name: field.strip() for name, field in zip(columns, fields, strict=True)}
-        target = _number(row["target_mm"], f"{where}: target_mm")
+        target = finite_number(row["target_mm"], f"{where}: target_mm")
         target = next((known for known in targets if abs(known - target) < _ROUNDING), target)
         if row["direction"] not in ("+", "-"):
             raise InvalidArgument(f"{where}: direction: expected + or -, got {row['direction']!r}")
@@ -106,7 +107,7 @@ def read_positions(path: str | PathLike[str]) -> PositionReadings:
         if target not in targets:
             targets.append(target)
         if row[value_column]:
-            value = _number(row[value_column], f"{where}: {value_column}")
+            value = finite_number(row[value_column], f"{where}: {value_column}")
             deviations[key] = value * MICROMETRE if value_column == "deviation_um" else value - target
     try:
         return PositionReadings(
@@ -133,13 +134,3 @@ def _value_column(columns: list[str], where: str) -> str:
     if len(values) != 1 or sorted(columns) != sorted([*_REQUIRED, *values]):
         raise InvalidArgument(f"{where}: {expected}, got {', '.join(columns)}")
     return values[0]
-
-
-def _number(text: str, where: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InvalidArgument(f"{where}: expected a number, got {text!r}")
-    return value

@@ -8,9 +8,10 @@ import numpy as np
 from stepdiag._core import Calibration
 from stepdiag.calibration.finding_text import fit_rows, provenance_rows
 from stepdiag.calibration.functional_point import functional_point_straightness
+from stepdiag.calibration.largest_by_kind import LargestEntry, largest_entries
 from stepdiag.calibration.unseen_text import unseen_rows
 from stepdiag.io.csv_text import csv_text, lengths
-from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
+from stepdiag.parameters import REPORT_UNIT, Kind, in_report_units
 from stepdiag.report.comparison import decimal
 from stepdiag.report.evaluation import reversal_rows, undetermined_rows
 
@@ -29,12 +30,13 @@ def calibration_report(calibration: Calibration) -> Iterator[str]:
     )
     yield f"machine: chain {calibration.chain}, volume {volume} mm, tool offset {tool} mm"
     yield f"{'':<14}{'largest value':<32}largest standard uncertainty"
-    for kind in KINDS:
-        values = list(_values(calibration, kind))
-        if values:
-            largest = _largest(kind, [(value, place) for value, _, place in values])
-            uncertain = _largest(kind, [(u, place) for _, u, place in values])
-            yield f"{kind:<14}{largest:<32}{uncertain}"
+    uncertain = largest_entries(calibration, uncertainty=True)
+    for kind, entry in largest_entries(calibration).items():
+        largest = _entry_text(calibration, kind, entry, entry.value)
+        u = "not known"
+        if kind in uncertain:
+            u = _entry_text(calibration, kind, uncertain[kind], uncertain[kind].standard_uncertainty)
+        yield f"{kind:<14}{largest:<32}{u}"
     yield from unseen_rows(calibration)
     yield from reversal_rows(calibration)
     yield "signs: actual less commanded; rotations and squarenesses by the right-hand rule"
@@ -43,23 +45,9 @@ def calibration_report(calibration: Calibration) -> Iterator[str]:
     yield from undetermined_rows(calibration)
 
 
-def _values(calibration: Calibration, kind: Kind) -> Iterator[tuple[float, float, str]]:
-    """Value, standard uncertainty and place of every value of a kind."""
-    for name, (position, value, uncertainty) in calibration.functions.items():
-        if kind_of(name) == kind:
-            shape = "'s shape" if name in calibration.undetermined_slopes else ""
-            for p, v, u in zip(position.tolist(), value.tolist(), uncertainty.tolist(), strict=True):
-                yield v, u, f"{name}{shape} at {p:g} mm"
-    for name, (angle, u) in calibration.squareness.items():
-        if kind_of(name) == kind:
-            yield angle, u, name
-
-
-def _largest(kind: Kind, numbers: list[tuple[float, str]]) -> str:
-    known = [(number, place) for number, place in numbers if not np.isnan(number)]
-    if not known:
-        return "not known"
-    number, place = max(known, key=lambda entry: abs(entry[0]))
+def _entry_text(calibration: Calibration, kind: Kind, entry: LargestEntry, number: float) -> str:
+    shape = "'s shape" if entry.parameter in calibration.undetermined_slopes else ""
+    place = entry.place.replace(entry.parameter, entry.parameter + shape)
     return f"{in_report_units(kind, number):9.4g} {REPORT_UNIT[kind]:<5}({place})"
 
 

@@ -321,7 +321,7 @@ def test_killed_acquisition_goes_on_in_another_process(tmp_path: Path, whole: Pa
     (tmp_path / "scenario.toml").write_text(
         acquiring.SCENARIO.format(plan=acquiring.SMALL, head=acquiring.BEAMS, noise="")
     )
-    command = [sys.executable, "-m", "stepdiag.cli"]
+    command = [sys.executable, "-m", "stepdiag"]
     options = ["--settle-count", "2", "--average", "2", "--interval-ms", "0", "-o", "run.csv"]
     processes: list[subprocess.Popen[str]] = []
 

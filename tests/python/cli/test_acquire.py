@@ -148,7 +148,7 @@ def test_bad_options_of_the_twin_are_refused(
 
 
 def test_interrupted_commands_end_and_keep_what_they_have(folder: Path) -> None:
-    command = [sys.executable, "-m", "stepdiag.cli"]
+    command = [sys.executable, "-m", "stepdiag"]
 
     def hear() -> None:  # also where the tests run in the background of a shell, which ignores Ctrl-C
         signal.signal(signal.SIGINT, signal.SIG_DFL)

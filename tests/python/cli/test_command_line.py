@@ -236,7 +236,7 @@ def test_interruption_gives_130(here: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_terminal_without_the_micro_sign_gets_its_report(here: Path) -> None:
-    command = [sys.executable, "-m", "stepdiag.cli", "evaluate", "scenario.toml", "run.csv", "-o", "calibration.csv"]
+    command = [sys.executable, "-m", "stepdiag", "evaluate", "scenario.toml", "run.csv", "-o", "calibration.csv"]
     environment = {**os.environ, "PYTHONIOENCODING": "iso8859-5"}
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=here, env=environment)
     assert done.returncode == 0
@@ -259,7 +259,7 @@ def limit_files(size: int) -> Callable[[], None]:
 )
 def test_full_disk_leaves_no_half_written_file(here: Path, arguments: list[str]) -> None:
     before = {path.name for path in here.iterdir()}
-    command = [sys.executable, "-m", "stepdiag.cli", *arguments]
+    command = [sys.executable, "-m", "stepdiag", *arguments]
     limit = limit_files(1024)
     done = subprocess.run(command, preexec_fn=limit, capture_output=True, text=True, check=False, cwd=here)
     assert done.returncode == 2
