@@ -12,6 +12,9 @@ from pathlib import Path
 
 import pytest
 from places import DOCS
+from terminals import needs_terminal
+
+pytestmark = needs_terminal
 
 SHELLS = {
     "bash": ["bash", "--norc", "--noprofile", "-i"],

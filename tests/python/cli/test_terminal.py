@@ -13,6 +13,7 @@ import click
 import pytest
 from click.testing import CliRunner
 from small_scenario import SCENARIO
+from terminals import needs_terminal
 
 import stepdiag as sd
 from stepdiag.cli.acquire import acquire
@@ -132,6 +133,7 @@ def in_terminal(*arguments: str) -> str:
     return shown.decode()
 
 
+@needs_terminal
 def test_command_has_colours_on_a_terminal_and_none_in_a_pipe(tmp_path: Path) -> None:
     scenario, run = tmp_path / "scenario.toml", tmp_path / "run.csv"
     scenario.write_text(SCENARIO)
@@ -145,6 +147,7 @@ def test_command_has_colours_on_a_terminal_and_none_in_a_pipe(tmp_path: Path) ->
     assert " ".join(plain.split()) == " ".join(piped.stdout.split())
 
 
+@needs_terminal
 def test_json_has_no_colour_on_a_terminal(tmp_path: Path) -> None:
     scenario = tmp_path / "scenario.toml"
     scenario.write_text(SCENARIO)
