@@ -1,7 +1,7 @@
-"""A twin: a simulator of the IDS3010, behind a socket, that reads a virtual machine which a controller moves.
+"""A twin: a simulated IDS3010 behind a socket, which measures a virtual machine that a controller moves.
 
-Beside the instrument's own functions it has `stepdiag.twin.moveTo` [x, y, z], `stepdiag.twin.setUp` [number],
-`stepdiag.twin.visit` [number, place, digest] and `stepdiag.twin.state` []; docs/acquisition.md says what they do.
+In addition to the functions of the instrument it has `stepdiag.twin.moveTo` [x, y, z], `stepdiag.twin.setUp` [number],
+`stepdiag.twin.visit` [number, place, digest] and `stepdiag.twin.state` []; docs/acquisition.md describes them.
 """
 
 import socketserver
@@ -24,7 +24,7 @@ PARSE_ERROR, NO_METHOD, BAD_PARAMS = -32700, -32601, -32602  # JSON-RPC 2.0
 
 
 class Twin:
-    """A twin that listens, from `with` on, in threads of its own."""
+    """A twin; inside a `with` block it listens in threads of its own."""
 
     def __init__(
         self,
@@ -35,8 +35,9 @@ class Twin:
         behaviour: TwinBehaviour | None = None,
         play: float | None = None,
     ) -> None:
-        """port: 0 is any that is free. play: seconds at every point of a visit, which the twin then moves through by
-        itself. Raises InvalidArgument for a head that the instrument cannot be, and where it cannot listen."""
+        """port: 0 takes any free one. play: the twin moves through visits by itself, with this time at every point, s.
+
+        Raises InvalidArgument if the instrument cannot have the head's beams, or the port cannot be opened."""
         described = scenario if isinstance(scenario, Scenario) else read_scenario(scenario)
         if play is not None and not 0.0 < play < 1e6:
             raise InvalidArgument(f"play: expected seconds above 0, got {play!r}")
@@ -83,7 +84,7 @@ class Twin:
             thread.join()
 
     def _move_on(self) -> None:
-        """Through the points of every visit that a client begins, and on to the next one of the same set-up."""
+        """Move through the points of every visit that a client begins, then to the next visit of the same set-up."""
         begun = self.instrument.visit_begun
         while begun.wait() and not self._ended.is_set():
             begun.clear()
@@ -101,7 +102,7 @@ class Twin:
 
 
 class Answers:
-    """What the instrument's functions answer."""
+    """Answers requests as the instrument does."""
 
     def __init__(self, instrument: TwinInstrument) -> None:
         self._instrument = instrument

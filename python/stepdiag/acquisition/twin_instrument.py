@@ -1,4 +1,4 @@
-"""The instrument of a twin: a virtual machine with its head, read as an IDS3010 reads."""
+"""The instrument of a twin: an IDS3010 on the head of a virtual machine."""
 
 import math
 import threading
@@ -18,7 +18,7 @@ from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.order_of_run import visits_of
 
 PICOMETRES = 1e9  # in a millimetre
-# The instrument's own numbers are not public; these say in words what they mean (errorNumberToString).
+# The numbers of the real instrument are not public; clients get the texts from errorNumberToString.
 NO_BEAM = 9001
 NOT_MEASURING = 9002
 WRONG_AXIS = 9003
@@ -32,13 +32,13 @@ TEXTS = {
 
 @dataclass(frozen=True)
 class TwinBehaviour:
-    """What a twin does beside reading exactly, to try a client with."""
+    """Deviations from exact readings, to test clients."""
 
-    settling: float = 0.0  # s: a move rings out, by 1/e in a fifth of this time
-    sampling_noise_um: float = 0.0  # of every value, beside the scenario's noise, which is that of a point
-    latch: bool = True  # a beam that was interrupted stays lost until the measurement is started anew
-    lost: frozenset[tuple[int, int]] = frozenset()  # (visit, point) where every beam is interrupted
-    interrupt: bool = False  # moving the head to another line interrupts every beam, as it does in truth
+    settling: float = 0.0  # s; oscillations after a move decay to 1/e in a fifth of this time
+    sampling_noise_um: float = 0.0  # of every value, in addition to the scenario's noise of each point
+    latch: bool = True  # an interrupted beam stays lost until the measurement is started again
+    lost: frozenset[tuple[int, int]] = frozenset()  # (visit, point) where all beams are interrupted
+    interrupt: bool = False  # moving the head to another line interrupts all beams, as in reality
 
     def __post_init__(self) -> None:
         for name, value in (("settling", self.settling), ("sampling_noise_um", self.sampling_noise_um)):
@@ -47,10 +47,10 @@ class TwinBehaviour:
 
 
 class TwinInstrument:
-    """State and readings, for several threads. Raises InvalidArgument for a head that is none of three axes.
+    """State and readings, for several threads. Raises InvalidArgument for a head that three axes cannot read.
 
-    The scenario's noise is that of a point: it is drawn anew with every move, not with every value. With `visit` it
-    is that of the same row of a simulated run; a visit begun again draws anew."""
+    The scenario's noise changes with every move, not with every value. In a visit it is that of the same row of a
+    simulated run; a repeated visit has new noise."""
 
     def __init__(self, scenario: Scenario, behaviour: TwinBehaviour | None = None) -> None:
         known = scenario.known
@@ -76,18 +76,19 @@ class TwinInstrument:
         self._index = 0  # in the visit
         self._moved_at = -math.inf
         self._before: list[float | None] = [None] * AXES
-        self._exact: list[float | None] | None = None  # mm, while nothing changes
+        self._exact: list[float | None] | None = None  # mm; None after a change
         self.mode = RUNNING
         self._interrupted = [False] * AXES
         self._reference = [0] * AXES
-        self.visit_begun = threading.Event()  # for whoever moves it
-        self.moves_itself = False  # through a visit that is begun (Twin, play)
+        self.visit_begun = threading.Event()  # for the thread that moves it
+        self.moves_itself = False  # through the points of a visit (Twin, play)
 
     # --- the machine ---
 
     def move_to(self, position: Sequence[float], *, counts: bool = True) -> None:
-        """The axes' positions, mm: as they come from a controller. Every call is a new point, if it counts; of a visit
-        only one that moves."""
+        """Move the axes to these positions, mm.
+
+        If it counts, every call is a new point; within a visit only a call that changes the position."""
         target = np.array(position, dtype=float)
         if target.shape != (3,) or not np.all(np.isfinite(target)):
             raise InvalidArgument("moveTo: expected three finite numbers")
@@ -104,8 +105,9 @@ class TwinInstrument:
             self._index += counts
 
     def set_up(self, number: int) -> None:
-        """Puts head and mirror up for the plan's line of this number (from 1). What the axes come from is from now on
-        told by their moves."""
+        """Set up head and mirror for the plan's line of this number (from 1).
+
+        From now on the moves of the axes show from which side they approach."""
         if not 1 <= number <= self._visits[-1].set_up:
             raise InvalidArgument(f"setUp: expected 1 to {self._visits[-1].set_up}, got {number}")
         with self._lock:
@@ -115,8 +117,10 @@ class TwinInstrument:
             self._setup_row = self._row
 
     def visit(self, number: int, index: int = 0, digest: str | None = None) -> None:
-        """The same for a visit of the plan, which is at its point of this place: also says how the axes come there,
-        and which row of the run it is. The axes stay where they are, unless the twin moves them itself."""
+        """Set up for a visit of the plan, at the point of this place in it.
+
+        The plan also gives the direction of approach and the row of the run. The axes stay where they are, unless the
+        twin moves them itself."""
         if digest is not None and digest != self._digest:
             raise InvalidArgument("visit: the twin has another plan or head")
         if not 1 <= number <= len(self._visits):
@@ -129,7 +133,7 @@ class TwinInstrument:
             self._visit, self._index = number, index
             self._approach = "".join("-" if sign < 0 else "+" for sign in visit.approach)
             self._place(visit.set_up)
-            if self.moves_itself:  # at once: the client reads as soon as it has its answer
+            if self.moves_itself:  # before the answer, after which the client reads
                 self._position = np.array(visit.positions[index])
             repeated = self._begun[number - 1] * self._rows
             self._begun[number - 1] += 1
@@ -139,7 +143,7 @@ class TwinInstrument:
             self.visit_begun.set()
 
     def state(self) -> dict[str, Any]:
-        """Where it stands, for whoever asks."""
+        """The current state, for clients."""
         with self._lock:
             position = [float(p) for p in self._position]
             return {"visit": self._visit, "set_up": self._set_up, "position_mm": position, "approach": self._approach}
@@ -150,7 +154,7 @@ class TwinInstrument:
             return self._visit, self._index
 
     def _place(self, set_up: int) -> None:
-        if set_up != self._set_up:  # without `interrupt`, whoever moved the head has started the measurement anew
+        if set_up != self._set_up:  # without `interrupt`, the measurement counts as started again
             self._interrupted = [self._behaviour.interrupt] * AXES
         self._set_up = set_up
 

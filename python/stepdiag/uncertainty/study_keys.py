@@ -45,18 +45,16 @@ class StudySection(Section):
     )
     methods: Annotated[tuple[Method, ...], Field(min_length=1)] = key(
         'a list of "adjustment", "enhanced", "conventional" and "one_step"',
-        "What virtual calibrations are evaluated with; several make a dimension of their own.",
+        "Methods of evaluation; several methods make a dimension of the result.",
         ("adjustment",),
     )
     samples: Annotated[int, Field(ge=0, le=4_000_000_000)] = key(
         "a whole number from 0 to 4e9", "Virtual calibrations in each cell; 0: propagation alone.", 10_000
     )
-    seed: Seed = key(SEED, "Seed of all that is drawn, the same in every cell.", 0)
-    digits: Annotated[int, Field(ge=1, le=3)] = key(
-        "1, 2 or 3", "Significant digits of standard uncertainties that matter.", 2
-    )
+    seed: Seed = key(SEED, "Seed of all random numbers, the same in every cell.", 0)
+    digits: Annotated[int, Field(ge=1, le=3)] = key("1, 2 or 3", "Significant digits of standard uncertainties.", 2)
     coverage: Annotated[float, Field(gt=0.0, lt=1.0)] = key(
-        "a probability between 0 and 1", "Of coverage intervals and expanded uncertainties.", 0.95
+        "a probability between 0 and 1", "Probability of coverage intervals and expanded uncertainties.", 0.95
     )
 
 
