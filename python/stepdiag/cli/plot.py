@@ -39,8 +39,10 @@ def plot(
     two calibrations       their differences B - A, with the limits of significance
     measurement            the readings; with its scenario the residuals, outliers and slips
     comparison             the differences in a file of compare
-    uncertainty result     standard uncertainties and budget, from a netCDF file of uncertainty
+    error map              its errors
+    uncertainty result     standard uncertainties, from a netCDF file of uncertainty also the budget
     scenario               what its plan determines, and how well
+    table of observe       how uncertainties grow with the number of steps
 
     Without -o the figure is written beside the first FILE, as a PNG file of its name. It replaces
     an older figure of stepdiag there, and nothing else. If a fit is rejected, the figure says so,

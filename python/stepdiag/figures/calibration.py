@@ -1,8 +1,7 @@
 """Figure of a calibration: the 21 parameters with 95 % bands, and the truth beside them."""
 
-import re
 from collections.abc import Iterator, Sequence
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +25,6 @@ from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 from stepdiag.style import BAND, COLOUR, own_style
 
 FloatArray = npt.NDArray[np.float64]
-_PARAMETER: Final = re.compile(r"\b(E[XYZABC][XYZ]|C0Y|B0Z|A0Z|rotations)\b")
 NEGATIVE: Any = {"linestyle": (0, (1, 1)), "linewidth": 1.0, "marker": "", "alpha": 0.9}
 
 
@@ -71,10 +69,8 @@ def _heading(calibration: Calibration, name: str) -> Heading:
 
 
 def undetermined_notes(calibration: Calibration) -> list[str]:
-    """What is said of undetermined parameters; set-ups are counted."""
-    notes = [f"undetermined: {text}" for text in calibration.undetermined if _PARAMETER.search(text)]
-    others = len(calibration.undetermined) - len(notes)
-    return notes + [f"undetermined: {others} more about set-ups, which the report lists"] * (others > 0)
+    """What is not determined, and what would help: parameters first, then set-ups."""
+    return [f"undetermined: {text}" for text in calibration.undetermined]
 
 
 def _draw_function(panels: ParameterPanels, calibration: Calibration, parameter: str) -> None:
@@ -98,20 +94,22 @@ def _draw_function(panels: ParameterPanels, calibration: Calibration, parameter:
 def with_gaps(
     calibration: Calibration, parameter: str, position: FloatArray, value: FloatArray, u: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """A table with NaN at nodes of the axis where a finding says that the parameter is not determined."""
-    if not _partial(calibration, parameter):
-        return position, value, u
+    """A table with NaN at those nodes of its axis where the parameter is not determined.
+
+    Where all is determined, an evaluation gives all functions of an axis at the same nodes. Tables
+    of other origin may have nodes of their own; they have no list of what is undetermined."""
     tables = [table[0] for name, table in calibration.functions.items() if name[2] == parameter[2]]
     nodes = np.unique(np.concatenate(tables))
+    if not calibration.undetermined or len(nodes) == len(position):
+        return position, value, u
     place = np.searchsorted(nodes, position)
     values, uncertainties = np.full((2, len(nodes)), np.nan)
     values[place], uncertainties[place] = value, u
     return nodes, values, uncertainties
 
 
-def _partial(calibration: Calibration, parameter: str = r"\w+") -> bool:
-    """Whether a finding says that a parameter is determined at some of its positions only."""
-    return any(re.search(rf"\b{parameter} at \d+ of its positions", text) for text in calibration.undetermined)
+def _has_gaps(calibration: Calibration) -> bool:
+    return any(np.isnan(with_gaps(calibration, name, *t)[1]).any() for name, t in calibration.functions.items())
 
 
 def _draw_truth(panels: ParameterPanels, calibration: Calibration, parameter: str, truth: ErrorMap) -> None:
@@ -137,9 +135,8 @@ def _handles(calibration: Calibration, truth: ErrorMap | None) -> Iterator[Any]:
         yield Line2D([], [], color=colour, label="approached in - direction", linestyle=(0, (1, 1)), linewidth=1.0)
     if truth is not None:
         yield Line2D([], [], label="truth", **TRUTH)
-    if len(calibration.functions) + len(calibration.squareness) < len(FUNCTIONS) + len(SQUARENESSES) or _partial(
-        calibration
-    ):
+    count = len(calibration.functions) + len(calibration.squareness)
+    if count < len(FUNCTIONS) + len(SQUARENESSES) or _has_gaps(calibration):
         yield Patch(label="not determined", **HATCH)
 
 

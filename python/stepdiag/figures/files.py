@@ -11,19 +11,21 @@ from stepdiag.io.data_files import read_calibration, read_measurement
 from stepdiag.io.file_kind import kind_of_file
 
 KINDS = (
-    "a calibration (with an error map as its truth), two calibrations, a measurement (with its scenario), "
-    "a comparison, an uncertainty result (.nc), or a scenario"
+    "a calibration (with an error map as its truth), two calibrations, an error map, a measurement (with its "
+    "scenario), a comparison, an uncertainty result, a scenario, or a table of observe"
 )
 # What is drawn, by the kinds of its files.
 _COMBINATIONS = {
     ("calibration",): "calibration",
     ("calibration", "error map"): "calibration",
     ("calibration", "calibration"): "calibrations",
+    ("error map",): "error map",
     ("measurement",): "measurement",
     ("TOML file", "measurement"): "measurement",
     ("comparison",): "comparison",
     ("uncertainty result",): "uncertainty",
     ("TOML file",): "observation",
+    ("table of steps",): "growth",
 }
 
 
@@ -59,6 +61,18 @@ def draw_files(files: Sequence[Path], *, volume: bool = False) -> tuple[Figure, 
         from stepdiag.figures.uncertainty import draw_uncertainty, read_drawn_uncertainty
 
         return draw_uncertainty(read_drawn_uncertainty(files[0]), name), {}
+    if what == "error map":
+        from stepdiag.figures.error_map import draw_error_map
+
+        errors = read_error_map(files[0])
+        with located(str(files[0])):
+            return draw_error_map(errors, name), {}
+    if what == "growth":
+        from stepdiag.figures.growth import draw_growth, read_steps
+
+        table = read_steps(files[0])
+        with located(str(files[0])):
+            return draw_growth(table, name), {}
     return _draw_observation(files[0])
 
 
@@ -109,9 +123,10 @@ def _draw_measurement(file: Path, scenario: Path | None) -> tuple[Figure, dict[P
 
 def _draw_observation(file: Path) -> tuple[Figure, dict[Path, str | None]]:
     from stepdiag.figures.uncertainty import draw_observation
-    from stepdiag.planning.observation import observe
+    from stepdiag.planning.observation import USUAL_STEPS, observe, prospects
     from stepdiag.scenario.description import read_scenario
 
     known = read_scenario(file).known
     run, found = observe(known)
-    return draw_observation(run, found, known, file.name), {}
+    table = prospects(known, [*USUAL_STEPS, known.plan.steps])
+    return draw_observation(run, found, known, file.name, table), {}

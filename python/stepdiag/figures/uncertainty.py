@@ -14,12 +14,17 @@ from matplotlib.patches import Patch
 from stepdiag._core import Adjustment, InvalidArgument, Measurement
 from stepdiag.calibration.finding_text import combination_text
 from stepdiag.figures.calibration import undetermined_notes, with_gaps
+from stepdiag.figures.growth import OWN, draw_growth_panels
 from stepdiag.figures.page import SMALL, Heading, Page
 from stepdiag.figures.parameter_panels import HATCH, HEIGHT, WIDTH, ParameterPanels, scaled
+from stepdiag.io.csv_text import CsvTable, finite_number, read_csv
+from stepdiag.io.data_files import is_netcdf
 from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, kind_of, units_of
+from stepdiag.planning.observation import Prospect
 from stepdiag.scenario.known import Known
 from stepdiag.style import COLOUR, SERIES, axis_label, own_style, plain
-from stepdiag.uncertainty.result import UncertaintyResult
+from stepdiag.uncertainty.result import UNCERTAINTY_FORMAT, UncertaintyResult
+from stepdiag.units import native
 
 if TYPE_CHECKING:
     from stepdiag.io.netcdf import NetcdfFile
@@ -28,6 +33,7 @@ FloatArray = npt.NDArray[np.float64]
 Curves = Mapping[str, tuple[FloatArray, FloatArray]]  # name -> position (mm; NaN of a squareness), u (mm or rad)
 
 BUDGET_HEIGHT: Final = 2.3
+GROWTH_HEIGHT: Final = 2.6
 PARAMETERS: Final = (*FUNCTIONS, *SQUARENESSES)
 PROPAGATED: Final[Mapping[str, Any]] = {"color": "black", "linewidth": 0.9, "linestyle": (0, (3, 2)), "marker": ""}
 
@@ -42,7 +48,7 @@ class DrawnUncertainty:
     propagated: Curves  # empty without
     groups: Sequence[str]  # of the budget
     budget: Mapping[str, tuple[float, FloatArray]]  # name -> position and parts, where its u is largest
-    warning: str
+    notes: Sequence[str]
 
 
 def draw_uncertainty(result: UncertaintyResult | DrawnUncertainty, name: str = "uncertainty") -> Figure:
@@ -53,8 +59,7 @@ def draw_uncertainty(result: UncertaintyResult | DrawnUncertainty, name: str = "
     drawn = _of_result(result) if isinstance(result, UncertaintyResult) else result
     with own_style():
         height = HEIGHT + (BUDGET_HEIGHT if drawn.budget else 0.0)
-        notes = [f"not to be trusted: {drawn.warning}"] if drawn.warning else []
-        page = Page(Heading(f"{name}: standard uncertainties", drawn.facts), WIDTH, height, notes)
+        page = Page(Heading(f"{name}: standard uncertainties", drawn.facts), WIDTH, height, drawn.notes)
         below = BUDGET_HEIGHT if drawn.budget else 0.0
         panels = ParameterPanels(page, drawn.volume, "u", below=below)
         main = drawn.sampled or drawn.propagated
@@ -71,10 +76,13 @@ def draw_uncertainty(result: UncertaintyResult | DrawnUncertainty, name: str = "
         return page.finish()
 
 
-def draw_observation(run: Measurement, found: Adjustment, known: Known, name: str = "scenario") -> Figure:
+def draw_observation(
+    run: Measurement, found: Adjustment, known: Known, name: str = "scenario", table: Sequence[Prospect] = ()
+) -> Figure:
     """Draw what `observe` has found: standard uncertainties of what a plan determines.
 
-    What it does not determine is hatched, and below is what would help. `name`: the title."""
+    What it does not determine is hatched, and below is what would help. `name`: the title. `table`:
+    what other numbers of steps would give."""
     calibration, plan = found.calibration, known.plan
     facts = (
         f"{len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines, {len(run)} points, "
@@ -86,49 +94,98 @@ def draw_observation(run: Measurement, found: Adjustment, known: Known, name: st
     notes = undetermined_notes(calibration)
     notes += [f"known: {combination_text(combination, value=False)}" for combination in found.combinations]
     with own_style():
-        page = Page(Heading(f"{name}: what the plan determines, and how well", facts), WIDTH, HEIGHT, notes)
-        panels = ParameterPanels(page, plan.volume, "u")
+        below = GROWTH_HEIGHT if table else 0.0
+        page = Page(Heading(f"{name}: what the plan determines, and how well", facts), WIDTH, HEIGHT + below, notes)
+        panels = ParameterPanels(page, plan.volume, "u", below=below)
         _draw_curves(panels, curves)
         for parameter in calibration.undetermined_slopes:
             panels.remark(parameter, "shape only")
         handles = [_curve_handle("standard uncertainty u, for a perfect machine")]
         if len(curves) < len(PARAMETERS):
             handles.append(Patch(label="not determined", **HATCH))
+        if table:
+            bottom = float(page.grid(1, 1).bottom or 0.0)
+            draw_growth_panels(page, table, plan.steps, top=bottom + (GROWTH_HEIGHT - 0.95) / page.size[1])
+            handles.append(Line2D([], [], label=f"this plan: {plan.steps} steps", **OWN))
         page.legend(handles)
         return page.finish()
 
 
 def read_drawn_uncertainty(path: Path) -> DrawnUncertainty:
-    """Read what the figure shows from the netCDF file of an uncertainty result.
+    """Read what the figure shows from the file of an uncertainty result, netCDF (.nc) or CSV.
 
-    Raises InvalidArgument naming file and variable."""
+    Raises InvalidArgument naming the file, and the variable or line."""
+    if not is_netcdf(path):
+        return _of_csv(read_csv(path, ("output", "position_mm", "unit"), UNCERTAINTY_FORMAT))
     from stepdiag.io.netcdf import open_dataset
 
-    if path.suffix.lower() != ".nc":
-        raise InvalidArgument(f"{path}: expected the netCDF file (.nc) of an uncertainty result: CSV has no budget")
     with open_dataset(path) as file:
-        return _of_file(file)
+        return _of_netcdf(file)
 
 
 def _of_result(result: UncertaintyResult) -> DrawnUncertainty:
     from stepdiag.io.netcdf import NetcdfFile
     from stepdiag.uncertainty.table import uncertainty_table
 
-    return _of_file(NetcdfFile(result.known.path, uncertainty_table(result)))
+    return _of_netcdf(NetcdfFile(result.known.path, uncertainty_table(result)))
 
 
-def _of_file(file: "NetcdfFile") -> DrawnUncertainty:
+def _of_netcdf(file: "NetcdfFile") -> DrawnUncertainty:
     sampled, propagated = _curves(file, "_u"), _curves(file, "_propagated_u")
     if not sampled and not propagated:
         raise InvalidArgument(f"{file.path}: expected standard uncertainties EXX_u ... or EXX_propagated_u, got none")
-    facts = [file.text("scenario", ""), f"method {file.text('method', 'not known')}"]
-    samples = file.number("samples")
-    facts += [f"{samples:,.0f} virtual calibrations"] if samples else []
     groups, budget = _budget(file, propagated)
-    text = ", ".join(filter(None, facts))
+    facts = _facts(file.text("scenario", ""), file.text("method", ""), file.number("samples"))
     return DrawnUncertainty(
-        file.lengths("volume_mm"), text, sampled, propagated, groups, budget, file.text("warning", "")
+        file.lengths("volume_mm"), facts, sampled, propagated, groups, budget, _notes(file.text("warning", ""))
     )
+
+
+def _of_csv(table: CsvTable) -> DrawnUncertainty:
+    sampled, propagated = (
+        _columns(table, name) for name in ("standard_uncertainty", "propagated_standard_uncertainty")
+    )
+    if not sampled and not propagated:
+        raise InvalidArgument(f"{table.path}: expected standard uncertainties of EXX ... A0Z, got none")
+    get = table.leading.get
+    samples = finite_number(get("samples", "0"), f"{table.path}: samples")
+    notes = _notes(get("warning", ""))
+    if propagated:
+        notes.append("the sources of these uncertainties (budget) are in netCDF files (.nc), not in CSV files")
+    facts = _facts(get("scenario", ""), get("method", ""), samples)
+    return DrawnUncertainty(table.lengths("volume_mm"), facts, sampled, propagated, [], {}, notes)
+
+
+def _facts(scenario: str, method: str, samples: float | None) -> str:
+    drawn = f"{samples:,.0f} virtual calibrations" if samples else ""
+    return ", ".join(filter(None, (scenario, f"method {method or 'not known'}", drawn)))
+
+
+def _notes(warning: str) -> list[str]:
+    return [f"not to be trusted: {warning}"] if warning else []
+
+
+def _columns(table: CsvTable, column: str) -> Curves:
+    """The curves in a column; derived quantities have none."""
+    if column not in table.columns:
+        return {}
+    found: dict[str, list[tuple[float, float]]] = {}
+    for where, row in table.rows:
+        name, unit = row["output"], row["unit"]
+        if name not in PARAMETERS:
+            continue
+        expected = REPORT_UNIT[kind_of(name)].replace("µ", "u")
+        if unit != expected:
+            raise InvalidArgument(f"{where}: unit: expected {expected} for {name}, got {unit!r}")
+        if (name in FUNCTIONS) != bool(row["position_mm"]):
+            raise InvalidArgument(
+                f"{where}: position_mm: expected a number for functions alone, got {row['position_mm']!r}"
+            )
+        position = finite_number(row["position_mm"], f"{where}: position_mm") if name in FUNCTIONS else np.nan
+        u = finite_number(row[column], f"{where}: {column}") if row[column] else np.nan
+        found.setdefault(name, []).append((position, native(f"_{unit}", u)))
+    curves = {name: np.transpose(rows) for name, rows in found.items()}
+    return {name: (position, u) for name, (position, u) in curves.items() if np.isfinite(u).any()}
 
 
 def _curves(file: "NetcdfFile", ending: str) -> Curves:

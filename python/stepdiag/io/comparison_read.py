@@ -1,8 +1,7 @@
 """Comparisons from their files, CSV or netCDF."""
 
-import csv
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -12,9 +11,8 @@ import numpy as np
 from stepdiag._core import InvalidArgument
 from stepdiag.calibration.comparison import Difference, significance_threshold
 from stepdiag.calibration.table_sums import FloatArray
-from stepdiag.io.csv_text import finite_number
+from stepdiag.io.csv_text import finite_number, read_csv
 from stepdiag.io.data_files import is_netcdf
-from stepdiag.io.whole_files import read_text
 from stepdiag.parameters import units_of
 from stepdiag.units import native
 
@@ -77,20 +75,11 @@ _MADE: Final = ("method_a", "date_a", "method_b", "date_b")
 
 
 def _read_csv(path: Path) -> StoredComparison:
-    lines = read_text(path).splitlines()
-    leading = dict(re.findall(r"(?m)^#\s*(\w+)\s*=\s*(.*?)\s*$", "\n".join(line for line in lines if line[:1] == "#")))
-    if leading.get("format") != COMPARISON_FORMAT:
-        raise InvalidArgument(f'{path}: format: expected "{COMPARISON_FORMAT}", got "{leading.get("format", "")}"')
-    start = next((k for k, line in enumerate(lines) if line.strip() and not line.startswith("#")), len(lines))
+    table = read_csv(path, _COLUMNS, COMPARISON_FORMAT)
     rows: dict[str, list[tuple[float, float, float, bool]]] = {}
-    table = csv.DictReader(lines[start:])
-    missing = [column for column in _COLUMNS if column not in (table.fieldnames or ())]
-    if missing:
-        raise InvalidArgument(f"{path}, line {start + 1}: expected the column {missing[0]}")
-    for row in table:
-        where = f"{path}, line {start + table.line_num}"
+    for where, row in table.rows:
         name, unit = row["parameter"], row["unit"]
-        if not _PARAMETER.fullmatch(name or ""):
+        if not _PARAMETER.fullmatch(name):
             raise InvalidArgument(f"{where}: parameter: expected EXX ... ECZ, C0Y, B0Z or A0Z, got {name!r}")
         expected = "um" if units_of(name[:3]) == "mm" else "urad"
         if unit != expected:
@@ -104,13 +93,8 @@ def _read_csv(path: Path) -> StoredComparison:
         shape_only = row["shape_only"] == "true"
         rows.setdefault(name, []).append((position, native(f"_{unit}", value), native(f"_{unit}", u), shape_only))
     differences = tuple(_of_rows(name, own) for name, own in rows.items())
-    try:
-        volume = np.array([float(edge) for edge in leading.get("volume_mm", "").split()])
-    except ValueError:
-        volume = np.empty(0)
-    if len(volume) != 3:
-        raise InvalidArgument(f"{path}: volume_mm: expected three numbers, got {leading.get('volume_mm', 'none')}")
-    return _checked(path, differences, volume, leading, {key: leading.get(key, "") for key in _MADE})
+    made = {key: table.leading.get(key, "") for key in _MADE}
+    return _checked(path, differences, table.lengths("volume_mm"), table.leading, made)
 
 
 def _of_rows(name: str, rows: Sequence[tuple[float, float, float, bool]]) -> Difference:
@@ -119,7 +103,11 @@ def _of_rows(name: str, rows: Sequence[tuple[float, float, float, bool]]) -> Dif
 
 
 def _checked(
-    path: Path, differences: tuple[Difference, ...], volume: FloatArray, leading: dict[str, str], made: dict[str, str]
+    path: Path,
+    differences: tuple[Difference, ...],
+    volume: FloatArray,
+    leading: Mapping[str, str],
+    made: dict[str, str],
 ) -> StoredComparison:
     if not differences:
         raise InvalidArgument(f"{path}: expected differences of the parameters EXX ... A0Z, got none")

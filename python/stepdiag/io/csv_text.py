@@ -3,9 +3,16 @@
 import csv
 import io
 import math
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
 
 from stepdiag._core import InvalidArgument
+from stepdiag.calibration.table_sums import FloatArray
+from stepdiag.io.whole_files import read_text
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]], leading: Mapping[str, str] | None = None) -> str:
@@ -22,6 +29,54 @@ def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]], leading: 
 def lengths(values: Iterable[float]) -> str:
     """Numbers, each read back to the same bits."""
     return " ".join(repr(float(value)) for value in values)
+
+
+@dataclass(frozen=True)
+class CsvTable:
+    """A file as texts: its leading lines by key, and for each row its place in words and its fields by column."""
+
+    path: Path
+    leading: Mapping[str, str]
+    columns: Sequence[str]
+    rows: Sequence[tuple[str, Mapping[str, str]]]
+
+    def lengths(self, key: str) -> FloatArray:
+        """Three lengths of a leading line. Raises InvalidArgument naming the key."""
+        return three_numbers(self.leading.get(key, ""), f"{self.path}: {key}")
+
+
+def read_csv(path: Path, columns: Sequence[str], format_: str = "") -> CsvTable:
+    """Read a file.
+
+    Raises InvalidArgument naming the file for another format than `format_`, for a missing column,
+    and for a row with another number of fields than the header."""
+    lines = read_text(path).splitlines()
+    start = next((k for k, line in enumerate(lines) if line.strip() and not line.startswith("#")), len(lines))
+    leading = dict(re.findall(r"(?m)^#\s*(\w+)\s*=\s*(.*?)\s*$", "\n".join(lines[:start])))
+    if format_ and leading.get("format") != format_:
+        raise InvalidArgument(f'{path}: format: expected "{format_}", got "{leading.get("format", "")}"')
+    table = csv.DictReader(lines[start:])
+    found = table.fieldnames or ()
+    for column in columns:
+        if column not in found:
+            raise InvalidArgument(f"{path}, line {start + 1}: expected the column {column}")
+    return CsvTable(path, leading, found, list(_rows(table, f"{path}, line", start)))
+
+
+def _rows(table: "csv.DictReader[str]", place: str, start: int) -> Iterator[tuple[str, Mapping[str, str]]]:
+    for row in table:
+        where = f"{place} {start + table.line_num}"
+        if None in row or None in row.values():
+            raise InvalidArgument(f"{where}: expected {len(table.fieldnames or ())} fields, as in the header")
+        yield where, row
+
+
+def three_numbers(text: str, where: str) -> FloatArray:
+    """The numbers of a text. Raises InvalidArgument unless there are three."""
+    words = text.split()
+    if len(words) != 3:
+        raise InvalidArgument(f"{where}: expected three numbers, got {text or 'none'}")
+    return np.array([finite_number(word, where) for word in words])
 
 
 def finite_number(field: str, where: str) -> float:

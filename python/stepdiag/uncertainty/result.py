@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 FloatArray = npt.NDArray[np.float64]
 
+UNCERTAINTY_FORMAT: Final = "stepdiag uncertainty 1"  # of files
 FAMILIES: Final = (*KINDS, "derived")
 
 # If a larger share of the samples has no result, the figures describe the others only.

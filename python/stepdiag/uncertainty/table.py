@@ -11,9 +11,7 @@ import numpy as np
 import xarray as xr
 
 from stepdiag.io.labelled_tables import position_axis
-from stepdiag.uncertainty.result import FloatArray, UncertaintyResult, label, volume_units
-
-UNCERTAINTY_FORMAT: Final = "stepdiag uncertainty 1"
+from stepdiag.uncertainty.result import UNCERTAINTY_FORMAT, FloatArray, UncertaintyResult, label, volume_units
 
 ABOUT: Final = {
     "format": UNCERTAINTY_FORMAT,

@@ -10,8 +10,8 @@ from stepdiag.io.csv_text import csv_text
 from stepdiag.io.data_files import date_of_today, is_netcdf
 from stepdiag.io.netcdf import write_dataset
 from stepdiag.io.whole_files import write_whole
-from stepdiag.uncertainty.result import UncertaintyResult
-from stepdiag.uncertainty.table import ABOUT, UNCERTAINTY_FORMAT, attributes_of, columns_of, uncertainty_table
+from stepdiag.uncertainty.result import UNCERTAINTY_FORMAT, UncertaintyResult
+from stepdiag.uncertainty.table import ABOUT, attributes_of, columns_of, uncertainty_table
 from stepdiag.units import report_value
 
 

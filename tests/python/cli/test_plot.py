@@ -31,6 +31,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "compare a.csv b.nc -o c.csv",
             "compare a.csv b.nc -o c.nc",
             "uncertainty scenario.toml -o u.nc",
+            "uncertainty scenario.toml -o u.csv",
+            "observe scenario.toml --steps 2,5,10 -o steps.csv",
         ):
             assert main(command.split()) == 0
         errors = sd.read_scenario("scenario.toml").machine().errors
@@ -61,7 +63,10 @@ EVERY_KIND = [
     "c.csv",
     "c.nc",
     "u.nc",
+    "u.csv",
+    "map.csv",
     "scenario.toml",
+    "steps.csv",
 ]
 
 
@@ -114,7 +119,8 @@ def test_rejected_fit_ends_with_code_3_and_a_marked_figure(here: Path, capsys: p
 
 MISTAKES = [
     ("notes.txt", "expected a calibration (with an error map as its truth), two calibrations, "),
-    ("map.csv", "got map.csv: error map"),
+    ("map.csv run.csv", "got map.csv: error map, run.csv: measurement"),
+    ("map.csv --volume", "--volume: expected a calibration, got map.csv"),
     ("a.csv run.csv", "got a.csv: calibration, run.csv: measurement"),
     ("nothing.csv", "nothing.csv: "),
     ("run.csv --volume", "--volume: expected a calibration, got run.csv"),
@@ -140,7 +146,7 @@ def test_mistakes_are_named_in_a_line(
 
 
 def test_damaged_files_are_refused_by_name(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for name in ("a.csv", "c.csv", "run.csv"):
+    for name in ("a.csv", "c.csv", "run.csv", "u.csv", "map.csv", "steps.csv"):
         lines = Path(name).read_text().splitlines()
         Path(f"bad-{name}").write_text("\n".join([*lines[:-1], lines[-1].replace(",", ";")]) + "\n")
         assert main(["plot", f"bad-{name}", "-o", "x.png"]) == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -51,10 +52,48 @@ def test_file_gives_the_same_figure(result: sd.UncertaintyResult, tmp_path: Path
     assert texts(result.plot()) == texts(draw_uncertainty(result))
 
 
-def test_table_without_a_budget_is_refused(result: sd.UncertaintyResult, tmp_path: Path) -> None:
+def test_csv_file_gives_the_same_curves_and_says_where_the_budget_is(
+    result: sd.UncertaintyResult, tmp_path: Path
+) -> None:
     write_uncertainty(result, tmp_path / "u.csv")
-    with pytest.raises(sd.InvalidArgument, match=r"u.csv: expected the netCDF file \(.nc\)"):
-        read_drawn_uncertainty(tmp_path / "u.csv")
+    figure, whole = draw_uncertainty(read_drawn_uncertainty(tmp_path / "u.csv")), draw_uncertainty(result)
+    for name in FUNCTIONS:
+        for line, expected in zip(panel(figure, name).lines, panel(whole, name).lines, strict=True):
+            # One rounding each way between rad and the file's µrad.
+            np.testing.assert_allclose(line.get_xydata(), expected.get_xydata(), rtol=1e-15)
+    assert "the sources of these uncertainties (budget) are in netCDF files (.nc), not in CSV files" in texts(figure)
+    assert len(figure.axes) == len(whole.axes) - 1
+
+
+def test_csv_file_of_the_propagation_alone_is_drawn(tmp_path: Path) -> None:
+    result = sd.evaluate_uncertainty(
+        sd.parse_scenario(UNCERTAIN), sd.UncertaintyRequest(points=(((1.0, 2.0, 3.0), None),))
+    )
+    write_uncertainty(result, tmp_path / "u.csv")
+    drawn = read_drawn_uncertainty(tmp_path / "u.csv")
+    assert not drawn.sampled
+    assert len(drawn.propagated) == 21, "without the error at the point"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("EXX,0.0,um", "EXX,,um", "position_mm: expected a number for functions alone, got ''"),
+        ("EXX,0.0,um", "EXX,near,um", "position_mm: expected a finite number, got 'near'"),
+        ("EXX,0.0,um", "EXX,0.0,mm", "unit: expected um for EXX, got 'mm'"),
+        ("volume_mm=80", "volume_mm=", "volume_mm: expected three numbers"),
+        ("propagated_standard_uncertainty", "u", "u.csv: expected standard uncertainties of EXX ... A0Z, got none"),
+        ("# format=stepdiag uncertainty 1", "# format=stepdiag uncertainty 9", "format: expected"),
+    ],
+)
+def test_damaged_csv_files_are_refused(old: str, new: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "u.csv"
+    write_uncertainty(sd.evaluate_uncertainty(sd.parse_scenario(UNCERTAIN), sd.UncertaintyRequest()), path)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(sd.InvalidArgument, match=re.escape(message)):
+        read_drawn_uncertainty(path)
 
 
 def test_observation_shows_what_is_determined_and_what_is_not() -> None:
