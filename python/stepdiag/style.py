@@ -147,5 +147,6 @@ def _png(pixels: bytes, size: tuple[int, int]) -> bytes:
     text = PngInfo()
     text.add_text("Software", MADE_BY)
     buffer = io.BytesIO()
-    picture.save(buffer, "PNG", optimize=True, dpi=(DPI, DPI), pnginfo=text)
+    # Level 9 makes the file a tenth smaller, and takes seven times as long: a tenth of the whole command.
+    picture.save(buffer, "PNG", compress_level=6, dpi=(DPI, DPI), pnginfo=text)
     return buffer.getvalue()
