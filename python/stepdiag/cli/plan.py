@@ -82,7 +82,8 @@ def plan(
     with Progress("plans") as progress:
         found = outcomes(described, progress)
     choice = choose(found, available, near, family)
-    click.echo("largest standard uncertainties by measuring time, for a machine with usual errors:")
+    say("largest standard uncertainties by measuring time, for a machine with usual errors")
+    say("(lines: body and face diagonals, single-axis and scale lines):")
     for line in plan_rows(found, choice, available, family):
         say(line)
     for line in [*left_out_rows(found), *advice(found, available, near, family)]:

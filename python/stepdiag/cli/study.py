@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, out_file, tell
+from stepdiag.cli.terminal import say
 from stepdiag.cli.workers import chosen_workers, worker_options
 from stepdiag.io.outputs import STUDY, OutputFile
 from stepdiag.progress import Progress
@@ -53,7 +54,7 @@ def study(
     failures = [result.failure for result in results.values() if result.failure]
     click.echo(f"wrote {path}: {len(results)} cells of {' x '.join(map(str, wanted.shape))}")
     for failure in dict.fromkeys(failures):
-        click.echo(f"no result in {failures.count(failure)} cells: {failure}")
+        say(f"no result in {failures.count(failure)} cells: {failure}")
     found = list(filter(None, (only_survivors(result.samples, result.lost) for result in results.values())))
     if found:
         tell("warning", f"cells not to be trusted: {len(found)}; in one of them, {found[0]}")

@@ -57,13 +57,17 @@ class Candidate:
 
     @property
     def description(self) -> str:
-        """ "4 body diagonals, 3 scale lines"; in what few words do."""
-        counts = [(sum(_moved(line) == axes for line in self.lines), name) for axes, name in _NAMES]
-        counts.append((len(self.scale_lines), "scale line"))
-        return ", ".join(f"{count} {name}{'s' * (count > 1)}" for count, name in counts if count)
+        """In words: "4 body diagonals, 3 scale lines"."""
+        return ", ".join(f"{count} {name}{'s' * (count > 1)}" for name, count in self.counts.items() if count)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of lines of each kind."""
+        counts = {name: sum(_moved(line) == axes for line in self.lines) for axes, name in _NAMES}
+        return counts | {"scale line": len(self.scale_lines)}
 
 
-_NAMES: Final = ((3, "body diagonal"), (2, "face diagonal"), (1, "single axis line"))
+_NAMES: Final = ((3, "body diagonal"), (2, "face diagonal"), (1, "single-axis line"))
 
 
 def _moved(line: str) -> int:

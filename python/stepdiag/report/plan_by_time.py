@@ -7,7 +7,10 @@ from stepdiag.io.csv_text import csv_text
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units
 from stepdiag.planning.plan_by_time import Choice, Controlled, Family, Outcome, choose, complete, front
 from stepdiag.report.fault_control import name, told_apart
+from stepdiag.report.text_columns import text_columns
 
+# Heads of columns with the numbers of lines, by Candidate.counts.
+LINES: Final = {"body diagonal": "body", "face diagonal": "face", "single-axis line": "single", "scale line": "scale"}
 FAR: Final = 2.0  # times the time that there is: how far the table goes on
 
 
@@ -17,19 +20,22 @@ def plan_rows(found: Sequence[Outcome], choice: Choice, minutes: float, family: 
     shown = [choice.taken, choice.next_better, choice.fastest]
     longest = max([FAR * minutes, *(o.minutes for o in shown if o is not None)])
     plans = [o for o in everything if o.minutes <= longest] or everything[:1]
-    width = max((len(o.candidate.description) for o in plans), default=5)
-    names = "".join(f"{kind:>14}" for kind in KINDS)
-    yield f"  {'min':>6}  {'lines':<{width}}{'steps':>7}{'spacing':>9}{'repeats':>9}{names}"
-    yield f"  {'':>6}  {'':<{width}}{'':>7}{'mm':>9}{'':>9}" + "".join(f"{REPORT_UNIT[kind]:>14}" for kind in KINDS)
-    ended = False
+    lines = [name for name in LINES if any(o.candidate.counts[name] for o in plans)]
+    rows = [
+        ["minutes", *(LINES[name] for name in lines), "steps", "spacing", "repeats", *KINDS],
+        ["", *("" for _ in lines), "", "mm", "", *(REPORT_UNIT[kind] for kind in KINDS)],
+    ]
     for o in plans:
-        if o.minutes > minutes and not ended:
-            ended = True
-            yield f"  {minutes:6.1f}  -- the time that there is --"
-        cells = "".join(f"{_cell(kind, o):>14}" for kind in KINDS)
         c = o.candidate
-        mark = "*" if o is choice.taken else " "
-        yield f" {mark}{o.minutes:6.1f}  {c.description:<{width}}{c.steps:7}{o.spacing:9.3g}{c.repeats:9}{cells}"
+        time = f"{'* ' if o is choice.taken else ''}{o.minutes:.1f}"
+        counts = [f"{c.counts[name] or '-'}" for name in lines]
+        cells = [_cell(kind, o) for kind in KINDS]
+        rows.append([time, *counts, f"{c.steps}", f"{o.spacing:.3g}", f"{c.repeats}", *cells])
+    table = list(text_columns(rows, left=()))
+    in_time = sum(o.minutes <= minutes for o in plans)
+    if in_time < len(plans):
+        table.insert(2 + in_time, f"  -- {minutes:g} minutes: the available time --")
+    yield from table
     if len(plans) < len(everything):
         yield f"  and {len(everything) - len(plans)} that take longer, up to {everything[-1].minutes:.0f} minutes"
 
