@@ -2846,9 +2846,9 @@ def straightness_reference(chain: Chain | str, tool: numpy.typing.ArrayLike = (0
     """
     One line: to which point straightnesses refer, and what they are at the functional point.
     """
-def summarise_volume(machine: Machine, x: numpy.typing.ArrayLike, y: numpy.typing.ArrayLike, z: numpy.typing.ArrayLike, *, without: collections.abc.Sequence[str] = []) -> VolumeSummary:
+def summarise_volume(machine: Machine, x: numpy.typing.ArrayLike, y: numpy.typing.ArrayLike, z: numpy.typing.ArrayLike, *, without: collections.abc.Sequence[str] = [], tilts: bool = True) -> VolumeSummary:
     """
-    On the grid of all combinations of these ascending positions (mm). without: names of parameters to be set to 0. Raises InvalidArgument for positions that do not ascend and unknown names.
+    On the grid of all combinations of these ascending positions (mm). without: names of parameters to be set to 0. tilts: whether to compute them, which takes most of the time. Raises InvalidArgument for positions that do not ascend and unknown names.
     """
 def t_quantile(probability: typing.SupportsFloat | typing.SupportsIndex, degrees_of_freedom: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """

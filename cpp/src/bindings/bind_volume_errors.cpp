@@ -54,17 +54,18 @@ void bind_volume_errors(py::module_& m) {
     m.def(
         "summarise_volume",
         [](const Machine& machine, const ArrayLike& x, const ArrayLike& y, const ArrayLike& z,
-           const std::vector<std::string>& without) {
+           const std::vector<std::string>& without, bool tilts) {
             const GridPositions grid = to_grid(x, y, z);
             std::vector<int> parameters;
             for (const std::string& name : without) parameters.push_back(to_parameter(name));
             py::gil_scoped_release release;
-            return summarise_volume(without_parameters(machine, parameters), grid);
+            return summarise_volume(without_parameters(machine, parameters), grid, tilts);
         },
         py::arg("machine"), py::arg("x"), py::arg("y"), py::arg("z"), py::kw_only(),
-        py::arg("without") = std::vector<std::string>{},
+        py::arg("without") = std::vector<std::string>{}, py::arg("tilts") = true,
         "On the grid of all combinations of these ascending positions (mm). without: names of parameters to be set to "
-        "0. Raises InvalidArgument for positions that do not ascend and unknown names.");
+        "0. tilts: whether to compute them, which takes most of the time. Raises InvalidArgument for positions that do "
+        "not ascend and unknown names.");
     m.def(
         "errors_at",
         [](const Machine& machine, const ArrayLike& points) {

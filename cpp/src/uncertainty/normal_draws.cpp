@@ -1,8 +1,10 @@
 #include "uncertainty/normal_draws.hpp"
 
+#include <Eigen/Cholesky>
 #include <cmath>
 
-#include "stepdiag/core/random.hpp"
+#include "core/block_product.hpp"
+#include "stepdiag/core/random_blocks.hpp"
 
 namespace stepdiag {
 
@@ -10,41 +12,45 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-PivotedRoot::PivotedRoot(const MatrixXd& covariance) {
+namespace {
+
+constexpr Index panel = 48;  // columns of the triangular root that are multiplied at once
+
+static_assert(NormalDraws::together % 6 == 0 && NormalDraws::together % Index(lane_group) == 0);
+
+}  // namespace
+
+NormalDraws::NormalDraws(const MatrixXd& covariance, std::uint64_t seed) : seed_(seed) {
+    const Index n = covariance.rows();
     // Scale by the standard uncertainties, so that the order of the pivots does not depend on the units mm and rad.
     const VectorXd u = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
     const VectorXd inverse = (u.array() > 0.0).select(u.array().inverse(), 0.0);
     const Eigen::LDLT<MatrixXd> factor(inverse.asDiagonal() * covariance * inverse.asDiagonal());
     const VectorXd d = factor.vectorD().cwiseMax(0.0);
     // The pivots descend. Those that are rounding add nothing.
-    rank = d.size();
-    while (rank > 1 && d[rank - 1] <= 1e-15 * d[0]) --rank;
-    lower = MatrixXd(factor.matrixL()).leftCols(rank) * d.head(rank).cwiseSqrt().asDiagonal();
-    Eigen::VectorXi order = Eigen::VectorXi::LinSpaced(int(u.size()), 0, int(u.size()) - 1);
+    rank_ = n;
+    while (rank_ > 1 && d[rank_ - 1] <= 1e-15 * d[0]) --rank_;
+    root_ = MatrixXd::Zero(n + widest_vector, rank_);
+    root_.topRows(n) = -(MatrixXd(factor.matrixL()).leftCols(rank_) * d.head(rank_).cwiseSqrt().asDiagonal());
+    Eigen::VectorXi order = Eigen::VectorXi::LinSpaced(int(n), 0, int(n) - 1);
     order = factor.transpositionsP() * order;
-    place.assign(order.begin(), order.end());
-    scale.resize(u.size());
-    for (Index i = 0; i < u.size(); ++i) scale[i] = u[order[i]];
+    place_.assign(order.begin(), order.end());
+    scale_.resize(n);
+    for (Index i = 0; i < n; ++i) scale_[i] = u[order[i]];
 }
 
-MatrixXd normal_root(const MatrixXd& covariance) {
-    const PivotedRoot root(covariance);
-    MatrixXd matrix(root.lower.rows(), root.rank);
-    for (Index i = 0; i < matrix.rows(); ++i)
-        matrix.row(root.place[std::size_t(i)]) = root.scale[i] * root.lower.row(i);
-    return matrix;
-}
-
-MatrixXd normal_numbers(std::uint64_t seed, std::uint64_t first_sample, Index count, Index samples) {
-    MatrixXd numbers(count, samples);
-    for (Index s = 0; s < samples; ++s)
-        for (Index i = 0; i < count; i += 2) {
-            const auto pair =
-                normal_pair(seed, RandomStream::monte_carlo, {first_sample + std::uint64_t(s), std::uint32_t(i / 2)});
-            numbers(i, s) = pair[0];
-            if (i + 1 < count) numbers(i + 1, s) = pair[1];
-        }
-    return numbers;
+void NormalDraws::draw(std::uint64_t first, MatrixXd& columns) const {
+    const Index n = scale_.size();
+    const std::size_t pairs = std::size_t(rank_ + 1) / 2;
+    MatrixXd numbers(together, 2 * Index(pairs));
+    fill_normal({seed_, RandomStream::monte_carlo, first, std::size_t(together)}, pairs, numbers.data());
+    MatrixXd product = MatrixXd::Zero(n + widest_vector, together);
+    for (Index k = 0; k < rank_; k += panel)
+        subtract_product(n - k, together, std::min(panel, rank_ - k), {&root_(k, k), root_.rows()},
+                         {&numbers(0, k), 1, numbers.rows()}, {&product(k, 0), product.rows()});
+    columns.resize(n, together);
+    for (Index s = 0; s < together; ++s)
+        for (Index i = 0; i < n; ++i) columns(place_[std::size_t(i)], s) = scale_[i] * product(i, s);
 }
 
 }  // namespace stepdiag

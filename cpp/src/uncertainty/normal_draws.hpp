@@ -1,29 +1,29 @@
-// Draws from the joint normal distribution of a calibration's values. Internal.
+// Draws from a joint normal distribution with expectation 0, such as that of the errors of a calibration's values.
+// Internal.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 
 namespace stepdiag {
 
-// covariance = A A^T with row place[i] of A = scale[i] * row i of `lower`, which is zero above its diagonal. The
-// covariance may be singular, because exactly known values (0 at home) have no variance: `lower` has `rank` columns.
-struct PivotedRoot {
-    explicit PivotedRoot(const Eigen::MatrixXd& covariance);
+class NormalDraws {
+public:
+    // The covariance may be singular, because exactly known values (0 at home) have no variance.
+    NormalDraws(const Eigen::MatrixXd& covariance, std::uint64_t seed);
 
-    Eigen::MatrixXd lower;
-    std::vector<Eigen::Index> place;
-    Eigen::VectorXd scale;
-    Eigen::Index rank;
+    static constexpr Eigen::Index together = 48;  // draws of one product
+    // The draws first ... first + together - 1 as columns. The bits of a draw depend on its number alone, and on the
+    // instruction set.
+    void draw(std::uint64_t first, Eigen::MatrixXd& columns) const;
+
+private:
+    std::uint64_t seed_;
+    Eigen::Index rank_;
+    Eigen::MatrixXd root_;             // lower triangle in the order of `place_`, negative; with spare rows
+    std::vector<Eigen::Index> place_;  // of each row of the root in a draw
+    Eigen::VectorXd scale_;            // of each row of the root
 };
-
-// The same as one matrix A.
-Eigen::MatrixXd normal_root(const Eigen::MatrixXd& covariance);
-
-// Standard normal numbers; each column is one sample.
-Eigen::MatrixXd normal_numbers(std::uint64_t seed, std::uint64_t first_sample, Eigen::Index count,
-                               Eigen::Index samples);
 
 }  // namespace stepdiag

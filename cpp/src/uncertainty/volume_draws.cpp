@@ -1,53 +1,79 @@
-// To first order, with axes 1, 2, 3 from workpiece to tool, the error is
-//   e = F1(p1) + F2(p2) + F3(p3) + G12(p1) p2 + (G13(p1) + G23(p2)) p3
-// For given p1 and p2 the extremes of a component over p3 are at corners of the convex hulls of F3. They bound |e|, so
-// that few pairs (p1, p2) need a search over p3.
+// A draw is the calibration's own field and what is drawn beside it. The own field with bounds of the rest leaves few
+// pairs (p1, p2) where an extreme can be. There the extremes of a component over p3 are at corners of the convex hulls
+// of F3, which bound |e|, so that fewer pairs still need a search over p3.
 #include "stepdiag/uncertainty/volume_draws.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
-#include "core/block_product.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/plan/line.hpp"
 #include "uncertainty/derived_parts.hpp"
 #include "uncertainty/in_blocks.hpp"
 #include "uncertainty/normal_draws.hpp"
 #include "uncertainty/upper_hull.hpp"
+#include "uncertainty/volume_field.hpp"
 
 namespace stepdiag {
 namespace {
 
+using Eigen::Array3d;
 using Eigen::ArrayXd;
+using Eigen::ArrayXXd;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-using Component3 = std::array<ArrayXd, 3>;  // by component
 
-constexpr Index together = 48;  // draws of one product: a multiple of 6
-constexpr Index panel = 48;     // columns of the triangular root that are multiplied at once
+void add(const VolumeField& a, const VolumeField& b, VolumeField& sum) {
+    for (std::size_t c = 0; c < 3; ++c) {
+        for (std::size_t r = 0; r < 3; ++r) sum.own[r][c] = a.own[r][c] + b.own[r][c];
+        sum.g12[c] = a.g12[c] + b.g12[c];
+        sum.g13[c] = a.g13[c] + b.g13[c];
+        sum.g23[c] = a.g23[c] + b.g23[c];
+    }
+}
 
-// F and G of one draw at the grid points.
-struct Field {
-    std::array<Component3, 3> own;
-    Component3 g12, g13, g23;
-    std::array<std::array<double, 2>, 3> tilt{};  // sums of the lowest and the highest, by component
+// The largest of a function of (p1, p2), with its largest by p1.
+struct Ceiling {
+    ArrayXXd at;  // p2, p1
+    ArrayXd over_p2;
+    Index first, second;  // p1 and p2 of the largest
+
+    explicit Ceiling(ArrayXXd values) : at(std::move(values)), over_p2(at.colwise().maxCoeff()) {
+        at.maxCoeff(&second, &first);
+    }
 };
+
+// Of a sum of functions of p1, p2 and p3: each at its positions, but p3.
+struct Excess {
+    ArrayXd first, second;
+    double third;
+};
+
+// Calls visit(p1, p2) wherever ceiling and excess together are above best(), which may grow meanwhile.
+template <class Best, class Visit>
+void where_above(const Ceiling& ceiling, const Excess& excess, Best&& best, Visit&& visit) {
+    const double most_second = excess.second.maxCoeff();
+    for (Index i = 0; i < ceiling.at.cols(); ++i) {
+        const double first = excess.first[i] + excess.third;
+        if (!(ceiling.over_p2[i] + first + most_second > best())) continue;
+        for (Index j = 0; j < ceiling.at.rows(); ++j)
+            if (ceiling.at(j, i) + first + excess.second[j] > best()) visit(i, j);
+    }
+}
 
 }  // namespace
 
 struct VolumeDraws::State {
-    Chain chain;
-    Vector3d tool;
-    std::uint64_t seed;
-    std::array<ArrayXd, 3> position, weight;  // in the order of the chain
-    VectorXd table;                           // of the calibration: delta, theta by axis and grid point
-    MatrixXd root;                            // triangular in the order of `place`, negative; with spare rows
-    std::vector<Index> place;                 // of each row of the root in the table
-    VectorXd scale;                           // of each row of the root
-    Index rank = 0;                           // columns of the root
+    VolumeGrid grid;
+    VectorXd table;  // of the calibration
+    VolumeField field;
+    NormalDraws draws;  // of a table, beside the calibration's
+    std::array<VectorXd, 3> weight;
+    std::vector<Ceiling> ceilings;   // of the calibration's field: X, -X, Y, -Y, Z, -Z, |e|
+    std::array<double, 3> farthest;  // largest |p|
 
     struct DiagonalPoint {
         std::array<Index, 3> interval;
@@ -57,105 +83,151 @@ struct VolumeDraws::State {
     std::array<std::vector<DiagonalPoint>, 4> diagonals;
     std::array<Vector3d, 4> directions;
 
-    Index first(std::size_t rank_of_axis) const;
-    Field field(const double* table) const;
+    void set_ceilings();
+    void set_diagonals(const GridPositions& positions, const Chain& chain);
+    // `rest` is what the field has beside the calibration's, `table` that of the field.
     template <class Row>
-    void figures(const Field& field, Row&& row) const;
-    double largest(const Field& field, Vector3d& low, Vector3d& high, double& mean2) const;
-    double diagonal(const Field& field, std::size_t d) const;
+    void figures(const VolumeField& field, const VolumeField& rest, const double* table, Row&& row) const;
+    double largest(const VolumeField& field, const VolumeField& rest) const;
+    double range(const VolumeField& field, const VolumeField& rest, std::size_t component) const;
+    double mean_square(const VolumeField& field, std::size_t component) const;
+    double diagonal(const VolumeField& field, std::size_t d) const;
 };
 
-Index VolumeDraws::State::first(std::size_t r) const {
-    Index at = 0;
-    for (std::size_t before = 0; before < r; ++before) at += 6 * position[before].size();
-    return at;
-}
-
-Field VolumeDraws::State::field(const double* values) const {
-    Field f;
-    const auto order = chain.order();
-    const auto slopes = [&](Eigen::Map<const MatrixXd> at, std::size_t after) {
-        Component3 g;
-        const int k = index(order[after]), i = (k + 1) % 3, j = (k + 2) % 3;
-        g[std::size_t(k)] = ArrayXd::Zero(at.cols());
-        g[std::size_t(i)] = at.row(3 + j);  // theta x e_k = (.., theta_j, -theta_i), cyclically
-        g[std::size_t(j)] = -at.row(3 + i).array();
-        return g;
-    };
-    for (std::size_t r = 0; r < 3; ++r) {
-        const Index n = position[r].size();
-        const Eigen::Map<const MatrixXd> at(values + first(r), 6, n);
-        for (int c = 0; c < 3; ++c) {
-            const int a = (c + 1) % 3, b = (c + 2) % 3;
-            const auto lever = [&](int of) -> ArrayXd {
-                const bool along = chain.carries_workpiece(order[r]) && index(order[r]) == of;
-                return along ? ArrayXd(tool[of] + position[r]) : ArrayXd(ArrayXd::Constant(n, tool[of]));
-            };
-            f.own[r][std::size_t(c)] = at.row(c).transpose().array() + at.row(3 + a).transpose().array() * lever(b) -
-                                       at.row(3 + b).transpose().array() * lever(a);
-            f.tilt[std::size_t(c)][0] += at.row(3 + c).minCoeff();
-            f.tilt[std::size_t(c)][1] += at.row(3 + c).maxCoeff();
-        }
-        if (r == 0) {
-            f.g12 = slopes(at, 1);
-            f.g13 = slopes(at, 2);
-        }
-        if (r == 1) f.g23 = slopes(at, 2);
-    }
-    return f;
-}
-
-// Largest |e|, the extremes of the components, and the mean of |e|^2.
-double VolumeDraws::State::largest(const Field& f, Vector3d& low, Vector3d& high, double& mean2) const {
-    const ArrayXd &p2 = position[1], &p3 = position[2];
-    const Index n1 = position[0].size(), n2 = p2.size();
-    ArrayXd bound = ArrayXd::Zero(n1 * n2);  // of |e|^2 over p3
-    const double mean_p = (weight[2] * p3).sum(), mean_pp = (weight[2] * p3 * p3).sum();
-    mean2 = 0.0;
-    for (std::size_t c = 0; c < 3; ++c) {
-        const ArrayXd& third = f.own[2][c];
-        const UpperHull top(p3, third), bottom(p3, -third);
-        std::size_t top_corner = 0, bottom_corner = 0;
-        const double mean_f = (weight[2] * third).sum(), mean_ff = (weight[2] * third * third).sum(),
-                     mean_fp = (weight[2] * third * p3).sum();
-        double highest = -1e300, lowest = 1e300;
-        for (Index i = 0; i < n1; ++i) {
-            double mean_of_row = 0.0;
-            for (Index j = 0; j < n2; ++j) {
-                const double s = f.g13[c][i] + f.g23[c][j];
-                const double a = f.own[0][c][i] + f.own[1][c][j] + f.g12[c][i] * p2[j];
-                const double up = a + top.support(s, top_corner), down = a - bottom.support(-s, bottom_corner);
-                const double most = std::max(up, -down);
-                bound[i * n2 + j] += most * most;
-                highest = std::max(highest, up);
-                lowest = std::min(lowest, down);
-                mean_of_row += weight[1][j] *
-                               (a * (a + 2.0 * (mean_f + s * mean_p)) + mean_ff + s * (2.0 * mean_fp + s * mean_pp));
+void VolumeDraws::State::set_ceilings() {
+    const ArrayXd &p2 = grid.position(1), &p3 = grid.position(2);
+    const Index n1 = grid.position(0).size(), n2 = p2.size();
+    std::array<ArrayXXd, 7> most;
+    for (ArrayXXd& values : most) values.resize(n2, n1);
+    for (Index i = 0; i < n1; ++i)
+        for (Index j = 0; j < n2; ++j) {
+            ArrayXd size2 = ArrayXd::Zero(p3.size());
+            for (std::size_t c = 0; c < 3; ++c) {
+                const ArrayXd e = field.own[2][c] + (field.g13[c][i] + field.g23[c][j]) * p3 +
+                                  (field.own[0][c][i] + field.own[1][c][j] + field.g12[c][i] * p2[j]);
+                most[2 * c](j, i) = e.maxCoeff();
+                most[2 * c + 1](j, i) = -e.minCoeff();
+                size2 += e.square();
             }
-            mean2 += weight[0][i] * mean_of_row;
+            most[6](j, i) = std::sqrt(size2.maxCoeff());
         }
-        low[Index(c)] = lowest;
-        high[Index(c)] = highest;
-    }
-    double best = -1.0;
-    const auto search = [&](Index at) {
-        if (!(bound[at] > best)) return;
-        const Index i = at / n2, j = at % n2;
-        ArrayXd size2 = ArrayXd::Zero(p3.size());
-        for (std::size_t c = 0; c < 3; ++c)
-            size2 += (f.own[2][c] + (f.g13[c][i] + f.g23[c][j]) * p3 +
-                      (f.own[0][c][i] + f.own[1][c][j] + f.g12[c][i] * p2[j]))
-                         .square();
-        best = std::max(best, size2.maxCoeff());
-    };
-    Index likely;
-    bound.maxCoeff(&likely);
-    search(likely);
-    for (Index at = 0; at < bound.size(); ++at) search(at);
-    return std::sqrt(best);
+    for (ArrayXXd& values : most) ceilings.emplace_back(std::move(values));
+    for (std::size_t r = 0; r < 3; ++r) farthest[r] = grid.position(r).abs().maxCoeff();
 }
 
-double VolumeDraws::State::diagonal(const Field& f, std::size_t d) const {
+void VolumeDraws::State::set_diagonals(const GridPositions& positions, const Chain& chain) {
+    std::size_t most = 2;
+    for (const auto& of_axis : positions) most = std::max(most, of_axis.size());
+    const char* names[] = {"ppp", "npp", "pnp", "nnp"};
+    for (std::size_t d = 0; d < 4; ++d) {
+        const Line line = Line::parse(names[d]);
+        Vector3d start, end;
+        for (const Axis axis : all_axes) {
+            const auto& of_axis = positions[std::size_t(index(axis))];
+            const bool rises = line.sign(axis) > 0;
+            start[index(axis)] = rises ? of_axis.front() : of_axis.back();
+            end[index(axis)] = rises ? of_axis.back() : of_axis.front();
+        }
+        directions[d] = (end - start).normalized();
+        for (std::size_t k = 0; k < most; ++k) {
+            DiagonalPoint at;
+            for (std::size_t r = 0; r < 3; ++r) {
+                const int axis = index(chain.order()[r]);
+                const double p = start[axis] + double(k) / double(most - 1) * (end[axis] - start[axis]);
+                const ArrayXd& nodes = grid.position(r);
+                const Index after = std::upper_bound(nodes.begin(), nodes.end(), p) - nodes.begin();
+                const Index interval = std::clamp(after - 1, Index(0), nodes.size() - 2);
+                at.interval[r] = interval;
+                at.t[r] = (p - nodes[interval]) / (nodes[interval + 1] - nodes[interval]);
+                at.point[Index(r)] = p;
+            }
+            diagonals[d].push_back(at);
+        }
+    }
+}
+
+// Largest |e|.
+double VolumeDraws::State::largest(const VolumeField& f, const VolumeField& rest) const {
+    const ArrayXd &p2 = grid.position(1), &p3 = grid.position(2);
+    const auto length = [](const VolumeField::Component3& v) {
+        return ArrayXd((v[0].square() + v[1].square() + v[2].square()).sqrt());
+    };
+    const Excess excess = {length(rest.own[0]) + farthest[1] * length(rest.g12) + farthest[2] * length(rest.g13),
+                           length(rest.own[1]) + farthest[2] * length(rest.g23), length(rest.own[2]).maxCoeff()};
+    const auto constant = [&](std::size_t c, Index i, Index j) {
+        return f.own[0][c][i] + f.own[1][c][j] + f.g12[c][i] * p2[j];
+    };
+    double best = 0.0;
+    const auto search = [&](Index i, Index j) {
+        const ArrayXd size2 = (f.own[2][0] + (f.g13[0][i] + f.g23[0][j]) * p3 + constant(0, i, j)).square() +
+                              (f.own[2][1] + (f.g13[1][i] + f.g23[1][j]) * p3 + constant(1, i, j)).square() +
+                              (f.own[2][2] + (f.g13[2][i] + f.g23[2][j]) * p3 + constant(2, i, j)).square();
+        best = std::max(best, std::sqrt(size2.maxCoeff()));
+    };
+    search(ceilings[6].first, ceilings[6].second);
+    std::array<std::array<UpperHull, 2>, 3> hulls = {{{UpperHull(p3, f.own[2][0]), UpperHull(p3, -f.own[2][0])},
+                                                      {UpperHull(p3, f.own[2][1]), UpperHull(p3, -f.own[2][1])},
+                                                      {UpperHull(p3, f.own[2][2]), UpperHull(p3, -f.own[2][2])}}};
+    std::array<std::array<std::size_t, 2>, 3> corners{};
+    where_above(
+        ceilings[6], excess, [&] { return best; },
+        [&](Index i, Index j) {
+            double bound2 = 0.0;
+            for (std::size_t c = 0; c < 3; ++c) {
+                const double s = f.g13[c][i] + f.g23[c][j], a = constant(c, i, j);
+                const double most =
+                    std::max(a + hulls[c][0].support(s, corners[c][0]), hulls[c][1].support(-s, corners[c][1]) - a);
+                bound2 += most * most;
+            }
+            if (std::sqrt(bound2) > best) search(i, j);
+        });
+    return best;
+}
+
+// Largest minus smallest value of a component of e.
+double VolumeDraws::State::range(const VolumeField& f, const VolumeField& rest, std::size_t c) const {
+    const ArrayXd &p2 = grid.position(1), &p3 = grid.position(2);
+    double sum = 0.0;
+    for (const double sign : {1.0, -1.0}) {
+        const Excess excess = {
+            sign * rest.own[0][c] + farthest[1] * rest.g12[c].abs() + farthest[2] * rest.g13[c].abs(),
+            sign * rest.own[1][c] + farthest[2] * rest.g23[c].abs(), (sign * rest.own[2][c]).maxCoeff()};
+        const UpperHull hull(p3, sign * f.own[2][c]);
+        std::size_t corner = 0;
+        double best = -std::numeric_limits<double>::infinity();
+        const auto search = [&](Index i, Index j) {
+            best = std::max(best, sign * (f.own[0][c][i] + f.own[1][c][j] + f.g12[c][i] * p2[j]) +
+                                      hull.support(sign * (f.g13[c][i] + f.g23[c][j]), corner));
+        };
+        const Ceiling& ceiling = ceilings[2 * c + (sign > 0.0 ? 0 : 1)];
+        search(ceiling.first, ceiling.second);
+        where_above(ceiling, excess, [&] { return best; }, search);
+        sum += best;
+    }
+    return sum;
+}
+
+// Mean of the square of a component of e over the box. The component is a sum of products of functions of p1, p2, p3,
+// so that the means of products of two functions of each are enough.
+double VolumeDraws::State::mean_square(const VolumeField& f, std::size_t c) const {
+    const auto means = [&](std::size_t r, const std::vector<const ArrayXd*>& functions) {
+        const Index n = Index(functions.size()) + 1;
+        MatrixXd columns(weight[r].size(), n);
+        columns.col(0).setOnes();
+        for (Index k = 1; k < n; ++k) columns.col(k) = functions[std::size_t(k - 1)]->matrix();
+        return MatrixXd(columns.transpose() * weight[r].asDiagonal() * columns);
+    };
+    const MatrixXd first = means(0, {&f.own[0][c], &f.g12[c], &f.g13[c]});
+    const MatrixXd second = means(1, {&f.own[1][c], &grid.position(1), &f.g23[c]});
+    const MatrixXd third = means(2, {&f.own[2][c], &grid.position(2)});
+    constexpr int terms[6][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {2, 2, 0}, {3, 0, 2}, {0, 3, 2}};
+    double mean = 0.0;
+    for (const auto& s : terms)
+        for (const auto& t : terms) mean += first(s[0], t[0]) * second(s[1], t[1]) * third(s[2], t[2]);
+    return mean;
+}
+
+double VolumeDraws::State::diagonal(const VolumeField& f, std::size_t d) const {
     double low = 0.0, high = 0.0, start = 0.0;
     bool is_first = true;
     for (const DiagonalPoint& at : diagonals[d]) {
@@ -176,100 +248,49 @@ double VolumeDraws::State::diagonal(const Field& f, std::size_t d) const {
 }
 
 template <class Row>
-void VolumeDraws::State::figures(const Field& f, Row&& row) const {
-    Vector3d low, high;
-    double mean2;
-    row[0] = largest(f, low, high, mean2);
-    row[1] = std::sqrt(std::max(mean2, 0.0));
-    for (int c = 0; c < 3; ++c) {
-        const auto& [least, most] = f.tilt[std::size_t(c)];
-        row[2 + c] = high[c] - low[c];
-        row[5 + c] = std::max(most, -least);
-        row[8 + c] = most - least;
+void VolumeDraws::State::figures(const VolumeField& f, const VolumeField& rest, const double* values, Row&& row) const {
+    row[0] = largest(f, rest);
+    double mean2 = 0.0;
+    for (std::size_t c = 0; c < 3; ++c) {
+        mean2 += mean_square(f, c);
+        row[2 + Index(c)] = range(f, rest, c);
+        double least = 0.0, most = 0.0;  // tilts are sums of functions of one position
+        for (std::size_t r = 0; r < 3; ++r) {
+            const auto tilt = grid.functions(values, r).col(3 + Index(c));
+            least += tilt.minCoeff();
+            most += tilt.maxCoeff();
+        }
+        row[5 + Index(c)] = std::max(most, -least);
+        row[8 + Index(c)] = most - least;
     }
+    row[1] = std::sqrt(std::max(mean2, 0.0));
     for (std::size_t d = 0; d < 4; ++d) row[Index(11 + d)] = diagonal(f, d);
 }
 
-VolumeDraws::VolumeDraws(const Calibration& calibration, const GridPositions& grid, const std::optional<Vector3d>& tool,
-                         std::uint64_t seed) {
+VolumeDraws::VolumeDraws(const Calibration& calibration, const GridPositions& positions,
+                         const std::optional<Vector3d>& tool, std::uint64_t seed) {
     if (calibration.covariance.size() == 0)
         throw InvalidArgument("calibration: expected one evaluated with full covariance");
-    check_grid(grid);
-    for (const auto& positions : grid)
-        if (positions.size() < 2) throw InvalidArgument("grid: expected at least two positions an axis");
-    auto state = std::make_unique<State>(
-        State{calibration.chain, tool_of(calibration, tool), seed, {}, {}, {}, {}, {}, {}, 0, {}, {}});
-    State& s = *state;
-    const auto order = s.chain.order();
-    const EntryLayout layout(calibration);
-    std::vector<std::vector<EntryLayout::Weighted>> rows;  // of the table, by the calibration's values
+    check_grid(positions);
+    for (const auto& of_axis : positions)
+        if (of_axis.size() < 2) throw InvalidArgument("grid: expected at least two positions an axis");
+    const VolumeGrid grid(calibration, positions, tool_of(calibration, tool));
+    auto state = std::make_unique<State>(State{grid,
+                                               grid.table(calibration_values(calibration)),
+                                               {},
+                                               NormalDraws(grid.covariance(calibration.covariance), seed),
+                                               {},
+                                               {},
+                                               {},
+                                               {},
+                                               {}});
     for (std::size_t r = 0; r < 3; ++r) {
-        const auto& positions = grid[std::size_t(index(order[r]))];
-        s.position[r] = Eigen::Map<const ArrayXd>(positions.data(), Index(positions.size()));
-        const std::vector<double> weights = trapezoidal_weights(positions);
-        s.weight[r] = Eigen::Map<const ArrayXd>(weights.data(), Index(weights.size()));
-        for (const double p : positions)
-            for (int c = 0; c < 6; ++c) {
-                auto& row = rows.emplace_back();
-                const int function = FunctionId{order[r], Component(c)}.index();
-                if (layout.has(function))
-                    for (const auto& node : layout.interpolation(function, p)) row.push_back(node);
-                for (const Squareness q : all_squarenesses) {
-                    const SquarenessTerm term = squareness_term(q);
-                    const int parameter = function_count + static_cast<int>(q);
-                    if (term.axis == order[r] && term.component == c && layout.has(parameter))
-                        row.push_back({layout.first(parameter), term.sign * p});
-                }
-            }
+        const std::vector<double> weights = trapezoidal_weights(positions[std::size_t(index(grid.axis(r)))]);
+        state->weight[r] = Eigen::Map<const VectorXd>(weights.data(), Index(weights.size()));
     }
-    const Index n = Index(rows.size());
-    const VectorXd values = calibration_values(calibration);
-    s.table = VectorXd::Zero(n);
-    MatrixXd half = MatrixXd::Zero(layout.size(), n);
-    for (Index i = 0; i < n; ++i)
-        for (const auto& [entry, weight] : rows[std::size_t(i)]) {
-            s.table[i] += weight * values[entry];
-            half.col(i) += weight * calibration.covariance.col(entry);
-        }
-    MatrixXd covariance = MatrixXd::Zero(n, n);
-    const MatrixXd half_rows = half.transpose();
-    for (Index i = 0; i < n; ++i)
-        for (const auto& [entry, weight] : rows[std::size_t(i)]) covariance.col(i) += weight * half_rows.col(entry);
-    const PivotedRoot root(covariance);
-    s.rank = root.rank;
-    s.place = root.place;
-    s.scale = root.scale;
-    s.root = MatrixXd::Zero(n + widest_vector, s.rank);
-    s.root.topRows(n) = -root.lower;
-
-    std::size_t most = 2;
-    for (const auto& positions : grid) most = std::max(most, positions.size());
-    const char* names[] = {"ppp", "npp", "pnp", "nnp"};
-    for (std::size_t d = 0; d < 4; ++d) {
-        const Line line = Line::parse(names[d]);
-        Vector3d start, end;
-        for (const Axis axis : all_axes) {
-            const auto& positions = grid[std::size_t(index(axis))];
-            const bool rises = line.sign(axis) > 0;
-            start[index(axis)] = rises ? positions.front() : positions.back();
-            end[index(axis)] = rises ? positions.back() : positions.front();
-        }
-        s.directions[d] = (end - start).normalized();
-        for (std::size_t k = 0; k < most; ++k) {
-            State::DiagonalPoint at;
-            for (std::size_t r = 0; r < 3; ++r) {
-                const int axis = index(order[r]);
-                const double p = start[axis] + double(k) / double(most - 1) * (end[axis] - start[axis]);
-                const ArrayXd& positions = s.position[r];
-                const Index after = std::upper_bound(positions.begin(), positions.end(), p) - positions.begin();
-                const Index interval = std::clamp(after - 1, Index(0), positions.size() - 2);
-                at.interval[r] = interval;
-                at.t[r] = (p - positions[interval]) / (positions[interval + 1] - positions[interval]);
-                at.point[Index(r)] = p;
-            }
-            s.diagonals[d].push_back(at);
-        }
-    }
+    grid.field(state->table.data(), state->field);
+    state->set_ceilings();
+    state->set_diagonals(positions, calibration.chain);
     state_ = std::move(state);
 }
 
@@ -277,28 +298,27 @@ VolumeDraws::~VolumeDraws() = default;
 VolumeDraws::VolumeDraws(VolumeDraws&&) noexcept = default;
 
 Eigen::RowVectorXd VolumeDraws::values() const {
+    const State& s = *state_;
     Eigen::RowVectorXd row(int(volume_figures.size()));
-    state_->figures(state_->field(state_->table.data()), row);
+    VolumeField nothing;
+    s.grid.field(VectorXd::Zero(s.table.size()).eval().data(), nothing);
+    s.figures(s.field, nothing, s.table.data(), row);
     return row;
 }
 
 VolumeDraws::Figures VolumeDraws::draw(std::uint64_t first, std::size_t count) const {
     const State& s = *state_;
-    const Index n = s.table.size();
     Figures result(Index(count), int(volume_figures.size()));
-    in_blocks(Index(count), together, [&](Index begin, Index end) {
-        const MatrixXd numbers = normal_numbers(s.seed, first + std::uint64_t(begin), s.rank, together);
-        MatrixXd product = MatrixXd::Zero(n + widest_vector, together);
-        for (Index k = 0; k < s.rank; k += panel)
-            subtract_product(n - k, together, std::min(panel, s.rank - k), {&s.root(k, k), s.root.rows()},
-                             {&numbers(k, 0), numbers.rows(), 1}, {&product(k, 0), product.rows()});
-        VectorXd table(n);
+    in_blocks(Index(count), NormalDraws::together, [&](Index begin, Index end) {
+        MatrixXd tables;
+        s.draws.draw(first + std::uint64_t(begin), tables);
+        VolumeField rest, field;
+        VectorXd table;
         for (Index draw = 0; draw < end - begin; ++draw) {
-            for (Index i = 0; i < n; ++i) {
-                const Index at = s.place[std::size_t(i)];
-                table[at] = s.table[at] + s.scale[i] * product(i, draw);
-            }
-            s.figures(s.field(table.data()), result.row(begin + draw));
+            s.grid.field(tables.col(draw).data(), rest);
+            add(s.field, rest, field);
+            table = s.table + tables.col(draw);
+            s.figures(field, rest, table.data(), result.row(begin + draw));
         }
     });
     return result;

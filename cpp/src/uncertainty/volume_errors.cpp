@@ -14,8 +14,9 @@ namespace stepdiag {
 namespace {
 
 using namespace STEPDIAG_NAMESPACE;
+using Eigen::ArrayXd;
+using Eigen::ArrayXXd;
 using Eigen::Index;
-using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
 using Motion = AxisMotion<double>;
 
@@ -44,12 +45,9 @@ struct Slab {
     Vector3d lowest, highest, tilt_lowest, tilt_highest;
 };
 
-void widen(Vector3d& lowest, Vector3d& highest, const Vector3<double>& v) {
-    const double values[] = {v.x, v.y, v.z};
-    for (int c = 0; c < 3; ++c) {
-        lowest[c] = std::min(lowest[c], values[c]);
-        highest[c] = std::max(highest[c], values[c]);
-    }
+void widen(Vector3d& lowest, Vector3d& highest, int c, double low, double high) {
+    lowest[c] = std::min(lowest[c], low);
+    highest[c] = std::max(highest[c], high);
 }
 
 // Linear functions of one axis at the nodes of any of them: delta without squarenesses, and theta.
@@ -123,7 +121,7 @@ std::vector<double> trapezoidal_weights(const std::vector<double>& positions) {
     return weights;
 }
 
-VolumeSummary summarise_volume(const Machine& machine, const GridPositions& grid) {
+VolumeSummary summarise_volume(const Machine& machine, const GridPositions& grid, bool tilts) {
     check_grid(grid);
     const auto order = machine.chain().order();
     std::array<std::vector<Motion>, 3> motions;
@@ -137,19 +135,22 @@ VolumeSummary summarise_volume(const Machine& machine, const GridPositions& grid
                                            machine.errors().theta(order[r], p)));
     }
     const Index n2 = Index(motions[1].size()), n3 = Index(motions[2].size());
-    // Functional point and orientation in the frame before the second axis.
-    std::vector<Vector3<double>> points(std::size_t(n2 * n3));
-    std::vector<Matrix3<double>> rotations(std::size_t(n2 * n3));
+    // Functional point by component, and orientation, in the frame before the second axis.
+    std::array<ArrayXXd, 3> points;
+    for (ArrayXXd& component : points) component.resize(n3, n2);
+    std::vector<Matrix3<double>> rotations(tilts ? std::size_t(n2 * n3) : 0);
     const Vector3<double> tool = broadcast3<double>(machine.tool());
     for (Index k = 0; k < n3; ++k) {
         const Motion& third = motions[2][std::size_t(k)];
         const Vector3<double> carried = move_point(third, tool).point;
         for (Index j = 0; j < n2; ++j) {
             const Motion& second = motions[1][std::size_t(j)];
-            points[std::size_t(j * n3 + k)] = move_point(second, carried).point;
-            rotations[std::size_t(j * n3 + k)] = second.rotation * third.rotation;
+            const Vector3<double> point = move_point(second, carried).point;
+            points[0](k, j) = point.x, points[1](k, j) = point.y, points[2](k, j) = point.z;
+            if (tilts) rotations[std::size_t(j * n3 + k)] = second.rotation * third.rotation;
         }
     }
+    const Eigen::Map<const ArrayXd> along_third(positions[2]->data(), n3), weight(weights[2].data(), n3);
     constexpr double infinite = std::numeric_limits<double>::infinity();
     std::vector<Slab> slabs(motions[0].size());
     in_blocks(Index(slabs.size()), 1, [&](Index i, Index) {
@@ -159,25 +160,35 @@ VolumeSummary summarise_volume(const Machine& machine, const GridPositions& grid
         Vector3d nominal = machine.tool();
         nominal[index(order[0])] += (*positions[0])[std::size_t(i)];
         const Motion& first = motions[0][std::size_t(i)];
+        const Vector3<double> origin = move_point(first, broadcast3<double>(Vector3d::Zero())).point;
+        const Vector3<double> rows[] = {first.rotation.row0, first.rotation.row1, first.rotation.row2};
+        const double origins[] = {origin.x, origin.y, origin.z};
+        std::array<ArrayXd, 3> e;
+        ArrayXd size2;
         for (Index j = 0; j < n2; ++j) {
             nominal[index(order[1])] = machine.tool()[index(order[1])] + (*positions[1])[std::size_t(j)];
-            double along = 0.0;
-            for (Index k = 0; k < n3; ++k) {
-                nominal[index(order[2])] = machine.tool()[index(order[2])] + (*positions[2])[std::size_t(k)];
-                const std::size_t at = std::size_t(j * n3 + k);
-                const Vector3<double> actual = move_point(first, points[at]).point;
-                const Vector3<double> e = {actual.x - nominal[0], actual.y - nominal[1], actual.z - nominal[2]};
-                const double size2 = dot(e, e);
-                along += weights[2][std::size_t(k)] * size2;
-                widen(slab.lowest, slab.highest, e);
-                widen(slab.tilt_lowest, slab.tilt_highest, tilt_of(first.rotation, rotations[at]));
-                if (size2 > slab.largest2) {
-                    slab.largest2 = size2;
-                    slab.at = {j, k};
-                    slab.components = {e.x, e.y, e.z};
-                }
+            size2 = ArrayXd::Zero(n3);
+            for (int c = 0; c < 3; ++c) {
+                ArrayXd& own = e[std::size_t(c)];
+                own = rows[c].x * points[0].col(j) + rows[c].y * points[1].col(j) + rows[c].z * points[2].col(j) +
+                      (origins[c] - nominal[c]);
+                if (c == index(order[2])) own -= along_third;
+                size2 += own.square();
+                widen(slab.lowest, slab.highest, c, own.minCoeff(), own.maxCoeff());
             }
-            slab.weighted2 += weights[1][std::size_t(j)] * along;
+            slab.weighted2 += weights[1][std::size_t(j)] * (weight * size2).sum();
+            if (const double most = size2.maxCoeff(); most > slab.largest2) {
+                Index k;
+                slab.largest2 = size2.maxCoeff(&k);
+                slab.at = {j, k};
+                slab.components = {e[0][k], e[1][k], e[2][k]};
+            }
+            for (Index k = 0; tilts && k < n3; ++k) {
+                const Vector3<double> tilt = tilt_of(first.rotation, rotations[std::size_t(j * n3 + k)]);
+                widen(slab.tilt_lowest, slab.tilt_highest, 0, tilt.x, tilt.x);
+                widen(slab.tilt_lowest, slab.tilt_highest, 1, tilt.y, tilt.y);
+                widen(slab.tilt_lowest, slab.tilt_highest, 2, tilt.z, tilt.z);
+            }
         }
     });
     VolumeSummary summary;

@@ -25,7 +25,7 @@ void check_covariance(const Calibration& calibration) {
 struct RangeModel::State {
     VolumeRanges ranges;
     VectorXd values;
-    MatrixXd root;
+    NormalDraws draws;
     std::uint64_t seed;
     std::vector<Output> outputs;
     std::vector<int> indices;  // index of each output in the ranges
@@ -35,7 +35,7 @@ RangeModel::RangeModel(const Calibration& calibration, const std::optional<Eigen
     check_covariance(calibration);
     auto state = std::make_shared<State>(State{VolumeRanges(calibration, tool_of(calibration, tool)),
                                                calibration_values(calibration),
-                                               normal_root(calibration.covariance),
+                                               NormalDraws(calibration.covariance, seed),
                                                seed,
                                                {},
                                                {}});
@@ -57,14 +57,11 @@ std::unique_ptr<SampleModel::Worker> RangeModel::worker() const {
     struct RangeWorker : Worker {
         explicit RangeWorker(const State& state) : state(state) {}
         void evaluate(const SampleBlock& block) override {
-            constexpr std::size_t together = 16;  // columns of a product; the size of a block is a multiple of it
-            for (std::size_t begin = 0; begin < block.samples; begin += together) {
-                const MatrixXd values =
-                    (state.root * normal_numbers(state.seed, block.first_sample + begin, state.root.cols(), together))
-                        .colwise() +
-                    state.values;
-                for (std::size_t s = 0; s < together; ++s) {
-                    const Ranges ranges = state.ranges.evaluate(values.col(Index(s)));
+            MatrixXd noise;
+            for (std::size_t begin = 0; begin < block.samples; begin += std::size_t(NormalDraws::together)) {
+                state.draws.draw(block.first_sample + begin, noise);
+                for (std::size_t s = 0; s < std::min(std::size_t(noise.cols()), block.samples - begin); ++s) {
+                    const Ranges ranges = state.ranges.evaluate(state.values + noise.col(Index(s)));
                     for (std::size_t k = 0; k < state.indices.size(); ++k)
                         block.output(k)[begin + s] = ranges[state.indices[k]];
                 }
@@ -84,13 +81,14 @@ VolumetricAccuracy volumetric_accuracy(const Calibration& calibration, const std
     check_covariance(calibration);
     const VolumeRanges ranges(calibration, tool_of(calibration, tool));
     const VectorXd values = calibration_values(calibration);
-    const MatrixXd root = normal_root(calibration.covariance);
+    const NormalDraws draws(calibration.covariance, options.seed);
 
-    const Index count = Index(options.samples), together = 16;
+    const Index count = Index(options.samples);
     MatrixXd drawn(count, range_count), of_noise(count, range_count);
     // The numbers of a sample depend on its index only, so the result does not depend on the threads.
-    in_blocks(count, together, [&](Index begin, Index end) {
-        const MatrixXd noise = root * normal_numbers(options.seed, std::uint64_t(begin), root.cols(), together);
+    in_blocks(count, NormalDraws::together, [&](Index begin, Index end) {
+        MatrixXd noise;
+        draws.draw(std::uint64_t(begin), noise);
         for (Index s = 0; s < end - begin; ++s) {
             drawn.row(begin + s) = ranges.evaluate(values + noise.col(s)).transpose();
             of_noise.row(begin + s) = ranges.evaluate(noise.col(s)).transpose();

@@ -8,7 +8,7 @@ from home may be small from another reference point. docs/volume.md has the form
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Final, Literal, cast
 
@@ -35,6 +35,7 @@ SQUARENESS_OF: Final[Mapping[str, tuple[str, ...]]] = {"X": (), "Y": ("C0Y",), "
 TWO_SIDED: Final = NormalDist().inv_cdf(0.975)
 ONE_SIDED: Final = NormalDist().inv_cdf(0.95)
 FEWEST_SAMPLES: Final = 1000
+MOST_NODES: Final = 201  # of an axis that are computed; 8 million points in a tenth of a second
 MOST_DRAWN: Final = 51  # positions an axis; more take much longer and change little
 # Lengths that differ by less were rounded on the way, mm.
 _ROUNDING: Final = 1e-6
@@ -68,9 +69,11 @@ class VolumeErrors(Displayed):
     tool: FloatArray  # (3,) offset of the functional point, mm
     box: FloatArray  # (2, 3) lowest and highest commanded positions, mm
     grid: tuple[FloatArray, FloatArray, FloatArray]  # positions of X, Y, Z, mm; errors are those at all combinations
+    every_node: bool  # whether all nodes in the box are among them
     largest: float  # mm; NaN where a parameter that acts in it is not determined, as all figures
     largest_at: FloatArray  # (3,) commanded, mm
     largest_components: FloatArray  # (3,) dx, dy, dz, mm
+    largest_spread: Spread | None  # its bias and standard uncertainty without between_nodes, mm
     largest_interval: Interval | None  # 95 %, with between_nodes; None without a covariance, as all intervals
     rms: float  # root of the mean of |e|^2 over the box, mm
     rms_interval: Interval | None
@@ -130,14 +133,14 @@ def volume_errors(
     """Summarise the error of the tool over a volume, with 95 % intervals where there is a covariance.
 
     tool: offset of the functional point, mm; none: the calibration's. box: (2, 3), lowest and highest commanded
-    positions, mm; none: the whole volume; of a Machine it is needed. grid: at least as many positions an axis, besides
-    the nodes of the tables; none: the nodes. limit: of the largest error, mm. between_nodes: standard uncertainty by
-    what lies between the nodes, mm; none: estimated. ranking: whether to compute it. samples: draws of the covariance.
-    progress: called with the number of draws that are done, and of all. Raises InvalidArgument for a box that is not in
-    the volume, and for numbers out of range."""
+    positions, mm; none: the whole volume; of a Machine it is needed. grid: at least as many positions an axis,
+    besides the nodes of the tables (of more than 201, 201); none: the nodes. limit: of the largest error, mm.
+    between_nodes: standard uncertainty by what lies between the nodes, mm; none: estimated. ranking: whether to
+    compute it. samples: draws of the covariance. progress: called with the number of draws that are done, and of
+    all. Raises InvalidArgument for a box that is not in the volume, and for numbers out of range."""
     machine, offset = _machine_of(source, tool)
     corners = _box_of(source, box)
-    positions = _positions(machine, corners, grid)
+    positions, every_node = _positions(machine, corners, grid)
     for name, length in (("limit", limit), ("between_nodes", between_nodes)):
         if length is not None and not (math.isfinite(length) and length >= 0.0):
             raise InvalidArgument(f"`{name}`: expected a length of at least 0 mm, got {length:g}")
@@ -161,21 +164,20 @@ def volume_errors(
         if known:
             along = _uncertainty_along(source, offset, found)
             bias, u = spreads["largest"]
-            spreads["largest"] = bias, math.hypot(max(u, along), between)
+            spreads["largest"] = bias, max(u, along)
     figures = {name: VolumeFigure(value, _interval(value, spreads.get(name))) for name, value in values.items()}
-    largest = figures["largest"]
-    bounds = _interval(largest.value, spreads.get("largest"), ONE_SIDED)
-    verdict, why = _verdict(source, limit, bounds, missing)
     nowhere = np.full(3, np.nan)
-    return VolumeErrors(
+    not_judged = VolumeErrors(
         source=source,
         tool=offset,
         box=corners,
         grid=positions,
-        largest=largest.value,
+        every_node=every_node,
+        largest=figures["largest"].value,
         largest_at=found.largest_at if known else nowhere,
         largest_components=found.components if known else nowhere,
-        largest_interval=largest.interval,
+        largest_spread=spreads.get("largest"),
+        largest_interval=None,
         rms=figures["rms"].value,
         rms_interval=figures["rms"].interval,
         ranges={axis: figures[f"range {axis}"] for axis in AXES},
@@ -185,12 +187,32 @@ def volume_errors(
         missing=missing,
         between_nodes=between,
         between_nodes_estimated=estimated,
+        bounds=None,
+        limit=None,
+        verdict=None,
+        no_verdict_because="",
+        ranking=_ranking(source, machine, positions) if known and ranking else (),
+        fit=source.fit if isinstance(source, Calibration) else None,
+    )
+    return judged(not_judged, limit=limit, between_nodes=between)
+
+
+def judged(found: VolumeErrors, *, limit: float | None, between_nodes: float) -> VolumeErrors:
+    """The same figures with this standard uncertainty by what lies between the nodes, beside this limit; mm."""
+    spread = None
+    if found.largest_spread is not None:
+        bias, u = found.largest_spread
+        spread = bias, math.hypot(u, between_nodes)
+    bounds = _interval(found.largest, spread, ONE_SIDED)
+    verdict, why = _verdict(found.source, limit, bounds, found.missing)
+    return replace(
+        found,
+        between_nodes=between_nodes,
+        largest_interval=_interval(found.largest, spread),
         bounds=bounds,
         limit=limit,
         verdict=verdict,
         no_verdict_because=why,
-        ranking=_ranking(source, machine, positions) if known and ranking else (),
-        fit=source.fit if isinstance(source, Calibration) else None,
     )
 
 
@@ -272,23 +294,30 @@ def _box_of(source: Calibration | Machine, box: npt.ArrayLike | None) -> FloatAr
     return corners
 
 
-def _positions(machine: Machine, box: FloatArray, grid: int | None) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The ends of the box and the nodes inside, with equidistant positions where a number is given."""
+def _positions(
+    machine: Machine, box: FloatArray, grid: int | None
+) -> tuple[tuple[FloatArray, FloatArray, FloatArray], bool]:
+    """The ends of the box and the nodes inside, with equidistant positions where a number is given; and whether these
+    are all nodes."""
     if grid is not None and not 2 <= grid <= 1001:
         raise InvalidArgument(f"grid: expected 2 to 1001 positions an axis, got {grid}")
-    axes = []
+    axes, every_node = [], True
     for axis, low, high in zip(AXES, *box, strict=True):
-        nodes = [position for name, (position, _) in machine.errors.functions.items() if name[2] == axis]
-        inside = np.concatenate([*nodes, np.linspace(low, high, grid or 2)])
-        inside = np.unique(inside[(inside > low) & (inside < high)])
-        inside = np.concatenate([[low], inside, [high]])
-        # Positions of one node may differ in the last digits between functions.
-        apart = np.concatenate([[True], np.diff(inside) > _ROUNDING])
-        kept = inside[apart]
-        kept[-1] = high
-        axes.append(kept)
+        of_functions = [position for name, (position, _) in machine.errors.functions.items() if name[2] == axis]
+        nodes = _apart(np.concatenate([[low, high], *of_functions]), low, high)
+        every_node = every_node and len(nodes) <= MOST_NODES
+        axes.append(_apart(np.concatenate([_thinned(nodes, MOST_NODES), np.linspace(low, high, grid or 2)]), low, high))
     x, y, z = axes
-    return x, y, z
+    return (x, y, z), every_node
+
+
+def _apart(positions: FloatArray, low: float, high: float) -> FloatArray:
+    """Ascending, from low to high. Positions of one node may differ in the last digits between functions."""
+    inside = np.unique(positions[(positions > low) & (positions < high)])
+    inside = np.concatenate([[low], inside, [high]])
+    kept: FloatArray = inside[np.concatenate([[True], np.diff(inside) > _ROUNDING])]
+    kept[-1] = high
+    return kept
 
 
 def _missing(source: Calibration | Machine, tool: FloatArray) -> dict[str, tuple[str, ...]]:
@@ -310,11 +339,11 @@ def _values(
     return {name: float(value) for name, value in zip(_core.VolumeDraws.names(), numbers, strict=True)}
 
 
-def _thinned(positions: FloatArray) -> FloatArray:
-    """At most MOST_DRAWN of them, both ends included."""
-    if len(positions) <= MOST_DRAWN:
+def _thinned(positions: FloatArray, most: int) -> FloatArray:
+    """At most so many of them, both ends included."""
+    if len(positions) <= most:
         return positions
-    kept: FloatArray = positions[np.round(np.linspace(0, len(positions) - 1, MOST_DRAWN)).astype(int)]
+    kept: FloatArray = positions[np.round(np.linspace(0, len(positions) - 1, most)).astype(int)]
     return kept
 
 
@@ -327,7 +356,8 @@ def _spreads(
     progress: Callable[[int, int], None] | None,
 ) -> dict[str, Spread]:
     """Of every figure its bias and its standard uncertainty, from draws of the covariance."""
-    draws = _core.VolumeDraws(calibration, *map(_thinned, grid), tool=tool, seed=seed)
+    drawn_at = [_thinned(positions, MOST_DRAWN) for positions in grid]
+    draws = _core.VolumeDraws(calibration, *drawn_at, tool=tool, seed=seed)
     parts, done = [], 0
     while done < samples:
         count = min(1000, samples - done)
@@ -391,12 +421,17 @@ def _between_nodes(calibration: Calibration, tool: FloatArray, point: FloatArray
         for name, factor in zip(labels, output.row, strict=True):
             if name in factors:
                 factors[name] += float(component * factor)
-    return math.sqrt(sum(factor**2 * _chord_variance(calibration, name) for name, factor in factors.items()))
+    covariance = calibration.covariance
+    variances = []
+    for name, (position, value, u) in calibration.functions.items():
+        own = np.array([label == name for label in labels])
+        block = np.diag(np.nan_to_num(u) ** 2) if covariance is None else covariance[np.ix_(own, own)]
+        variances.append(factors[name] ** 2 * _chord_variance(position, value, block))
+    return math.sqrt(sum(variances))
 
 
-def _chord_variance(calibration: Calibration, name: str) -> float:
+def _chord_variance(position: FloatArray, value: FloatArray, covariance: FloatArray) -> float:
     """Mean square of what a function deviates from its chords, estimated from its table; noise is taken off."""
-    position, value, u = calibration.functions[name]
     if len(position) < 3:
         return 0.0
     h = np.diff(position)
@@ -404,11 +439,6 @@ def _chord_variance(calibration: Calibration, name: str) -> float:
     weights = np.zeros((len(position) - 2, len(position)))  # of second derivatives
     rows = np.arange(len(position) - 2)
     weights[rows, rows], weights[rows, rows + 1], weights[rows, rows + 2] = before, -before - after, after
-    if calibration.covariance is None:
-        covariance = np.diag(np.nan_to_num(u) ** 2)
-    else:
-        own = [k for k, (label, _) in enumerate(calibration.covariance_labels) if label == name]
-        covariance = calibration.covariance[np.ix_(own, own)]
     noise = np.sum((weights @ covariance) * weights, axis=1)
     return max(float(np.mean((weights @ value) ** 2 - noise)), 0.0) * float(np.mean(h**4)) / 120.0
 
@@ -434,7 +464,7 @@ def _ranking(
     for members in (groups, axes):
         part = []
         for name, parameters in members:
-            without = _core.summarise_volume(machine, *grid, without=list(parameters))
+            without = _core.summarise_volume(machine, *grid, without=list(parameters), tilts=False)
             part.append(VolumeContribution(name, parameters, without.largest, without.rms))
         ranked += sorted(part, key=lambda contribution: contribution.largest)
     return tuple(ranked)

@@ -9,7 +9,7 @@ import numpy as np
 from stepdiag._core import Calibration, ErrorMap, Machine
 from stepdiag.calibration.comparison import Comparison, Difference
 from stepdiag.calibration.table_sums import FloatArray
-from stepdiag.calibration.volume import Interval, VolumeErrors, volume_errors
+from stepdiag.calibration.volume import Interval, VolumeErrors, judged, volume_errors
 from stepdiag.display import Displayed, Facts
 
 ChangeVerdict = Literal["improved", "worse", "cannot be told"]
@@ -71,19 +71,20 @@ class VolumeChange(Displayed):
 def volume_change(comparison: Comparison) -> VolumeChange:
     """Compute the largest error and the rms over the volume by A and by B, with verdicts and the parameters' effects.
 
-    Both with the tool offset of A. What lies between the nodes is left out: it is much the same before and after. The
-    interval of B - A follows from those of A and B, taken as independent (method of
+    Both with the tool offset of A. What lies between the nodes is left out of the intervals of `largest`: it is much
+    the same before and after. The interval of B - A follows from those of A and B, taken as independent (method of
     variance estimates recovery, Zou and Donner 2008): value -/+ sqrt(of the squared distances to the ends of the
     intervals that make it smaller/larger). The verdict is "improved" or "worse" where that interval excludes 0. There
     is none without covariances, for evaluations of the same run, and against an error map."""
     one, other = comparison.a, comparison.b
-    a, b = (volume_errors(each, tool=one.tool, between_nodes=0.0, ranking=False) for each in (one, other))
+    a, b = (volume_errors(each, tool=one.tool, ranking=False) for each in (one, other))
     reason = _no_verdict(comparison, a, b)
+    known_a, known_b = (judged(each, limit=None, between_nodes=0.0).largest_interval for each in (a, b))
     return VolumeChange(
         one.tool,
         a,
         b,
-        _change(a.largest, b.largest, a.largest_interval, b.largest_interval, reason),
+        _change(a.largest, b.largest, known_a, known_b, reason),
         _change(a.rms, b.rms, a.rms_interval, b.rms_interval, reason),
         _effects(comparison),
         reason,

@@ -19,6 +19,7 @@ from stepdiag.cli.options import (
 )
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, PAGE, PDF, OutputFile
+from stepdiag.progress import Progress
 
 _WORDS = {
     "customer": "Who receives the report.",
@@ -156,11 +157,13 @@ def _write_page(
     path = output.claim(*request.inputs)
     if path.suffix.lower() == ".pdf":
         find_browser()
-    page, contents = report_page(request, path)
+    with Progress("report"):
+        page, contents = report_page(request, path)
     for note in contents.notes:
         tell("warning", note)
     if path.suffix.lower() == ".pdf":
-        write_pdf(page, path)
+        with Progress("Chromium prints"):
+            write_pdf(page, path)
     else:
         write_whole(path, page)
     return contents.before

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, __version__
+from stepdiag.calibration.volume import judged
 from stepdiag.io.file_kind import PAGE_BEGINS
 from stepdiag.objects.report import report_object
 from stepdiag.objects.volume import volume_object
@@ -47,8 +48,9 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
     change, before = contents.change, None
     if contents.before is not None and change is not None:
         before = ErrorInVolume(change.a, *error_grid(contents.before))
-    if change is not None and request.limit is None and np.array_equal(change.tool, calibration.tool):
-        found = ErrorInVolume(change.b, *error_grid(calibration))  # there already; without its ranking
+    if change is not None and np.array_equal(change.tool, calibration.tool):  # there already; without its ranking
+        figures_after = judged(change.b, limit=request.limit, between_nodes=change.b.between_nodes)
+        found = ErrorInVolume(figures_after, *error_grid(calibration))
     else:
         found = error_in_volume(calibration, request.limit)
     sections = [

@@ -20,7 +20,6 @@ NODES: Final = 13  # of the grid along each axis
 MICRO: Final = 1e3  # µm of a mm
 MICRORADIAN: Final = 1e6  # µrad of a rad
 MOST_RANKED: Final = 5
-MOST_RANKED_POINTS: Final = 1_000_000  # of the grid of nodes; the ranking of more takes seconds
 
 
 class ErrorInVolume(NamedTuple):
@@ -36,10 +35,7 @@ def error_in_volume(calibration: Calibration, limit: float | None) -> ErrorInVol
     """The figures, as `stepdiag volume` has them, and what is drawn.
 
     Raises InvalidArgument for a limit that is not positive."""
-    functions = calibration.functions
-    nodes = [max((len(p) for name, (p, _, _) in functions.items() if name[2] == axis), default=2) for axis in AXES]
-    figures = volume_errors(calibration, limit=limit, ranking=math.prod(nodes) <= MOST_RANKED_POINTS)
-    return ErrorInVolume(figures, *error_grid(calibration))
+    return ErrorInVolume(volume_errors(calibration, limit=limit), *error_grid(calibration))
 
 
 def error_grid(calibration: Calibration) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from stepdiag._core import Calibration
 from stepdiag.calibration.table_sums import FloatArray
-from stepdiag.calibration.volume import Interval, VolumeContribution, VolumeErrors, VolumeFigure
+from stepdiag.calibration.volume import MOST_NODES, Interval, VolumeContribution, VolumeErrors, VolumeFigure
 from stepdiag.units import report_value
 
 _RANKED: Final = 5  # parameters in the report; the JSON object has all
@@ -88,8 +88,10 @@ def _frame_rows(found: VolumeErrors) -> Iterator[str]:
     shape = " x ".join(str(n) for n in found.shape)
     low, high = (_lengths(corner) for corner in found.box)
     yield f"box {low} to {high} mm, tool offset {_lengths(found.tool)} mm, {shape} positions, approached in +"
+    if not found.every_node:
+        yield f"the tables have more than {MOST_NODES} nodes an axis: {MOST_NODES} of them, evenly"
     if found.largest_interval is not None:
-        kind = "estimated" if found.between_nodes_estimated else "stated"
+        kind = "estimated from the tables" if found.between_nodes_estimated else "stated"
         yield f"95 % intervals in brackets; between nodes ({kind}): standard uncertainty {_um(found.between_nodes)} µm"
     elif isinstance(found.source, Calibration) and found.source.covariance is None:
         yield "no intervals: the file has no covariance; evaluate writes it to netCDF (-o calibration.nc)"

@@ -12,6 +12,7 @@ from usual import ALL_CHAINS, CHAIN
 import stepdiag as sd
 from stepdiag import _core
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES
+from stepdiag.report.volume import volume_report
 
 # Both evaluate one pose; what is left is rounding of positions of up to 1 m.
 EXACT = 1e-9
@@ -134,6 +135,21 @@ def test_box_ends_and_nodes_are_in_the_grid() -> None:
     nodes = calibrate(1).functions["EXX"][0]
     assert set(nodes[(nodes > 1.0) & (nodes < 70.0)].tolist()) <= set(found.grid[0].tolist())
     assert {24.0, 47.0} <= set(np.round(found.grid[0], 9).tolist())
+
+
+def test_of_very_many_nodes_some_are_computed_and_it_is_said() -> None:
+    nodes = np.linspace(0.0, 80.0, 1001)
+    many = sd.Machine(CHAIN, sd.ErrorMap({"EXX": (nodes, 1e-4 * nodes)}), TOOL)
+    found = sd.volume_errors(many, box=whole(), ranking=False)
+    assert not found.every_node
+    assert found.shape == (201, 2, 2)
+    assert set(found.grid[0].tolist()) <= set(nodes.tolist())
+    assert found.grid[0][[0, -1]].tolist() == [0.0, 80.0]
+    assert found.largest == pytest.approx(8e-3, rel=1e-9)
+    assert "the tables have more than 201 nodes an axis: 201 of them, evenly" in list(volume_report(found))
+    few = sd.volume_errors(many, box=[[10, 0, 0], [20, 60, 50]], ranking=False)
+    assert few.every_node
+    assert few.shape[0] == 126
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,19 @@ def test_figures_are_those_of_both_volumes_at_the_tool_of_a() -> None:
     np.testing.assert_array_equal(change.tool, TOOL)
 
 
+def test_what_lies_between_the_nodes_is_in_the_volumes_and_not_in_the_change() -> None:
+    a, b = (calibrate(seed, full_covariance=True) for seed in (1, 2))
+    change = sd.volume_change(sd.compare_calibrations(a, b))
+    for own, interval, calibration in (
+        (change.a, change.largest.a_interval, a),
+        (change.b, change.largest.b_interval, b),
+    ):
+        alone = sd.volume_errors(calibration, ranking=False)
+        assert own.largest_interval == alone.largest_interval
+        assert own.between_nodes == alone.between_nodes > 0.0
+        assert interval == sd.volume_errors(calibration, between_nodes=0.0, ranking=False).largest_interval
+
+
 @pytest.mark.parametrize("name", ["EXX", "EZY", "EBX", "ECX", "EAZ", "C0Y", "A0Z"])
 def test_effect_of_a_parameter_is_that_of_the_exact_machine_with_it_alone(name: str) -> None:
     """By brute force: errors on a fine grid of a machine whose only error is the difference."""

@@ -29,8 +29,8 @@ struct VolumeSummary {
 void check_grid(const GridPositions& grid);
 // Of the trapezoidal rule over ascending positions; they sum to 1.
 std::vector<double> trapezoidal_weights(const std::vector<double>& positions);
-// Throws InvalidArgument as check_grid.
-VolumeSummary summarise_volume(const Machine& machine, const GridPositions& grid);
+// `tilts`: whether to compute them, which takes most of the time. Throws InvalidArgument as check_grid.
+VolumeSummary summarise_volume(const Machine& machine, const GridPositions& grid, bool tilts = true);
 
 // The machine with these parameters (indices of Term: functions, then squarenesses) set to 0.
 Machine without_parameters(const Machine& machine, const std::vector<int>& parameters);

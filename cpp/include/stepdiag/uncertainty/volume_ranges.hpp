@@ -36,8 +36,8 @@ public:
     const std::array<std::vector<std::string>, range_count>& missing() const;
 
 private:
-    struct Grid;
-    std::unique_ptr<const Grid> grid_;
+    struct State;
+    std::unique_ptr<const State> state_;
 };
 
 }  // namespace stepdiag
