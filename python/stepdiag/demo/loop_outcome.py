@@ -9,7 +9,7 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag.demo.loop_cases import CHAIN, NOISE, LoopCase, scenario_text, write_scenario, write_truth
-from stepdiag.demo.loop_job import PATIENCE, Controller, FloatArray, Job
+from stepdiag.demo.loop_job import PATIENCE, Controller, FloatArray, Job, compensator_of
 from stepdiag.demo.loop_points import Agreement, Sizes, agreement, covariances, errors_at, grid_nodes, random_points
 from stepdiag.demo.loop_recheck import Translations, translations
 from stepdiag.io.whole_files import write_whole
@@ -127,7 +127,7 @@ def repetitions(outcome: LoopOutcome, seeds: int) -> dict[str, Agreement]:
 def whole_grid(outcome: LoopOutcome) -> tuple[float, float]:
     """Largest errors at all nodes of the grid before and after compensation, calculated, mm."""
     nodes = [outcome.scenario.known.plan.nodes(axis) for axis in "XYZ"]
-    compensator = _core.Compensator(outcome.table, CHAIN)
+    compensator = compensator_of(outcome.table, outcome.scenario)
     before = after = 0.0
     for x in nodes[0]:
         targets = np.stack(np.meshgrid([x], nodes[1], nodes[2], indexing="ij"), axis=-1).reshape(-1, 3)

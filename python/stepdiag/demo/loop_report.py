@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stepdiag import _core
-from stepdiag.demo.loop_cases import CHAIN, DISTANCE_NOISE, RADIUS, SCREW_AMPLITUDE, SCREW_PITCH, TILT_NOISE, finer
+from stepdiag.demo.loop_cases import DISTANCE_NOISE, RADIUS, SCREW_AMPLITUDE, SCREW_PITCH, TILT_NOISE, finer
+from stepdiag.demo.loop_job import compensator_of
 from stepdiag.demo.loop_outcome import LoopOutcome, whole_grid
 from stepdiag.demo.loop_points import Agreement, FloatArray, Sizes, errors_at
 from stepdiag.demo.paper_report import alias_of
@@ -82,7 +82,7 @@ def left_along(outcome: LoopOutcome, axis: int, positions: FloatArray) -> FloatA
     """Error remaining along an axis with the others at home, calculated, (n, 3), mm."""
     targets = np.zeros((len(positions), 3))
     targets[:, axis] = positions
-    return errors_at(outcome.machine, _core.Compensator(outcome.table, CHAIN).command(targets), targets)
+    return errors_at(outcome.machine, compensator_of(outcome.table, outcome.scenario).command(targets), targets)
 
 
 def noise_note(outcome: LoopOutcome, repeated: dict[str, Agreement] | None) -> Iterator[str]:

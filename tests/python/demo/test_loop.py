@@ -1,5 +1,6 @@
 """The closed loop, calculated: the same instrument and compensator as in LinuxCNC (tests/linuxcnc/test_loop.py)."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,9 @@ STEPS = 10
 
 
 def outcome_of(case: LoopCase, folder: Path, steps: int = STEPS) -> LoopOutcome:
-    outcome, _ = run_case(case, folder, Calculated(), None, steps, (100, 200), lambda text: None)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # users see warnings
+        outcome, _ = run_case(case, folder, Calculated(), None, steps, (100, 200), lambda text: None)
     return outcome
 
 
