@@ -215,7 +215,8 @@ def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None,
         comparison = compare_calibrations(one, other, limit=limit)
     except InvalidArgument as error:
         raise InvalidArgument(f"{a}, {b}: {error}") from None
-    change = volume_change(comparison)
+    with Progress("volumes of A and B"):
+        change = volume_change(comparison)
     if written is not None:
         from stepdiag.report.comparison import write_comparison
 

@@ -8,6 +8,7 @@ import click
 from stepdiag.cli.options import PATH, Writes, tell_fit
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import COMP_FILE, COMP_LINES, GRID, ISG_TABLE, KINEMATICS_TABLE, OutputFile, claim_folder
+from stepdiag.progress import Progress
 
 # Those of stepdiag.export.write.FORMATS, which is slow to import; a test compares them.
 FORMATS = ("linuxcnc-comp", "linuxcnc-kins", "isg", "csv-grid")
@@ -91,6 +92,8 @@ def export(context: click.Context, /, calibration: Path, to: str, output: Output
     check_input(calibration)
     read = read_what_is_exported(calibration)
     check_fit(read, f"{calibration}", options["accept_rejected"])
-    for line in export_calibration(read, to, path, ExportOptions(**options)):
+    with Progress("export"):
+        lines = export_calibration(read, to, path, ExportOptions(**options))
+    for line in lines:
         say(line)
     tell_fit(context, calibration, read.fit)

@@ -7,6 +7,7 @@ import click
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, fit_warnings, tell
 from stepdiag.io.outputs import FIGURE, PNG, OutputFile
+from stepdiag.progress import Progress
 
 
 @click.command(epilog="\b\nExample: stepdiag plot calibration.nc truth.csv -o calibration.pdf")
@@ -58,9 +59,10 @@ def plot(
         check_input(file)
     path = claim_beside(files[0], PNG) if output is None else output.claim(*everything)
     _check_options(files, truth, scenario)
-    figure, fits = draw_files(everything, volume=volume)
-    with own_style():
-        content = save(figure, path.suffix.lower().removeprefix("."))
+    with Progress("plot"):
+        figure, fits = draw_files(everything, volume=volume)
+        with own_style():
+            content = save(figure, path.suffix.lower().removeprefix("."))
     write_whole(path, content)
     click.echo(f"wrote {path}")
     for warning in (warning for file, fit in fits.items() for warning in fit_warnings(file, fit)):

@@ -8,6 +8,7 @@ import click
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import PATH, PointInMm, fit_warnings, json_option, tell, tell_fit
 from stepdiag.cli.terminal import say
+from stepdiag.progress import Progress
 
 Point = tuple[float, float, float]
 HOME: Final = (0.0, 0.0, 0.0)
@@ -84,7 +85,11 @@ def positions(
     else:
         lines = {name: axis_line(calibration, name) for name in "XYZ"}
         lines |= {name: diagonal_line(calibration, name) for name in BODY_DIAGONALS}
-    predicted = {name: predict_positions(calibration, *ends, points=points, tool=tool) for name, ends in lines.items()}
+    predicted = {}
+    with Progress("lines") as progress:
+        for name, ends in lines.items():
+            progress(len(predicted), len(lines))
+            predicted[name] = predict_positions(calibration, *ends, points=points, tool=tool)
     if as_json:
         from stepdiag.objects.positions import predicted_object
         from stepdiag.objects.writer import json_text
