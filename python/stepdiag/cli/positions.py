@@ -58,7 +58,7 @@ def positions(
     from stepdiag.io.data_files import is_netcdf, read_calibration
     from stepdiag.io.file_kind import kind_of_file
     from stepdiag.io.whole_files import check_input
-    from stepdiag.positions.prediction import axis_line, diagonal_line, predict_positions
+    from stepdiag.positions.prediction import PredictedPositions, axis_line, diagonal_line, predict_positions
     from stepdiag.report.positions import predicted_report
 
     check_input(file)
@@ -85,7 +85,7 @@ def positions(
     else:
         lines = {name: axis_line(calibration, name) for name in "XYZ"}
         lines |= {name: diagonal_line(calibration, name) for name in BODY_DIAGONALS}
-    predicted = {}
+    predicted: dict[str, PredictedPositions] = {}
     with Progress("lines") as progress:
         for name, ends in lines.items():
             progress(len(predicted), len(lines))

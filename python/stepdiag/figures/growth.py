@@ -17,7 +17,10 @@ from stepdiag.style import COLOUR, axis_label, own_style, series
 from stepdiag.units import unit_of
 
 WIDTH, HEIGHT = 11.0, 4.2
-PANELS: Final[tuple[tuple[Kind, Kind], ...]] = (("positioning", "straightness"), ("angle", "squareness"))
+PANELS: Final[dict[str, tuple[Kind, Kind]]] = {
+    "lengths": ("positioning", "straightness"),
+    "angles": ("angle", "squareness"),
+}
 MARKERS: Final = "os^D"
 OWN: Final[dict[str, Any]] = {"color": COLOUR["limit"], "linewidth": 0.9, "linestyle": (0, (4, 2))}
 MIRROR: Final = ("mirror_width_mm", "mirror_height_mm")
@@ -41,8 +44,9 @@ def draw_growth(table: Sequence[Prospect], name: str = "plan") -> Figure:
 def draw_growth_panels(page: Page, table: Sequence[Prospect], own: int | None = None, **shape: Any) -> None:
     """Two panels beside each other, lengths and angles. `own`: a number of steps to mark. `shape`: of the grid."""
     grid = page.grid(1, len(PANELS), wspace=0.2, **shape)
-    for column, kinds in enumerate(PANELS):
+    for column, (title, kinds) in enumerate(PANELS.items()):
         axes = page.figure.add_subplot(grid[0, column])
+        axes.set_title(title, weight="bold", pad=3.0)
         _draw(axes, table, kinds)
         if own is not None:
             axes.axvline(own, zorder=0.9, **OWN)
@@ -67,7 +71,7 @@ def read_steps(path: Path) -> list[Prospect]:
 def _draw(axes: Axes, table: Sequence[Prospect], kinds: Sequence[Kind]) -> None:
     for kind in kinds:
         number, exponent = KINDS.index(kind), growth(table, kind)
-        power = "" if exponent is None else f", u ~ steps^{round(exponent, 2) + 0.0:.2f}"  # 0.0: -0 becomes 0
+        power = "" if exponent is None else f" ~ steps^{round(exponent, 2) + 0.0:.2f}"  # 0.0: -0 becomes 0
         known = [found for found in table if found.largest.get(kind, 0.0) > 0.0]
         values = [in_report_units(kind, found.largest[kind]) for found in known]
         style: dict[str, Any] = {"color": series(number)[0], "marker": MARKERS[number], "markersize": 5.0}
@@ -83,7 +87,6 @@ def _draw(axes: Axes, table: Sequence[Prospect], kinds: Sequence[Kind]) -> None:
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.set_xlabel("steps of each axis")
     axes.set_ylabel(axis_label("largest u", REPORT_UNIT[kinds[0]]))
-    axes.set_title(f"largest u, {' and '.join(kinds)}", weight="bold", pad=3.0)
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=len(kinds), fontsize=SMALL, borderaxespad=0.0)
 
 

@@ -24,9 +24,7 @@ TABLE = [
 
 def test_points_are_the_table_and_legends_have_the_exponents() -> None:
     figure = draw_growth(TABLE)
-    lengths, angles = (
-        panel(figure, f"largest u, {kinds}") for kinds in ("positioning and straightness", "angle and squareness")
-    )
+    lengths, angles = panel(figure, "lengths"), panel(figure, "angles")
     assert all(count > 200 for count in ink(figure).values())
     for axes, number, expected in (
         (lengths, 0, 0.1 * np.sqrt([5, 20, 80])),
@@ -36,9 +34,17 @@ def test_points_are_the_table_and_legends_have_the_exponents() -> None:
         np.testing.assert_allclose(
             axes.lines[number].get_xydata(), np.column_stack([[5, 20, 80], expected]), rtol=1e-14
         )
-    assert {"positioning, u ~ steps^0.50", "straightness, u ~ steps^0.00", "angle, u ~ steps^1.00", "squareness"} <= {
+    assert {"positioning ~ steps^0.50", "straightness ~ steps^0.00", "angle ~ steps^1.00", "squareness"} <= {
         *texts(figure)
     }
+
+
+def test_legends_stay_clear_of_titles() -> None:
+    figure = draw_growth(TABLE)
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        title = axes._left_title.get_window_extent()
+        assert axes.get_legend().get_window_extent().x0 > title.x1
 
 
 def test_file_of_observe_gives_the_same_table(tmp_path: Path) -> None:
@@ -65,5 +71,5 @@ def test_observation_shows_the_growth_and_marks_its_own_plan() -> None:
     scenario = sd.parse_scenario(SCENARIO)
     run, found = sd.observe(scenario)
     figure = draw_observation(run, found, scenario.known, table=TABLE)
-    assert panel(figure, "largest u, positioning and straightness").lines[-1].get_xdata() == [5, 5]
+    assert panel(figure, "lengths").lines[-1].get_xdata() == [5, 5]
     assert "this plan: 5 steps" in texts(figure)
