@@ -30,7 +30,7 @@ def draw_error_map(errors: ErrorMap, name: str = "error map") -> Figure:
         panels = ParameterPanels(page, travel, "")
         for parameter in FUNCTIONS:
             if parameter not in errors.functions:
-                panels.mark_missing(parameter, "0")
+                panels.mark_missing(parameter, "not in the map")
                 continue
             position, value = errors.functions[parameter]
             panels.draw(parameter, position, value)
@@ -41,7 +41,7 @@ def draw_error_map(errors: ErrorMap, name: str = "error map") -> Figure:
             if parameter in errors.squareness:
                 panels.draw_squareness(parameter, errors.squareness[parameter], np.nan)
             else:
-                panels.mark_missing(parameter, "0")
+                panels.mark_missing(parameter, "not in the map")
         panels.zero_lines()
         page.legend(_handles(errors, complete=count == len(FUNCTIONS) + len(SQUARENESSES)))
         return page.finish()
