@@ -183,6 +183,10 @@ def _columns(table: CsvTable, column: str) -> Curves:
             )
         position = finite_number(row["position_mm"], f"{where}: position_mm") if name in FUNCTIONS else np.nan
         u = finite_number(row[column], f"{where}: {column}") if row[column] else np.nan
+        if u < 0.0:
+            raise InvalidArgument(f"{where}: {column}: expected at least 0, got {row[column]}")
+        if name in found and not position > found[name][-1][0]:
+            raise InvalidArgument(f"{where}: expected positions of {name} that ascend, got {row['position_mm']}")
         found.setdefault(name, []).append((position, native(f"_{unit}", u)))
     curves = {name: np.transpose(rows) for name, rows in found.items()}
     return {name: (position, u) for name, (position, u) in curves.items() if np.isfinite(u).any()}

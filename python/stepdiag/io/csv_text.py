@@ -49,18 +49,21 @@ def read_csv(path: Path, columns: Sequence[str], format_: str = "") -> CsvTable:
     """Read a file.
 
     Raises InvalidArgument naming the file for another format than `format_`, for a missing column,
-    and for a row with another number of fields than the header."""
-    lines = read_text(path).splitlines()
+    for a row with another number of fields than the header, and for what is no CSV."""
+    lines = read_text(path).split("\n")
     start = next((k for k, line in enumerate(lines) if line.strip() and not line.startswith("#")), len(lines))
     leading = dict(re.findall(r"(?m)^#\s*(\w+)\s*=\s*(.*?)\s*$", "\n".join(lines[:start])))
     if format_ and leading.get("format") != format_:
         raise InvalidArgument(f'{path}: format: expected "{format_}", got "{leading.get("format", "")}"')
-    table = csv.DictReader(lines[start:])
-    found = table.fieldnames or ()
-    for column in columns:
-        if column not in found:
-            raise InvalidArgument(f"{path}, line {start + 1}: expected the column {column}")
-    return CsvTable(path, leading, found, list(_rows(table, f"{path}, line", start)))
+    table = csv.DictReader(lines[start:], strict=True)
+    try:
+        found = table.fieldnames or ()
+        for column in columns:
+            if column not in found:
+                raise InvalidArgument(f"{path}, line {start + 1}: expected the column {column}")
+        return CsvTable(path, leading, found, list(_rows(table, f"{path}, line", start)))
+    except csv.Error as error:
+        raise InvalidArgument(f"{path}, line {start + table.line_num}: not valid CSV: {error}") from None
 
 
 def _rows(table: "csv.DictReader[str]", place: str, start: int) -> Iterator[tuple[str, Mapping[str, str]]]:
