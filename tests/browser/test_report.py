@@ -33,6 +33,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         files = ["--scenario", "scenario.toml", "--run", "run.csv", "--uncertainty", "uncertainty.nc"]
         assert main(["report", "judged.csv", "calibration.nc", *files, "-o", "report.html"]) == 3, "as one is rejected"
         assert main(["report", "judged.csv", "-o", "rejected.html"]) == 3
+        sd.read_calibration("calibration.nc").judged("doubtful", ["more noise than stated"]).write("doubtful.csv")
+        assert main(["report", "doubtful.csv", "-o", "doubtful.html"]) == 0
         yield folder
 
 
@@ -168,6 +170,40 @@ def test_rejected_fit_is_said_first_and_in_red(browser: Browser, folder: Path) -
     assert "Fit REJECTED: do not use this calibration" in seen.page.locator("#verdict h2").inner_text()
     red = np.mean(picture(seen.page, "#verdict"), axis=(0, 1))
     assert red[0] > 2.0 * max(red[1], red[2]), "most of the band is red"
+    seen.page.close()
+
+
+CONTRAST = """() => {
+  const channels = (colour) => (colour.match(/[\\d.]+/g) || []).map(Number);
+  const linear = (c) => (c /= 255) <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
+  const luminance = ([r, g, b]) => 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+  const behind = (element) => {
+    for (let e = element; e; e = e.parentElement) {
+      const [r, g, b, alpha] = channels(getComputedStyle(e).backgroundColor);
+      if (alpha === undefined || alpha > 0) return [r, g, b];
+    }
+    return [255, 255, 255];
+  };
+  const found = [];
+  for (const element of document.querySelectorAll("body *")) {
+    const words = [...element.childNodes].filter((n) => n.nodeType === 3).map((n) => n.textContent.trim()).join("");
+    if (!words || ["SCRIPT", "STYLE", "NOSCRIPT"].includes(element.tagName)) continue;
+    const style = getComputedStyle(element), is_drawn = element instanceof SVGElement;
+    const text = luminance(channels(is_drawn ? style.fill : style.color)), ground = luminance(behind(element));
+    const contrast = (Math.max(text, ground) + 0.05) / (Math.min(text, ground) + 0.05);
+    found.push([words.slice(0, 40), contrast]);
+  }
+  return found;
+}"""
+
+
+@pytest.mark.parametrize("name", ["report.html", "rejected.html", "doubtful.html"])
+def test_words_stand_out_from_what_is_behind_them(name: str, browser: Browser, folder: Path) -> None:
+    """By WCAG 2.2, level AA: contrasts of at least 4.5."""
+    seen = Seen(browser, folder / name)
+    found = seen.page.evaluate(CONTRAST)
+    assert len(found) > 100
+    assert [(words, contrast) for words, contrast in found if contrast < 4.5] == []
     seen.page.close()
 
 

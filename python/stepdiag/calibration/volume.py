@@ -1,7 +1,8 @@
 """The error of the tool in the volume: how large, where, how certain, within a limit or not, and what causes it.
 
 The error is that of the functional point, at the tool offset: its actual minus its nominal position, by the exact pose
-of the machine's chain, in the machine frame, with axes approached in + direction. The frame is the calibration's: at
+of the machine's chain, in the machine frame, with axes approached in + direction; for other directions there is the
+largest error alone, from tables of both directions. The frame is the calibration's: at
 home every error is 0, and the straightnesses EYX, EZX and EZY are 0 at both ends of travel. An error that is large far
 from home may be small from another reference point. docs/volume.md has the formulas.
 """
@@ -9,6 +10,7 @@ from home may be small from another reference point. docs/volume.md has the form
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Final, Literal, cast
 
@@ -16,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag import _core
-from stepdiag._core import Calibration, InvalidArgument, Machine
+from stepdiag._core import Calibration, ErrorMap, InvalidArgument, Machine
 from stepdiag.calibration.table_sums import FloatArray
 from stepdiag.display import Displayed, Facts, point_text
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
@@ -88,6 +90,7 @@ class VolumeErrors(Displayed):
     limit: float | None  # mm
     verdict: Verdict | None  # None without a limit, without a covariance, or where the largest error is not known
     no_verdict_because: str  # why there is none although there is a limit; else empty
+    other_approaches: Mapping[str, float]  # "-++" ...: largest error of X, Y, Z so approached, mm; empty: not known
     ranking: tuple[VolumeContribution, ...]  # parameters, then axes; the smallest largest error first
     fit: str | None  # verdict of the calibration's fit
 
@@ -191,6 +194,7 @@ def volume_errors(
         limit=None,
         verdict=None,
         no_verdict_because="",
+        other_approaches=_other_approaches(source, machine, positions) if known else {},
         ranking=_ranking(source, machine, positions) if known and ranking else (),
         fit=source.fit if isinstance(source, Calibration) else None,
     )
@@ -452,6 +456,24 @@ def _diagonals(machine: Machine, box: FloatArray, grid: tuple[FloatArray, FloatA
         errors = _core.errors_at(machine, start + share[:, None] * (end - start))[:, :3]
         along = (errors - errors[0]) @ ((end - start) / np.linalg.norm(end - start))
         yield float(np.ptp(along))
+
+
+def _other_approaches(
+    source: Calibration | Machine, machine: Machine, grid: tuple[FloatArray, FloatArray, FloatArray]
+) -> dict[str, float]:
+    """The largest error for the other seven directions of approach, where reversal errors are known."""
+    if isinstance(source, Machine) or not source.reversal or source.undetermined_reversal_constants:
+        return {}
+    negative, found = source.negative_functions, {}
+    for approach in map("".join, product("+-", repeat=3)):
+        tables = {
+            name: negative[name][:2] if name in negative and approach[AXES.index(name[2])] == "-" else table
+            for name, table in machine.errors.functions.items()
+        }
+        other = Machine(machine.chain, ErrorMap(tables, dict(machine.errors.squareness)), machine.tool)
+        if "-" in approach:
+            found[approach] = _core.summarise_volume(other, *grid, tilts=False).largest
+    return found
 
 
 def _ranking(

@@ -77,6 +77,8 @@ class VolumeObject(TypedDict):
     """ppp, npp, pnp, nnp: range of the errors along a body diagonal of the box."""
     missing: dict[str, list[str]]
     """X ... C: parameters that act in it and are not determined."""
+    other_approaches_um: dict[str, float | None]
+    """-++ ...: largest error of X, Y, Z approached in these directions; empty: not known. No interval."""
     ranking: list[Without]
     """Parameters, then axes; the smallest largest error first."""
 
@@ -111,6 +113,7 @@ def volume_object(found: VolumeErrors, file: Path, warnings: Sequence[str]) -> V
         "tilt_ranges": {name: _figure(figure, "urad") for name, figure in found.tilt_ranges.items()},
         "diagonals": {name: _figure(figure, "um") for name, figure in found.diagonals.items()},
         "missing": {name: list(parameters) for name, parameters in found.missing.items()},
+        "other_approaches_um": {name: in_unit("um", value) for name, value in found.other_approaches.items()},
         "ranking": [
             {
                 "name": one.name,

@@ -204,6 +204,13 @@
     if (next) { drawFlat(next); later(drawRest); } else later(finish);
   }
   function drawAll() { flat.forEach(drawFlat); return finish(); }
+  // Plotly is packed to a third of its size. The policy of the page knows the text that comes out.
+  async function unpack() {
+    const packed = Uint8Array.from(atob(byId("stepdiag-plotly").textContent), (letter) => letter.charCodeAt(0));
+    const script = document.createElement("script");
+    script.textContent = await new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+    document.head.append(script);
+  }
 
   function paper(on) {
     if (printing === on) return;
@@ -213,16 +220,21 @@
     resize();
     if (on) photograph();
   }
-  window.addEventListener("beforeprint", () => paper(true));
-  window.addEventListener("afterprint", () => { if (location.hash !== "#print") paper(false); });
-  if (location.hash === "#print") {
-    paper(true);
-  } else {
-    flat.filter((div) => div.getBoundingClientRect().top < 1.2 * innerHeight).forEach(drawFlat);
-    if (!drawn.size && flat.length) drawFlat(flat[0]);
-    performance.mark("stepdiag-first-figure");
-    later(drawRest);
-    let asked2 = 0;
-    window.addEventListener("resize", () => { clearTimeout(asked2); asked2 = setTimeout(resize, 100); });
+  function start() {
+    window.addEventListener("beforeprint", () => paper(true));
+    window.addEventListener("afterprint", () => { if (location.hash !== "#print") paper(false); });
+    if (location.hash === "#print") {
+      paper(true);
+    } else {
+      flat.filter((div) => div.getBoundingClientRect().top < 1.2 * innerHeight).forEach(drawFlat);
+      if (!drawn.size && flat.length) drawFlat(flat[0]);
+      performance.mark("stepdiag-first-figure");
+      later(drawRest);
+      let asked2 = 0;
+      window.addEventListener("resize", () => { clearTimeout(asked2); asked2 = setTimeout(resize, 100); });
+    }
   }
+  unpack().then(start, () => {
+    byId("volume-caption").textContent = "This browser is too old to draw it; the values are in the table below.";
+  });
 })();

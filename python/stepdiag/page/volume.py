@@ -143,6 +143,16 @@ def volume_section(contents: Contents, found: ErrorInVolume, before: ErrorInVolu
 
 def _what_it_is(figures: VolumeErrors) -> str:
     text = "Actual less commanded position of the functional point; 0 at home, so it depends on that reference."
+    if figures.other_approaches:
+        worst = max(figures.other_approaches, key=figures.other_approaches.__getitem__)
+        directions = " ".join(f"{axis}{sign}" for axis, sign in zip(AXES, worst.replace("-", "−"), strict=True))
+        text += (
+            f" All axes are approached in + direction; approached in {directions}, the largest error is "
+            f"{with_ends(figures.other_approaches[worst], None)}, the most of other directions. That has no interval, "
+            "because the covariance of reversal errors is not known."
+        )
+    elif isinstance(figures.source, Calibration) and figures.source.reversal:
+        text += " All axes are approached in + direction. Not all reversal errors are known."
     if figures.largest_interval is not None:
         kind = "estimated from the tables" if figures.between_nodes_estimated else "stated"
         text += f" Errors between the nodes: standard uncertainty {with_ends(figures.between_nodes, None)}, {kind}."

@@ -257,7 +257,8 @@ def method_section(contents: Contents) -> Markup:
         ("Uncertainties", "95 % intervals are ± 1.96 standard uncertainties (GUM), of each value by itself."),
         (
             "Error in the volume",
-            "Actual less commanded position of the functional point, by the exact pose of the machine, at all nodes.",
+            "Actual less commanded position of the functional point, by the exact pose of the machine, at the nodes of "
+            "the tables (of more than 201, at 201 of them).",
         ),
     ]
     return section("method", "Method", definitions(rows, "lines"))

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from stepdiag._core import Calibration
+from stepdiag._core import Calibration, Machine
 from stepdiag.calibration.table_sums import FloatArray
 from stepdiag.calibration.volume import MOST_NODES, Interval, VolumeContribution, VolumeErrors, VolumeFigure
 from stepdiag.units import report_value
@@ -90,12 +90,29 @@ def _frame_rows(found: VolumeErrors) -> Iterator[str]:
     yield f"box {low} to {high} mm, tool offset {_lengths(found.tool)} mm, {shape} positions, approached in +"
     if not found.every_node:
         yield f"the tables have more than {MOST_NODES} nodes an axis: {MOST_NODES} of them, evenly"
+    yield from _reversal_rows(found)
     if found.largest_interval is not None:
         kind = "estimated from the tables" if found.between_nodes_estimated else "stated"
         yield f"95 % intervals in brackets; between nodes ({kind}): standard uncertainty {_um(found.between_nodes)} µm"
     elif isinstance(found.source, Calibration) and found.source.covariance is None:
         yield "no intervals: the file has no covariance; evaluate writes it to netCDF (-o calibration.nc)"
     yield "error: of the functional point, actual minus nominal; 0 at home, so it depends on that reference"
+
+
+def _reversal_rows(found: VolumeErrors) -> Iterator[str]:
+    source = found.source
+    if isinstance(source, Machine) or not source.reversal:
+        return
+    if not found.other_approaches:
+        yield "approached in other directions: not known, as not all reversal errors are"
+        return
+    worst = max(found.other_approaches, key=found.other_approaches.__getitem__)
+    directions = " ".join(f"{axis}{sign}" for axis, sign in zip("XYZ", worst, strict=True))
+    yield (
+        f"approached in {directions}: largest error {_um(found.other_approaches[worst])} µm, the most of other "
+        "directions;"
+    )
+    yield "  no interval: the covariance of reversal errors is not known; figures and verdict are of +"
 
 
 def _um(value: float) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from calibrations import TOOL, VOLUME, calibrate, parts_of
+from calibrations import PLAN, TOOL, VOLUME, calibrate, parts_of, simulate
 from refusal import refused
 from usual import ALL_CHAINS, CHAIN
 
@@ -127,6 +127,33 @@ def test_diagonals_are_those_of_the_calibration() -> None:
     for name, diagonal in sd.diagonal_errors(calibration).items():
         # One is exact, the other of first order: they differ by rotations times errors, 1e-4 * 0.05 mm.
         assert found.diagonals[name].value == pytest.approx(diagonal.range, abs=1e-5)
+
+
+def test_other_directions_of_approach_are_those_of_the_machine() -> None:
+    calibration = sd.evaluate(simulate(1, repeats=2, backward=True), PLAN, sd.Head(), CHAIN, TOOL)
+    parts = parts_of(calibration)
+    nodes = {name: position for name, (position, _, _) in calibration.functions.items()}
+    parts["reversal"] = {
+        name: (position, 5e-3 * scale * np.cos(position / 9.0), np.full_like(position, 1e-4))
+        for k, (name, position) in enumerate(nodes.items())
+        for scale in [(1.0 if name[1] in "XYZ" else 2e-3) * (1 + k % 3)]
+    }
+    parts["undetermined_reversal_constants"] = []
+    parts["reversal_negative_uncertainty"] = {name: np.full_like(position, 1e-4) for name, position in nodes.items()}
+    both = sd.Calibration(**parts)
+    found = sd.volume_errors(both)
+    own = sd.Machine(both.chain, both.to_error_map(), TOOL)
+    assert len(found.other_approaches) == 7
+    for approach, largest in found.other_approaches.items():
+        size = np.linalg.norm(own.error(all_points(found), approach), axis=1)
+        assert largest == pytest.approx(size.max(), abs=EXACT)
+    worst = max(found.other_approaches.values())
+    assert any(f"largest error {1e3 * worst:.4g} µm" in row for row in volume_report(found))
+    assert sd.volume_errors(calibrate(1)).other_approaches == {}
+    parts["undetermined_reversal_constants"] = ["EXX"]
+    partly = sd.volume_errors(sd.Calibration(**parts))
+    assert partly.other_approaches == {}
+    assert any("not known, as not all reversal errors are" in row for row in volume_report(partly))
 
 
 def test_box_ends_and_nodes_are_in_the_grid() -> None:

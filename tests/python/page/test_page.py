@@ -134,6 +134,45 @@ def test_drawings_are_those_that_plotly_knows(evaluated: Path) -> None:
         go.Figure(data=drawing["data"], layout={**content["layout"], **drawing["layout"]})
 
 
+def test_temperatures_are_those_of_the_run(here: Path) -> None:
+    header, *rows = Path("run.csv").read_text().splitlines()
+    temperature = [f"{20.0 + 0.25 * k}" for k in range(len(rows))]
+    temperature[3] = ""  # a lost reading
+    lines = [f"{header},temperature_c", *(f"{row},{t}" for row, t in zip(rows, temperature, strict=True))]
+    Path("warm.csv").write_text("\n".join(lines) + "\n")
+    assert main(["evaluate", "scenario.toml", "warm.csv", "-o", "warm.nc"]) == 0
+    page = page_of(calibration=Path("warm.nc"), run=Path("warm.csv"))
+    (trace,) = json.loads(page.scripts["stepdiag-figures"])["figures"]["figure-temperatures"]["data"]
+    assert trace["y"] == [float(t) if t else None for t in temperature]
+    assert trace["x"] == list(range(1, len(rows) + 1))
+    known = [float(t) for t in temperature if t]
+    figures = [f"{f(known):.2f} °C" for f in (np.mean, np.min, np.max)]
+    assert " ".join(["temperature", *figures]) in page.text.replace("\u00a0", " ")
+    without = page_of(calibration=Path("warm.nc"))
+    assert "No run was given with this report (--run), so its temperatures are not shown." in without.text
+
+
+def test_both_directions_of_approach_are_drawn_and_told(here: Path) -> None:
+    Path("scenario.toml").write_text(SCENARIO.replace("steps = 5", "steps = 5\nbackward = true"))
+    assert main(["simulate", "scenario.toml", "-o", "both.csv"]) == 0
+    assert main(["evaluate", "scenario.toml", "both.csv", "-o", "both.nc"]) == 0
+    calibration, page = sd.read_calibration("both.nc"), page_of(calibration=Path("both.nc"))
+    assert "approached in − direction" in {word.strip() for word in page.words}, "the legend"
+    drawn = json.loads(page.scripts["stepdiag-figures"])["figures"]
+    for name, (position, value, _) in calibration.negative_functions.items():
+        (trace,) = [trace for trace in drawn[f"figure-{name}"]["data"] if trace["name"] == "− direction"]
+        assert trace["x"] == position.tolist()
+        factor = sd.in_report_units(sd.kind_of(name), 1.0)
+        np.testing.assert_allclose(trace["y"], factor * value, rtol=0.0, atol=5.1e-5)  # rounded to 0.1 nm
+    found = sd.volume_errors(calibration)
+    if calibration.undetermined_reversal_constants:
+        assert "Not all reversal errors are known." in page.text
+    else:
+        largest = shown(1e3 * max(found.other_approaches.values()))
+        assert re.search(rf"approached in X[+−] Y[+−] Z[+−], the largest error is {largest}", page.text)
+    assert page.values()["volume"]["other_approaches_um"].keys() == found.other_approaches.keys()
+
+
 def test_page_can_be_read_without_seeing_it(evaluated: Path) -> None:
     page = page_of(calibration=Path("calibration.nc"))
     assert page.all("html")[0]["lang"] == "en"
@@ -186,7 +225,7 @@ def test_words_of_files_and_flags_are_escaped(evaluated: Path) -> None:
     page = page_of(calibration=Path("<b>&.nc"), scenario=Path("scenario.toml"), words={"operator": bad})
     assert page.text.count(bad) == 6, "customer, operator and its flag, and the machine thrice: title, heading, header"
     assert "<b>&.nc" in page.text
-    assert len([one for one in page.all("script") if "type" not in one]) == 2, "Plotly's and ours"
+    assert len([one for one in page.all("script") if "type" not in one]) == 1, "ours; Plotly's is packed"
     assert not page.all("b")
 
 
