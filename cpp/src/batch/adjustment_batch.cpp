@@ -10,8 +10,7 @@
 namespace stepdiag {
 namespace {
 
-// Every set keeps all its readings and the uncertainties that follow from theirs: options that say otherwise are a
-// caller's mistake.
+// A batch uses every reading with its stated uncertainty; options that ask for anything else are refused.
 AdjustmentOptions of_sets(AdjustmentOptions options) {
     const double asked = options.outlier_probability;
     if (asked != 0.0 && asked != AdjustmentOptions{}.outlier_probability)
@@ -33,7 +32,7 @@ std::vector<double> standard_uncertainties(const Calibration& calibration) {
     return all;
 }
 
-// By reading of the problem: row * channels + channel, channels as in signal_channels.
+// For each reading of the problem: row * channels + channel, where channels are those of signal_channels.
 std::vector<std::ptrdiff_t> inputs(const AdjustmentProblem& problem, const Measurement& measurement) {
     const std::vector<int> signals = signal_channels(measurement);
     std::vector<std::ptrdiff_t> list;
@@ -82,7 +81,7 @@ private:
     }
 
     bool in_one_step_;
-    std::size_t readings_;  // of a set
+    std::size_t readings_;  // in a set
     std::unique_ptr<const SimdStart> start_;
 };
 

@@ -1,4 +1,4 @@
-// The adjustment of many sets of readings, each converged or one step from the pattern's solution. Internal.
+// Adjusts many sets of readings: each until it converges, or by one step from the pattern's solution. Internal.
 #pragma once
 
 #include "batch/batch_method.hpp"

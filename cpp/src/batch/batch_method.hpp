@@ -1,4 +1,4 @@
-// What stands behind a BatchEvaluator: one method of evaluation, prepared for the pattern of its readings. Internal.
+// Implementation of a BatchEvaluator: one method of evaluation, prepared for a pattern of readings. Internal.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@ public:
     std::vector<CalibrationEntry> entries;
     Calibration of_pattern;
 
-    // What one thread writes to. Outlives no map.
+    // Working memory of one thread. The method must outlive it.
     class Worker {
     public:
         virtual ~Worker() = default;
@@ -25,10 +25,10 @@ public:
     virtual Eigen::MatrixXd gain() const = 0;
 
 protected:
-    explicit BatchMethod(Calibration of_pattern);  // entries: those of its tables
+    explicit BatchMethod(Calibration of_pattern);  // sets entries to those of its tables
 };
 
-// The pattern and what it is evaluated with.
+// The pattern, and everything that its evaluation needs.
 struct BatchPattern {
     const Measurement& measurement;
     const Plan& plan;
@@ -38,7 +38,7 @@ struct BatchPattern {
     const BatchOptions& options;
 };
 
-// Channels of a set of readings, by their place in Measurement::channels(): all but time and temperature.
+// Places in Measurement::channels() of the channels of a set of readings: all but time and temperature.
 std::vector<int> signal_channels(const Measurement& measurement);
 
 }  // namespace stepdiag

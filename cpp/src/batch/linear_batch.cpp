@@ -11,7 +11,7 @@
 namespace stepdiag {
 namespace {
 
-static_assert(sizeof(LaneRow) == lane_group * sizeof(double));  // so that rows make one array of numbers
+static_assert(sizeof(LaneRow) == lane_group * sizeof(double));  // rows are read as one array of numbers
 
 bool is_enhanced(const BatchPattern& pattern) { return pattern.options.method == EvaluationMethod::enhanced; }
 
@@ -20,7 +20,7 @@ LengthKind length_kind(const BatchPattern& pattern) {
 }
 
 Calibration evaluate(const BatchPattern& p) {
-    // No calibration to be used, but the point at which maps are linear: samples may lie anywhere.
+    // This only sets the point at which the maps are linear, so no limits apply: samples may lie anywhere.
     const EvaluationOptions options{p.options.uncertainty, false, PlausibleLimits::none()};
     return is_enhanced(p) ? evaluate_enhanced(p.measurement, p.plan, p.chain, p.tool, p.heads, options)
                           : evaluate_conventional(p.measurement, p.plan, p.chain, p.tool, p.heads, options);
@@ -30,7 +30,7 @@ std::vector<Pass> passes_of(const BatchPattern& p, const ReadingUncertainty& unc
     return collect_passes(p.measurement, p.plan, p.heads, uncertainty, length_kind(p));
 }
 
-// The same readings, each of the standard uncertainty that it has by its quantity alone.
+// The same readings; the standard uncertainty of each one follows from its quantity alone.
 Measurement without_uncertainties(const Measurement& measurement) {
     auto channels = measurement.channels();
     for (Channel& channel : channels) channel.standard_uncertainty.clear();
@@ -69,7 +69,7 @@ public:
     }
 
 private:
-    // How length, alpha and beta at `place` change with one raw channel of one row.
+    // Change of length, alpha and beta at `place` with one raw channel of one row.
     struct RawEffect {
         std::size_t place = 0;
         ChannelEffect by_channel = ChannelEffect::Zero();
@@ -120,7 +120,7 @@ private:
     std::vector<Pass> passes_;
     SimdReduction reduction_;
     LaneMap map_;
-    std::vector<RawEffect> effects_;  // by raw channel: row * channels + channel
+    std::vector<RawEffect> effects_;  // for each raw channel: row * channels + channel
 };
 
 }  // namespace

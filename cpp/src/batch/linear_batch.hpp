@@ -1,4 +1,4 @@
-// The published evaluations, conventional and enhanced, of many sets of readings: one linear map of the pattern.
+// The published evaluations, conventional and enhanced, of many sets of readings, by one linear map of the pattern.
 // Internal.
 #pragma once
 

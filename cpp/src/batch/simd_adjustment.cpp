@@ -10,7 +10,7 @@ namespace stepdiag {
 namespace {
 
 constexpr int most_steps = 30;
-// Of the square sum a reading: more may be another minimum than that next to zero.
+// Limit of the square sum per reading. Above it, the solution may be another minimum than the one next to zero.
 constexpr double gross_scatter = 100.0;
 
 using Lanes = double[lane_group];
@@ -41,7 +41,7 @@ SimdAdjustment::SimdAdjustment(const SimdStart& start)
       r_(Eigen::Index(start.input.size())),
       difference_(Eigen::Index(start.input.size())) {}
 
-// Values are F x, and dx = N^-1 J^T (d reading/u): rows of F N^-1 J^T, lane_group at once.
+// Values are F x, and dx = N^-1 J^T (d reading/u). Computes lane_group rows of F N^-1 J^T at a time.
 Eigen::MatrixXd simd_gain(const SimdStart& start, std::size_t readings) {
     const std::vector<LinearForm>& forms = start.pattern.forms;
     Eigen::MatrixXd gain = Eigen::MatrixXd::Zero(Eigen::Index(forms.size()), Eigen::Index(readings));
@@ -62,12 +62,12 @@ Eigen::MatrixXd simd_gain(const SimdStart& start, std::size_t readings) {
     return gain;
 }
 
-// Of the changes, the last two tell how the next ones go on: steps shrink by turns, so that it is two steps whose ratio
-// holds.
+// The last two changes predict the next ones: steps shrink alternately by more and by less, so only the ratio over two
+// steps is steady.
 void SimdAdjustment::Progress::add(double largest) {
     constexpr double diverges = 1e4, shrinks = 0.25;
     constexpr int early = 4, late = 12, most_steps_left = 16;
-    constexpr double safety = 10.0;  // the first ratios are those of second order
+    constexpr double safety = 10.0;  // the first ratios still contain second-order effects
     const double first = change[0];
     change = {largest, change[0], change[1]};
     ++steps;
@@ -79,7 +79,7 @@ void SimdAdjustment::Progress::add(double largest) {
         const double ratio = change[0] / change[2];
         const double left = (change[0] + change[1]) * ratio / (1.0 - ratio);
         if (ratio < shrinks && safety * left < settled_tolerance) state = settled;
-        // As they went on the whole; full steps are dearer one by one.
+        // Decides by the mean rate since the early steps, because a full Gauss-Newton step costs more than a step here.
         if (steps == early) at_early = std::max(change[0], change[1]);
         const double rate = std::log(at_early / change[0]) / (steps - early + 1);
         if (state == goes_on && steps >= late && !(std::log(largest / settled_tolerance) < most_steps_left * rate))
@@ -126,7 +126,7 @@ void SimdAdjustment::step(const double* readings, std::size_t stride) {
     for (std::size_t i = 0; i < readings_count; ++i) s_.data()[i] = r_.data()[i] - difference_.data()[i];
 }
 
-// The largest change of a value, in its standard uncertainty; NaN where one is.
+// The largest change of a value, in units of its standard uncertainty; NaN if any change is NaN.
 void SimdAdjustment::find_changes(double* largest) const {
     std::fill_n(largest, lane_group, 0.0);
     for (std::size_t e = 0; e < start_.pattern.forms.size(); ++e) {
@@ -141,7 +141,7 @@ void SimdAdjustment::find_changes(double* largest) const {
     }
 }
 
-// Of the residuals before the last step.
+// The square sum of the residuals before the last step.
 void SimdAdjustment::find_square_sum(double* sum) const {
     std::fill_n(sum, lane_group, 0.0);
     for (std::size_t r = 0; r < start_.input.size(); ++r)
@@ -158,7 +158,7 @@ void SimdAdjustment::move() {
     }
 }
 
-// What is open is taken to be at 0 first, then where it came out (solve_from_zero.cpp).
+// Undetermined unknowns are first held at 0, then at the values that were found (solve_from_zero.cpp).
 void SimdAdjustment::recentre(std::size_t lane) {
     for (Eigen::Index j = 0; j < start_.pattern.start.size(); ++j) centre_.at(j)[lane] = x_.at(j)[lane];
     progress_[lane] = {};
@@ -229,7 +229,7 @@ bool SimdAdjustment::has_all_readings(const double* readings, std::size_t stride
     });
 }
 
-// As it is adjusted alone.
+// Adjusts the set in the same way as a single run.
 void SimdAdjustment::adjust_in_full(const double* readings, std::size_t stride, std::size_t lane) {
     if (!in_full_) in_full_ = std::make_unique<PreparedAdjustment>(start_.pattern);
     PreparedAdjustment& own = *in_full_;

@@ -1,4 +1,4 @@
-// The adjustment of many sets of readings at once, one a lane, each converged. Internal: not installed.
+// Adjusts many sets of readings at once, one in each lane, each until it converges. Internal: not installed.
 #pragma once
 
 #include <memory>
@@ -10,16 +10,16 @@
 
 namespace stepdiag {
 
-// What is left of a solution, by the steps that led there, as a part of each value's standard uncertainty: converged.
+// A set has converged when the estimated remaining error of every value is below this part of its standard uncertainty.
 inline constexpr double settled_tolerance = 5e-5;
 
-// What all threads read: the problem, its solution for the pattern's readings, derivatives and factor there.
+// What all threads read: the problem, its solution for the pattern's readings, and derivatives and factor there.
 struct SimdStart {
     PreparedAdjustment pattern;
-    std::vector<std::ptrdiff_t> input;         // by reading of the problem: which of a set's readings
-    std::vector<double> weight;                // likewise: 1/u
-    std::vector<double> value;                 // likewise: the pattern's
-    std::vector<double> one_over_uncertainty;  // by value of the tables; 0 of those that are 0 by definition
+    std::vector<std::ptrdiff_t> input;         // for each reading of the problem: its place in a set of readings
+    std::vector<double> weight;                // the same: 1/u
+    std::vector<double> value;                 // the same: the pattern's reading
+    std::vector<double> one_over_uncertainty;  // for each value of the tables; 0 for values that are 0 by definition
     SimdJacobian jacobian;
     SimdFactor factor;
 
@@ -27,7 +27,7 @@ struct SimdStart {
               const std::vector<double>& standard_uncertainty);
 };
 
-// d value / d reading at the start, readings being those of a set: values x readings, from the normal equations.
+// d value / d reading at the start, by the normal equations: a row for each value, a column for each reading of a set.
 Eigen::MatrixXd simd_gain(const SimdStart& start, std::size_t readings);
 
 // Unknowns or readings of lane_group lanes, [index * lane_group + lane].
@@ -38,30 +38,31 @@ public:
     const double* data() const { return numbers_.data(); }
     double* at(Eigen::Index index) { return numbers_.data() + index * Eigen::Index(lane_group); }
     const double* at(Eigen::Index index) const { return numbers_.data() + index * Eigen::Index(lane_group); }
-    void fill(const Eigen::VectorXd& same);  // in all lanes
+    void fill(const Eigen::VectorXd& same);  // sets all lanes
 
 private:
     AlignedNumbers numbers_;
 };
 
-// Steps with derivatives J0 and factor as they are at the start, N0 = J0^T J0 + P. Plain chord steps would end where
-// J0^T r = 0, not J(x)^T r = 0, some hundredths of an uncertainty away, and N0^-1 J(x)^T r diverges, because N0^-1
-// magnifies what J(x) - J0 makes of large residuals. So the residuals of the solution are an unknown s beside x, and a
-// step solves the augmented system (A. Bjorck, BIT 7 (1967) 257)
+// Steps with constant derivatives J0 and factor of N0 = J0^T J0 + P. Plain chord steps would converge to J0^T r = 0
+// instead of J(x)^T r = 0, some hundredths of an uncertainty away; and N0^-1 J(x)^T r diverges, because N0^-1 magnifies
+// the part of large residuals that comes from J(x) - J0. Therefore the residuals of the solution are an additional
+// unknown s, and a step solves the augmented system (A. Bjorck, BIT 7 (1967) 257)
 //   s + ds = r(x) - J0 dx,   J(x)^T s + J0^T ds - P (x + dx) = 0
-//   => N0 dx = J0^T (r(x) - s) + J(x)^T s - P x,   s := r(x) - J0 dx,
-// which is at rest where J(x)^T r(x) = P x: at the adjustment's own solution, by a factor of (J - J0)/J0 a step.
+//   => N0 dx = J0^T (r(x) - s) + J(x)^T s - P x,   s := r(x) - J0 dx.
+// Its fixed point is J(x)^T r(x) = P x, the solution of the adjustment. A step reduces the error by a factor of (J -
+// J0)/J0.
 class SimdAdjustment {
 public:
     explicit SimdAdjustment(const SimdStart& start);
 
-    // Of lane_group sets, readings[input * stride + lane]: values[value * value_stride + lane]; NaN where a reading is
-    // no number or no solution is found.
+    // Adjusts lane_group sets: from readings[input * stride + lane] to values[value * value_stride + lane]. Gives NaN
+    // where a reading is not a number, or no solution is found.
     void adjust(const double* readings, std::size_t stride, double* values, std::size_t value_stride);
-    // The first step alone.
+    // Takes the first step only.
     void adjust_in_one_step(const double* readings, std::size_t stride, double* values, std::size_t value_stride);
 
-    // Of the last `adjust`, by lane: steps, and whether they had to be full Gauss-Newton steps.
+    // For each lane of the last `adjust`: number of steps, and whether full Gauss-Newton steps were needed.
     struct Count {
         int steps;
         bool in_full;
@@ -69,7 +70,8 @@ public:
     const std::array<Count, lane_group>& counts() const { return counts_; }
 
 private:
-    // How the steps of a lane went: the largest change of a value, in its standard uncertainty, the last one first.
+    // The last steps of a lane: the largest change of a value in each, in units of its standard uncertainty, the newest
+    // first.
     struct Progress {
         enum State { goes_on, settled, lost, failed } state = goes_on;
         std::array<double, 3> change = {};
@@ -91,7 +93,7 @@ private:
 
     const SimdStart& start_;
     SimdModel model_;
-    std::unique_ptr<PreparedAdjustment> in_full_;  // made where it is needed first
+    std::unique_ptr<PreparedAdjustment> in_full_;  // created on first use
     SimdNumbers x_, dx_, centre_, s_, r_, difference_;
     std::array<Progress, lane_group> progress_;
     std::array<Count, lane_group> counts_;

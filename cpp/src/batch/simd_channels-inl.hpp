@@ -1,5 +1,5 @@
-// A point's channels from its length and tilts, and forces on them back again, with a lane for each set of readings
-// (simd_model.hpp).
+// Computes the channels of a point from its length and tilts, and carries forces on channels back, with one set of
+// readings in each lane (simd_model.hpp).
 #if defined(STEPDIAG_SIMD_CHANNELS_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef STEPDIAG_SIMD_CHANNELS_INL
 #undef STEPDIAG_SIMD_CHANNELS_INL
@@ -8,7 +8,7 @@
 #endif
 
 #include "batch/simd_model.hpp"
-// Vectors before the text that is calculated with them:
+// First the vectors, because the following text is compiled for them:
 #include "core/simd-inl.hpp"
 //
 #include "measurement/reading-inl.hpp"
@@ -20,7 +20,7 @@ namespace HWY_NAMESPACE {
 using Lanes3 = Vector3<Vector>;
 using Lanes9 = Matrix3<Vector>;
 
-// What is kept of a node and of a set-up, in vectors.
+// Vectors kept for each node and for each set-up.
 enum NodePart : int { node_rotation = 0, node_shift = 9, node_turn_pull = 12, node_shift_pull = 15, node_parts = 18 };
 enum SetupPart : int {
     sensor = 0,
@@ -29,17 +29,17 @@ enum SetupPart : int {
     normal_pull = 15,
     sensor_pull = 18,
     origin_pull = 21,
-    setup_columns = 24,  // the unknowns, then what pulls at those that are no angles nor lateral
+    setup_columns = 24,  // the unknowns, then their pulls, without angles and lateral
 };
 
-// One vector of lanes of one problem: where its numbers are.
+// One vector of lanes of a problem: where its numbers are stored.
 struct Chunk {
     const SimdProblem& problem;
     const SimdModel::At& at;
     std::size_t lane;
     double* nodes;
     double* setups;
-    Vector largest_turn;  // its square
+    Vector largest_turn;  // squared
 
     STEPDIAG_INLINE double* node(int index) const { return nodes + std::size_t(index) * node_parts * hn::Lanes(Tag()); }
     STEPDIAG_INLINE double* setup(int index) const {
@@ -50,7 +50,7 @@ struct Chunk {
         double* to = at.pulled + place(index);
         hn::StoreU(hn::Add(hn::LoadU(Tag(), to), force), Tag(), to);
     }
-    // Puts the residual of a channel that the model says reads `value`; gives the force of its s.
+    // Stores the residual of a channel whose modelled reading is `value`; returns the force of its s.
     STEPDIAG_INLINE Vector force(const SimdProblem::Channel& channel, Vector value) const {
         const Vector read = hn::LoadU(Tag(), at.readings + std::size_t(channel.input) * at.stride + lane);
         const Vector weight = hn::Set(Tag(), channel.weight);
@@ -79,12 +79,12 @@ STEPDIAG_INLINE void put9(double* to, int index, const Lanes9& value) {
 STEPDIAG_INLINE void add(double* to, int index, Vector value) { put(to, index, hn::Add(part(to, index), value)); }
 STEPDIAG_INLINE void add3(double* to, int index, const Lanes3& value) { put3(to, index, part3(to, index) + value); }
 
-// What the channels of a point pull at its length and tilts.
+// Pull of a point's channels on its length and tilts.
 struct TiltPull {
     Vector length, alpha, beta;
 };
 
-// The channels of a point (ChannelModel::read_channels) and back again.
+// The channels of a point (ChannelModel::read_channels), and the way back.
 class Channels {
 public:
     STEPDIAG_INLINE Channels(const Chunk& chunk, const SimdProblem::Point& point, double* setup,
@@ -100,7 +100,7 @@ public:
     }
     const TiltPull& tilt_pull() const { return tilt_; }
 
-    // `beam`: number of d1 ... dn, from 0.
+    // `beam`: number of the beam d1 ... dn, from 0.
     STEPDIAG_INLINE void pull_distance(const SimdProblem::Channel& channel, const Eigen::Vector2d& offset, int beam) {
         const Vector x = hn::Set(Tag(), offset.x()), y = hn::Set(Tag(), offset.y());
         const Vector arm = beam_arm(mirror_, x, y), distance = beam_distance(mirror_, scale_ * arm);
@@ -136,7 +136,7 @@ public:
         if (y) force_y = chunk_.force(*y, spot.y);
         pull(setup::psd_zero, force_x);
         pull(setup::psd_zero + 1, force_y);
-        // How much the spot moves outwards: what pulls at the lever, and at the gain.
+        // Outward movement of the spot, which pulls at the lever and at the gain.
         const Vector outwards = sub_mul(force_x, mirror_.beta, force_y * mirror_.alpha);
         pull(setup::gain, outwards * lever);
         const Vector lever_pull = outwards * scale_ * (mirror_.inverse_w + mirror_.inverse_w);

@@ -56,12 +56,12 @@ void prepare_setups(Chunk& chunk) {
     }
 }
 
-// A force on the functional point and one on the normal's tip.
+// Forces on the functional point and on the tip of the normal.
 struct MirrorPull {
     Lanes3 point, normal;
 };
 
-// From the mirror's pose to the readings and back (ChannelModel::read).
+// From the mirror's pose to the readings, and back (ChannelModel::read).
 STEPDIAG_INLINE MirrorPull pull_mirror(const Chunk& chunk, const SimdProblem::Point& point, const Lanes3& position,
                                        const Lanes3& normal) {
     double* setup = chunk.setup(point.setup);
@@ -77,20 +77,20 @@ STEPDIAG_INLINE MirrorPull pull_mirror(const Chunk& chunk, const SimdProblem::Po
     const Lanes3 q_pull{pulled.length * mirror.beta, negative(pulled.length * mirror.alpha), pulled.length};
     const Vector m_by_z = mul_add(beta_pull, mirror.beta, alpha_pull * mirror.alpha);
     const Lanes3 m_pull{beta_pull * inverse, negative(alpha_pull * inverse), negative(m_by_z * inverse)};
-    // The sensor turned sees everything turned the other way.
+    // A turn of the sensor acts like the opposite turn of everything it sees.
     add3(setup, sensor_pull, cross(q_pull, q) + cross(m_pull, m));
     const MirrorPull pull{machine_R_sensor * q_pull, machine_R_sensor * m_pull};
     put3(setup, origin_pull, part3(setup, origin_pull) - pull.point);
     return pull;
 }
 
-// Through the chain from the tool to the workpiece, and the forces back to the tool.
+// Follows the chain from the tool to the workpiece, and carries the forces back to the tool.
 STEPDIAG_INLINE void pull_point(const Chunk& chunk, const SimdProblem::Point& point) {
     const SimdProblem& problem = chunk.problem;
     double* setup = chunk.setup(point.setup);
     Lanes3 position = broadcast3<Vector>(problem.tool);
     Lanes3 normal = part3(setup, mirror_normal);
-    Lanes3 position_arm[3], normal_arm[3];  // what turns with an axis
+    Lanes3 position_arm[3], normal_arm[3];  // vectors that turn with an axis
     for (int place = 2; place >= 0; --place) {
         const double* node = chunk.node(point.node[place]);
         const AxisMotion<Vector> axis{part9(node, node_rotation), part3(node, node_shift),

@@ -1,7 +1,8 @@
-// The adjustment's model for many sets of readings at once, one set a lane: weighted residuals
+// The adjustment's model for many sets of readings at once, one in each lane. Computes weighted residuals
 //   r = (read - model(x))/u  (normal_equations.hpp, channel_model.hpp)
-// and J(x)^T s, J = d (model/u) / dx, for given s. Without J: each s goes back through the model as a force, to the
-// mirror's pose and from there to each axis' node and to the set-up (reverse differentiation). Internal: not installed.
+// and, for given s, the product J(x)^T s with J = d (model/u) / dx. J itself is not formed (reverse differentiation):
+// each s is a force on a reading, which is carried back to the mirror's pose, and from there to the nodes of the axes
+// and to the set-up. Internal: not installed.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,27 +15,26 @@
 
 namespace stepdiag {
 
-// Numbers of lanes stand as number[index * lane_group + lane]. After the last unknown there is one more place: 0 in x,
-// and without meaning in a gradient. It stands for what is not unknown.
-// The problem as plain numbers.
+// The problem as plain numbers. Numbers of lanes are stored as number[index * lane_group + lane]. One additional place
+// after the last unknown stands for quantities that are not unknown: it is 0 in x, and meaningless in a gradient.
 struct SimdProblem {
     struct Channel {
-        int reading;           // of the adjustment's problem; no_reading where the pattern has none
-        std::ptrdiff_t input;  // which of a set's readings
+        int reading;           // index in the adjustment's problem; no_reading if the pattern has none
+        std::ptrdiff_t input;  // place in a set of readings
         double weight;         // 1/u
     };
     struct Point {
         int setup;
-        std::array<int, 3> node;  // by place in the chain; home is the last node
+        std::array<int, 3> node;  // for each place in the chain; home is the last node
         double travel, time;
         int first_channel;
     };
     struct Node {
         std::array<int, 6> unknown;
-        std::array<double, 3> position;  // of the axis, as a vector of the machine frame, mm
+        std::array<double, 3> position;  // of the axis, as a vector in the machine frame, mm
     };
     struct Setup {
-        std::vector<int> unknown;  // by setup::Column
+        std::vector<int> unknown;  // for each setup::Column
         Eigen::Matrix3d machine_R_line;
         Eigen::Vector3d origin;
         const HeadCalibration* head;
@@ -43,16 +43,16 @@ struct SimdProblem {
 
     HeadLayout kind;
     int unknowns;
-    int channels;                           // of a point
-    std::array<bool, 3> carries_workpiece;  // by place in the chain
+    int channels;                           // per point
+    std::array<bool, 3> carries_workpiece;  // for each place in the chain
     Eigen::Vector3d tool;
     std::vector<Point> points;
     std::vector<Channel> of_points;
     std::vector<Node> nodes;
     std::vector<Setup> setups;
-    int setup_size;  // the largest
+    int setup_size;  // largest number of set-up unknowns
 
-    // `input`: by reading of the problem, which of a set's readings it is. The problem must live as long.
+    // `input`: for each reading of the problem, its place in a set of readings. The problem must outlive this object.
     SimdProblem(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input);
 };
 
@@ -60,9 +60,9 @@ class SimdModel {
 public:
     SimdModel(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input);
 
-    // Numbers by reading of the problem: [reading * lane_group + lane]; a set's readings: readings[input * stride +
-    // lane]. Gives r, and J(x)^T s in `pulled`. `is_valid`: by lane, false where a rotation is too large for the series
-    // that are summed here (0.1 rad): what is given is then worthless.
+    // Residuals r and forces s are stored as [reading * lane_group + lane], with readings of the problem; the readings
+    // of the sets as readings[input * stride + lane]. Computes r, and J(x)^T s in `pulled`. `is_valid`, for each lane:
+    // false if a rotation is too large for the series used here (0.1 rad); the results are then meaningless.
     struct At {
         const double* x;
         const double* readings;

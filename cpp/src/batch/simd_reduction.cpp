@@ -20,18 +20,23 @@ struct Tilts {
     Pair alpha, beta;
 };
 
-// (-beta, alpha) is k spot, because a spot lies where the light goes: of reduce_spot's g(x) x = spot there is left
-//   h k = w,  h = 2 (distance w + psd_distance + k spot . spot_beam),  w = 1 - k^2 |spot|^2,
+// (-beta, alpha) is k spot, because a spot lies in the direction of the light. Then the equation g(x) x = spot of
+// reduce_spot becomes
+//   h k = w,  h = 2 (distance w + psd_distance + k spot . spot_beam),  w = 1 - k^2
+// spot
+// ^2,
 // and with k = c/D, D = 2 (distance + psd_distance):
-//   f(c) = c + p c^2 - q c^3 - 1 = 0,  p = 2 spot . spot_beam/D^2 + r,  q = 2 distance r/D,  r = |spot|^2/D^2,
-// where p and q are small, r being about the square of the tilt.
+//   f(c) = c + p c^2 - q c^3 - 1 = 0,  p = 2 spot . spot_beam/D^2 + r,  q = 2 distance r/D,  r =
+// spot
+// ^2/D^2,
+// where p and q are small: r is about the square of the tilt.
 struct SpotEquation {
     Pair p, q, r;
 
     STEPDIAG_INLINE Pair f(Pair c) const { return mul_add(mul_add(sub_mul(q, c, p), c, all(1.0)), c, all(-1.0)); }
 };
 
-// Newton's method. Lanes stop by themselves: `done`. Those that no mirror gives end with NaN.
+// Newton's method. Each lane stops by itself (`done`). A spot that no mirror gives ends as NaN.
 HWY_NOINLINE Pair solve_by_newton(const SpotEquation& spot, MaskPair done, Pair c) {
     const Pair zero = all(0.0), one = all(1.0);
     MaskPair possible = all_true();
@@ -41,7 +46,7 @@ HWY_NOINLINE Pair solve_by_newton(const SpotEquation& spot, MaskPair done, Pair 
         c = select(done, c, c - change);
         const Pair h_by_d = mul_add(sub_mul(spot.q, c, spot.p - spot.r), c, one), w = sub_mul(spot.r * c, c, one);
         possible = both(possible, either(done, both(both(h_by_d > zero, slope > zero), w > zero)));
-        // The next error is below the square of a change of 1e-8.
+        // Convergence is quadratic: after a change of 1e-8 the error is below 1e-16.
         done = either(done, either(magnitude(change) <= all(1e-8) * magnitude(c), no(possible)));
     }
     return select(both(possible, done), c, none());
@@ -55,8 +60,8 @@ STEPDIAG_INLINE Tilts tilts_of_spot(const ReducedRow& row, Pair distance, Pair s
         const Pair beam = mul_add(spot_x, all(2.0 * row.spot_beam_x), spot_y * all(2.0 * row.spot_beam_y));
         spot.p = mul_add(beam, inverse2, r);
     }
-    // The root to second order, 1 - (p - q)(1 - 2 p + 3 q), and a step of Newton's method with 1/f' to first order, the
-    // same factor: that leaves some 30 p^5.
+    // The root to second order, 1 - (p - q)(1 - 2 p + 3 q), then a step of Newton's method with 1/f' to first order,
+    // which is the same factor. The error that remains is about 30 p^5.
     const Pair slope = mul_add(all(3.0), spot.q, mul_add(all(-2.0), spot.p, one));
     const Pair start = sub_mul(spot.p - spot.q, slope, one);
     Pair c = sub_mul(spot.f(start), slope, start);
@@ -67,7 +72,7 @@ STEPDIAG_INLINE Tilts tilts_of_spot(const ReducedRow& row, Pair distance, Pair s
     return {k * spot_y, negative(k * spot_x)};
 }
 
-// As reduce_beams: w = 2/(1 + sqrt(1 + 4 m)); of small tilts its series, the first term left out of which is 42 m^5.
+// As reduce_beams: w = 2/(1 + sqrt(1 + 4 m)). For small tilts its series; the first omitted term is 42 m^5.
 STEPDIAG_INLINE Tilts tilts_of_beams(Pair a, Pair b) {
     const Pair m = square_sum(a, b), one = all(1.0);
     Pair w = mul_add(m, mul_add(m, mul_add(m, mul_add(m, all(14.0), all(-5.0)), all(2.0)), all(-1.0)), one);
@@ -76,7 +81,7 @@ STEPDIAG_INLINE Tilts tilts_of_beams(Pair a, Pair b) {
     return {w * a, w * b};
 }
 
-// One pair of vectors of lanes.
+// Reduces one pair of vectors of lanes.
 class Reducer {
 public:
     Reducer(const double* readings, std::size_t stride, double* inputs)
@@ -94,7 +99,7 @@ public:
 
     STEPDIAG_INLINE void report(bool* lost) const {
         double number[lane_group];
-        store((lengths_ + tilts_) * all(0.0), number);  // NaN, or 0
+        store((lengths_ + tilts_) * all(0.0), number);  // NaN if anything is not finite, otherwise 0
         for (std::size_t lane = 0; lane < 2 * hn::Lanes(Tag()); ++lane) lost[lane] = !(number[lane] == 0.0);
     }
 
@@ -109,7 +114,7 @@ private:
         if (row.by_distance_alone) put_length(row, sum[0]);
         else put_tilts_and_length(row, tilts_of_beams(sum[1], sum[2]), sum[0]);
     }
-    // The length is the beam's, less the lever arm's part by the tilts.
+    // The length of the beam, less the tilts' effect by the lever arm.
     STEPDIAG_INLINE void put_tilts_and_length(const ReducedRow& row, Tilts tilts, Pair distance) {
         const Pair t = square_sum(tilts.alpha, tilts.beta);
         const Pair lever = sub_mul(all(row.lateral_x), tilts.beta, all(row.lateral_y) * tilts.alpha);
@@ -123,7 +128,7 @@ private:
     STEPDIAG_INLINE void put_tilts(const ReducedRow& row, Pair alpha, Pair beta) {
         put_tilts(row, {alpha, beta}, square_sum(alpha, beta));
     }
-    // Tilts of 45 degrees and more send no beam back.
+    // A mirror tilted by 45 degrees or more returns no beam.
     STEPDIAG_INLINE void put_tilts(const ReducedRow& row, Tilts tilts, Pair t) {
         tilts_ = tilts_ + select(all(1.0) > t, t, none());
         store(tilts.alpha, inputs_ + (row.place + 1) * lane_group);
@@ -133,7 +138,7 @@ private:
     const double* readings_;
     std::size_t stride_;
     double* inputs_;
-    // Sums, in which what is not finite stays.
+    // Sums of all results, which reveal values that are not finite.
     Pair lengths_ = all(0.0), tilts_ = all(0.0);
 };
 
@@ -176,7 +181,7 @@ SimdReduction::Lost SimdReduction::reduce(const double* readings, std::size_t st
 
 namespace {
 
-// Finds the raw channels of a row that was read.
+// Finds the raw channels that were read in a row.
 class RawPlaces {
 public:
     explicit RawPlaces(const Measurement& pattern) : pattern_(pattern), signals_(signal_channels(pattern)) {}
@@ -195,7 +200,7 @@ private:
     std::vector<int> signals_;
 };
 
-// Raw channels of one row as passes.cpp takes them; `raws` empty where the reading is lost.
+// Raw channels of one row, as passes.cpp uses them; `raws` is empty if the reading was lost.
 struct TakenRow {
     ReducedRow::Kind kind = ReducedRow::distance;
     std::vector<std::uint32_t> raws = {};
@@ -210,7 +215,7 @@ TakenRow take_beams(const RawPlaces& places, int beams, std::size_t row, const H
             taken.raws.push_back(*raw);
             offsets.push_back(head.beam_offsets[i]);
         }
-    // Where all beams are equally long the solution's derivatives are its coefficients.
+    // With equal lengths of all beams, the derivatives of the solution are its coefficients.
     const auto reduced = reduce_beams(Eigen::VectorXd::Zero(Eigen::Index(offsets.size())), offsets);
     if (!reduced) return {};
     taken.solution.assign(reduced->jacobian.data(), reduced->jacobian.data() + reduced->jacobian.size());

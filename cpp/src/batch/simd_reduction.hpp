@@ -1,5 +1,5 @@
-// The reduction of raw channels to lengths and tilts (passes.cpp, measurement/reading.cpp) for many sets of readings of
-// one pattern, a set a lane. Internal.
+// Reduces raw channels to lengths and tilts (passes.cpp, measurement/reading.cpp) for many sets of readings of one
+// pattern, one set in each lane. Internal.
 #pragma once
 
 #include <array>
@@ -11,16 +11,16 @@
 
 namespace stepdiag {
 
-// How one row of the measurement is reduced.
+// Reduction of one row of the measurement.
 struct ReducedRow {
     enum Kind : std::uint32_t { distance, tilts, distance_and_tilts, spot, beams };
     Kind kind;
-    std::uint32_t raws;      // raw channels that it takes
+    std::uint32_t raws;      // number of its raw channels
     std::uint32_t place;     // of its length among the inputs of the linear map; alpha and beta follow
     bool by_distance_alone;  // LengthKind::distance
     double lateral_x, lateral_y, travel;
     double psd_distance, spot_beam_x, spot_beam_y;
-    bool is_beside;  // the beam that makes the spot, beside the axis
+    bool is_beside;  // whether the beam that makes the spot is beside the axis
 };
 
 class SimdReduction {
@@ -29,15 +29,17 @@ public:
     SimdReduction(const Measurement& pattern, const HeadCalibrations& heads, const std::vector<Pass>& passes,
                   LengthKind kind);
 
-    // lane_group sets, from readings[raw * stride + lane] to inputs[place * lane_group + lane]. `lost`: the lanes
-    // that no mirror gives, or with a reading that counts and is not finite.
+    // Reduces lane_group sets, from readings[raw * stride + lane] to inputs[place * lane_group + lane]. `lost`: lanes
+    // with readings that no mirror gives, or that count and are not finite.
     using Lost = std::array<bool, lane_group>;
     Lost reduce(const double* readings, std::size_t stride, double* inputs) const;
 
-    // --- for the code that runs it
+    // --- for the code that executes it
     const std::vector<ReducedRow>& rows() const { return rows_; }
-    const std::uint32_t* raws() const { return raws_.data(); }     // row by row: row * channels + channel
-    const double* solutions() const { return solutions_.data(); }  // of rows of beams: (distance, a, b) by each beam
+    const std::uint32_t* raws() const { return raws_.data(); }  // for each row: row * channels + channel
+    const double* solutions() const {
+        return solutions_.data();
+    }  // for each row of beams: (distance, a, b) by each beam
 
 private:
     std::vector<ReducedRow> rows_;

@@ -64,7 +64,7 @@ void multiply(const SimdJacobian::Numbers& jacobian, const double* unknowns, dou
         }
 }
 
-// Rows of L right of one block column: y -= L x.
+// Rows of L below the diagonal block of one block column: y -= L x.
 STEPDIAG_INLINE const double* eliminate(const double* l, int rows, const Pair (&own)[six], double* y) {
     for (int i = 0; i < rows; ++i, l += six, y += lane_group) {
         Pair sum = load(y);
@@ -85,7 +85,7 @@ STEPDIAG_INLINE const double* collect(const double* l, int rows, const double* y
 
 void solve_corner(const SimdFactor::Numbers& factor, double* border) {
     const int rank = int(factor.corner_order.size());
-    std::vector<double> numbers(2 * lane_group * std::size_t(rank));  // no more than a pair of the widest vectors each
+    std::vector<double> numbers(2 * lane_group * std::size_t(rank));  // room for a pair of the widest vectors each
     const std::size_t width = pair_lanes();
     const auto at = [&](int i) HWY_ATTR { return numbers.data() + width * std::size_t(i); };
     const auto l = [&](int i, int k) { return factor.corner[std::size_t(k) * rank + i]; };

@@ -1,5 +1,5 @@
-// The adjustment's linear algebra for many right-hand sides at once, one a lane (simd_model.hpp), with derivatives and
-// factor as they are at one place. Internal: not installed.
+// Linear algebra of the adjustment for many right-hand sides at once, one in each lane (simd_model.hpp), with
+// derivatives and factor of one place. Internal: not installed.
 #pragma once
 
 #include <vector>
@@ -16,7 +16,7 @@ public:
     void add_transposed(const double* readings, double* unknowns) const;  // unknowns += J^T readings
     void multiply(const double* unknowns, double* readings) const;        // readings = J unknowns
 
-    // Up to three readings of a point, which have their unknowns in common.
+    // Up to three readings of a point, which share their unknowns.
     static constexpr int most_rows = 3;
     struct Bundle {
         int first_reading, rows;
@@ -34,19 +34,20 @@ private:
     Numbers numbers_;
 };
 
-// L of N = L L^T, in the order in which it is read.
+// L of N = L L^T, stored in the order of its use.
 class SimdFactor {
 public:
     explicit SimdFactor(const BorderedFactor& factor);
 
-    void solve(double* right_hand_side) const;  // in place; held unknowns are 0
+    void solve(double* right_hand_side) const;  // in place; fixed unknowns are 0
 
     struct Numbers {
-        std::vector<int> rows;       // of the band below each diagonal block
-        std::vector<double> column;  // by block column: diagonal block, rows below, the border's rows; row by row
+        std::vector<int> rows;  // of the band, below each diagonal block
+        std::vector<double>
+            column;  // for each block column: diagonal block, rows below, rows of the border; row by row
         int border;
         std::vector<int> corner_order;
-        std::vector<double> corner;  // column by column, with reciprocals of the pivots
+        std::vector<double> corner;  // column by column, with the reciprocals of the pivots
     };
 
 private:

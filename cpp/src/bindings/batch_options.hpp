@@ -1,4 +1,4 @@
-// How evaluators of many sets of readings are told their method.
+// Python arguments that select the method of batch evaluators.
 #pragma once
 
 #include <string>

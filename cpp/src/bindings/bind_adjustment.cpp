@@ -36,7 +36,7 @@ struct Outlier {
     int number;
 };
 
-// What Python sees: an adjustment, and the run's rows that it belongs to.
+// In Python, an adjustment knows the rows of its run.
 struct AdjustmentOfRun {
     Adjustment adjustment;
     std::vector<Station> stations;
@@ -65,7 +65,7 @@ Slips to_slips(const std::string& slips) {
     throw InvalidArgument("adjustment slips: expected \"report\" or \"estimate\", got \"" + slips + "\"");
 }
 
-// The functions of the package that make sentences of a verdict's reasons, and of faults that may be unseen.
+// The package's functions that word the reasons of a verdict, and faults that may be unseen.
 py::object& reason_wording() {
     static py::object& words = *new py::object(py::none());  // outlives the interpreter
     return words;
@@ -90,7 +90,7 @@ struct handle_type_name<stepdiag::bindings::PriorLike> {
 namespace stepdiag::bindings {
 namespace {
 
-// A keyword for each unknown, named by the table.
+// One keyword for each unknown, with its name in the table.
 template <std::size_t... quantity>
 void bind_priors(py::module_& m, std::index_sequence<quantity...>) {
     py::class_<Priors>(m, "SetupPriors",

@@ -11,7 +11,7 @@
 namespace stepdiag::bindings {
 namespace {
 
-// What Python sees: an evaluator, and the shape of a set of readings.
+// In Python, an evaluator knows the shape of a set of readings.
 struct EvaluatorOfPattern {
     BatchEvaluator evaluator;
     std::size_t rows;
@@ -40,7 +40,7 @@ std::unique_ptr<EvaluatorOfPattern> make(const Measurement& pattern, const Plan&
                            signal_names(pattern)});
 }
 
-// Sets first ... first + lane_group - 1, as far as there are; the others are the first one again.
+// Evaluates the sets first ... first + lane_group - 1; places after the last set repeat the first one.
 void evaluate_group(const EvaluatorOfPattern& of, BatchEvaluator::Worker& worker, std::size_t first,
                     const double* readings, std::size_t sets, double* values) {
     const std::size_t inputs = of.readings(), entries = of.evaluator.entries().size();

@@ -1,5 +1,5 @@
-// A calibration put together from its parts, as readers of other formats need it. What an evaluation makes is bound in
-// bind_evaluation.cpp.
+// Construction of a calibration from its parts, for readers of other formats. bind_evaluation.cpp binds results of
+// evaluations.
 #include <limits>
 
 #include "bindings.hpp"

@@ -7,7 +7,7 @@
 
 namespace stepdiag::bindings {
 
-// A file of a table, or what was read from one.
+// The file of a table, or its content.
 class TableLike : public py::object {
     PYBIND11_OBJECT_DEFAULT(TableLike, py::object, PyObject_Type)
 };
@@ -79,7 +79,7 @@ Position tool_of(const Compensator& compensator, const std::optional<ArrayLike>&
     return tool ? to_position(to_vector3(*tool, "tool")) : compensator.tool();
 }
 
-// `ask` gives three numbers for one position.
+// `ask` returns three numbers for a position.
 template <class Ask>
 DoubleArray for_each_position(const ArrayLike& positions, const char* name, Ask&& ask) {
     const Points points = to_points(positions, name);

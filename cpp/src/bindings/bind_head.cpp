@@ -409,7 +409,7 @@ const HeadDesign& design_of(const Head& head) {
     return *head.design;
 }
 
-// The mirror that a head is looked at with: its own, or one that no beam of a sensible head misses.
+// Size of the mirror for drawings: the head's own, or one that no beam of a usual head misses.
 Eigen::Vector2d mirror_of(const Head& head) {
     if (head.mirror) return *head.mirror;
     double widest = 0.0;
@@ -429,7 +429,7 @@ MirrorPose to_mirror(const Head& head, double distance, const ArrayLike& tilt, c
     return tilted_mirror({place.x(), place.y(), distance}, angles.x(), angles.y());
 }
 
-// A segment of a ray tree, for drawing and for the account of powers.
+// A segment of a ray tree, for drawings and power budgets.
 struct BeamSegment {
     std::string beam;
     int parent;
@@ -449,7 +449,7 @@ const char* name_of(SegmentEnd end) {
     return "cut";
 }
 
-constexpr double drawn_length = 50.0;  // mm: of a segment that leaves
+constexpr double drawn_length = 50.0;  // mm, of a segment that leaves the head
 
 std::vector<BeamSegment> trace_beams(const Head& head, double distance, const ArrayLike& tilt, const ArrayLike& lateral,
                                      const std::optional<Environment>& environment) {

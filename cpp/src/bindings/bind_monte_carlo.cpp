@@ -18,7 +18,7 @@ using Progress = std::optional<py::typing::Callable<py::object(std::uint64_t)>>;
 using ModelFunction = py::typing::Callable<py::object(DoubleArray)>;
 using Correlation = std::pair<std::vector<int>, ArrayLike>;
 
-// Asked by the thread that called, without the interpreter lock. Ctrl-C ends a run also where nobody asks for progress.
+// The calling thread polls this without the interpreter lock. Ctrl-C ends a run even if nobody watches its progress.
 RunControl to_control(const IntegerLike& threads, const Progress& progress) {
     return {to_int(threads, "threads"), [&progress](std::uint64_t leaves_done) {
                 const py::gil_scoped_acquire lock;
@@ -33,9 +33,9 @@ std::uint64_t to_leaf(const IntegerLike& number, const char* name) {
     return std::uint64_t(to_integer(number, name, 0, std::int64_t(largest_leaf_count)));
 }
 
-// Worker threads call a Python function in turn, each with the interpreter lock.
+// Worker threads call a Python function one after another, each with the interpreter lock.
 FunctionModel::Function to_function(const ModelFunction& function) {
-    // The last one to let go of the function may be a thread without the lock.
+    // The last reference may be dropped by a thread that does not hold the lock.
     const std::shared_ptr<py::function> shared(new py::function(function), [](py::function* held) {
         const py::gil_scoped_acquire lock;
         delete held;
@@ -266,7 +266,7 @@ void bind_runs(py::module_& m) {
 
 namespace {
 
-// Whole groups of lanes, of which those asked for are copied.
+// Evaluates whole groups of lanes, and copies the samples that were asked for.
 DoubleArray evaluate(const SampleModel& model, std::uint64_t first_sample, std::size_t samples) {
     constexpr std::size_t at_a_time = 64 * lane_group;
     const std::size_t outputs = model.outputs().size();

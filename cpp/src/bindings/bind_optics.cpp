@@ -15,7 +15,7 @@ Material to_material(const MaterialLike& material) {
     throw InvalidArgument("material: expected the name of a glass or an index of at least 1");
 }
 
-// Coated faces send a part of the light back.
+// Coated faces reflect a part of the light.
 std::vector<Face> coated(std::vector<Face> faces, double reflectance) {
     if (!(reflectance >= 0.0 && reflectance <= 1.0)) throw InvalidArgument("reflectance: expected a share from 0 to 1");
     for (Face& face : faces)
@@ -51,7 +51,7 @@ std::vector<DoubleArray> outlines(const HeadBody& body) {
     return arrays;
 }
 
-const Medium glass{1.5};  // stands in until the wavelength is known
+const Medium glass{1.5};  // placeholder until the wavelength is known
 
 }  // namespace
 

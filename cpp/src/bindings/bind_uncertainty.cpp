@@ -106,7 +106,7 @@ std::optional<Eigen::Vector3d> to_tool(const std::optional<ArrayLike>& tool) {
     return tool ? std::optional(to_vector3(*tool, "tool")) : std::nullopt;
 }
 
-// Name -> what is missing for it, where something is.
+// Name -> undetermined parameters that it needs; only names that lack any.
 template <std::size_t Size>
 std::map<std::string, std::vector<std::string>> missing_by_name(
     const std::array<std::vector<std::string>, Size>& missing, const std::array<const char*, Size>& names) {
@@ -306,7 +306,7 @@ std::uint64_t to_sample(const IntegerLike& number) {
     return std::uint64_t(to_integer(number, "sample", 0, std::int64_t(1) << 62));
 }
 
-// Fields of both options, by name: those that SimulationOptions has, and the others.
+// Splits fields by name: those of SimulationOptions, and the others.
 std::pair<Fields, Fields> split(const Fields& fields) {
     std::pair<Fields, Fields> parts;
     for (const auto& [name, value] : fields)
@@ -323,7 +323,7 @@ std::unique_ptr<VirtualCalibrations> make(const Machine& machine, const Plan& pl
     const auto [of_simulation, of_adjustment] = split(fields);
     const Heads actual = to_heads(heads, plan);
     SimulationOptions simulated = options_of(simulation, of_simulation);
-    simulated.noise = {};  // it is drawn with the inputs
+    simulated.noise = {};  // it is drawn together with the inputs
     const VirtualRun run{machine,
                          plan,
                          actual,

@@ -21,7 +21,7 @@ int to_parameter(const std::string& name) {
     throw InvalidArgument("without: expected names EXX ... ECZ, C0Y, B0Z, A0Z, got \"" + name + "\"");
 }
 
-// Without a copy: of a million points it would take as long as their errors.
+// Without a copy, which would take as long as computing the errors.
 DoubleArray to_rows(SixRows&& rows) {
     auto* kept = new SixRows(std::move(rows));
     const py::capsule owner(kept, [](void* matrix) { delete static_cast<SixRows*>(matrix); });

@@ -1,4 +1,4 @@
-// What the parts of the extension share: argument types with honest names in signatures, and their conversion.
+// Shared by the parts of the extension: argument types that give correct signatures, and their conversion.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -25,11 +25,11 @@ namespace stepdiag::bindings {
 using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
-// Anything that NumPy makes an array of; the shape is checked here, so that a wrong one is an InvalidArgument.
+// Anything that NumPy converts to an array. The shape is checked here, so that a wrong one is an InvalidArgument.
 class ArrayLike : public py::object {
     PYBIND11_OBJECT_DEFAULT(ArrayLike, py::object, PyObject_Type)
 };
-// Anything that is a whole number to Python; the range is checked here, so that a wrong one is an InvalidArgument.
+// Any integer of Python. The range is checked here, so that a value beyond it is an InvalidArgument.
 class IntegerLike : public py::object {
     PYBIND11_OBJECT_DEFAULT(IntegerLike, py::object, PyIndex_Check)
 };
@@ -46,7 +46,7 @@ class PathLike : public py::object {
     PYBIND11_OBJECT_DEFAULT(PathLike, py::object, PyObject_Type)
 };
 
-// What Python calls SetupPriors.
+// SetupPriors in Python.
 struct Priors {
     SetupPriors value;
 };
@@ -57,7 +57,7 @@ Eigen::Vector2d to_vector2(const py::handle& array, const char* name);
 Points to_points(const py::handle& array, const char* name);  // (n, 3)
 Eigen::MatrixXd to_matrix(const py::handle& array, const char* name);
 std::int64_t to_integer(const IntegerLike& number, const std::string& name, std::int64_t lowest, std::int64_t highest);
-int to_int(const IntegerLike& number, const std::string& name);  // any that an int holds
+int to_int(const IntegerLike& number, const std::string& name);  // any value of an int
 std::uint64_t to_seed(const IntegerLike& number);
 std::string to_path(const PathLike& path);
 Chain to_chain(const ChainLike& chain);  // a Chain, or its text
@@ -67,14 +67,14 @@ Placement to_placement(const ArrayLike& position, const ArrayLike& rotation);  /
 Heads to_heads(const HeadLike& heads, const Plan& plan);                       // a Head, or one for each line
 
 DoubleArray to_numpy(const std::vector<double>& values);
-DoubleArray to_numpy(const std::vector<std::optional<double>>& values);  // NaN where there is none
+DoubleArray to_numpy(const std::vector<std::optional<double>>& values);  // NaN where there is no value
 DoubleArray to_numpy(const Eigen::MatrixXd& matrix);
 DoubleArray to_numpy_vector(const Eigen::VectorXd& vector);
 
-// The function of the package that makes a sentence of a finding: all sentences are worded in Python.
+// The package's function that words a finding: all sentences are made in Python.
 py::object& wording();
 Calibration worded(Calibration calibration);       // with its findings in words; needs the interpreter lock
-Calibration worded(const Adjustment& adjustment);  // its calibration, also with the reasons of its verdict
+Calibration worded(const Adjustment& adjustment);  // its calibration, also with the reasons of its verdict in words
 
 template <class Records>
 py::typing::Tuple<typename Records::value_type, py::ellipsis> to_tuple(const Records& records) {
@@ -88,7 +88,7 @@ inline ArrayLike zeros(int size) {
     return py::reinterpret_borrow<ArrayLike>(py::make_tuple(0.0, 0.0, 0.0)[py::slice(0, size, 1)]);
 }
 
-// In the order of the rooms: signatures name the types that are bound before.
+// In the order of the rooms: a type must be bound before signatures name it.
 void bind_core(py::module_& m);
 void bind_machine(py::module_& m);
 void bind_plan(py::module_& m);

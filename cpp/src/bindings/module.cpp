@@ -1,4 +1,5 @@
-// stepdiag._core: the C++ library as Python sees it. Each part checks shapes, releases the interpreter lock and calls.
+// stepdiag._core: the C++ library in Python. Each part checks shapes, releases the interpreter lock, and calls the
+// library.
 #include <limits>
 
 #include "bindings.hpp"
@@ -30,7 +31,7 @@ Eigen::VectorXd to_vector_of(const py::handle& object, const char* name, py::ssi
     throw InvalidArgument(name + ": expected a whole number of " + range + ", got " + std::string(py::repr(number)));
 }
 
-// A bool is an int to Python, but nobody means one here.
+// A bool is an int in Python, but here it is always a mistake.
 py::int_ to_python_int(const IntegerLike& number, const std::string& name, const std::string& range) {
     if (py::isinstance<py::bool_>(number)) refuse_integer(number, name, range);
     const auto integer = py::reinterpret_steal<py::int_>(PyNumber_Index(number.ptr()));
@@ -96,7 +97,7 @@ Eigen::MatrixXd to_matrix(const py::handle& object, const char* name) {
 }
 
 std::string to_path(const PathLike& path) {
-    // Any bytes may name a file, but for the one that ends a name in C.
+    // A file name may have any bytes except the one that ends strings in C.
     const auto name = py::module_::import("os").attr("fsencode")(path).cast<std::string>();
     if (name.find('\0') != std::string::npos)
         throw InvalidArgument("path: expected the name of a file, got one with a NUL byte");
@@ -136,7 +137,7 @@ DoubleArray to_numpy(const Eigen::MatrixXd& matrix) {
 
 DoubleArray to_numpy_vector(const Eigen::VectorXd& vector) { return DoubleArray(vector.size(), vector.data()); }
 
-// The message may quote a file's path, which need not be UTF-8.
+// The message may quote a path, which need not be UTF-8.
 void bind_exception(py::module_& m) {
     static py::exception<InvalidArgument> type(m, "InvalidArgument", PyExc_ValueError);
     type.doc() = "Bad input: the message names the argument, file and line, or key, what was expected and what came.";

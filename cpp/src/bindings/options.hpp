@@ -1,5 +1,5 @@
-// Option structs in Python: a verb takes one whole as `options`, or its fields by name, which make one. So the fields
-// are listed where the struct is bound, and nowhere else.
+// Option structs in Python: functions take one as `options`, or its fields by name. The fields are listed where the
+// struct is bound, and nowhere else.
 #pragma once
 
 #include <optional>
@@ -10,7 +10,7 @@ namespace stepdiag::bindings {
 
 using Fields = py::KWArgs<py::object>;
 
-// Throws InvalidArgument where both are given; a field that there is not is a TypeError, as of any Python function.
+// Throws InvalidArgument if both are given. An unknown field is a TypeError, as with any Python function.
 template <class Options>
 Options options_of(const std::optional<Options>& given, const Fields& fields) {
     if (!given) return py::type::of<Options>()(**fields).template cast<Options>();

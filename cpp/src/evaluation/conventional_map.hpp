@@ -5,14 +5,14 @@
 
 namespace stepdiag {
 
-// The passes that it uses.
+// Which passes it uses.
 inline std::vector<bool> body_diagonals(const std::vector<Pass>& passes) {
     std::vector<bool> are;
     for (const Pass& pass : passes) are.push_back(pass.line.is_body_diagonal());
     return are;
 }
 
-// Distances -> translations, summed from home; the frame is then turned so that EYX, EZX and EZY have no slope.
+// Distances -> translations, added up from home. Then the frame is turned so that EYX, EZX and EZY have no slope.
 class ConventionalMap {
 public:
     ConventionalMap(const std::vector<Pass>& passes, const Plan& plan, const std::vector<bool>& usable)
@@ -36,7 +36,7 @@ public:
         std::vector<Number> lengths(readings.values.size() / values_per_reading);
         for (std::size_t i = 0; i < lengths.size(); ++i) lengths[i] = readings.values[values_per_reading * i];
         std::vector<Number> out(layout_.size(), Number::Zero());
-        Number slope[3][3];  // of component c over axis a
+        Number slope[3][3];  // of component c along axis a
         for (const Axis axis : all_axes) {
             const int a = index(axis);
             const auto functions = functions_of<Number>(out, layout_, axis, Component::X);
@@ -47,7 +47,7 @@ public:
                 if (c != a) take_off_trend<Number>(functions[c], layout_.nodes, end);  // positioning keeps its slope
             }
         }
-        // A squareness is the angle between two axes: what their two straightness slopes have together.
+        // A squareness is the angle between two axes: the sum of their two straightness slopes.
         for (const Squareness s : all_squarenesses) {
             const auto [axis, component, sign] = squareness_term(s);
             out[layout_.row(s)] = sign * (slope[index(axis)][component] + slope[component][index(axis)]);
@@ -55,7 +55,7 @@ public:
         return out;
     }
 
-    // Sums of readings that are noise, were nothing else the matter: where a step was read on more lines than needed.
+    // Sums of readings whose expectation is 0, where a step was read on more lines than needed.
     template <class Number>
     std::vector<Number> contradictions(const ReadingRows<Number>& readings, Thinning& thinning) const {
         std::vector<Number> out;

@@ -1,5 +1,5 @@
-// The linear map of the enhanced evaluation (stepdiag/evaluation/enhanced.hpp): tilts -> rotations -> lengths without
-// what the rotations do -> slopes -> translations. Internal.
+// The linear map of the enhanced evaluation (stepdiag/evaluation/enhanced.hpp): tilts -> rotations -> lengths corrected
+// for the rotations -> slopes -> translations. Internal.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -33,7 +33,8 @@ public:
     bool is_slope_determined(FunctionId id) const { return !id.is_positioning() || slopes_.determines_scale(id.axis); }
     bool is_determined(Squareness s) const { return slopes_.determines(s); }
 
-    // Whether a translation is known at every step, but lost readings left laser angles open that its shape hangs on.
+    // Whether a translation is known at every step, but its shape depends on laser angles that are undetermined because
+    // readings were lost.
     bool is_bent(FunctionId id) const {
         return !id.is_rotation() && bent_[index(id.axis)][static_cast<int>(id.component)];
     }
@@ -49,8 +50,8 @@ public:
         return out;
     }
 
-    // Sums of readings that are noise, were nothing else the matter: where there are more tilts, lengths and trends
-    // than needed. Those of the lengths and of the trends depend on each other.
+    // Sums of readings whose expectation is 0, where there are more tilts, lengths and trends than needed. Those of
+    // lengths and trends are correlated.
     template <class Number>
     std::vector<Number> contradictions(const ReadingRows<Number>& readings, Thinning& thinning) const {
         std::vector<Number> out, angles(layout_.size(), Number::Zero());
@@ -68,14 +69,14 @@ public:
     }
 
 private:
-    // theta of a node times `coefficient` moves a reading's length.
+    // The rotation of a node times `coefficient` changes the length of a reading.
     struct AngularContribution {
-        int row;  // of the parameters
+        int row;  // among the parameters
         double coefficient;
     };
 
-    // n . (theta_a x L_a) = theta_a . (L_a x n), for every reading. A pass whose lengths hang on rotations that nobody
-    // knows is not usable.
+    // n . (theta_a x L_a) = theta_a . (L_a x n), for every reading. A pass whose lengths depend on undetermined
+    // rotations is not usable.
     void find_angular_contributions(const Chain& chain, const Eigen::Vector3d& tool, const Plan& plan) {
         const double negligible = 1e-12 * (plan.volume().norm() + tool.norm());
         for (const Pass& pass : passes_) {
@@ -98,8 +99,8 @@ private:
         }
     }
 
-    // Laser angles that stay open bend a straight line into each axis and component. It is taken off with the trend,
-    // unless a line was lost on some of the intervals: then the shape is not known either.
+    // An undetermined laser angle adds a straight line to each axis and component. It disappears with the trend, unless
+    // a line was lost on some of the intervals: then the shape is undetermined, too.
     void find_shapes_that_hang_on_laser_angles(const Plan& plan) {
         const double negligible = 1e-9 * plan.volume().norm();
         for (Eigen::Index j = 0; j < slopes_.null_space().cols(); ++j) {
@@ -158,7 +159,7 @@ private:
         return lengths;
     }
 
-    // Shapes from the steps, slopes from the slope system; straightness ends at 0 by the choice of frame.
+    // Shapes from the steps, slopes from the slope system. Straightnesses end at 0 by the choice of frame.
     template <class Number>
     void solve_lengths(const std::vector<Number>& lengths, const std::vector<Number>& slopes,
                        std::vector<Number>& out) const {
@@ -178,10 +179,10 @@ private:
     ParameterLayout layout_;
     AxisSystems angles_;
     AxisSystems lengths_;
-    std::vector<std::vector<AngularContribution>> contributions_;  // by reading
-    std::vector<bool> usable_;                                     // by pass: its lengths
+    std::vector<std::vector<AngularContribution>> contributions_;  // for each reading
+    std::vector<bool> usable_;                                     // for each pass: whether its lengths are usable
     SlopeSystem slopes_;
-    std::array<std::array<bool, 3>, 3> bent_{};  // by axis and component of translation
+    std::array<std::array<bool, 3>, 3> bent_{};  // for each axis and component of translation
 };
 
 }  // namespace stepdiag

@@ -18,7 +18,7 @@ Fit fit_of_noise(double square_sum, int freedom) {
 }
 
 ChiSquare chi_square(const Eigen::VectorXd& values, const Eigen::MatrixXd& covariance) {
-    constexpr double rank_threshold = 1e-9;  // of correlations
+    constexpr double rank_threshold = 1e-9;  // relative to correlations
     if (values.size() == 0) return {0.0, 0};
     const Eigen::VectorXd scale =
         covariance.diagonal().unaryExpr([](double v) { return v > 0.0 ? 1.0 / std::sqrt(v) : 0.0; });

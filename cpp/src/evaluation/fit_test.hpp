@@ -1,4 +1,5 @@
-// The chi-square test of a fit, and what it says by itself (docs/conventions.md, "Verdict of a fit"). Internal.
+// Chi-square test of a fit, and the verdict that follows from it alone (docs/conventions.md, "Verdict of a fit").
+// Internal.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,24 +8,24 @@
 
 namespace stepdiag {
 
-inline constexpr double largest_noise_factor = 3.0;  // root of the variance factor
-inline constexpr double doubtful_below = 1e-2;       // probability of a misfit as large
+inline constexpr double largest_noise_factor = 3.0;  // square root of the variance factor
+inline constexpr double doubtful_below = 1e-2;       // probability of a misfit at least as large
 inline constexpr double doubtful_above = 1.0 - 1e-3;
 
-// Of a square sum larger than this one.
+// The probability of a larger square sum.
 double chi_square_probability(double square_sum, double freedom);
 
-// Where nothing but noise is tested: whether by one factor it is larger or smaller than stated.
+// The verdict if only the noise is tested: whether it is larger or smaller than stated by a common factor.
 Fit fit_of_noise(double square_sum, int freedom);
 
 struct ChiSquare {
     double square_sum;
     int freedom;
 };
-// values^T covariance^-1 values, over the rank of the covariance.
+// values^T covariance^-1 values, with the rank of the covariance as degrees of freedom.
 ChiSquare chi_square(const Eigen::VectorXd& values, const Eigen::MatrixXd& covariance);
 
-// Sum of share share^T, in blocks.
+// Sum of share share^T, added up in blocks.
 class ShareSum {
 public:
     explicit ShareSum(Eigen::Index size);

@@ -15,7 +15,7 @@ HWY_BEFORE_NAMESPACE();
 namespace stepdiag {
 namespace HWY_NAMESPACE {
 
-// Flattened, so that the evaluation's own templates become part of what is compiled for this instruction set.
+// Inlined completely, so that the templates of the evaluation are compiled for this instruction set.
 HWY_FLATTEN void apply_enhanced(const EnhancedMap& map, const ReadingRows<LaneRow>& readings,
                                 std::vector<LaneRow>& parameters) {
     parameters = map.apply(readings);

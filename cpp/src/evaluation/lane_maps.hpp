@@ -1,6 +1,6 @@
-// The linear maps of the published evaluations for lane_group sets of readings at once: from the lengths and tilts of
-// all readings to what evaluate_enhanced and evaluate_conventional determine of them. Weights are those of the passes
-// that a map was made of, which must live as long. Internal.
+// Linear maps of the published evaluations for lane_group sets of readings at once: from lengths and tilts of all
+// readings to the parameters that evaluate_enhanced and evaluate_conventional determine. Weights are those of the
+// passes from which a map was made; the passes must outlive it. Internal.
 #pragma once
 
 #include <functional>
@@ -10,8 +10,7 @@
 
 namespace stepdiag {
 
-// A number of each lane. Plain loops, which the compiler turns into vectors of the instruction set that the calling
-// function is compiled for.
+// One number for each lane. The compiler vectorises the plain loops for the instruction set of the calling function.
 struct LaneRow {
     double lane[lane_group];
 

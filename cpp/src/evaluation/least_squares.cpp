@@ -9,7 +9,7 @@ namespace stepdiag {
 
 LeastSquares solve_least_squares(const Eigen::MatrixXd& equations, const Eigen::VectorXd& standard_uncertainty) {
     constexpr double rank_threshold = 1e-9;
-    constexpr double in_row_space = 1e-6;  // of the projector's diagonal, which is 1 or clearly less
+    constexpr double in_row_space = 1e-6;  // of the projector's diagonal, which is 1 or clearly smaller
     if (standard_uncertainty.size() != equations.rows() || !equations.allFinite() ||
         !standard_uncertainty.allFinite() || !(standard_uncertainty.array() > 0.0).all())
         throw InvalidArgument(

@@ -1,9 +1,9 @@
 // From a linear map of readings to parameters: values, standard uncertainties, covariance. Internal.
 //
-// A map applies itself to "rows": each reading's length, alpha and beta is a row of numbers, one for each of several
-// sets of readings evaluated at once. One set gives the values. A set that holds the effect of one raw channel alone
-// gives that channel's share of every parameter, and the shares make eq. 6: Cov(x) = sum over raw channels of share
-// share^T. Rows of lanes evaluate many runs of one pattern (lane_maps.hpp).
+// A map is applied to "rows": length, alpha and beta of each reading are each a row of numbers, with one number for
+// each of several sets of readings. One set gives the values. A set that holds the effect of a single raw channel gives
+// the share of that channel in every parameter. The shares make eq. 6: Cov(x) = sum over raw channels of share share^T.
+// Rows of lanes evaluate many runs of one pattern (lane_maps.hpp).
 #pragma once
 
 #include <Eigen/Core>
@@ -18,27 +18,27 @@ namespace stepdiag {
 template <int Width>
 using Row = Eigen::Array<double, Width, 1>;
 
-constexpr std::size_t largest_covariance = 10'000;  // values: 800 MB
+constexpr std::size_t largest_covariance = 10'000;  // values; it has 800 MB
 constexpr int values_per_reading = 3;               // length, alpha, beta
 
-// What a map is applied to: sets of readings, a Row<Width> each value. Where only one pass's readings differ from
-// zero, or no tilt does, a map may skip the rest.
+// Sets of readings to which a map is applied: a Row<Width> for each value. A map may skip the rest if only the readings
+// of one pass, or no tilts, differ from zero.
 template <class Number>
 struct ReadingRows {
-    std::vector<Number> values;  // values_per_reading a reading
-    int only_pass = -1;          // -1: all
+    std::vector<Number> values;  // values_per_reading for each reading
+    int only_pass = -1;          // -1: all passes
     bool has_tilts = true;
 };
 
-// The parameters that a map gives: functions by index and node, then squarenesses.
+// Parameters that a map gives: functions by index and node, then squarenesses.
 struct ParameterLayout {
-    int nodes;  // an axis
+    int nodes;  // per axis
     int row(int function, int node) const { return function * nodes + node; }
     int row(Squareness squareness) const { return function_count * nodes + static_cast<int>(squareness); }
     int size() const { return function_count * nodes + squareness_count; }
 };
 
-// Where the three translations / rotations of an axis begin in the parameters.
+// First elements of the three translations or rotations of an axis among the parameters.
 template <class Number>
 std::array<Number*, 3> functions_of(std::vector<Number>& parameters, const ParameterLayout& layout, Axis axis,
                                     Component first) {
@@ -48,7 +48,7 @@ std::array<Number*, 3> functions_of(std::vector<Number>& parameters, const Param
     return {begin(0), begin(1), begin(2)};
 }
 
-// Takes a straight line off a function: 0 at home, `end` at the last node.
+// Subtracts a straight line from a function: 0 at home, `end` at the last node.
 template <class Number>
 void take_off_trend(Number* function, int nodes, const Number& end) {
     for (int k = 1; k < nodes; ++k) {
@@ -72,7 +72,7 @@ struct ChannelShare {
 };
 
 inline std::vector<ChannelShare> channel_shares(const std::vector<Pass>& passes) {
-    // Channels that move no tilt come first in each pass, so that whole blocks can skip the angles.
+    // In each pass, channels without effect on tilts come first, so that whole blocks can skip the angles.
     std::vector<ChannelShare> shares;
     for (std::size_t v = 0; v < passes.size(); ++v)
         for (const bool tilts : {false, true})
@@ -83,7 +83,7 @@ inline std::vector<ChannelShare> channel_shares(const std::vector<Pass>& passes)
     return shares;
 }
 
-// Calls `take(block, columns)` for the parameters' shares of successive raw channels; `block` holds a row a parameter.
+// Calls `take(block, columns)` for the shares of successive raw channels; `block` has a row for each parameter.
 template <int Width, class Map, class Take>
 void for_each_share(const Map& map, const std::vector<Pass>& passes, Take&& take) {
     const auto shares = channel_shares(passes);
@@ -107,7 +107,7 @@ void for_each_share(const Map& map, const std::vector<Pass>& passes, Take&& take
     }
 }
 
-// Of the parameters, in the order of the tables.
+// Determined parameters, in the order of the tables.
 template <class Map>
 std::vector<int> determined_rows(const Map& map, const ParameterLayout& layout) {
     std::vector<int> rows;
@@ -118,11 +118,11 @@ std::vector<int> determined_rows(const Map& map, const ParameterLayout& layout) 
     return rows;
 }
 
-// Fills functions, squarenesses and covariance of the calibration with what `map.is_determined` names.
+// Sets functions, squarenesses and covariance of the calibration, as far as `map.is_determined`.
 template <class Map>
 void evaluate_linear(const Map& map, const std::vector<Pass>& passes, const Plan& plan, bool full_covariance,
                      Calibration& calibration) {
-    constexpr int width = 8;  // the rows of a step's sum stay in registers
+    constexpr int width = 8;  // the rows of a step's sum then stay in registers
     const ParameterLayout layout{plan.steps() + 1};
     const std::vector<int> rows = determined_rows(map, layout);
     if (full_covariance && rows.size() > largest_covariance)
@@ -158,8 +158,8 @@ void evaluate_linear(const Map& map, const std::vector<Pass>& passes, const Plan
                 CalibratedSquareness{values[layout.row(s)][0], std::sqrt(variance[layout.row(s)].sum())};
 }
 
-// Sums the solved steps of one axis from home: component c goes to out[c][0] = 0 ... out[c][intervals]. With
-// `only_pass` the lengths of all other passes are known to be 0.
+// Adds up the solved steps of one axis from home: component c goes to out[c][0] = 0 ... out[c][intervals]. With
+// `only_pass`, the lengths of all other passes are known to be 0.
 template <class Number>
 void add_up_steps(const AxisSystem& system, const std::vector<Number>& lengths, const std::vector<Pass>& passes,
                   int only_pass, const std::array<Number*, 3>& out) {
@@ -188,7 +188,7 @@ void add_up_steps(const AxisSystem& system, const std::vector<Number>& lengths, 
     }
 }
 
-// Takes one of so many contradictions: others are not worked out.
+// Selects every n-th contradiction; the others are not computed.
 class Thinning {
 public:
     explicit Thinning(std::size_t one_of) : one_of_(one_of) {}
@@ -198,8 +198,8 @@ private:
     std::size_t one_of_, seen_ = 0;
 };
 
-// Sums of right sides, a row of coefficients each. `right_sides`: makes them, where any is taken. A share of a few
-// readings has right sides of 0 nearly everywhere, which are left out of the sums.
+// Sums of right-hand sides, with a row of coefficients for each. `right_sides` computes them, and is called only if one
+// of the sums is selected. Most right-hand sides of a share are 0, and are skipped.
 template <class Number, class RightSides>
 void add_contradictions(const Eigen::MatrixXd& contradictions, const RightSides& right_sides, Thinning& thinning,
                         std::vector<Number>& out) {
@@ -220,7 +220,7 @@ void add_contradictions(const Eigen::MatrixXd& contradictions, const RightSides&
     }
 }
 
-// What the steps of one axis say twice: `channels` of the readings, one equation of a step each.
+// Redundant readings of the steps of one axis: `channels` of the readings, one equation for each step.
 template <class Number>
 void add_contradictions(const AxisSystem& system, const std::vector<Number>& readings, const std::vector<int>& channels,
                         const std::vector<Pass>& passes, Thinning& thinning, std::vector<Number>& out) {
@@ -239,7 +239,7 @@ void add_contradictions(const AxisSystem& system, const std::vector<Number>& rea
     }
 }
 
-// A map's contradictions in place of its parameters: one of so many.
+// Gives the contradictions of a map in place of its parameters, thinned out.
 template <class Map>
 struct Contradictions {
     const Map& map;
@@ -252,9 +252,10 @@ struct Contradictions {
     }
 };
 
-// Tests whether the readings contradict each other: t^T Cov(t)^-1 t of the map's contradictions t is chi-square, its
-// freedom the rank of Cov(t). Sets fit and variance factor of the calibration. Neighbouring steps share readings, which
-// Cov(t) counts. Of very many contradictions some hundreds, evenly spaced, are taken.
+// Tests whether the readings contradict each other: t^T Cov(t)^-1 t of the map's contradictions t is chi-square
+// distributed, with the rank of Cov(t) as degrees of freedom. Sets fit and variance factor of the calibration. Cov(t)
+// accounts for readings that neighbouring steps share. Of very many contradictions some hundreds are tested, at equal
+// intervals.
 template <class Map>
 void test_fit(const Map& map, const std::vector<Pass>& passes, Calibration& calibration) {
     constexpr int width = 8;

@@ -8,7 +8,7 @@
 namespace stepdiag {
 namespace {
 
-constexpr double position_tolerance = 1e-3;  // mm: positions are written with three decimals by many controllers
+constexpr double position_tolerance = 1e-3;  // mm; many controllers write positions with three decimals
 
 void check_head_fits(const HeadCalibration& head, int beams, bool has_spots) {
     if (beams > 0 && beams != int(head.beam_offsets.size()))

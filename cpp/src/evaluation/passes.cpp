@@ -10,7 +10,7 @@
 namespace stepdiag {
 namespace {
 
-// Reading and effects of the raw channels on (distance, alpha, beta).
+// Reading, and the effects of its raw channels on (distance, alpha, beta).
 struct Reduced {
     Reading reading{0.0, 0.0, 0.0};
     bool has_distance = false;
@@ -25,10 +25,10 @@ struct Reduced {
     }
 };
 
-// Reduces the raw channels of one row after another.
+// Reduces the raw channels of successive rows.
 class Reducer {
 public:
-    // Tilts and spots are not looked at where only distances count.
+    // Ignores tilts and spots if only distances count.
     Reducer(const Measurement& measurement, const HeadCalibrations& heads, const ReadingUncertainty& uncertainty,
             LengthKind kind)
         : measurement_(measurement),
@@ -80,7 +80,7 @@ private:
         const auto distance = raw_value(distance_, row, uncertainty_.distance);
         const auto x = raw_value(spot_x_, row, uncertainty_.spot);
         const auto y = raw_value(spot_y_, row, uncertainty_.spot);
-        if (!distance) return result;  // a spot alone gives no tilt
+        if (!distance) return result;  // a spot gives no tilt without a distance
         if (!x || !y) {
             result.has_distance = true;
             result.reading.distance = distance->value;
@@ -110,7 +110,8 @@ private:
         Reduced result;
         const auto reduced =
             reduce_beams(Eigen::Map<const Eigen::VectorXd>(distances.data(), Eigen::Index(distances.size())), offsets);
-        if (reduced) result.take(*reduced, standard_uncertainties);  // else too few beams are left: a lost reading
+        if (reduced)
+            result.take(*reduced, standard_uncertainties);  // otherwise too few beams are left, and the reading is lost
         return result;
     }
 
@@ -121,13 +122,13 @@ private:
     std::vector<const Channel*> beams_;
 };
 
-// Length and tilts of a point from the reduced reading. The length is linear in the parameters only after the product
-// of tilt and lever arm is taken off: L = q_z + beta q_x - alpha q_y with q the vector from beam origin to functional
+// Length and tilts of a point, from the reduced reading. The length is linear in the parameters only without the
+// product of tilt and lever arm: L = q_z + beta q_x - alpha q_y, where q is the vector from beam origin to functional
 // point.
 void fill_point(PassPoint& point, const Reduced& reduced, double travel, bool is_scale_line, LengthKind kind) {
     const Reading& reading = reduced.reading;
     point.has_tilt = reduced.has_tilt;
-    // A scale line runs along its own beam: no lever arm, so that it needs no tilts.
+    // A scale line is parallel to its beam: without a lever arm it needs no tilts.
     point.has_length = reduced.has_distance && (reduced.has_tilt || is_scale_line || kind == LengthKind::distance);
     Eigen::RowVector3d by_reading(1.0, 0.0, 0.0);  // of the length, by (distance, alpha, beta)
     double length = reading.distance;
@@ -171,7 +172,7 @@ std::vector<Pass> collect_passes(const Measurement& measurement, const Plan& pla
             const Station& station = measurement.stations()[row];
             check_station(measurement, row, planned);
             PassPoint& point = pass.points[station.point];
-            // The file's position only finds the point: it may have been rounded when it was written.
+            // The position in the file only identifies the point, because it may have been rounded when it was written.
             const Eigen::Vector3d travel = pass.frame.transpose() * (planned[station.point].commanded - start);
             point.lateral = travel.head<2>();
             fill_point(point, reducer.reduce(row), travel.z(), pass.is_scale_line, kind);

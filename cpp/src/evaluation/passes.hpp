@@ -1,5 +1,5 @@
-// A run as the linear evaluations see it: passes along lines, each reading reduced to a length and two tilts that the
-// parameters enter linearly. Internal: not installed.
+// A run in the form that linear evaluations need: passes along lines, with each reading reduced to a length and two
+// tilts that are linear in the parameters. Internal: not installed.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +11,7 @@
 
 namespace stepdiag {
 
-// How one raw channel of a reading moves (length, alpha, beta) by one standard uncertainty.
+// Change of (length, alpha, beta) with one raw channel of a reading, by one standard uncertainty.
 using ChannelEffect = Eigen::Vector3d;
 
 struct PassPoint {
@@ -31,7 +31,7 @@ struct Pass {
     bool is_scale_line;
     Eigen::Matrix3d frame;  // machine_R_line
     std::vector<PassPoint> points;
-    int first_reading;  // readings of all passes are counted through: that of points[0]
+    int first_reading;  // index of the reading of points[0] among those of all passes
 
     Eigen::Vector3d direction() const { return frame.col(2); }
 };
@@ -41,18 +41,18 @@ enum class LengthKind {
     lever_arm_corrected,  // beam length L less commanded travel and lever arm times tilts; needs both tilts
 };
 
-// Throws InvalidArgument naming the row for a line or point that is not the plan's, a commanded position more than 1 um
-// off the plan's, channels that do not fit the head, or readings that no mirror gives.
+// Throws InvalidArgument naming the row if a line or point is not in the plan, a commanded position differs from the
+// plan by more than 1 um, channels do not fit the head, or no mirror gives the readings.
 std::vector<Pass> collect_passes(const Measurement& measurement, const Plan& plan, const HeadCalibrations& heads,
                                  const ReadingUncertainty& uncertainty, LengthKind kind);
 
-// A step of one axis over one of its intervals, as one pass made it; scale lines make none.
+// A step of one axis over one of its intervals, as measured in one pass. Scale lines have no steps.
 struct Step {
     int pass;
     int point;    // from `point` to `point + 1`
-    double sign;  // travel sign: increments times sign count in the axis' own direction
+    double sign;  // of travel: increments times sign count in the direction of the axis
 };
-using AxisSteps = std::vector<std::vector<Step>>;  // per interval, counted from home
+using AxisSteps = std::vector<std::vector<Step>>;  // for each interval, counted from home
 std::array<AxisSteps, 3> collect_steps(const std::vector<Pass>& passes, const Plan& plan);
 
 }  // namespace stepdiag

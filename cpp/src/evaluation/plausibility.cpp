@@ -25,12 +25,12 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
-// The distances of one line in one run beside the plan's travel along it.
+// Distances of one line in one run, and the plan's travel along it.
 struct LineDistances {
     std::vector<std::size_t> row;
     std::vector<double> travel, distance;  // mm
 
-    // Growth of the distance by the travel, as most pairs of readings half a line apart have it.
+    // Ratio of distance to travel: the median over pairs of readings half a line apart.
     double growth() const {
         const std::size_t half = (row.size() + 1) / 2;
         std::vector<double> ratios;
@@ -39,7 +39,7 @@ struct LineDistances {
         return median(std::move(ratios));
     }
 
-    // What a reading stands beside the line that most others are on, mm.
+    // Deviations of the readings from the line that most of them lie on, mm.
     std::vector<double> deviations() const {
         std::vector<double> offsets;
         for (std::size_t i = 0; i < row.size(); ++i) offsets.push_back(distance[i] - travel[i]);
@@ -76,7 +76,7 @@ std::string unit_like(double growth) {
                                        : "expected readings in mm, of this plan and volume";
 }
 
-// Which edges of the volume the positioning errors ask for.
+// Suggests edges of the volume that would explain the positioning errors.
 std::string volume_like(const Calibration& calibration, const PlausibleLimits& limits) {
     std::string edges;
     for (const Axis axis : all_axes) {
@@ -91,10 +91,10 @@ std::string volume_like(const Calibration& calibration, const PlausibleLimits& l
     return edges.empty() ? edges : "the readings fit a travel of " + edges + ": is the volume right?";
 }
 
-// The first line of at least so many readings whose distances do not grow as the plan travels; empty where there is
-// none.
+// A sentence about the first line with at least so many readings whose distances do not grow with the plan's travel;
+// empty if there is none.
 std::string foreign_distances(const Measurement& measurement, const Plan& plan, std::size_t fewest) {
-    constexpr double tolerance = 0.05;  // ten times what 0.1 rad of misalignment makes
+    constexpr double tolerance = 0.05;  // ten times the effect of a misalignment of 0.1 rad
     for (const auto& entry : rows_by_pass(measurement)) {
         const LineDistances line = distances_of(measurement, entry.second, plan);
         if (line.row.size() < fewest) continue;
@@ -117,7 +117,7 @@ struct Excess {
     void note(const Excess& other, double uncertainty) {
         const double slack = std::isnan(uncertainty) ? 0.0 : 3.0 * uncertainty;
         const double by = (std::abs(other.value) - slack) / other.limit;
-        if (by <= factor || std::isnan(factor)) return;  // a value that is not a number is the worst
+        if (by <= factor || std::isnan(factor)) return;  // a value that is not a number counts as the worst
         *this = other;
         factor = by;
     }
@@ -141,13 +141,13 @@ void check(const PlausibleLimits& limits) {
 }
 
 void refuse_foreign_distances(const Measurement& measurement, const Plan& plan) {
-    constexpr std::size_t enough = 8;  // of which two may be wrong ones
+    constexpr std::size_t enough = 8;  // readings, of which two may be wrong
     const std::string sentence = foreign_distances(measurement, plan, enough);
     if (!sentence.empty()) throw InvalidArgument(sentence);
 }
 
 std::string far_reading(const Measurement& measurement, const Plan& plan) {
-    constexpr double far = 1e-2;  // of the volume's shortest edge: no machine is so wrong
+    constexpr double far = 1e-2;  // of the shortest edge of the volume: no machine has such errors
     double largest = far * plan.volume().minCoeff();
     std::string place;
     for (const auto& entry : rows_by_pass(measurement)) {

@@ -16,8 +16,8 @@ void add_step(Sum& sum, const std::vector<Pass>& passes, const Step& step) {
     sum[from + 1] += step.sign;
 }
 
-// The sum of the increments of one line over the travel of one axis, counted in the axis' direction; empty where it
-// cannot be completed.
+// The sum of a line's increments over the travel of one axis, in the direction of the axis; empty if increments are
+// missing.
 Sum sum_over_travel(const std::vector<Pass>& passes, int pass, const AxisSystem& axis) {
     Sum sum;
     const Eigen::RowVector3d direction = passes[pass].direction().transpose();
@@ -84,7 +84,7 @@ SlopeSystem make_slope_system(const std::vector<Pass>& passes, const Plan& plan,
                 variance += coefficient * coefficient * variance_of_reading[reading];
                 system.sums_.back().push_back({reading, coefficient});
             }
-            // Lateral travel that cancels leaves rounding behind, which must not look like a determined angle.
+            // Lateral travel that cancels leaves rounding errors, which must not look like a determined angle.
             for (double& coefficient : equation.tail(unknowns - SlopeSystem::first_laser_angle))
                 if (std::abs(coefficient) < 1e-9 * plan.volume().norm()) coefficient = 0.0;
             equations.push_back(equation);

@@ -1,9 +1,9 @@
-// The linear trends of a run: what the sums of length increments over an axis' travel say of scales, squarenesses and
-// laser angles. To first order the length of line d at a point with lateral travel (x, y) and axis positions p changes
-// by
-//   n_d . sum_a delta_a(p_a)  -  a_d y + b_d x,      (a_d, b_d) the line's laser angles,
-// with delta_X(end) = (EXX, 0, 0), delta_Y(end) = (-C0Y Y, EYY, 0), delta_Z(end) = (B0Z Z, -A0Z Z, EZZ): the three
-// slopes that are 0 are the choice of frame. One equation for each line and axis, one for each scale line. Internal.
+// Linear trends of a run: sums of length increments over the travel of an axis determine scales, squarenesses and laser
+// angles. To first order, at lateral travel (x, y) and axis positions p, the length of line d changes by
+//   n_d . sum_a delta_a(p_a)  -  a_d y + b_d x,      where (a_d, b_d) are the line's laser angles,
+// with delta_X(end) = (EXX, 0, 0), delta_Y(end) = (-C0Y Y, EYY, 0), delta_Z(end) = (B0Z Z, -A0Z Z, EZZ). The three
+// slopes that are 0 are the choice of frame. There is one equation for each line and axis, and one for each scale line.
+// Internal.
 #pragma once
 
 #include <vector>
@@ -22,7 +22,8 @@ public:
     bool determines_scale(Axis axis) const { return determined_[scale(axis)]; }
     bool determines(Squareness s) const { return determined_[squareness(s)]; }
 
-    // Unknowns that the equations leave free: each column solves them with 0 on the right.
+    // Combinations of unknowns that remain undetermined: each column solves the equations with 0 on the right-hand
+    // side.
     const Eigen::MatrixXd& null_space() const { return null_space_; }
 
     template <class Number>
@@ -69,13 +70,13 @@ private:
         return sums;
     }
 
-    std::vector<std::vector<Term>> sums_;  // an equation each: a sum of lengths
+    std::vector<std::vector<Term>> sums_;  // a sum of lengths for each equation
     Eigen::MatrixXd inverse_, contradictions_;
     Eigen::MatrixXd null_space_;
     std::vector<bool> determined_;
 };
 
-// A step that a line has lost is taken from the other lines' solution of it; a sum that cannot be completed makes no
+// A step that a line has lost is taken from the solution of the other lines. A sum that cannot be completed gives no
 // equation.
 SlopeSystem make_slope_system(const std::vector<Pass>& passes, const Plan& plan, const AxisSystems& lengths,
                               const std::vector<bool>& usable);

@@ -9,8 +9,8 @@ namespace {
 
 using Equations = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
-// Most intervals have the same equations as the one before: solved once. Weights that differ by a hundredth of a
-// percent count as the same; that moves no estimate by more than that share of its uncertainty.
+// Most intervals have the same equations as the one before, and these are solved once. Weights that differ by less than
+// 0.01 % count as equal: that changes an estimate by less than this part of its uncertainty.
 class StepSolver {
 public:
     std::shared_ptr<const LeastSquares> solve(const Equations& equations, const Eigen::VectorXd& uncertainty) {
@@ -30,11 +30,11 @@ private:
     std::shared_ptr<const LeastSquares> last_;
 };
 
-// What readings see of an interval's three components.
+// What readings tell about the three components of an interval.
 struct Kind {
-    int first_column;   // of machine_R_line: local x and y for the tilts, z for the lengths
-    int rows_per_step;  // equations that a step makes
-    int first_channel;  // of a reading
+    int first_column;   // of machine_R_line: local x and y for tilts, z for lengths
+    int rows_per_step;  // equations of a step
+    int first_channel;  // in a reading
     Component first_component;
     OpenReason lack;
     Remedy more_lines;
@@ -51,7 +51,7 @@ Equations equations_of(const std::vector<Step>& steps, const std::vector<Pass>& 
     return equations;
 }
 
-// The component of one interval along a direction as a sum of readings; none where they do not determine it.
+// One interval's component along a direction, as a sum of readings; empty if the readings do not determine it.
 std::optional<ReadingSum> solve_along(const StepSystem& interval, const Eigen::RowVector3d& direction,
                                       const std::vector<Pass>& passes, const Kind& kind) {
     constexpr double negligible = 1e-9;
@@ -77,7 +77,7 @@ std::optional<ReadingSum> solve_along(const StepSystem& interval, const Eigen::R
     return sum;
 }
 
-// Builds the systems of all three axes, and bridges gaps: intervals that would be determined if no reading were lost.
+// Builds the systems of all three axes, and bridges gaps: intervals that would be determined without lost readings.
 class SystemBuilder {
 public:
     SystemBuilder(const std::vector<Pass>& passes, const std::array<AxisSteps, 3>& steps, const Plan& plan, Kind kind,
@@ -97,13 +97,14 @@ public:
     }
 
 private:
-    static constexpr std::size_t most_gaps = 100;  // solved jointly: their number enters with its third power
+    static constexpr std::size_t most_gaps =
+        100;  // solved jointly; the time grows with the third power of their number
 
     struct Gap {
         int axis;
         int interval;
     };
-    // An equation for the components of all gaps: their coefficients, and the readings on its right side.
+    // An equation for the components of all gaps: coefficients, and the readings on its right-hand side.
     struct Bridge {
         Eigen::RowVectorXd coefficients;
         ReadingSum right;
@@ -137,7 +138,7 @@ private:
         return variances_[step.pass][step.point][channel] + variances_[step.pass][step.point + 1][channel];
     }
 
-    // The unknown number of the first component of a gap; none where the interval is no gap.
+    // Index of the first unknown of a gap; empty if the interval is no gap.
     std::optional<int> unknown(int axis, int interval) const {
         for (std::size_t g = 0; g < gaps_.size(); ++g)
             if (gaps_[g].axis == axis && gaps_[g].interval == interval) return int(3 * g);
@@ -166,7 +167,7 @@ private:
         }
     }
 
-    // The steps that were read in a gap: they do not suffice, but they count.
+    // Steps that were read in a gap: too few, but they help.
     void add_steps_inside(std::size_t gap, std::vector<Bridge>& bridges) const {
         const StepSystem& interval = systems_[gaps_[gap].axis].intervals[gaps_[gap].interval];
         const Equations equations = equations_of(interval.steps, passes_, kind_);
@@ -262,7 +263,7 @@ private:
     const std::array<AxisSteps, 3>& steps_;
     const Plan& plan_;
     Kind kind_;
-    std::vector<std::vector<bool>> has_reading_;  // by pass and point
+    std::vector<std::vector<bool>> has_reading_;  // for each pass and point
     std::vector<std::vector<Eigen::Vector3d>> variances_;
     AxisSystems systems_;
     std::vector<Gap> gaps_;

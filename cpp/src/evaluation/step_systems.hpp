@@ -1,4 +1,5 @@
-// The small systems of equations of single steps: eq. 4 for the angles and its counterpart for the lengths. Internal.
+// Small systems of equations of single steps: eq. 4 for the angles, and the corresponding one for the lengths.
+// Internal.
 #pragma once
 
 #include <array>
@@ -20,21 +21,22 @@ struct ReadingTerm {
 };
 using ReadingSum = std::vector<ReadingTerm>;
 
-// One interval of one axis: the steps that were read at both ends, and the pseudoinverse that makes three components of
-// them. Where readings were lost and the steps alone do not suffice, sums that reach over the lost points.
+// One interval of one axis: the steps that were read at both ends, and the pseudoinverse that solves them for three
+// components. If readings were lost and these steps do not suffice: sums of readings that bridge the lost points.
 struct StepSystem {
     std::vector<Step> steps;
-    std::shared_ptr<const LeastSquares> solution;  // 3 unknowns; one equation a step (length) or two (alpha, beta)
+    std::shared_ptr<const LeastSquares>
+        solution;  // 3 unknowns; one equation for each step (length) or two (alpha, beta)
     bool is_bridged = false;
-    std::array<ReadingSum, 3> bridge;  // then: the components
-    std::array<bool, 3> determined{};  // the components
+    std::array<ReadingSum, 3> bridge;  // the components, if it is bridged
+    std::array<bool, 3> determined{};  // which components
 };
 
 // All intervals of an axis.
 struct AxisSystem {
     std::vector<StepSystem> intervals;
-    std::array<bool, 3> determined{};  // component: in every interval
-    std::optional<Undetermined> gap;   // where not: the first interval that lacks readings
+    std::array<bool, 3> determined{};  // components that are determined in every interval
+    std::optional<Undetermined> gap;   // otherwise: the first interval that lacks readings
 };
 using AxisSystems = std::array<AxisSystem, 3>;
 
@@ -46,7 +48,7 @@ AxisSystems make_angle_systems(const std::vector<Pass>& passes, const std::array
 AxisSystems make_length_systems(const std::vector<Pass>& passes, const std::array<AxisSteps, 3>& steps,
                                 const Plan& plan, const std::vector<bool>& usable);
 
-// What an interval adds to the length along a direction, as a sum of lengths; none where they do not determine it.
+// Change of length along a direction over an interval, as a sum of lengths; empty if they do not determine it.
 std::optional<ReadingSum> solve_length_along(const StepSystem& interval, const Eigen::RowVector3d& direction,
                                              const std::vector<Pass>& passes);
 

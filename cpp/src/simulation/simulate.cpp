@@ -120,7 +120,7 @@ Measurement simulate(const Machine& machine, const Plan& plan, const Heads& head
     check_run(plan, heads, options);
     const std::vector<PlannedPass> passes = planned_passes(plan, options.repeats, options.backward);
     const std::vector<std::string> signals = signal_names(heads.head);
-    std::map<const Head*, std::shared_ptr<const TracedReader>> traced;  // a common head is put together once
+    std::map<const Head*, std::shared_ptr<const TracedReader>> traced;  // a head that lines share is built once
     std::vector<SignalRow> rows;
     for (const PlannedPass& pass : passes) {
         const LinePlace place = place_on_line(machine, plan, heads, pass.line);

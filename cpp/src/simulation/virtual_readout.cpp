@@ -7,7 +7,7 @@ namespace {
 
 PassReader reader_on(const Machine& machine, const Plan& plan, const Heads& heads, const Line& line,
                      SimulationOptions options) {
-    if (!options.seconds_per_reading) options.seconds_per_reading = 1.0;  // who reads says what time has gone by
+    if (!options.seconds_per_reading) options.seconds_per_reading = 1.0;  // the caller states the time of each reading
     check_run(plan, heads, options);
     if (!plan.contains(line)) throw InvalidArgument("line: \"" + line.name() + "\" is not in the plan");
     const LinePlace place = place_on_line(machine, plan, heads, line);
