@@ -78,7 +78,7 @@ double usual_tilt(const Measurement& measurement, const std::vector<std::size_t>
         x = value("alpha", first);
         y = value("beta", first);
     }
-    return std::min(1.0, step * std::round(std::hypot(x, y) / step));
+    return std::min(1.0, step * std::round(std::sqrt(x * x + y * y) / step));
 }
 
 // On all of the line's runs.

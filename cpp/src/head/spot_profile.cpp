@@ -37,7 +37,8 @@ void check_spot(const BeamSpot& spot) {
 }
 
 double beam_radius(const GaussianMode& mode, double reduced_length) {
-    return mode.waist_radius * std::hypot(1.0, (reduced_length - mode.waist_position) / rayleigh_length(mode));
+    const double ratio = (reduced_length - mode.waist_position) / rayleigh_length(mode);
+    return mode.waist_radius * std::sqrt(1.0 + ratio * ratio);
 }
 
 double share_between(double low, double high, double centre, double radius) {

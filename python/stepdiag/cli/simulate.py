@@ -71,7 +71,8 @@ def demo(output: OutputFile | None, controller: str | None) -> None:
         from stepdiag.linuxcnc.processes import LinuxcncError
 
         try:
-            lines = run_loop(claim_loop(folder), controller_of(controller), progress=progress)
+            machine = controller_of(controller)  # refused before a folder is made
+            lines = run_loop(claim_loop(folder), machine, progress=progress)
         except LinuxcncError as error:
             raise click.ClickException(str(error)) from error
     for line in lines:

@@ -47,13 +47,18 @@ class LoopError(LinuxcncError):
 
 
 class Linuxcnc:
-    """Starts LinuxCNC once for each job."""
+    """Starts LinuxCNC once for each job. Raises InvalidArgument if stepdiag was installed from a wheel."""
 
     name = "LinuxCNC"
 
-    def do(self, job: Job, say: Say) -> FloatArray:
+    def __init__(self) -> None:
         if not BRIDGE.is_file():
-            raise InvalidArgument(f"{BRIDGE}: not found; the loop needs the source folder of stepdiag")
+            raise InvalidArgument(
+                "the loop in LinuxCNC needs stepdiag's source folder, which an installed package lacks: use ./run demo "
+                "--controller linuxcnc there, which installs LinuxCNC too, or --controller calculated here"
+            )
+
+    def do(self, job: Job, say: Say) -> FloatArray:
         listening = _Listening()
         try:
             # HAL's files take no path with a space.
