@@ -1,6 +1,7 @@
 """A wheel in a bare Debian (wheel/test): what it brings, and what it needs."""
 
 import csv
+import os
 import subprocess
 import sys
 import sysconfig
@@ -48,14 +49,18 @@ assert numba.threading_layer() == "tbb"
 
 
 def output_of(code: str) -> str:
-    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=False)
+    # There numba finds the TBB that came from PyPI, and so would anybody else.
+    environment = os.environ | {"LD_LIBRARY_PATH": f"{sys.prefix}/lib"}
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code], capture_output=True, text=True, check=False, env=environment
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 def libraries_loaded_by(code: str) -> set[Path]:
     maps = output_of(code + "\nprint(open('/proc/self/maps').read())")
-    return {Path(line.split()[-1]) for line in maps.splitlines() if ".so" in line.split()[-1]}
+    return {Path(place) for place in maps.split() if ".so" in place}
 
 
 def test_the_package_is_the_installed_one() -> None:
