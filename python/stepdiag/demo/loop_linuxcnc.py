@@ -54,8 +54,8 @@ class Linuxcnc:
     def __init__(self) -> None:
         if not BRIDGE.is_file():
             raise InvalidArgument(
-                "the loop in LinuxCNC needs stepdiag's source folder, which an installed package lacks: use ./run demo "
-                "--controller linuxcnc there, which installs LinuxCNC too, or --controller calculated here"
+                "the loop in LinuxCNC needs LinuxCNC and stepdiag's source folder, which an installed package lacks: "
+                "use ./run in that folder, or `controller` calculated"
             )
 
     def do(self, job: Job, say: Say) -> FloatArray:
