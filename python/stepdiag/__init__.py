@@ -137,6 +137,7 @@ if TYPE_CHECKING:
     from stepdiag.io.data_files import read_calibration, read_measurement, write_calibration, write_measurement
     from stepdiag.linuxcnc.processes import LinuxcncError
     from stepdiag.linuxcnc.session import LinuxcncSession
+    from stepdiag.mistakes.search import FoundMistake, find_mistakes
     from stepdiag.parameters import in_report_units, kind_of
     from stepdiag.planning.observation import extents, observe
     from stepdiag.positions.evaluation import MeasuredPositions, evaluate_positions
@@ -192,6 +193,7 @@ __all__ = [
     "FigureChange",
     "FinishedCells",
     "FitReason",
+    "FoundMistake",
     "FunctionModel",
     "GaussianMode",
     "Head",
@@ -281,6 +283,7 @@ __all__ = [
     "export_calibration",
     "expose",
     "extents",
+    "find_mistakes",
     "functional_point_straightness",
     "head_sensitivities",
     "in_report_units",
@@ -375,6 +378,10 @@ _LATER = {
     ),
     "linuxcnc.processes": ("LinuxcncError",),
     "linuxcnc.session": ("LinuxcncSession",),
+    "mistakes.search": (
+        "FoundMistake",
+        "find_mistakes",
+    ),
     "parameters": (
         "in_report_units",
         "kind_of",

@@ -4,14 +4,18 @@ from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from typing import Literal
 
+import numpy as np
+
 from stepdiag._core import __version__
 from stepdiag.acquisition.ids3010 import RUNNING, STARTING, TWIN, Ids3010, InstrumentError, Sample
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.raw_file import RawContent, RawFile
 from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, Session, Value
 from stepdiag.acquisition.reading_plan import placement
+from stepdiag.acquisition.run_from_raw import PICOMETRES
 from stepdiag.acquisition.settling import Reading, take_reading
 from stepdiag.acquisition.triggers import Context, Operator, Trigger, point_text
+from stepdiag.mistakes.nominal_way import Way, line_remark
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import Visit, visits_of
 
@@ -82,6 +86,9 @@ class Acquisition:
             if index + 1 == len(visit.points):
                 write()
                 self._operator.tell(self._summary(visit))
+                remark = self._remark(visit)
+                if remark is not None:
+                    self._operator.tell(f"warning: line {visit.line}: {remark}")
 
     def _remaining(self) -> Iterator[tuple[Visit, int]]:
         for visit in self._visits:
@@ -173,6 +180,19 @@ class Acquisition:
             f"visit {visit.number} of {len(self._visits)} (line {visit.line}, run {visit.run}, {visit.direction}): "
             f"{len(readings)} readings, {lost} lost"
         )
+
+    def _remark(self, visit: Visit) -> str | None:
+        """What its distances say of a line, beside the nominal way."""
+        read = np.array([self.done[visit.number, int(point)].pm for point in visit.points], dtype=float)  # None: NaN
+        plan = self._known.plan
+        travel = {
+            line: plan.points(line, visit.run)[visit.points] @ plan.frame(line)[:, 2]
+            for line in (*plan.lines, *plan.scale_lines)
+            if len(plan.points(line, visit.run)) == len(visit.points)
+        }
+        distance = self._header.sign * np.mean(read, axis=1) / PICOMETRES
+        way = Way(visit.run, visit.line, np.arange(len(visit.points)), travel.pop(visit.line), distance)
+        return line_remark(way, travel)
 
 
 def _records(visit: Visit, index: int, reading: Reading, channels: list[str]) -> Iterator[Record]:

@@ -58,7 +58,8 @@ def evaluate(
 
     The first line of the report is the verdict of the fit, which is also stored in the calibration.
     If the fit is rejected, the command ends with a warning and exit code 3; the calibration is
-    written, but must not be used. For the linear methods it is the worse of two verdicts: that of
+    written, but must not be used. A mistake that would explain a fit that is not accepted is named,
+    with what to change. For the linear methods it is the worse of two verdicts: that of
     their own test, and that of the adjustment of the same readings. A result that no machine can
     have ([plausible] in the scenario) is an error, and nothing is written.
 
@@ -72,7 +73,9 @@ def evaluate(
     from stepdiag.config.toml_text import located
     from stepdiag.io.data_files import is_netcdf, read_measurement, write_calibration
     from stepdiag.io.whole_files import check_input
+    from stepdiag.mistakes.search import find_mistakes
     from stepdiag.report.evaluation import evaluation_report
+    from stepdiag.report.mistakes import with_mistake
     from stepdiag.scenario.description import (
         JudgedEvaluation,
         adjust_scenario,
@@ -96,11 +99,17 @@ def evaluate(
     measurement = read_measurement(run)
     provenance = provenance_of(known, run, method=method)
     with located(str(run)), Progress("evaluate"):
-        result = (
-            adjust_scenario(known, measurement, full_covariance=with_covariance, reliability=reliability)
-            if method == "adjustment"
-            else evaluate_beside_adjustment(known, measurement, method=method, full_covariance=with_covariance)
-        )
+        try:
+            result = (
+                adjust_scenario(known, measurement, full_covariance=with_covariance, reliability=reliability)
+                if method == "adjustment"
+                else evaluate_beside_adjustment(known, measurement, method=method, full_covariance=with_covariance)
+            )
+        except InvalidArgument as error:
+            raise with_mistake(error, known, measurement) from None
+        adjusted = result.adjustment if isinstance(result, JudgedEvaluation) else result
+        is_odd = adjusted is None or adjusted.verdict.fit in ("doubtful", "rejected")
+        mistakes = find_mistakes(known, measurement, adjusted) if is_odd else []
     written = write_calibration(
         result.calibration if isinstance(result, JudgedEvaluation) else result,
         path,
@@ -112,9 +121,9 @@ def evaluate(
         from stepdiag.objects.writer import json_text
 
         files, warnings = evaluated_files(scenario, run, path), fit_warnings(path, written.fit)
-        click.echo(json_text(evaluation_object(result, written, files, measurement, known, warnings)))
+        click.echo(json_text(evaluation_object(result, written, files, measurement, known, warnings, mistakes)))
     else:
-        for line in evaluation_report(result, measurement, known):
+        for line in evaluation_report(result, measurement, known, mistakes):
             say(line)
     tell_fit(context, path, written.fit)
 

@@ -18,6 +18,7 @@ from stepdiag._core import (
     __version__,
 )
 from stepdiag.calibration.finding_text import combination_text, fault_text
+from stepdiag.mistakes.search import FoundMistake
 from stepdiag.objects.calibration import (
     CalibrationTables,
     Fit,
@@ -213,12 +214,25 @@ class LinearPart(TypedDict):
     """Why the readings could not be adjusted."""
 
 
+class NamedMistake(TypedDict):
+    entry: str
+    """Name in the catalogue; of two at once both."""
+    text: str
+    edit: str
+    """What to change."""
+    fit: Verdict
+    """With the mistake undone, as the next."""
+    variance_factor: float | None
+
+
 class EvaluationObject(TypedDict):
     """Result of `stepdiag evaluate`."""
 
     stepdiag: str
     format: Literal["stepdiag evaluation 1"]
     fit: Fit
+    mistakes: list[NamedMistake]
+    """Of which one would explain a fit that is not accepted; several: the readings do not tell which."""
     warnings: list[str]
     files: EvaluatedFiles
     readings: Readings
@@ -239,6 +253,7 @@ def evaluation_object(
     measurement: Measurement,
     known: Known,
     warnings: Sequence[str],
+    mistakes: Sequence[FoundMistake] = (),
 ) -> EvaluationObject:
     """What an evaluation found. `written`: its calibration with the date and provenance of its file."""
     adjusted = isinstance(result, Adjustment)
@@ -246,6 +261,7 @@ def evaluation_object(
         "stepdiag": __version__,
         "format": "stepdiag evaluation 1",
         "fit": fit_of(written),
+        "mistakes": [_mistake(found) for found in mistakes],
         "warnings": list(warnings),
         "files": files,
         "readings": readings_of(measurement, known),
@@ -254,6 +270,17 @@ def evaluation_object(
         "adjustment": _adjustment(result) if isinstance(result, Adjustment) else None,
         "linear": _linear(result) if isinstance(result, JudgedEvaluation) else None,
         "notes": [*cosine_rows(measurement, known), *drift_rows(measurement, known)] if adjusted else [],
+    }
+
+
+def _mistake(found: FoundMistake) -> NamedMistake:
+    fit: Any = found.fit
+    return {
+        "entry": found.entry,
+        "text": found.text,
+        "edit": found.edit,
+        "fit": fit,
+        "variance_factor": number(found.variance_factor),
     }
 
 

@@ -1,7 +1,7 @@
 """What the commands tell about their results, as lines of text."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -9,8 +9,10 @@ from stepdiag._core import Adjustment, Calibration, Measurement, straightness_re
 from stepdiag.calibration.finding_text import NOISE_ALONE, combination_text, fault_rows, fit_rows, verdict_rows
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.calibration.unseen_text import unseen_rows
+from stepdiag.mistakes.search import FoundMistake
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.fault_control import control_rows
+from stepdiag.report.mistakes import mistake_rows, unchecked_row
 from stepdiag.report.prior_effects import cosine_rows, drift_rows
 from stepdiag.report.setup_table import setup_rows
 from stepdiag.scenario.description import JudgedEvaluation
@@ -18,15 +20,22 @@ from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
 
 
-def evaluation_report(result: JudgedEvaluation | Adjustment, measurement: Measurement, known: Known) -> Iterator[str]:
-    """The verdict of the fit, lost readings, largest standard uncertainties and what is not determined; of an
-    adjustment also the faults of the readings, and how head and mirror were set up."""
+def evaluation_report(
+    result: JudgedEvaluation | Adjustment,
+    measurement: Measurement,
+    known: Known,
+    mistakes: Sequence[FoundMistake] = (),
+) -> Iterator[str]:
+    """The verdict of the fit, the mistakes that would explain it, lost readings, largest standard uncertainties and
+    what is not determined; of an adjustment also the faults of the readings, and how head and mirror were set up."""
     if isinstance(result, JudgedEvaluation):
-        return _published(result, measurement, known)
-    return _adjusted(result, measurement, known)
+        return _published(result, measurement, known, mistakes)
+    return _adjusted(result, measurement, known, mistakes)
 
 
-def _published(judged: JudgedEvaluation, measurement: Measurement, known: Known) -> Iterator[str]:
+def _published(
+    judged: JudgedEvaluation, measurement: Measurement, known: Known, mistakes: Sequence[FoundMistake]
+) -> Iterator[str]:
     calibration = judged.calibration
     first, *rest = fit_rows(calibration)
     yield first
@@ -36,17 +45,22 @@ def _published(judged: JudgedEvaluation, measurement: Measurement, known: Known)
         f"({adjusted})"
     )
     yield from rest
+    yield from mistake_rows(mistakes)
     yield from _what_was_done(calibration, measurement, known)
     yield from uncertainty_rows(calibration)
     yield from undetermined_rows(calibration)
     yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
+    yield unchecked_row(known)
     if known.keys.adjustment.model_fields_set:
         yield f"note: [adjustment] is not used by the method {calibration.method}"
 
 
-def _adjusted(adjustment: Adjustment, measurement: Measurement, known: Known) -> Iterator[str]:
+def _adjusted(
+    adjustment: Adjustment, measurement: Measurement, known: Known, mistakes: Sequence[FoundMistake]
+) -> Iterator[str]:
     calibration = adjustment.calibration
     yield from verdict_rows(adjustment)
+    yield from mistake_rows(mistakes)
     yield from _what_was_done(calibration, measurement, known)
     yield from fault_rows(adjustment.faults)
     yield from uncertainty_rows(calibration)
@@ -61,6 +75,7 @@ def _adjusted(adjustment: Adjustment, measurement: Measurement, known: Known) ->
     yield from cosine_rows(measurement, known)
     yield from drift_rows(measurement, known)
     yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
+    yield unchecked_row(known)
     if adjustment.reliability:
         yield from control_rows(adjustment.reliability)
 

@@ -10,6 +10,8 @@ import numpy as np
 from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement
 from stepdiag.calibration.finding_text import verdict_rows
 from stepdiag.io.data_files import read_measurement
+from stepdiag.mistakes.search import find_mistakes
+from stepdiag.report.mistakes import mistake_rows, with_mistake
 from stepdiag.scenario.description import adjust_scenario, read_scenario
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
@@ -37,18 +39,26 @@ def adjust_run(scenario_file: Path, run_file: Path) -> FoundTogether:
     known, run = read_scenario(scenario_file).known, read_measurement(run_file)
     try:
         if any(np.isfinite(run.channels[name]).any() for name in known.signals if name in run.channels):
-            adjustment = adjust_scenario(known, run)
-            return FoundTogether(tuple(_said(known, run, adjustment)), adjustment.calibration)
+            return _adjusted(known, run)
         _check_points(known, run)
     except InvalidArgument as error:
         raise InvalidArgument(f"{run_file}: does not belong to {scenario_file}: {error}") from None
     return FoundTogether(("the points are those of the plan; there are no readings of this head yet",))
 
 
+def _adjusted(known: Known, run: Measurement) -> FoundTogether:
+    try:
+        adjustment = adjust_scenario(known, run)
+    except InvalidArgument as error:
+        raise with_mistake(error, known, run) from None
+    return FoundTogether(tuple(_said(known, run, adjustment)), adjustment.calibration)
+
+
 def _said(known: Known, run: Measurement, adjustment: Adjustment) -> Iterator[str]:
     incomplete, missing = lost_readings(run, known.plan, known.signals)
     yield f"{len(run)} rows, {incomplete} without a complete reading; {missing} points of the plan without a row"
     yield from verdict_rows(adjustment)
+    yield from mistake_rows(find_mistakes(known, run, adjustment))
 
 
 def _check_points(known: Known, run: Measurement) -> None:

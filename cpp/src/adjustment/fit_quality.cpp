@@ -1,0 +1,23 @@
+#include <cmath>
+
+#include "adjustment/adjustment_result.hpp"
+#include "adjustment/smoothness.hpp"
+
+namespace stepdiag {
+
+std::optional<FitQuality> fit_quality(const Measurement& measurement, const Plan& plan, const Chain& chain,
+                                      const Eigen::Vector3d& tool, const HeadCalibrations& heads,
+                                      const AdjustmentOptions& options, int most_steps) {
+    const AdjustmentProblem problem(measurement, plan, chain, tool, heads, options);
+    if (problem.readings().empty()) return std::nullopt;
+    const bool smooth = options.smoothness && !options.smoothness->cross_validated;
+    GaussNewton solver(problem, smooth ? given_deviations(*options.smoothness) : std::array<double, function_count>{});
+    solver.assume_usual(std::vector<bool>(std::size_t(problem.size()), false));
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
+    if (!solver.try_solve(x, most_steps)) solver.equations().linearise(x, false);
+    const double square_sum = solver.equations().square_sum(x);
+    if (!std::isfinite(square_sum)) return std::nullopt;
+    return FitQuality{square_sum, degrees_of_freedom(solver)};
+}
+
+}  // namespace stepdiag

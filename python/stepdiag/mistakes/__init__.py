@@ -1,0 +1,1 @@
+"""Which mistake would explain that readings and scenario disagree: changed copies of both, adjusted and compared."""

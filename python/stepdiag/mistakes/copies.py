@@ -1,0 +1,247 @@
+"""Changed copies of a run and of the known half of its scenario, as the entries of the catalogue make them."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from stepdiag import _core
+from stepdiag.scenario.known import Known
+
+Rows = npt.NDArray[np.int_]
+Values = npt.NDArray[np.float64]
+Fields = Mapping[str, Values]  # by channel
+
+
+@dataclass(frozen=True)
+class Case:
+    """What an adjustment is given: a run, and what is known of it."""
+
+    known: Known
+    run: _core.Measurement
+
+
+Change = Callable[[Case], Case]
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A mistake that may have been made: its sentence and an edit to offer, both without a full stop, and the change
+    that undoes it.
+
+    `unknowns`: numbers in the change that were chosen for the fit. `last_resort`: says where, not what; named only
+    where nothing else is."""
+
+    entry: str  # name in the catalogue
+    text: str
+    edit: str
+    change: Change
+    unknowns: int = 0
+    last_resort: bool = False
+
+
+@dataclass(frozen=True)
+class Family:
+    """Hypotheses by one number that the readings choose, 0 being no mistake: the best is sought between these trials."""
+
+    make: Callable[[float], Hypothesis]
+    trials: tuple[float, ...]
+
+
+def all_lines(known: Known) -> list[str]:
+    return [*known.plan.lines, *known.plan.scale_lines]
+
+
+def passes_of(run: _core.Measurement) -> dict[tuple[int, str], Rows]:
+    """The rows of each line of each run, in the order in which they stand."""
+    rows: dict[tuple[int, str], list[int]] = {}
+    for row, key in enumerate(zip(run.run.tolist(), run.line, strict=True)):
+        rows.setdefault(key, []).append(row)
+    return {key: np.array(own) for key, own in rows.items()}
+
+
+def rows_of(run: _core.Measurement, lines: Iterable[str]) -> Rows:
+    named = set(lines)
+    return np.flatnonzero([line in named for line in run.line])
+
+
+def tilts_of(known: Known) -> tuple[str, str] | None:
+    """The two channels that tilts are read from; none of beams, which have neither."""
+    for pair in (("alpha", "beta"), ("spot_x", "spot_y")):
+        if set(pair) <= set(known.signals):
+            return pair
+    return None
+
+
+def distances_of(known: Known) -> list[str]:
+    """The channels that are lengths of beams."""
+    return [name for name in known.signals if name.startswith("d")]
+
+
+def with_channels(run: _core.Measurement, fields: Fields, uncertainty: Fields | None = None) -> _core.Measurement:
+    """The run with other readings, and other standard uncertainties where it has any."""
+    return _core.Measurement(
+        run.line,
+        run.point.tolist(),
+        run.position,
+        {**run.channels, **fields},
+        run=run.run.tolist(),
+        direction=run.direction,
+        standard_uncertainty={**run.standard_uncertainty, **(uncertainty or {})},
+    )
+
+
+def scaled(channels: Sequence[str], factor: float, lines: Sequence[str] | None = None) -> Change:
+    """These channels times a factor, on these lines or on all."""
+
+    def change(case: Case) -> Case:
+        run = case.run
+        factors = np.ones(len(run))
+        factors[rows_of(run, lines) if lines is not None else slice(None)] = factor
+        stated = run.standard_uncertainty
+        return replace(
+            case,
+            run=with_channels(
+                run,
+                {name: run.channels[name] * factors for name in channels},
+                {name: stated[name] * np.abs(factors) for name in channels if name in stated},
+            ),
+        )
+
+    return change
+
+
+def permuted(order: Mapping[str, str], lines: Sequence[str] | None = None) -> Change:
+    """Each channel takes the readings of another one, on these lines or on all."""
+
+    def change(case: Case) -> Case:
+        run = case.run
+        rows = rows_of(run, lines) if lines is not None else np.arange(len(run))
+
+        def taken(fields: Fields) -> dict[str, Values]:
+            result = {to: fields[to].copy() for to in order if to in fields}
+            for to, source in order.items():
+                if to in fields and source in fields:
+                    result[to][rows] = fields[source][rows]
+            return result
+
+        return replace(case, run=with_channels(run, taken(run.channels), taken(run.standard_uncertainty)))
+
+    return change
+
+
+def moved_rows(source: Rows) -> Change:
+    """Each row takes the readings of another one; -1: of none."""
+
+    def change(case: Case) -> Case:
+        run = case.run
+
+        def taken(fields: Fields) -> dict[str, Values]:
+            # Time stays: it belongs to the order of the rows.
+            return {
+                name: np.where(source >= 0, values[source], np.nan) if name != "time" else values
+                for name, values in fields.items()
+            }
+
+        return replace(case, run=with_channels(run, taken(run.channels), taken(run.standard_uncertainty)))
+
+    return change
+
+
+def without(rows: Rows, channels: Sequence[str]) -> Change:
+    """These readings are lost."""
+
+    def change(case: Case) -> Case:
+        emptied = {}
+        for name in channels:
+            emptied[name] = case.run.channels[name].copy()
+            emptied[name][rows] = np.nan
+        return replace(case, run=with_channels(case.run, emptied))
+
+    return change
+
+
+def in_turn(first: Change, second: Change) -> Change:
+    return lambda case: second(first(case))
+
+
+def with_plan(
+    *,
+    volume: Sequence[float] | None = None,
+    order: Sequence[str] | None = None,
+    names: Mapping[str, str] | None = None,
+) -> Change:
+    """Another plan, in which each point of the run has its number still: of another volume, with other orders of steps,
+    or lines by other names."""
+    renamed = names or {}
+
+    def change(case: Case) -> Case:
+        known, run = case.known, case.run
+        old = known.plan
+        plan = _core.Plan(
+            old.volume if volume is None else volume,
+            [renamed.get(line, line) for line in old.lines],
+            old.steps,
+            order=old.orders if order is None else list(order),
+            scale_lines=[renamed.get(line, line) for line in old.scale_lines],
+        )
+        lines = [renamed.get(line, line) for line in run.line]
+        position = np.array(run.position)
+        for (number, line), rows in passes_of(run).items():
+            position[rows] = plan.points(renamed.get(line, line), number)[run.point[rows]]
+        moved = _core.Measurement(
+            lines,
+            run.point.tolist(),
+            position,
+            run.channels,
+            run=run.run.tolist(),
+            direction=run.direction,
+            standard_uncertainty=run.standard_uncertainty,
+        )
+        return Case(
+            replace(
+                known,
+                plan=plan,
+                heads={renamed.get(line, line): head for line, head in known.heads.items()},
+                setup_by_line={renamed.get(line, line): own for line, own in known.setup_by_line.items()},
+            ),
+            moved,
+        )
+
+    return change
+
+
+def with_heads(make: Callable[[_core.Head], _core.Head], lines: Sequence[str] | None = None) -> Change:
+    """Other heads, on these lines or on all; one object for each."""
+
+    def change(case: Case) -> Case:
+        made: dict[int, _core.Head] = {}
+        heads = dict(case.known.heads)
+        for line, head in heads.items():
+            if lines is None or line in lines:
+                heads[line] = made.setdefault(id(head), make(head))
+        return replace(case, known=replace(case.known, heads=heads))
+
+    return change
+
+
+def head_like(head: _core.Head, *, psd_distance: float | None = None, beam_offsets: Values | None = None) -> _core.Head:
+    """A head of a layout with another place of its detector, or other beams."""
+    return _core.Head(
+        head.layout,
+        standoff=head.standoff,
+        psd_distance=head.psd_distance if psd_distance is None else psd_distance,
+        beam_offsets=list(head.beam_offsets if beam_offsets is None else beam_offsets),
+        wavelength=head.wavelength,
+        aperture=head.aperture,
+        mirror=head.mirror,
+    )
+
+
+def places(known: Known, *, scale_lines: bool = False) -> Iterator[tuple[list[str] | None, str]]:
+    """All lines together, then each; with the words that follow what is wrong there. Tilts of a scale line act at second
+    order only: nothing tells of them."""
+    yield None, "on all lines"
+    for line in all_lines(known) if scale_lines else known.plan.lines:
+        yield [line], f"on line {line}"
