@@ -7,6 +7,7 @@ tests/python/mistakes/test_catalogue.py."""
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations, permutations
 from typing import Any, Final
 
@@ -77,7 +78,7 @@ DISTANCE_FACTORS: Final = (
     (1 / 25.4, "in inches"),
 )
 # How sensor axes that are turned about the beam show: what alpha and beta (spot_x and spot_y) take.
-TURNS: Final = {90: (True, 1.0, -1.0), -90: (True, -1.0, 1.0), 180: (False, -1.0, -1.0)}
+TURNS: Final = {90: (True, -1.0, 1.0), -90: (True, 1.0, -1.0), 180: (False, -1.0, -1.0)}
 
 
 def columns(case: Case, channels: Sequence[str]) -> str:
@@ -135,7 +136,7 @@ def _exchanged(entry: str, case: Case) -> Hypotheses:
             yield Hypothesis(
                 entry,
                 f"{_both(distances)} are exchanged {where}: in their columns stand "
-                f"{', '.join(dict((v, k) for k, v in order.items())[name] for name in distances)}",
+                f"{', '.join({v: k for k, v in order.items()}[name] for name in distances)}",
                 f"in the run rename the columns{_rows(lines)}",
                 permuted(order, lines),
             )
@@ -176,7 +177,7 @@ def _turned(entry: str, case: Case) -> Hypotheses:
                     entry,
                     f"{said}, so that its beams stand elsewhere than beam_offsets_mm says",
                     f"in [head] turn beam_offsets_mm by {degrees}°",
-                    with_heads(lambda head, d=degrees: _with_beams(head, _rotation(d)), lines),
+                    with_heads(partial(_with_beams, by=_rotation(degrees)), lines),
                 )
 
 
@@ -208,7 +209,7 @@ def _mirrored_beams(entry: str, case: Case) -> Hypotheses:
             entry,
             f"the {name} coordinates in beam_offsets_mm have the wrong sign",
             f"in [head] change the sign of {name} in beam_offsets_mm",
-            with_heads(lambda head, by=signs: _with_beams(head, by)),
+            with_heads(partial(_with_beams, by=signs)),
         )
 
 
@@ -233,7 +234,7 @@ def _factors(entry: str, case: Case) -> Hypotheses:
                 if factor > 1.0
                 else f"beam_offsets_mm is too small by a factor of {1 / factor:g}: {why}",
                 f"in [head] divide beam_offsets_mm by {factor:g}",
-                with_heads(lambda head, f=factor: _with_beams(head, np.eye(2) / f)),
+                with_heads(partial(_with_beams, by=np.eye(2) / factor)),
             )
 
 
@@ -322,8 +323,12 @@ def _other_heads(entry: str, case: Case) -> Hypotheses:
                     entry,
                     f"line {line} was measured by the head {name}",
                     f'in [line.{line}] head = "{name}"',
-                    with_heads(lambda _, other=head: other, [line]),
+                    with_heads(partial(_replaced, by=head), [line]),
                 )
+
+
+def _replaced(_: _core.Head, by: _core.Head) -> _core.Head:
+    return by
 
 
 def _shifted(entry: str, case: Case) -> Hypotheses:
@@ -383,7 +388,7 @@ def _near(entry: str, case: Case) -> Families:
     if plan.lines and plan.scale_lines:
         groups.insert(0, list(plan.scale_lines))
     for lines in groups:
-        yield Family(lambda excess, lines=lines: _of_distances(entry, case, distances, excess, lines), _PPM)
+        yield Family(partial(_of_distances, entry, case, distances, lines), _PPM)
     if pair:
         yield Family(
             lambda log: _factor(
@@ -399,7 +404,7 @@ _PPM: Final = (-1e-3, 1e-3)
 _LOGARITHMS: Final = (-0.4, -0.1, 0.1, 0.4)
 
 
-def _of_distances(entry: str, case: Case, channels: Sequence[str], excess: float, lines: Sequence[str]) -> Hypothesis:
+def _of_distances(entry: str, case: Case, channels: Sequence[str], lines: Sequence[str], excess: float) -> Hypothesis:
     where = f"line {lines[0]}" if len(lines) == 1 else "the scale lines"
     return Hypothesis(
         entry,
@@ -416,7 +421,7 @@ def _wide_beams(entry: str, factor: float) -> Hypothesis:
         entry,
         f"beam_offsets_mm is wrong by a factor: the beams stand {factor:.4g} times as far apart",
         f"in [head] multiply beam_offsets_mm by {factor:.4g}",
-        with_heads(lambda head: _with_beams(head, np.eye(2) * factor)),
+        with_heads(partial(_with_beams, by=np.eye(2) * factor)),
         unknowns=1,
     )
 

@@ -43,7 +43,7 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class Family:
-    """Hypotheses by one number that the readings choose, 0 being no mistake: the best is sought between these trials."""
+    """Hypotheses by one number that the readings choose, 0 being no mistake: the best is sought between the trials."""
 
     make: Callable[[float], Hypothesis]
     trials: tuple[float, ...]
@@ -81,11 +81,12 @@ def distances_of(known: Known) -> list[str]:
 
 def with_channels(run: _core.Measurement, fields: Fields, uncertainty: Fields | None = None) -> _core.Measurement:
     """The run with other readings, and other standard uncertainties where it has any."""
+    channels: dict[str, npt.ArrayLike] = {**run.channels, **fields}
     return _core.Measurement(
         run.line,
         run.point.tolist(),
         run.position,
-        {**run.channels, **fields},
+        channels,
         run=run.run.tolist(),
         direction=run.direction,
         standard_uncertainty={**run.standard_uncertainty, **(uncertainty or {})},
@@ -194,7 +195,7 @@ def with_plan(
             lines,
             run.point.tolist(),
             position,
-            run.channels,
+            dict(run.channels),
             run=run.run.tolist(),
             direction=run.direction,
             standard_uncertainty=run.standard_uncertainty,
@@ -240,8 +241,8 @@ def head_like(head: _core.Head, *, psd_distance: float | None = None, beam_offse
 
 
 def places(known: Known, *, scale_lines: bool = False) -> Iterator[tuple[list[str] | None, str]]:
-    """All lines together, then each; with the words that follow what is wrong there. Tilts of a scale line act at second
-    order only: nothing tells of them."""
+    """All lines together, then each; with the words that follow what is wrong there. Of tilts scale lines are no
+    place: they act at second order only there, so that nothing tells of them."""
     yield None, "on all lines"
     for line in all_lines(known) if scale_lines else known.plan.lines:
         yield [line], f"on line {line}"

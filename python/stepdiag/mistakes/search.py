@@ -2,11 +2,11 @@
 
 A mistake is named where the fit with it undone is better by `CLEAR` in chi-square than with the readings and the
 scenario as they are (relative to the variance factor that is left, so that noise of any size names nothing), is not
-itself rejected, and explains more than the faults of single readings that the adjustment found. Hypotheses within
-`CLEAR` of each other are not told apart, and are named together."""
+itself rejected, and explains more than the faults of single readings that the adjustment found. What is less than
+`ALTERNATIVE` behind the best is not told from it, and is named with it."""
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Final
@@ -23,7 +23,8 @@ from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import only
 
-CLEAR: Final = 60.0  # in chi-square, as gain and between alternatives
+CLEAR: Final = 60.0  # least gain in chi-square
+ALTERNATIVE: Final = 25.0  # what is less behind the best may be it, as of faults
 FAULT: Final = 28.0  # what one fault of single readings must explain to be one
 CREDIBLE: Final = 9.0  # variance factor above which a fit is rejected: not worth an exact adjustment
 MOST_ADJUSTED: Final = 4
@@ -77,7 +78,11 @@ class _Tried:
 
 
 def find_mistakes(
-    scenario: Scenario | Known, measurement: _core.Measurement, adjustment: _core.Adjustment | None = None
+    scenario: Scenario | Known,
+    measurement: _core.Measurement,
+    adjustment: _core.Adjustment | None = None,
+    *,
+    refused: bool = False,
 ) -> list[FoundMistake]:
     """The mistakes of which one would explain why a run and its scenario disagree; none where nothing does, or nothing
     needs to.
@@ -89,17 +94,22 @@ def find_mistakes(
         scenario: its `known` half is used.
         measurement: the run, as it was read.
         adjustment: of this run, if there is one: faults of single readings that it found are not explained again.
+        refused: the run cannot be adjusted, or not to what a machine can be.
     """
     known = scenario.known
     case = Case(known, only(measurement, known.signals))
     with ThreadPoolExecutor(min(2, os.cpu_count() or 1)) as pool:
-        return _Search(case, adjustment, pool).found()
+        return _Search(case, adjustment, refused, pool).found()
 
 
 class _Search:
-    def __init__(self, case: Case, adjustment: _core.Adjustment | None, pool: ThreadPoolExecutor) -> None:
+    def __init__(
+        self, case: Case, adjustment: _core.Adjustment | None, refused: bool, pool: ThreadPoolExecutor
+    ) -> None:
         self._case, self._adjustment, self._pool = case, adjustment, pool
-        self._as_read = _fit_of(case, ENOUGH)
+        # However well they fit: no machine is off by so much.
+        self._is_impossible = refused or gross_lines(case.known, case.run) > 0
+        self._as_read = _NONE if self._is_impossible else _fit_of(case, ENOUGH)
 
     def found(self) -> list[FoundMistake]:
         singles = self._singles(self._case)
@@ -111,7 +121,7 @@ class _Search:
         )
 
     def _singles(self, case: Case) -> list[_Tried]:
-        """The best of all mistakes without a number of their own, the very best first."""
+        """The best of all mistakes without a number of their own, in the order of the catalogue."""
         gross = gross_lines(case.known, case.run)
 
         def screened(hypothesis: Hypothesis) -> _Tried | None:
@@ -122,16 +132,14 @@ class _Search:
             return _Tried(hypothesis, _fit_of(changed, SCREENING if left == 0 else 1))
 
         tried = [one for one in self._pool.map(screened, _hypotheses(case)) if one is not None]
-        tried.sort(key=lambda one: one.fit.square_sum)
-
-        def refined(one: _Tried) -> _Tried:
-            return _Tried(one.hypothesis, _fit_of(one.hypothesis.change(case), ENOUGH))
-
-        return sorted(self._pool.map(refined, tried[:REFINED]), key=lambda one: one.fit.square_sum)
+        limit = sorted(one.fit.square_sum for one in tried)[:REFINED][-1] if tried else 0.0
+        best = [one.hypothesis for one in tried if one.fit.square_sum <= limit]
+        fits = self._pool.map(lambda hypothesis: _fit_of(hypothesis.change(case), ENOUGH), best)
+        return list(map(_Tried, best, fits))
 
     def _of_families(self) -> list[_Tried]:
         """The best of each family."""
-        if gross_lines(self._case.known, self._case.run):
+        if self._is_impossible:
             return []  # what is no round number does not repair that
         families = [family for mistake in CATALOGUE for family in mistake.families_of(self._case)]
         best = self._pool.map(lambda family: _best_of(family, self._case, self._as_read), families)
@@ -140,17 +148,17 @@ class _Search:
     def _begun(self, tried: list[_Tried]) -> list[_Tried]:
         """Mistakes that explain a part. What the readings do not tell apart begins once."""
         begun: list[_Tried] = []
-        for one in tried:
+        for one in sorted(tried, key=lambda one: one.fit.square_sum):
             if self._gain(one) < CLEAR:
                 break
-            if all(abs(other.fit.square_sum - one.fit.square_sum) > CLEAR * one.fit.factor for other in begun):
+            if all(abs(other.fit.square_sum - one.fit.square_sum) > ALTERNATIVE * one.fit.factor for other in begun):
                 begun.append(one)
             if len(begun) == BEGUN:
                 break
         return begun
 
     def _with_second(self, first: _Tried) -> Iterator[_Tried]:
-        for second in self._singles(first.hypothesis.change(self._case))[:MOST_ADJUSTED]:
+        for second in self._singles(first.hypothesis.change(self._case)):
             a, b = first.hypothesis, second.hypothesis
             yield _Tried(
                 Hypothesis(
@@ -167,19 +175,22 @@ class _Search:
         factor = max(1.0, tried.fit.factor)
         return self._as_read.excess(factor) - tried.excess(factor)
 
-    def _named(self, tried: Iterable[_Tried]) -> list[FoundMistake]:
+    def _named(self, tried: Sequence[_Tried]) -> list[FoundMistake]:
         """The best with all that is not told from it, adjusted exactly."""
-        tried = sorted(tried, key=lambda one: one.excess(max(1.0, one.fit.factor)))
-        if not tried or self._gain(tried[0]) < CLEAR or tried[0].fit.factor > CREDIBLE:
+        if not tried:
             return []
-        factor = max(1.0, tried[0].fit.factor)
-        best = tried[0].excess(factor)
-        alike = [one for one in tried if one.excess(factor) - best < CLEAR and one.fit.factor <= CREDIBLE]
-        simple = [one for one in alike if not one.hypothesis.unknowns]
-        if tried[0].hypothesis.unknowns and simple:
-            alike = [*simple, *(one for one in alike if one.hypothesis.unknowns)]
-        if self._is_explained_by_faults(best, factor, last=tried[0].hypothesis.last_resort):
+        first = min(tried, key=lambda one: one.fit.factor)
+        factor = max(1.0, first.fit.factor)
+        if self._gain(first) < CLEAR or factor > CREDIBLE:
             return []
+        best = min(one.excess(factor) for one in tried)
+        if self._is_explained_by_faults(best, factor, last=first.hypothesis.last_resort):
+            return []
+        # What fits equally well stays in the order of the catalogue.
+        alike = sorted(
+            (one for one in tried if one.excess(factor) - best < ALTERNATIVE),
+            key=lambda one: round(one.excess(factor) - best),
+        )
         return [found for one in alike[:MOST_ADJUSTED] if (found := self._adjusted(one.hypothesis)) is not None]
 
     def _is_explained_by_faults(self, best: float, factor: float, *, last: bool) -> bool:
@@ -285,10 +296,10 @@ def _best_of(family: Family, case: Case, as_read: _Fit) -> _Tried | None:
     for value in family.trials:
         fits[value] = _fit_of(family.make(value).change(case), ENOUGH)
     for _ in range(2):
-        value = _least(fits)
-        if value is None or value in fits:
+        least = _least(fits)
+        if least is None or least in fits:
             break
-        fits[value] = _fit_of(family.make(value).change(case), ENOUGH)
+        fits[least] = _fit_of(family.make(least).change(case), ENOUGH)
     values = sorted(fits)
     best = min(values, key=lambda value: fits[value].square_sum)
     if best in (values[0], values[-1], 0.0):

@@ -29,7 +29,7 @@ def mistake_text(found: Sequence[FoundMistake]) -> str:
 def with_mistake(error: InvalidArgument, known: Known, measurement: Measurement) -> InvalidArgument:
     """The refusal of a run, with the mistake that explains it, if one does."""
     try:
-        found = find_mistakes(known, measurement)
+        found = find_mistakes(known, measurement, refused=True)
     except InvalidArgument:  # the run does not belong to the plan at all
         return error
     return InvalidArgument(f"{error}\n{chr(10).join(mistake_rows(found))}") if found else error
@@ -42,5 +42,6 @@ def unchecked_row(known: Known) -> str:
     wavelengths = ", ".join(dict.fromkeys(f"{head.wavelength:g}" for head in heads))
     return (
         f"check by hand, as no reading shows it: chain {known.chain.name}, tool offset {point_text(known.tool)}, "
-        f"standoff {standoffs} mm, and what all distances share: wavelength ({wavelengths} nm), index of air, temperature"
+        f"standoff {standoffs} mm, wavelength {wavelengths} nm, and the index of air and the temperature that all "
+        "distances were reduced with"
     )
