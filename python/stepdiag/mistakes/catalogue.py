@@ -435,11 +435,11 @@ def _psd_distances(entry: str, case: Case) -> Families:
         return
 
     def make(log: float) -> Hypothesis:
-        distance = float(f"{stated * math.exp(log):.4g}")
+        distance = float(f"{stated * math.exp(log):.3g}")
         return Hypothesis(
             entry,
-            f"psd_distance_mm is {distance:g}, not {stated:g}: the spots have another lever",
-            f"in [head] psd_distance_mm = {distance:g}",
+            f"psd_distance_mm is about {distance:g}, not {stated:g}: the spots have another lever",
+            f"in [head] write psd_distance_mm as it is; {distance:g} fits best",
             with_heads(lambda head: head_like(head, psd_distance=distance)),
             unknowns=1,
         )

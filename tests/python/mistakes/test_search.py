@@ -1,0 +1,97 @@
+"""What is named and what is not: sound and noisy runs, two mistakes at once, faults of single readings, lost lines."""
+
+import numpy as np
+import pytest
+from mistaken import changed, described, rows_of, simulated, step_plan
+
+import stepdiag as sd
+from stepdiag._core import fit_quality
+from stepdiag.scenario.description import adjustment_options
+
+HEADS = ["ideal", "psd", "multi_beam"]
+
+
+@pytest.mark.parametrize("head", HEADS)
+def test_quick_fit_is_that_of_the_adjustment(head: str) -> None:
+    scenario = described(head, steps=5)
+    run, known = simulated(scenario, seed=2), scenario.known
+    options = adjustment_options(known)
+    quick = fit_quality(run, known.plan, known.head, known.chain, known.tool, options, 30)
+    adjusted = sd.adjust_scenario(scenario, run)
+    assert quick is not None
+    assert quick.degrees_of_freedom == adjusted.degrees_of_freedom
+    assert quick.weighted_square_sum == pytest.approx(adjusted.weighted_square_sum, rel=1e-8)
+    # What the search relies on: a run that fits is told from the others after a few steps.
+    screened = fit_quality(run, known.plan, known.head, known.chain, known.tool, options, 3)
+    assert screened is not None
+    assert screened.weighted_square_sum < 2.0 * quick.weighted_square_sum
+
+
+@pytest.mark.parametrize("head", HEADS)
+@pytest.mark.parametrize("noise", [1.0, 1.5, 4.0])
+def test_nothing_is_named_where_there_is_no_mistake(head: str, noise: float) -> None:
+    scenario = described(head, steps=6)
+    for seed in range(3):
+        assert sd.find_mistakes(scenario, simulated(scenario, seed=seed, noise=noise)) == []
+
+
+def test_two_mistakes_at_once_are_named() -> None:
+    scenario = described("ideal", steps=6)
+    run = simulated(scenario, seed=5, plan=step_plan(6, order="ZYX"))
+    found = sd.find_mistakes(scenario, changed(run, {"alpha": -run.channels["alpha"]}))
+    assert {one.entry for one in found} == {"order, sign"}
+    assert found[0].text == "the step order is ZYX, not XYZ, and alpha has the wrong sign on all lines"
+    assert found[0].fit == "accepted"
+
+
+def test_mistakes_that_act_alike_are_named_together() -> None:
+    """On these beams an exchange of d2 and d3 is a mirrored layout."""
+    scenario = described("multi_beam", steps=6)
+    run = simulated(scenario, seed=5)
+    channels = run.channels
+    found = sd.find_mistakes(scenario, changed(run, {"d2": channels["d3"], "d3": channels["d2"]}))
+    assert [one.entry for one in found] == ["exchanged", "mirrored"]
+
+
+@pytest.mark.parametrize("size", [0.02, 5.0])
+def test_a_single_wrong_reading_is_no_mistake_of_the_catalogue(size: float) -> None:
+    scenario = described("ideal", steps=6)
+    run = simulated(scenario, seed=5)
+    distance = run.channels["distance"].copy()
+    distance[rows_of(run, "npp")[8]] += size
+    wrong = changed(run, {"distance": distance})
+    adjustment = sd.adjust_scenario(scenario, wrong)
+    assert adjustment.faults
+    assert sd.find_mistakes(scenario, wrong, adjustment) == []
+
+
+def test_a_slip_is_named_by_the_faults_alone() -> None:
+    scenario = described("ideal", steps=6)
+    run = simulated(scenario, seed=5)
+    distance = run.channels["distance"].copy()
+    distance[rows_of(run, "npp")[8:]] += 0.02
+    wrong = changed(run, {"distance": distance})
+    adjustment = sd.adjust_scenario(scenario, wrong)
+    assert adjustment.verdict.fit == "rejected"
+    assert sd.find_mistakes(scenario, wrong, adjustment) == []
+
+
+def test_a_disturbed_stretch_is_found_where_nothing_says_what_it_was() -> None:
+    scenario = described("ideal", steps=6)
+    run, rng = simulated(scenario, seed=5), np.random.default_rng(1)
+    rows = rows_of(run, "pnp")[4:11]
+    fields = {name: values.copy() for name, values in run.channels.items()}
+    fields["distance"][rows] += 0.05 * rng.normal(size=len(rows))
+    fields["alpha"][rows] += 5e-5 * rng.normal(size=len(rows))
+    (found,) = sd.find_mistakes(scenario, changed(run, fields))
+    assert found.entry == "disturbed"
+    assert found.text.startswith("the readings of line pnp from point 4 to point 10 do not go with the others")
+
+
+def test_same_names_on_any_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = described("psd", steps=5)
+    run = simulated(scenario, seed=5)
+    wrong = changed(run, {"spot_x": -run.channels["spot_x"]})
+    several = sd.find_mistakes(scenario, wrong)
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    assert sd.find_mistakes(scenario, wrong) == several
