@@ -15,7 +15,7 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag.mistakes.copies import (
-    Case,
+    Copy,
     Family,
     Hypothesis,
     Values,
@@ -38,7 +38,7 @@ Hypotheses = Iterator[Hypothesis]
 Families = Iterator[Family]
 
 
-def _none(entry: str, case: Case) -> Iterator[Any]:
+def _none(entry: str, copy: Copy) -> Iterator[Any]:
     return iter(())
 
 
@@ -47,14 +47,14 @@ class Mistake:
     """An entry: its name, and what it makes of a run; hypotheses with a number of their own are families."""
 
     name: str
-    hypotheses: Callable[[str, Case], Hypotheses] = _none
-    families: Callable[[str, Case], Families] = _none
+    hypotheses: Callable[[str, Copy], Hypotheses] = _none
+    families: Callable[[str, Copy], Families] = _none
 
-    def of(self, case: Case) -> Hypotheses:
-        return self.hypotheses(self.name, case)
+    def of(self, copy: Copy) -> Hypotheses:
+        return self.hypotheses(self.name, copy)
 
-    def families_of(self, case: Case) -> Families:
-        return self.families(self.name, case)
+    def families_of(self, copy: Copy) -> Families:
+        return self.families(self.name, copy)
 
 
 # Readings that are this much too large, and why they might be.
@@ -81,7 +81,7 @@ DISTANCE_FACTORS: Final = (
 TURNS: Final = {90: (True, -1.0, 1.0), -90: (True, 1.0, -1.0), 180: (False, -1.0, -1.0)}
 
 
-def columns(case: Case, channels: Sequence[str]) -> str:
+def columns(copy: Copy, channels: Sequence[str]) -> str:
     """How the columns of channels are called in a file."""
     units = {"alpha": "_urad", "beta": "_urad"}
     return ", ".join(f"{name}{units.get(name, '_mm')}" for name in channels)
@@ -95,32 +95,32 @@ def _rows(lines: Sequence[str] | None) -> str:
     return "" if lines is None else f" in the rows of {_both(lines)}"
 
 
-def _signs(entry: str, case: Case) -> Hypotheses:
-    pair, distances = tilts_of(case.known), distances_of(case.known)
+def _signs(entry: str, copy: Copy) -> Hypotheses:
+    pair, distances = tilts_of(copy.known), distances_of(copy.known)
     groups = [[name] for name in pair or ()]
     lengths = [distances] + ([[name] for name in distances] if len(distances) > 1 else [])
     for of_lengths, some in ((False, groups), (True, lengths)):
-        for lines, where in places(case.known, scale_lines=of_lengths):
+        for lines, where in places(copy.known, scale_lines=of_lengths):
             for channels in some:
                 verb = "has" if len(channels) == 1 else "have"
                 yield Hypothesis(
                     entry,
                     f"{_both(channels)} {verb} the wrong sign {where}",
-                    f"in the run multiply {columns(case, channels)} by -1{_rows(lines)}",
+                    f"in the run multiply {columns(copy, channels)} by -1{_rows(lines)}",
                     scaled(channels, -1.0, lines),
                 )
 
 
-def _exchanged(entry: str, case: Case) -> Hypotheses:
-    pair, distances = tilts_of(case.known), distances_of(case.known)
+def _exchanged(entry: str, copy: Copy) -> Hypotheses:
+    pair, distances = tilts_of(copy.known), distances_of(copy.known)
     pairs = [pair] if pair else []
     pairs += combinations(distances, 2)
-    for lines, where in places(case.known):
+    for lines, where in places(copy.known):
         for a, b in pairs:
             yield Hypothesis(
                 entry,
                 f"{a} and {b} are exchanged {where}",
-                f"in the run exchange the columns {columns(case, [a])} and {columns(case, [b])}{_rows(lines)}",
+                f"in the run exchange the columns {columns(copy, [a])} and {columns(copy, [b])}{_rows(lines)}",
                 permuted({a: b, b: a}, lines),
             )
         if pair:
@@ -128,7 +128,7 @@ def _exchanged(entry: str, case: Case) -> Hypotheses:
             yield Hypothesis(
                 entry,
                 f"{a} and {b} are exchanged and both have the wrong sign {where}",
-                f"in the run exchange {columns(case, [a])} and {columns(case, [b])} and multiply both by -1"
+                f"in the run exchange {columns(copy, [a])} and {columns(copy, [b])} and multiply both by -1"
                 f"{_rows(lines)}",
                 in_turn(permuted({a: b, b: a}, lines), scaled(pair, -1.0, lines)),
             )
@@ -150,10 +150,10 @@ def _cycles(names: Sequence[str]) -> Iterator[dict[str, str]]:
                 yield dict(zip(names, order, strict=True))
 
 
-def _turned(entry: str, case: Case) -> Hypotheses:
-    pair = tilts_of(case.known)
-    for lines, where in places(case.known):
-        heads = "the head is" if lines or len({id(head) for head in case.known.heads.values()}) == 1 else "heads are"
+def _turned(entry: str, copy: Copy) -> Hypotheses:
+    pair = tilts_of(copy.known)
+    for lines, where in places(copy.known):
+        heads = "the head is" if lines or len({id(head) for head in copy.known.heads.values()}) == 1 else "heads are"
         for degrees, (exchanged, first, second) in TURNS.items():
             as_said = " (upside down)" if degrees == 180 else ""
             said = f"{heads} turned by {degrees}° about its beam{as_said} {where}"
@@ -168,11 +168,11 @@ def _turned(entry: str, case: Case) -> Hypotheses:
                     if exchanged
                     else f"{said}, so that {a} and {b} have the wrong sign",
                     "turn the head, or in the run "
-                    + (f"exchange {columns(case, [a])} and {columns(case, [b])}, then " if exchanged else "")
-                    + f"multiply {columns(case, negative)} by -1{_rows(lines)}",
+                    + (f"exchange {columns(copy, [a])} and {columns(copy, [b])}, then " if exchanged else "")
+                    + f"multiply {columns(copy, negative)} by -1{_rows(lines)}",
                     in_turn(turn, signs),
                 )
-            elif _has_beams(case):
+            elif _has_beams(copy):
                 yield Hypothesis(
                     entry,
                     f"{said}, so that its beams stand elsewhere than beam_offsets_mm says",
@@ -181,13 +181,13 @@ def _turned(entry: str, case: Case) -> Hypotheses:
                 )
 
 
-def _same(case: Case) -> Case:
-    return case
+def _same(copy: Copy) -> Copy:
+    return copy
 
 
-def _has_beams(case: Case) -> bool:
+def _has_beams(copy: Copy) -> bool:
     """Whether the scenario says where the beams stand, and not a description."""
-    return all(head.layout == "multi_beam" and head.design is None for head in case.known.heads.values())
+    return all(head.layout == "multi_beam" and head.design is None for head in copy.known.heads.values())
 
 
 def _rotation(degrees: int) -> Values:
@@ -199,8 +199,8 @@ def _with_beams(head: _core.Head, by: Values) -> _core.Head:
     return head_like(head, beam_offsets=head.beam_offsets @ by.T)
 
 
-def _mirrored_beams(entry: str, case: Case) -> Hypotheses:
-    if not _has_beams(case):
+def _mirrored_beams(entry: str, copy: Copy) -> Hypotheses:
+    if not _has_beams(copy):
         return
     for axis, name in enumerate(("x", "y")):
         signs = np.eye(2)
@@ -213,20 +213,20 @@ def _mirrored_beams(entry: str, case: Case) -> Hypotheses:
         )
 
 
-def _factors(entry: str, case: Case) -> Hypotheses:
-    pair, distances = tilts_of(case.known), distances_of(case.known)
-    for lines, where in places(case.known):
+def _factors(entry: str, copy: Copy) -> Hypotheses:
+    pair, distances = tilts_of(copy.known), distances_of(copy.known)
+    for lines, where in places(copy.known):
         if pair:
             # Of one line, or of one channel, another factor than that of the optics is far-fetched.
             for factor, why in TILT_FACTORS if lines is None else TILT_FACTORS[:2]:
-                yield _factor(entry, case, pair, factor, where, why, lines)
+                yield _factor(entry, copy, pair, factor, where, why, lines)
             for channel in pair if lines is None else ():
                 for factor, why in TILT_FACTORS[:2]:
-                    yield _factor(entry, case, [channel], factor, where, why, lines)
-    for lines, where in places(case.known, scale_lines=True):
+                    yield _factor(entry, copy, [channel], factor, where, why, lines)
+    for lines, where in places(copy.known, scale_lines=True):
         for factor, why in DISTANCE_FACTORS:
-            yield _factor(entry, case, distances, factor, where, why, lines)
-    if _has_beams(case):
+            yield _factor(entry, copy, distances, factor, where, why, lines)
+    if _has_beams(copy):
         for factor, why in ((0.5, "half of what it is"), (2.0, "twice what it is"), (10.0, "ten times what it is")):
             yield Hypothesis(
                 entry,
@@ -240,7 +240,7 @@ def _factors(entry: str, case: Case) -> Hypotheses:
 
 def _factor(
     entry: str,
-    case: Case,
+    copy: Copy,
     channels: Sequence[str],
     factor: float,
     where: str,
@@ -253,19 +253,19 @@ def _factor(
     return Hypothesis(
         entry,
         f"{_both(channels)} {verb} too {size} {where}: {why}",
-        f"in the run multiply {columns(case, channels)} by {1.0 / factor:.6g}{_rows(lines)}",
+        f"in the run multiply {columns(copy, channels)} by {1.0 / factor:.6g}{_rows(lines)}",
         scaled(channels, 1.0 / factor, lines),
         unknowns,
     )
 
 
-def _lines_exchanged(entry: str, case: Case) -> Hypotheses:
-    passes = passes_of(case.run)
-    for a, b in combinations(all_lines(case.known), 2):
+def _lines_exchanged(entry: str, copy: Copy) -> Hypotheses:
+    passes = passes_of(copy.run)
+    for a, b in combinations(all_lines(copy.known), 2):
         numbers = [number for number, line in passes if line == a and (number, b) in passes]
         if not numbers or any(len(passes[n, a]) != len(passes[n, b]) for n in numbers):
             continue
-        source = np.arange(len(case.run))
+        source = np.arange(len(copy.run))
         for n in numbers:
             source[passes[n, a]], source[passes[n, b]] = passes[n, b], passes[n, a]
         yield Hypothesis(
@@ -276,11 +276,11 @@ def _lines_exchanged(entry: str, case: Case) -> Hypotheses:
         )
 
 
-def _reversed(entry: str, case: Case) -> Hypotheses:
-    passes = passes_of(case.run)
-    taken = set(all_lines(case.known))
-    for line in all_lines(case.known):
-        source = np.arange(len(case.run))
+def _reversed(entry: str, copy: Copy) -> Hypotheses:
+    passes = passes_of(copy.run)
+    taken = set(all_lines(copy.known))
+    for line in all_lines(copy.known):
+        source = np.arange(len(copy.run))
         for (_, name), rows in passes.items():
             if name == line:
                 source[rows] = rows[::-1]
@@ -300,8 +300,8 @@ def _reversed(entry: str, case: Case) -> Hypotheses:
             )
 
 
-def _orders(entry: str, case: Case) -> Hypotheses:
-    stated = case.known.plan.orders
+def _orders(entry: str, copy: Copy) -> Hypotheses:
+    stated = copy.known.plan.orders
     for order in map("".join, permutations("XYZ")):
         if stated != [order]:
             yield Hypothesis(
@@ -312,10 +312,10 @@ def _orders(entry: str, case: Case) -> Hypotheses:
             )
 
 
-def _other_heads(entry: str, case: Case) -> Hypotheses:
-    described = case.known.described_heads
-    heads = {described[line].place: head for line, head in case.known.heads.items()}
-    for line in all_lines(case.known):
+def _other_heads(entry: str, copy: Copy) -> Hypotheses:
+    described = copy.known.described_heads
+    heads = {described[line].place: head for line, head in copy.known.heads.items()}
+    for line in all_lines(copy.known):
         for place, head in heads.items():
             if place != described[line].place:
                 name = place.removeprefix("head.")
@@ -331,12 +331,12 @@ def _replaced(_: _core.Head, by: _core.Head) -> _core.Head:
     return by
 
 
-def _shifted(entry: str, case: Case) -> Hypotheses:
-    for way in ways_of(case.known, case.run):
+def _shifted(entry: str, copy: Copy) -> Hypotheses:
+    for way in ways_of(copy.known, copy.run):
         for shift in shift_of(way):
-            source = np.arange(len(case.run))
+            source = np.arange(len(copy.run))
             source[way.rows] = np.where(shift.source >= 0, way.rows[shift.source], -1)
-            point = case.run.point[way.rows[shift.place]]
+            point = copy.run.point[way.rows[shift.place]]
             run = f" (run {way.run})" if way.run else ""
             yield Hypothesis(
                 entry,
@@ -349,9 +349,9 @@ def _shifted(entry: str, case: Case) -> Hypotheses:
             )
 
 
-def _volume(entry: str, case: Case) -> Hypotheses:
-    plan = case.known.plan
-    found = axis_lengths(case.known, ways_of(case.known, case.run))
+def _volume(entry: str, copy: Copy) -> Hypotheses:
+    plan = copy.known.plan
+    found = axis_lengths(copy.known, ways_of(copy.known, copy.run))
     if found is None:
         return
     stated = np.array(plan.volume)
@@ -379,24 +379,24 @@ def _volume(entry: str, case: Case) -> Hypotheses:
     )
 
 
-def _near(entry: str, case: Case) -> Families:
+def _near(entry: str, copy: Copy) -> Families:
     """Factors that are no round numbers."""
-    known = case.known
+    known = copy.known
     pair, distances = tilts_of(known), distances_of(known)
     plan = known.plan
     groups = [[line] for line in plan.lines] if len(plan.lines) > 1 else []
     if plan.lines and plan.scale_lines:
         groups.insert(0, list(plan.scale_lines))
     for lines in groups:
-        yield Family(partial(_of_distances, entry, case, distances, lines), _PPM)
+        yield Family(partial(_of_distances, entry, copy, distances, lines), _PPM)
     if pair:
         yield Family(
             lambda log: _factor(
-                entry, case, pair, math.exp(log), "on all lines", "a gain that is not applied", None, 1
+                entry, copy, pair, math.exp(log), "on all lines", "a gain that is not applied", None, 1
             ),
             _LOGARITHMS,
         )
-    elif _has_beams(case):
+    elif _has_beams(copy):
         yield Family(lambda log: _wide_beams(entry, math.exp(log)), _LOGARITHMS)
 
 
@@ -404,13 +404,13 @@ _PPM: Final = (-1e-3, 1e-3)
 _LOGARITHMS: Final = (-0.4, -0.1, 0.1, 0.4)
 
 
-def _of_distances(entry: str, case: Case, channels: Sequence[str], lines: Sequence[str], excess: float) -> Hypothesis:
+def _of_distances(entry: str, copy: Copy, channels: Sequence[str], lines: Sequence[str], excess: float) -> Hypothesis:
     where = f"line {lines[0]}" if len(lines) == 1 else "the scale lines"
     return Hypothesis(
         entry,
         f"{_both(channels)} on {where} {'has' if len(channels) == 1 else 'have'} a factor of {1.0 + excess:.6f} "
         "against the other lines: wavelength or refractive index (air: 1.00027) was not applied alike, or they drift",
-        f"in the run multiply {columns(case, channels)} by {1.0 / (1.0 + excess):.6f}{_rows(lines)}",
+        f"in the run multiply {columns(copy, channels)} by {1.0 / (1.0 + excess):.6f}{_rows(lines)}",
         scaled(channels, 1.0 / (1.0 + excess), lines),
         unknowns=1,
     )
@@ -426,8 +426,8 @@ def _wide_beams(entry: str, factor: float) -> Hypothesis:
     )
 
 
-def _psd_distances(entry: str, case: Case) -> Families:
-    heads = case.known.heads.values()
+def _psd_distances(entry: str, copy: Copy) -> Families:
+    heads = copy.known.heads.values()
     if not all(head.layout == "psd" and head.design is None for head in heads):
         return
     stated = next(iter(heads)).psd_distance

@@ -15,14 +15,14 @@ Fields = Mapping[str, Values]  # by channel
 
 
 @dataclass(frozen=True)
-class Case:
+class Copy:
     """What an adjustment is given: a run, and what is known of it."""
 
     known: Known
     run: _core.Measurement
 
 
-Change = Callable[[Case], Case]
+Change = Callable[[Copy], Copy]
 
 
 @dataclass(frozen=True)
@@ -96,13 +96,13 @@ def with_channels(run: _core.Measurement, fields: Fields, uncertainty: Fields | 
 def scaled(channels: Sequence[str], factor: float, lines: Sequence[str] | None = None) -> Change:
     """These channels times a factor, on these lines or on all."""
 
-    def change(case: Case) -> Case:
-        run = case.run
+    def change(copy: Copy) -> Copy:
+        run = copy.run
         factors = np.ones(len(run))
         factors[rows_of(run, lines) if lines is not None else slice(None)] = factor
         stated = run.standard_uncertainty
         return replace(
-            case,
+            copy,
             run=with_channels(
                 run,
                 {name: run.channels[name] * factors for name in channels},
@@ -116,8 +116,8 @@ def scaled(channels: Sequence[str], factor: float, lines: Sequence[str] | None =
 def permuted(order: Mapping[str, str], lines: Sequence[str] | None = None) -> Change:
     """Each channel takes the readings of another one, on these lines or on all."""
 
-    def change(case: Case) -> Case:
-        run = case.run
+    def change(copy: Copy) -> Copy:
+        run = copy.run
         rows = rows_of(run, lines) if lines is not None else np.arange(len(run))
 
         def taken(fields: Fields) -> dict[str, Values]:
@@ -127,7 +127,7 @@ def permuted(order: Mapping[str, str], lines: Sequence[str] | None = None) -> Ch
                     result[to][rows] = fields[source][rows]
             return result
 
-        return replace(case, run=with_channels(run, taken(run.channels), taken(run.standard_uncertainty)))
+        return replace(copy, run=with_channels(run, taken(run.channels), taken(run.standard_uncertainty)))
 
     return change
 
@@ -135,8 +135,8 @@ def permuted(order: Mapping[str, str], lines: Sequence[str] | None = None) -> Ch
 def moved_rows(source: Rows) -> Change:
     """Each row takes the readings of another one; -1: of none."""
 
-    def change(case: Case) -> Case:
-        run = case.run
+    def change(copy: Copy) -> Copy:
+        run = copy.run
 
         def taken(fields: Fields) -> dict[str, Values]:
             # Time stays: it belongs to the order of the rows.
@@ -145,7 +145,7 @@ def moved_rows(source: Rows) -> Change:
                 for name, values in fields.items()
             }
 
-        return replace(case, run=with_channels(run, taken(run.channels), taken(run.standard_uncertainty)))
+        return replace(copy, run=with_channels(run, taken(run.channels), taken(run.standard_uncertainty)))
 
     return change
 
@@ -153,18 +153,18 @@ def moved_rows(source: Rows) -> Change:
 def without(rows: Rows, channels: Sequence[str]) -> Change:
     """These readings are lost."""
 
-    def change(case: Case) -> Case:
+    def change(copy: Copy) -> Copy:
         emptied = {}
         for name in channels:
-            emptied[name] = case.run.channels[name].copy()
+            emptied[name] = copy.run.channels[name].copy()
             emptied[name][rows] = np.nan
-        return replace(case, run=with_channels(case.run, emptied))
+        return replace(copy, run=with_channels(copy.run, emptied))
 
     return change
 
 
 def in_turn(first: Change, second: Change) -> Change:
-    return lambda case: second(first(case))
+    return lambda copy: second(first(copy))
 
 
 def with_plan(
@@ -177,8 +177,8 @@ def with_plan(
     or lines by other names."""
     renamed = names or {}
 
-    def change(case: Case) -> Case:
-        known, run = case.known, case.run
+    def change(copy: Copy) -> Copy:
+        known, run = copy.known, copy.run
         old = known.plan
         plan = _core.Plan(
             old.volume if volume is None else volume,
@@ -200,7 +200,7 @@ def with_plan(
             direction=run.direction,
             standard_uncertainty=run.standard_uncertainty,
         )
-        return Case(
+        return Copy(
             replace(
                 known,
                 plan=plan,
@@ -216,13 +216,13 @@ def with_plan(
 def with_heads(make: Callable[[_core.Head], _core.Head], lines: Sequence[str] | None = None) -> Change:
     """Other heads, on these lines or on all; one object for each."""
 
-    def change(case: Case) -> Case:
+    def change(copy: Copy) -> Copy:
         made: dict[int, _core.Head] = {}
-        heads = dict(case.known.heads)
+        heads = dict(copy.known.heads)
         for line, head in heads.items():
             if lines is None or line in lines:
                 heads[line] = made.setdefault(id(head), make(head))
-        return replace(case, known=replace(case.known, heads=heads))
+        return replace(copy, known=replace(copy.known, heads=heads))
 
     return change
 

@@ -16,7 +16,7 @@ import numpy as np
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.mistakes.catalogue import CATALOGUE
-from stepdiag.mistakes.copies import Case, Family, Hypothesis, in_turn, passes_of, without
+from stepdiag.mistakes.copies import Copy, Family, Hypothesis, in_turn, passes_of, without
 from stepdiag.mistakes.nominal_way import gross_lines
 from stepdiag.scenario.description import Scenario, adjust_scenario, adjustment_options
 from stepdiag.scenario.heads import of_run
@@ -95,24 +95,28 @@ def find_mistakes(
         measurement: the run, as it was read.
         adjustment: of this run, if there is one: faults of single readings that it found are not explained again.
         refused: the run cannot be adjusted, or not to what a machine can be.
+
+    Raises:
+        InvalidArgument: the run does not belong to the scenario's plan or head.
     """
     known = scenario.known
-    case = Case(known, only(measurement, known.signals))
+    copy = Copy(known, only(measurement, known.signals))
+    _quality(copy, 1)
     with ThreadPoolExecutor(min(2, os.cpu_count() or 1)) as pool:
-        return _Search(case, adjustment, refused, pool).found()
+        return _Search(copy, adjustment, refused, pool).found()
 
 
 class _Search:
     def __init__(
-        self, case: Case, adjustment: _core.Adjustment | None, refused: bool, pool: ThreadPoolExecutor
+        self, copy: Copy, adjustment: _core.Adjustment | None, refused: bool, pool: ThreadPoolExecutor
     ) -> None:
-        self._case, self._adjustment, self._pool = case, adjustment, pool
+        self._copy, self._adjustment, self._pool = copy, adjustment, pool
         # However well they fit: no machine is off by so much.
-        self._is_impossible = refused or gross_lines(case.known, case.run) > 0
-        self._as_read = _NONE if self._is_impossible else _fit_of(case, ENOUGH)
+        self._is_impossible = refused or gross_lines(copy.known, copy.run) > 0
+        self._as_read = _NONE if self._is_impossible else _fit_of(copy, ENOUGH)
 
     def found(self) -> list[FoundMistake]:
-        singles = self._singles(self._case)
+        singles = self._singles(self._copy)
         return (
             self._named(singles)
             or self._named(self._of_families())
@@ -120,29 +124,29 @@ class _Search:
             or self._named(self._disturbed())
         )
 
-    def _singles(self, case: Case) -> list[_Tried]:
+    def _singles(self, copy: Copy) -> list[_Tried]:
         """The best of all mistakes without a number of their own, in the order of the catalogue."""
-        gross = gross_lines(case.known, case.run)
+        gross = gross_lines(copy.known, copy.run)
 
         def screened(hypothesis: Hypothesis) -> _Tried | None:
-            changed = _changed(hypothesis, case)
+            changed = _changed(hypothesis, copy)
             # What leaves distances off by millimetres needs no adjustment.
             if changed is None or not (left := gross_lines(changed.known, changed.run)) < max(gross, 1):
                 return None
             return _Tried(hypothesis, _fit_of(changed, SCREENING if left == 0 else 1))
 
-        tried = [one for one in self._pool.map(screened, _hypotheses(case)) if one is not None]
+        tried = [one for one in self._pool.map(screened, _hypotheses(copy)) if one is not None]
         limit = sorted(one.fit.square_sum for one in tried)[:REFINED][-1] if tried else 0.0
         best = [one.hypothesis for one in tried if one.fit.square_sum <= limit]
-        fits = self._pool.map(lambda hypothesis: _fit_of(hypothesis.change(case), ENOUGH), best)
+        fits = self._pool.map(lambda hypothesis: _fit_of(hypothesis.change(copy), ENOUGH), best)
         return list(map(_Tried, best, fits))
 
     def _of_families(self) -> list[_Tried]:
         """The best of each family."""
         if self._is_impossible:
             return []  # what is no round number does not repair that
-        families = [family for mistake in CATALOGUE for family in mistake.families_of(self._case)]
-        best = self._pool.map(lambda family: _best_of(family, self._case, self._as_read), families)
+        families = [family for mistake in CATALOGUE for family in mistake.families_of(self._copy)]
+        best = self._pool.map(lambda family: _best_of(family, self._copy, self._as_read), families)
         return [one for one in best if one is not None]
 
     def _begun(self, tried: list[_Tried]) -> list[_Tried]:
@@ -158,7 +162,7 @@ class _Search:
         return begun
 
     def _with_second(self, first: _Tried) -> Iterator[_Tried]:
-        for second in self._singles(first.hypothesis.change(self._case)):
+        for second in self._singles(first.hypothesis.change(self._copy)):
             a, b = first.hypothesis, second.hypothesis
             yield _Tried(
                 Hypothesis(
@@ -203,7 +207,7 @@ class _Search:
 
     def _adjusted(self, hypothesis: Hypothesis) -> FoundMistake | None:
         try:
-            changed = hypothesis.change(self._case)
+            changed = hypothesis.change(self._copy)
             adjustment = adjust_scenario(changed.known, changed.run)
         except InvalidArgument:
             return None
@@ -217,13 +221,13 @@ class _Search:
 
     def _disturbed(self) -> list[_Tried]:
         """A stretch of one line without which all others agree: where it is sought, as nothing says what it was."""
-        passes = passes_of(self._case.run)
+        passes = passes_of(self._copy.run)
         if len(passes) < 2:
             return []
-        names = self._case.known.signals
+        names = self._copy.known.signals
 
         def left(rows: "np.typing.NDArray[np.int_]") -> _Fit:
-            return _fit_of(without(rows, names)(self._case), ENOUGH)
+            return _fit_of(without(rows, names)(self._copy), ENOUGH)
 
         keys = list(passes)
         fits = list(self._pool.map(lambda key: left(passes[key]), keys))
@@ -245,7 +249,7 @@ class _Search:
             middle = (low + high) // 2
             low, high = (low, middle) if is_enough(first, middle) else (middle + 1, high)
         last = low
-        points = self._case.run.point[rows[[first, last]]]
+        points = self._copy.run.point[rows[[first, last]]]
         run = f" (run {number})" if number else ""
         stretch = rows[first : last + 1]
         text = f"the readings of line {line}{run} from point {points[0]} to point {points[1]} do not go with the others"
@@ -266,40 +270,44 @@ class _Search:
         ]
 
 
-def _hypotheses(case: Case) -> Iterator[Hypothesis]:
+def _hypotheses(copy: Copy) -> Iterator[Hypothesis]:
     for mistake in CATALOGUE:
-        yield from mistake.of(case)
+        yield from mistake.of(copy)
 
 
-def _changed(hypothesis: Hypothesis, case: Case) -> Case | None:
+def _changed(hypothesis: Hypothesis, copy: Copy) -> Copy | None:
     try:
-        return hypothesis.change(case)
+        return hypothesis.change(copy)
     except InvalidArgument:
         return None
 
 
-def _fit_of(case: Case, steps: int) -> _Fit:
+def _quality(copy: Copy, steps: int) -> _core.FitQuality | None:
+    known = copy.known
+    return _core.fit_quality(
+        copy.run, known.plan, of_run(known.heads), known.chain, known.tool, adjustment_options(known), steps
+    )
+
+
+def _fit_of(copy: Copy, steps: int) -> _Fit:
     """How well a copy fits."""
-    known = case.known
     try:
-        found = _core.fit_quality(
-            case.run, known.plan, of_run(known.heads), known.chain, known.tool, adjustment_options(known), steps
-        )
+        found = _quality(copy, steps)
     except InvalidArgument:
         return _NONE
     return _NONE if found is None else _Fit(found.weighted_square_sum, found.degrees_of_freedom)
 
 
-def _best_of(family: Family, case: Case, as_read: _Fit) -> _Tried | None:
+def _best_of(family: Family, copy: Copy, as_read: _Fit) -> _Tried | None:
     """The hypothesis of a family that fits best; None where it is at the end of the trials, or as things are."""
     fits = {0.0: as_read}
     for value in family.trials:
-        fits[value] = _fit_of(family.make(value).change(case), ENOUGH)
+        fits[value] = _fit_of(family.make(value).change(copy), ENOUGH)
     for _ in range(2):
         least = _least(fits)
         if least is None or least in fits:
             break
-        fits[least] = _fit_of(family.make(least).change(case), ENOUGH)
+        fits[least] = _fit_of(family.make(least).change(copy), ENOUGH)
     values = sorted(fits)
     best = min(values, key=lambda value: fits[value].square_sum)
     if best in (values[0], values[-1], 0.0):

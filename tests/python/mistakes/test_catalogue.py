@@ -70,6 +70,7 @@ def really(plan: sd.Plan | None = None, head: sd.Head | None = None) -> Make:
 BEAMS = described("multi_beam", steps=STEPS).known.head.beam_offsets
 RIGHT_ANGLE = np.array([[0.0, -1.0], [1.0, 0.0]])
 PLACES = np.arange(3 * STEPS + 1)
+TWICE = np.where(PLACES > 7, PLACES - 1, PLACES)
 
 CASES: list[tuple[str, str, Make, str]] = [
     ("sign", "ideal", scaled("alpha", -1.0), "alpha has the wrong sign on all lines"),
@@ -99,7 +100,7 @@ CASES: list[tuple[str, str, Make, str]] = [
     ("factor", "psd", scaled("distance", 1e-3), "distance is too small by a factor of 1000 on all lines: in m"),
     ("lines exchanged", "ideal", lines_exchanged("ppp", "npp"), "lines ppp and npp are exchanged"),
     ("lines exchanged", "ideal", lines_exchanged("p00", "0p0"), "lines p00 and 0p0 are exchanged"),
-    ("reversed", "ideal", of_line("npp", lambda rows: rows[::-1]), "line npp is reversed: its points stand from its end"),
+    ("reversed", "ideal", of_line("npp", lambda rows: rows[::-1]), "line npp is reversed: its points stand from"),
     (
         "reversed",
         "psd",
@@ -107,13 +108,13 @@ CASES: list[tuple[str, str, Make, str]] = [
         "line nnp is reversed: it was measured as ppn",
     ),
     ("order", "multi_beam", really(step_plan(STEPS, order="ZXY")), "the step order is ZXY, not XYZ"),
-    ("shifted", "ideal", of_line("pnp", lambda rows: rows[np.minimum(PLACES, np.where(PLACES > 7, PLACES - 1, PLACES))]),
+    ("shifted", "ideal", of_line("pnp", lambda rows: rows[TWICE]),
      "line pnp: a point was read twice before point 8"),
     ("shifted", "psd", of_line("ppp", lambda rows: np.append(np.delete(rows, 9), -1)),
      "line ppp: a point was skipped before point 9"),
     ("volume", "ideal", really(step_plan(STEPS, volume=(810.0, 600.0, 500.0))), "x_mm = 810"),
     ("psd distance", "psd", really(head=sd.Head("psd", psd_distance=300.0)), "psd_distance_mm is about 290, not 100"),
-    ("near factor", "ideal", lambda head: scale_lines_scaled(run_of(head)), "distance on the scale lines has a factor of"),
+    ("near factor", "ideal", lambda head: scale_lines_scaled(run_of(head)), "distance on the scale lines has a factor"),
 ]  # fmt: skip
 
 
