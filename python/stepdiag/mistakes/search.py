@@ -32,6 +32,7 @@ BEGUN: Final = 2  # singles on which a second mistake is sought
 SCREENING: Final = 3  # steps of Gauss-Newton after which a run that fits is told from the others
 ENOUGH: Final = 30  # after which it is at its minimum
 REFINED: Final = 10  # of the best of a screening
+NEAR: Final = 10.0  # times the least square sum of a screening, above which nothing becomes the best
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,8 @@ class _Search:
             return _Tried(hypothesis, _fit_of(changed, SCREENING if left == 0 else 1))
 
         tried = [one for one in self._pool.map(screened, _hypotheses(copy)) if one is not None]
-        limit = sorted(one.fit.square_sum for one in tried)[:REFINED][-1] if tried else 0.0
+        sums = sorted(one.fit.square_sum for one in tried)
+        limit = min(sums[:REFINED][-1], NEAR * sums[0]) if sums else 0.0
         best = [one.hypothesis for one in tried if one.fit.square_sum <= limit]
         fits = self._pool.map(lambda hypothesis: _fit_of(hypothesis.change(copy), ENOUGH), best)
         return list(map(_Tried, best, fits))
@@ -302,7 +304,7 @@ def _best_of(family: Family, copy: Copy, as_read: _Fit) -> _Tried | None:
     """The hypothesis of a family that fits best; None where it is at the end of the trials, or as things are."""
     fits = {0.0: as_read}
     for value in family.trials:
-        fits[value] = _fit_of(family.make(value).change(copy), ENOUGH)
+        fits[value] = _fit_of(family.make(value).change(copy), SCREENING)
     for _ in range(2):
         least = _least(fits)
         if least is None or least in fits:
