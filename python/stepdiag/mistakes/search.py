@@ -32,6 +32,7 @@ BEGUN: Final = 2  # singles on which a second mistake is sought
 SCREENING: Final = 3  # steps of Gauss-Newton after which a run that fits is told from the others
 ENOUGH: Final = 30  # after which it is at its minimum
 REFINED: Final = 10  # of the best of a screening
+MOST_PARABOLAS: Final = 6
 NEAR: Final = 10.0  # times the least square sum of a screening, above which nothing becomes the best
 
 
@@ -305,11 +306,13 @@ def _best_of(family: Family, copy: Copy, as_read: _Fit) -> _Tried | None:
     fits = {0.0: as_read}
     for value in family.trials:
         fits[value] = _fit_of(family.make(value).change(copy), SCREENING)
-    for _ in range(2):
-        least = _least(fits)
+    for _ in range(MOST_PARABOLAS):
+        before, least = min(fit.square_sum for fit in fits.values()), _least(fits)
         if least is None or least in fits:
             break
         fits[least] = _fit_of(family.make(least).change(copy), ENOUGH)
+        if abs(before - fits[least].square_sum) < 0.1:
+            break
     values = sorted(fits)
     best = min(values, key=lambda value: fits[value].square_sum)
     if best in (values[0], values[-1], 0.0):
