@@ -21,7 +21,7 @@ from stepdiag.mistakes.nominal_way import gross_lines
 from stepdiag.scenario.description import Scenario, adjust_scenario, adjustment_options
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.known import Known
-from stepdiag.scenario.planned_readings import only
+from stepdiag.scenario.planned_readings import check_points, only
 
 CLEAR: Final = 60.0  # least gain in chi-square
 ALTERNATIVE: Final = 25.0  # what is less behind the best may be it, as of faults
@@ -99,11 +99,11 @@ def find_mistakes(
         refused: the run cannot be adjusted, or not to what a machine can be.
 
     Raises:
-        InvalidArgument: the run does not belong to the scenario's plan or head.
+        InvalidArgument: a point of the run is not in the scenario's plan.
     """
     known = scenario.known
+    check_points(measurement, known.plan)
     copy = Copy(known, only(measurement, known.signals))
-    _quality(copy, 1)
     with ThreadPoolExecutor(min(2, os.cpu_count() or 1)) as pool:
         return _Search(copy, adjustment, refused, pool).found()
 
@@ -285,17 +285,13 @@ def _changed(hypothesis: Hypothesis, copy: Copy) -> Copy | None:
         return None
 
 
-def _quality(copy: Copy, steps: int) -> _core.FitQuality | None:
-    known = copy.known
-    return _core.fit_quality(
-        copy.run, known.plan, of_run(known.heads), known.chain, known.tool, adjustment_options(known), steps
-    )
-
-
 def _fit_of(copy: Copy, steps: int) -> _Fit:
     """How well a copy fits."""
+    known = copy.known
     try:
-        found = _quality(copy, steps)
+        found = _core.fit_quality(
+            copy.run, known.plan, of_run(known.heads), known.chain, known.tool, adjustment_options(known), steps
+        )
     except InvalidArgument:
         return _NONE
     return _NONE if found is None else _Fit(found.weighted_square_sum, found.degrees_of_freedom)

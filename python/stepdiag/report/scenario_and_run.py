@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -14,9 +13,7 @@ from stepdiag.mistakes.search import find_mistakes
 from stepdiag.report.mistakes import mistake_rows, with_mistake
 from stepdiag.scenario.description import adjust_scenario, read_scenario
 from stepdiag.scenario.known import Known
-from stepdiag.scenario.planned_readings import lost_readings
-
-SAME_POINT: Final = 1e-3  # mm, as in the evaluations: positions in files may have been rounded
+from stepdiag.scenario.planned_readings import check_points, lost_readings
 
 
 @dataclass(frozen=True)
@@ -40,7 +37,7 @@ def adjust_run(scenario_file: Path, run_file: Path) -> FoundTogether:
     try:
         if any(np.isfinite(run.channels[name]).any() for name in known.signals if name in run.channels):
             return _adjusted(known, run)
-        _check_points(known, run)
+        check_points(run, known.plan)
     except InvalidArgument as error:
         raise InvalidArgument(f"{run_file}: does not belong to {scenario_file}: {error}") from None
     return FoundTogether(("the points are those of the plan; there are no readings of this head yet",))
@@ -59,12 +56,3 @@ def _said(known: Known, run: Measurement, adjustment: Adjustment) -> Iterator[st
     yield f"{len(run)} rows, {incomplete} without a complete reading; {missing} points of the plan without a row"
     yield from verdict_rows(adjustment)
     yield from mistake_rows(find_mistakes(known, run, adjustment))
-
-
-def _check_points(known: Known, run: Measurement) -> None:
-    """Raises InvalidArgument for a point that the plan does not have."""
-    plan = known.plan
-    for line, number, point, position in zip(run.line, run.run, run.point, run.position, strict=True):
-        points = plan.points(line, int(number)) if line in (*plan.lines, *plan.scale_lines) else ()
-        if point >= len(points) or np.max(np.abs(points[point] - position)) > SAME_POINT:
-            raise InvalidArgument(f"run {number}, line {line}, point {point}: is not in the plan, or not there")
