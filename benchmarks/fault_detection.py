@@ -100,17 +100,16 @@ class Setting:
             drift=(self.drift * rng.normal() + self.drift_of_run) / 3600.0,
         )
 
-    def run(self, seed: int, *, perfect: bool = False) -> tuple[sd.Measurement, sd.Machine]:
-        """A run of the machine of this seed; `perfect`: no noise, all set-ups true."""
+    def run(self, seed: int, *, noisy: bool = True) -> tuple[sd.Measurement, sd.Machine]:
+        """A run of the machine of this seed."""
         rng = np.random.default_rng([14, seed])
         machine = sd.Machine(CHAIN, sd.random_error_map(VOLUME, seed=seed, intervals=self.steps))
-        lines = [] if perfect else [*self.lines, *SCALE_LINES]
         run = sd.simulate(
             machine,
             self.plan,
             HEADS[self.head],
-            misalignment={line: self.misalignment(line, rng) for line in lines},
-            noise=sd.Noise(seed=seed, **({} if perfect else NOISE)),
+            misalignment={line: self.misalignment(line, rng) for line in [*self.lines, *SCALE_LINES]},
+            noise=sd.Noise(seed=seed, **(NOISE if noisy else {})),
             repeats=self.repeats,
             seconds_per_reading=SECONDS_PER_READING if self.drift or self.drift_of_run else None,
         )
@@ -197,18 +196,26 @@ CELLS = {
 }
 
 
+def controlled(setting: Setting, seed: int, fault: Fault) -> float:
+    """What a fault of size 1 adds to chi-square, from this run without noise: its set-ups are part of it."""
+    run, _ = setting.run(seed, noisy=False)
+    size = 20.0 * NOISE[{"d": "distance", "s": "spot"}.get(fault.channel[0], "tilt")]
+    left = [setting.adjust(r, outlier_probability=0.0) for r in (run, fault.into(run, size))]
+    sound, faulty = (math.nan if a is None else a.weighted_square_sum for a in left)
+    return (faulty - sound) / size**2
+
+
 @functools.cache
-def hypotheses(cell: str, count: int = 24) -> list[tuple[Fault, float]]:
-    """Single distances, single tilts and slips, with q: the chi-square that size 1 leaves in perfect readings."""
+def hypotheses(cell: str, count: int = 24) -> list[Fault]:
+    """Single distances, single tilts and slips that the readings control."""
     setting, rng = CELLS[cell], np.random.default_rng(len(cell))
-    found: list[tuple[Fault, float]] = []
-    run, _ = setting.run(0, perfect=True)
+    found: list[Fault] = []
+    run, _ = setting.run(0)
     while len(found) < count:
         fault = pick(KINDS_OF_FAULTS[len(found) % 4], run, rng)
-        size = 20.0 * NOISE[{"d": "distance", "s": "spot"}.get(fault.channel[0], "tilt")]
-        left = setting.adjust(fault.into(run, size), outlier_probability=0.0)
-        if left is not None and left.weighted_square_sum > 0.02 * 20.0**2:  # otherwise nothing controls it
-            found.append((fault, left.weighted_square_sum / size**2))
+        noise = NOISE[{"d": "distance", "s": "spot"}.get(fault.channel[0], "tilt")]
+        if controlled(setting, 0, fault) * noise**2 > 0.02:
+            found.append(fault)
     return found
 
 
@@ -220,9 +227,10 @@ def sound(cell: str, seed: int) -> str:
 def faulty(cell: str, seed: int) -> tuple[float, bool, bool]:
     """Root of lambda; whether a fault was found; whether it was this one."""
     known, other = hypotheses(cell), seed // len(LEVELS)
-    (fault, q), level = known[other % len(known)], LEVELS[seed % len(LEVELS)]
-    run, _ = CELLS[cell].run(10_000_000 + seed)
-    adjusted = CELLS[cell].adjust(fault.into(run, (-1) ** other * level / q**0.5))
+    fault, level, run_seed = known[other % len(known)], LEVELS[seed % len(LEVELS)], 10_000_000 + seed
+    run, _ = CELLS[cell].run(run_seed)
+    size = (-1) ** other * level / controlled(CELLS[cell], run_seed, fault) ** 0.5
+    adjusted = CELLS[cell].adjust(fault.into(run, size))
     return level, adjusted is not None and bool(classes(adjusted)), adjusted is not None and fault.is_in(adjusted)
 
 

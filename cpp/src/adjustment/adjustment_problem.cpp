@@ -384,7 +384,7 @@ void AdjustmentProblem::estimate(std::vector<EstimatedFault> faults) {
         ++border_;
         prior_.push_back(fault.prior);
         usual_.push_back(fault.usual);
-        change_scale_.push_back(is_length(readings_[fault.readings.front()]) ? 1.0 / metre : 1.0);
+        change_scale_.push_back(is_length(readings_[fault.pattern.readings.front()]) ? 1.0 / metre : 1.0);
     }
     faults_ = std::move(faults);
 }

@@ -52,9 +52,17 @@ struct AdjustedReading {
     bool used() const { return outlier == 0; }
 };
 
-// A fault whose size is an unknown: what some readings read too much.
-struct EstimatedFault {
+// What each of some readings reads too much by a fault of size 1.
+struct ReadingPattern {
     std::vector<int> readings;
+    std::vector<double> share;
+
+    bool operator==(const ReadingPattern& other) const { return readings == other.readings && share == other.share; }
+};
+
+// A fault whose size is an unknown.
+struct EstimatedFault {
+    ReadingPattern pattern;
     PriorUncertainty prior;  // of the size
     double usual;            // size that it may have where nothing tells it
     int group;  // of alternatives, of which one is the fault: together they are one thing that was not known

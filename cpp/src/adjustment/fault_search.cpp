@@ -76,8 +76,7 @@ FaultSearch::SolutionPointer FaultSearch::run() {
 
 void FaultSearch::add_fault(std::vector<EstimatedFault>& faults, const Candidate& candidate, PriorUncertainty prior,
                             int group) const {
-    const auto readings = hypotheses_.readings(candidate.hypothesis);
-    faults.push_back({{readings.begin(), readings.end()}, prior, std::abs(candidate.score.size), group});
+    faults.push_back({hypotheses_.pattern(candidate.hypothesis), prior, std::abs(candidate.score.size), group});
 }
 
 AdjustmentProblem FaultSearch::handled(int without, const Candidate* instead) const {
@@ -111,7 +110,7 @@ Eigen::VectorXd FaultSearch::carried(const Solution& from, const AdjustmentProbl
     x.head(problem_.size()) = from.x().head(problem_.size());
     for (const EstimatedFault& fault : to.faults())
         for (const EstimatedFault& old : from.problem().faults())
-            if (old.readings == fault.readings) x[fault.unknown] = from.x()[old.unknown];
+            if (old.pattern == fault.pattern) x[fault.unknown] = from.x()[old.unknown];
     return x;
 }
 

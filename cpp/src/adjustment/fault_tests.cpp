@@ -57,13 +57,22 @@ FaultScore score_of(const ReadingPattern& pattern, const NormalEquations& equati
     return {s, q > least_share * square ? q : 0.0};
 }
 
-std::string name(FaultKind kind) { return kind == FaultKind::reading ? "reading" : "slip"; }
+std::string name(FaultKind kind) {
+    constexpr const char* names[] = {"reading", "slip", "factor"};
+    return names[static_cast<int>(kind)];
+}
 
 FaultHypotheses::FaultHypotheses(const AdjustmentProblem& problem) {
     std::map<std::pair<int, int>, std::vector<int>> by_channel;
+    std::vector<double> farthest(problem.setups().size());
     for (const AdjustedPoint& point : problem.points())
-        for (int r = point.first_reading; r < point.end_reading; ++r)
+        farthest[point.setup] = std::max(farthest[point.setup], point.place.travel);
+    part_of_travel_.resize(problem.readings().size());
+    for (const AdjustedPoint& point : problem.points())
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
             by_channel[{point.setup, problem.readings()[r].channel}].push_back(r);
+            part_of_travel_[r] = point.place.travel / farthest[point.setup];
+        }
     for (auto& [place, readings] : by_channel) {
         std::sort(readings.begin(), readings.end(),
                   [&](int a, int b) { return problem.readings()[a].row < problem.readings()[b].row; });
@@ -76,6 +85,8 @@ FaultHypotheses::FaultHypotheses(const AdjustmentProblem& problem) {
         for (int i = free && count == 2 ? 1 : 0; i < count; ++i)
             all_.push_back({FaultKind::reading, sequence, used[i]});
         for (int i = free ? 2 : 0; i < count - 1; ++i) all_.push_back({FaultKind::slip, sequence, used[i]});
+        const bool is_only_distance = place.second == 0 && problem.setups()[place.first].model.beams() == 0;
+        if (is_only_distance && count > 2) all_.push_back({FaultKind::factor, sequence, 0});
         // Of two readings the slip is the other reading's fault.
         if (free && count > 2) first_.push_back({used[0], used[1]});
         else first_.push_back({none, none});
@@ -88,6 +99,15 @@ FaultHypotheses::Readings FaultHypotheses::readings(const FaultHypothesis& hypot
     const std::vector<int>& sequence = sequences_[hypothesis.sequence].readings;
     const int* first = sequence.data() + hypothesis.first;
     return {first, hypothesis.kind == FaultKind::reading ? first + 1 : sequence.data() + sequence.size()};
+}
+
+ReadingPattern FaultHypotheses::pattern(const FaultHypothesis& hypothesis) const {
+    ReadingPattern pattern;
+    for (const int r : readings(hypothesis)) {
+        pattern.readings.push_back(r);
+        pattern.share.push_back(share(hypothesis, r));
+    }
+    return pattern;
 }
 
 std::optional<FaultHypothesis> FaultHypotheses::as_slip(const FaultHypothesis& reading) const {
@@ -126,6 +146,8 @@ FaultTests::FaultTests(const NormalEquations& equations, const BorderedFactor& f
         set(int(h), share < controlled_share ? 0.0 : weight_[r] * weight_[r] * share);
         exact_[h] = true;
     }
+    for (std::size_t h = 0; h < all.size(); ++h)
+        if (all[h].kind == FaultKind::factor) refine(int(h));
     test_slips(most_solutions);
 }
 
@@ -170,14 +192,16 @@ void FaultTests::refine(int hypothesis) {
 
 void FaultTests::set(int hypothesis, double c_r_c) {
     c_r_c_[hypothesis] = c_r_c;
+    const FaultHypothesis& h = hypotheses_->all()[hypothesis];
     double sum = 0.0;
-    for (const int r : hypotheses_->readings(hypotheses_->all()[hypothesis])) sum += weight_[r] * residuals_[r];
+    for (const int r : hypotheses_->readings(h)) sum += weight(h, r) * residuals_[r];
     scores_[hypothesis] = FaultScore(sum, c_r_c);
 }
 
 double FaultTests::square(int hypothesis) const {
+    const FaultHypothesis& h = hypotheses_->all()[hypothesis];
     double sum = 0.0;
-    for (const int r : hypotheses_->readings(hypotheses_->all()[hypothesis])) sum += weight_[r] * weight_[r];
+    for (const int r : hypotheses_->readings(h)) sum += std::pow(weight(h, r), 2);
     return sum;
 }
 
@@ -187,7 +211,7 @@ Eigen::VectorXd FaultTests::gradient(const FaultHypothesis& hypothesis) const {
         if (weight_[r] == 0.0) continue;
         const NormalEquations::Row row = equations_->row(r);
         for (int i = 0; i < row.size; ++i)
-            if (row.unknown[i] != no_unknown) gradient[row.unknown[i]] += weight_[r] * row.derivative[i];
+            if (row.unknown[i] != no_unknown) gradient[row.unknown[i]] += weight(hypothesis, r) * row.derivative[i];
     }
     return gradient;
 }
@@ -203,7 +227,7 @@ double FaultTests::controlled(int hypothesis, const Eigen::VectorXd& effect) con
     const FaultHypothesis& h = hypotheses_->all()[hypothesis];
     double q = 0.0;
     for (const int r : hypotheses_->readings(h))
-        if (weight_[r] > 0.0) q += weight_[r] * (weight_[r] - equations_->row(r).product(effect));
+        if (weight_[r] > 0.0) q += weight(h, r) * (weight(h, r) - equations_->row(r).product(effect));
     return q < controlled_share * square(hypothesis) ? 0.0 : q;
 }
 
@@ -213,7 +237,7 @@ std::vector<double> FaultTests::correlations(int hypothesis, const Eigen::Vector
     const double own = controlled(hypothesis, effect);
     if (own == 0.0) return correlations;
     Eigen::VectorXd shown = Eigen::VectorXd::Zero(weight_.size());  // R c
-    for (const int r : hypotheses_->readings(all[hypothesis])) shown[r] = weight_[r];
+    for (const int r : hypotheses_->readings(all[hypothesis])) shown[r] = weight(all[hypothesis], r);
     for (Eigen::Index r = 0; r < weight_.size(); ++r)
         if (weight_[r] > 0.0) shown[r] -= equations_->row(int(r)).product(effect);
     // Of the readings from each place of a sequence to its end.
@@ -227,9 +251,10 @@ std::vector<double> FaultTests::correlations(int hypothesis, const Eigen::Vector
     }
     for (std::size_t k = 0; k < all.size(); ++k) {
         if (c_r_c_[k] == 0.0) continue;
-        const int r = *hypotheses_->readings(all[k]).begin();
-        const double product =
-            all[k].kind == FaultKind::reading ? weight_[r] * shown[r] : from[all[k].sequence][all[k].first];
+        double product = 0.0;
+        if (all[k].kind == FaultKind::slip) product = from[all[k].sequence][all[k].first];
+        else
+            for (const int r : hypotheses_->readings(all[k])) product += weight(all[k], r) * shown[r];
         correlations[k] = product / std::sqrt(own * c_r_c_[k]);
     }
     return correlations;

@@ -25,7 +25,7 @@ struct ReadingSequence {
 struct FaultHypothesis {
     FaultKind kind;
     int sequence;
-    int first;  // into its sequence: the reading, or that from which on the channel slipped
+    int first;  // into its sequence: the reading, that from which on the channel slipped, or 0
 
     bool operator==(const FaultHypothesis& other) const {
         return kind == other.kind && sequence == other.sequence && first == other.first;
@@ -34,7 +34,7 @@ struct FaultHypothesis {
 
 // Every fault that is tested for, each once. The slip before the last reading is that reading's fault. Where an unknown
 // of the set-up takes up a constant of the channel, the slip after the first reading is the opposite of that reading's
-// fault (`as_slip`), and of two readings there is only one fault. Readings that are left out take no part: make it anew
+// fault (`as_slip`), and of two readings there is only one fault. A factor is one of a line's only distance. Readings that are left out take no part: make it anew
 // after leaving one out.
 class FaultHypotheses {
 public:
@@ -51,6 +51,11 @@ public:
         const int* end() const { return last; }
     };
     Readings readings(const FaultHypothesis& hypothesis) const;
+    // What one of its readings reads too much by a fault of size 1.
+    double share(const FaultHypothesis& hypothesis, int reading) const {
+        return hypothesis.kind == FaultKind::factor ? part_of_travel_[reading] : 1.0;
+    }
+    ReadingPattern pattern(const FaultHypothesis& hypothesis) const;
 
     // A wrong first reading, named as a slip of all later ones by as much the other way; none for other faults.
     std::optional<FaultHypothesis> as_slip(const FaultHypothesis& reading) const;
@@ -64,6 +69,7 @@ private:
     std::vector<ReadingSequence> sequences_;
     std::vector<std::array<int, 2>> first_;  // two used places of each sequence that has a free constant
     std::vector<bool> is_tilt_;
+    std::vector<double> part_of_travel_;  // by reading: of the farthest one of its set-up
     std::vector<FaultHypothesis> all_;
 };
 
@@ -74,12 +80,6 @@ struct FaultScore {
 
     FaultScore() = default;
     FaultScore(double s, double q);  // s = c.w and q; 0 where nothing controls it
-};
-
-// What each of some readings reads too much by a fault of size 1.
-struct ReadingPattern {
-    std::vector<int> readings;
-    std::vector<double> share;
 };
 
 // Of any fault, at the equations' last linearisation, with the factor there: one solution. Below this share of c.c, q
@@ -120,6 +120,9 @@ public:
     double correlation(int h, int k) const { return correlations(h)[k]; }
 
 private:
+    double weight(const FaultHypothesis& hypothesis, int reading) const {  // element of c
+        return weight_[reading] * hypotheses_->share(hypothesis, reading);
+    }
     Eigen::VectorXd gradient(const FaultHypothesis& hypothesis) const;  // J^T c
     double controlled(int hypothesis, const Eigen::VectorXd& effect) const;
     void test_slips(int most_solutions);

@@ -39,9 +39,10 @@ NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&p
     std::size_t weights = 0;
     first_weight_.resize(problem.readings().size());
     point_of_reading_.resize(problem.readings().size());
-    std::vector<std::vector<const EstimatedFault*>> faults(problem.readings().size());
+    std::vector<std::vector<std::pair<int, double>>> faults(problem.readings().size());  // unknown, share
     for (const EstimatedFault& fault : problem.faults())
-        for (const int r : fault.readings) faults[r].push_back(&fault);
+        for (std::size_t k = 0; k < fault.pattern.readings.size(); ++k)
+            faults[fault.pattern.readings[k]].emplace_back(fault.unknown, fault.pattern.share[k]);
     std::vector<std::pair<std::size_t, double>> of_faults;  // into derivatives_: they are the same everywhere
     for (std::size_t p = 0; p < problem.points().size(); ++p) {
         const AdjustedPoint& point = problem.points()[p];
@@ -54,20 +55,20 @@ NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&p
         const std::size_t known = 18 + setup.active.size();
         std::size_t count = known;
         for (int r = point.first_reading; r < point.end_reading; ++r)
-            for (const EstimatedFault* fault : faults[r]) {
+            for (const auto& [unknown, share] : faults[r]) {
                 const auto begin = unknowns_.end() - std::ptrdiff_t(count - known);
-                if (std::find(begin, unknowns_.end(), fault->unknown) != unknowns_.end()) continue;
-                unknowns_.push_back(fault->unknown);
+                if (std::find(begin, unknowns_.end(), unknown) != unknowns_.end()) continue;
+                unknowns_.push_back(unknown);
                 ++count;
             }
         for (int r = point.first_reading; r < point.end_reading; ++r) {
             first_weight_[r] = weights;
             point_of_reading_[r] = int(p);
-            for (const EstimatedFault* fault : faults[r]) {
+            for (const auto& [unknown, share] : faults[r]) {
                 const auto begin = unknowns_.end() - std::ptrdiff_t(count - known);
-                const auto place = std::find(begin, unknowns_.end(), fault->unknown) - begin;
+                const auto place = std::find(begin, unknowns_.end(), unknown) - begin;
                 of_faults.emplace_back(weights + known + std::size_t(place),
-                                       1.0 / problem.readings()[r].standard_uncertainty);
+                                       share / problem.readings()[r].standard_uncertainty);
             }
             weights += count;
         }

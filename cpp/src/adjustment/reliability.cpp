@@ -306,8 +306,14 @@ private:
         const auto& all = hypotheses_.all();
         for (int h = 0; h < int(all.size()); ++h) {
             if (!is_controlled(h)) continue;
-            const auto& effects = all[h].kind == FaultKind::reading ? of : from;
-            const double changed = limit_ * uncertainty(h) * std::abs(effects[all[h].sequence][all[h].first]);
+            const ReadingSequence& sequence = hypotheses_.sequences()[all[h].sequence];
+            double effect = (all[h].kind == FaultKind::reading ? of : from)[all[h].sequence][all[h].first];
+            if (all[h].kind == FaultKind::factor) {
+                effect = 0.0;
+                for (std::size_t i = 0; i < sequence.readings.size(); ++i)
+                    effect += hypotheses_.share(all[h], sequence.readings[i]) * of[all[h].sequence][i];
+            }
+            const double changed = limit_ * uncertainty(h) * std::abs(effect);
             Entry& entry = largest[{group_[h], values_[v].family}];
             if (changed > entry.effect) entry = {changed, h, v};
         }

@@ -205,7 +205,8 @@ void bind_result(py::module_& m) {
     py::class_<Fault>(m, "Fault", "A fault that explains the readings, if it is the one.")
         .def_property_readonly(
             "kind", [](const Fault& f) { return name(f.kind); },
-            "\"reading\", or \"slip\": an offset of its channel from this reading on.")
+            "\"reading\", \"slip\": an offset of its channel from this reading on, or \"factor\": distances of its line "
+            "too long by a part of the travel.")
         .def_readonly("row", &Fault::row)
         .def_readonly("run", &Fault::run)
         .def_readonly("line", &Fault::line)
@@ -299,7 +300,7 @@ void bind_result(py::module_& m) {
         "not told apart at any size: their effects have a correlation of 0.999 and more, but the calibration differs.")
         .def_property_readonly(
             "kind", [](const FaultControl& c) { return name(c.kind); },
-            "\"reading\", or \"slip\": an offset of its channel from a reading on.")
+            "\"reading\", \"slip\": an offset of its channel from a reading on, or \"factor\" on a line's distances.")
         .def_readonly("channel", &FaultControl::channel, "\"distance\", \"tilt\" or \"spot\".")
         .def_readonly("count", &FaultControl::count, "Of controlled faults, one a place (of long runs: evenly spaced).")
         .def_readonly("uncontrolled", &FaultControl::uncontrolled, "More of them, which no other reading controls.")

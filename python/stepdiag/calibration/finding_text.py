@@ -290,6 +290,8 @@ def _fault(fault: Fault) -> str:
         f"too {'much' if fault.size > 0 else 'little'}"
     )
     run = f" (run {fault.run})" if fault.run else ""
+    if fault.kind == "factor":
+        return f"a factor on distances: {fault.channel} on {fault.line}{run} reads {size} where the line is farthest"
     if fault.kind == "slip":
         name = "an offset" if is_angle or fault.channel.startswith("spot") else "a slip of the fringe counter"
         return f"{name}: {fault.channel} on {fault.line}{run} reads {size} from point {fault.point} on"
@@ -300,8 +302,8 @@ def _alternative(fault: Fault) -> str:
     is_angle = fault.channel in ("alpha", "beta")
     size = f"{fault.size * (MICRO if is_angle else 1e3):+.4g} {'µrad' if is_angle else 'µm'}"
     run = f" (run {fault.run})" if fault.run else ""
-    since = " from point {} on" if fault.kind == "slip" else " point {}"
-    return f"{fault.channel} of {fault.line}{since.format(fault.point)}{run} ({size})"
+    where = {"slip": f" from point {fault.point} on", "factor": " growing along the line"}
+    return f"{fault.channel} of {fault.line}{where.get(fault.kind, f' point {fault.point}')}{run} ({size})"
 
 
 def _doubt(found: FaultClass) -> str:

@@ -11,6 +11,7 @@ from stepdiag.units import report_value
 FAULT_NAMES: Final = {
     ("reading", "distance"): "wrong distance",
     ("slip", "distance"): "slip of distances",
+    ("factor", "distance"): "factor on a line's distances",
     ("reading", "tilt"): "wrong tilt",
     ("slip", "tilt"): "slip of tilts",
     ("reading", "spot"): "wrong spot",
@@ -49,7 +50,7 @@ def _text(fault: UnseenFault, calibration: Calibration) -> tuple[bool, str]:
 
     name = f"a {FAULT_NAMES[fault.kind, fault.channel]}"
     value, unit = report_value(FAULT_UNITS[fault.channel], fault.size)
-    below = f"below {value:.3g} {unit}"
+    below = f"below {value:.3g} {unit}" + (" at the line's end" if fault.kind == "factor" else "")
     u = {kind: uncertainty for kind, (uncertainty, _) in largest_uncertainties(calibration).items()}
     beyond = [kind for kind in KINDS if fault.hidden[kind] > _WITHIN * u.get(kind, 0.0)]
     shown = [

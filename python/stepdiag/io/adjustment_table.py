@@ -181,7 +181,7 @@ def _faults(faults: list[FaultClass]) -> dict[str, Any]:
             "kind": (
                 [fault.kind for fault in members],
                 "kind",
-                {"comment": "slip: an offset of the channel from this reading of the line on"},
+                {"comment": "slip: an offset of the channel from this reading of the line on; factor: all of the line"},
             ),
             "row": ([fault.row for fault in members], "row of the measurement, from 0"),
             "run": ([fault.run for fault in members], "run"),

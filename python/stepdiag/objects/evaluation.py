@@ -96,7 +96,7 @@ class SetupRate(_SetupUnknown):
 
 
 class _Fault(TypedDict):
-    kind: Literal["reading", "slip"]
+    kind: Literal["reading", "slip", "factor"]
     channel: str
     run: int
     line: str
@@ -169,7 +169,7 @@ class ByKind(TypedDict):
 
 
 class _Control(TypedDict):
-    fault: Literal["reading", "slip"]
+    fault: Literal["reading", "slip", "factor"]
     channel: Literal["distance", "tilt", "spot"]
     controlled: int
     uncontrolled: int

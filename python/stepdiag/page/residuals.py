@@ -202,7 +202,7 @@ def _worst(details: FitDetails) -> list[Markup]:
 def _faults(details: FitDetails) -> Markup | None:
     if not details.faults:
         return element("p", "No reading was found to be wrong, and none was left out.")
-    kinds = {"slip": "offset from this point on"}
+    kinds = {"slip": "offset from this point on", "factor": "growing along the line"}
     treatments = {"left_out": "left out", "estimated": "size is an unknown of the adjustment"}
     rows = []
     for fault in details.faults:

@@ -94,18 +94,20 @@ struct ReadingResidual {
 };
 
 // What may be wrong with the readings of one channel in one set-up. A slip is an offset of all of them from a point on,
-// in the order in which they were made: a fringe counter that lost count, a head that was knocked.
-enum class FaultKind { reading, slip };
-std::string name(FaultKind kind);  // "reading", "slip"
+// in the order in which they were made: a fringe counter that lost count, a head that was knocked. A factor makes
+// distances too long by a part of the travel: the air of a single line, tilts whose zero is off (a distance is corrected
+// by their squares).
+enum class FaultKind { reading, slip, factor };
+std::string name(FaultKind kind);  // "reading", ...
 // One fault that explains the readings, if it is the one.
 struct Fault {
     FaultKind kind;
-    std::size_t row;  // of the reading, or of the first one that slipped
+    std::size_t row;  // of the reading, of the first one that slipped, or of the line's first
     int run;
     std::string line;
     int point;
     std::string channel;
-    double size;                  // what was read too much, mm or rad
+    double size;                  // what was read too much, mm or rad; by a factor where the line is farthest
     double standard_uncertainty;  // of the size
     double chi_square_gain;       // what it takes off chi-square
 };
