@@ -126,7 +126,7 @@ Measurement with_fault(const Measurement& run, const Solved& solved, const Fault
         const auto& reading = solved.problem.readings()[r];
         for (auto& channel : channels)
             if (channel.name == solved.problem.channel_name(reading))
-                channel.value[reading.row] = *channel.value[reading.row] + size;
+                channel.value[reading.row] = *channel.value[reading.row] + size * solved.hypotheses.share(hypothesis, r);
     }
     return Measurement(run.stations(), channels);
 }
@@ -166,7 +166,8 @@ struct Dense {
 VectorXd indicator(const Solved& solved, const FaultHypothesis& hypothesis) {
     VectorXd c = VectorXd::Zero(Eigen::Index(solved.problem.readings().size()));
     for (const int r : solved.hypotheses.readings(hypothesis))
-        if (solved.problem.readings()[r].used()) c[r] = 1.0 / solved.problem.readings()[r].standard_uncertainty;
+        if (solved.problem.readings()[r].used())
+            c[r] = solved.hypotheses.share(hypothesis, r) / solved.problem.readings()[r].standard_uncertainty;
     return c;
 }
 
@@ -228,14 +229,15 @@ TEST(FaultTests, HaveEachFaultOnce) {
     const Workshop shop;
     const Solved solved(shop, shop.run());
     // Four diagonals of 13 points and three channels, with constants that are free: 13 readings and 10 slips in between
-    // (from the third to the last but one). Three scale lines of two points: a fault each channel.
-    EXPECT_EQ(solved.hypotheses.all().size(), std::size_t(4 * 3 * (13 + 10) + 3 * 3));
+    // (from the third to the last but one), and a factor on their distances. Three scale lines of two points: a fault
+    // each channel.
+    EXPECT_EQ(solved.hypotheses.all().size(), std::size_t(4 * (3 * (13 + 10) + 1) + 3 * 3));
     EXPECT_EQ(solved.hypotheses.sequences().size(), std::size_t(4 * 3 + 3 * 3));
     // With a constant that is known the whole channel may be off, and each end by itself.
     Workshop known = shop;
     known.options.setup[int(stepdiag::SetupQuantity::distance_constant)] = stepdiag::fixed_unknown;
     EXPECT_EQ(Solved(known, known.run()).hypotheses.all().size(),
-              std::size_t(4 * (3 * 13 + 2 * 10 + 12) + 3 * (2 + 1 + 2)));
+              std::size_t(4 * (3 * 13 + 2 * 10 + 12 + 1) + 3 * (2 + 1 + 2)));
 }
 
 TEST(FaultTests, OrderReadingsByTimeThroughBothDirections) {
@@ -257,9 +259,10 @@ TEST(FaultTests, AgreeWithActualAdjustments) {
     for (const auto& [kind, channel, first] : {std::tuple(FaultKind::slip, 0, 6),
                                                {FaultKind::reading, 0, 4},
                                                {FaultKind::slip, 1, 5},
-                                               {FaultKind::reading, 2, 9}}) {
+                                               {FaultKind::reading, 2, 9},
+                                               {FaultKind::factor, 0, 0}}) {
         const auto hypothesis = solved.hypotheses.all()[solved.find(kind, "npp", channel, first)];
-        const double size = channel == 0 ? 2 * micrometre : 20 * micro;
+        const double size = kind == FaultKind::factor ? 10 * micrometre : channel == 0 ? 2 * micrometre : 20 * micro;
         const Measurement wrong = with_fault(run, solved, hypothesis, size);
         const auto score = Solved(shop, wrong).tests().scores()[solved.find(kind, "npp", channel, first)];
         const double step = 0.5 * size;

@@ -21,26 +21,30 @@ FACES = SMALL.replace('"nnp"]', '"nnp", "pp0", "p0p", "0pp"]')
 TWICE = SMALL.replace("steps = 2", "steps = 2\nrepeats = 2")
 
 
-def with_fault(run: sd.Measurement, channel: str, rows: np.ndarray, size: float) -> sd.Measurement:
+def with_fault(run: sd.Measurement, channel: str, rows: np.ndarray, size: np.ndarray) -> sd.Measurement:
     values = run.channels
     values[channel] = values[channel].copy()
     values[channel][rows] += size
     return sd.Measurement(run.line, run.point, run.position, values, run=run.run)
 
 
-def faults(run: sd.Measurement) -> list[tuple[str, str, np.ndarray]]:
-    """Kind, channel and rows of every fault there is, by the words of the definition: lines in their order."""
+def faults(run: sd.Measurement) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
+    """Kind, channel, rows and shares of every fault there is, by the words of the definition: lines in their order."""
     found = []
     lines = np.array(run.line)
     for number in sorted({*run.run.tolist()}):
         for line in dict.fromkeys(run.line):
             rows = np.flatnonzero((lines == line) & (run.run == number))
             if len(rows) == 2:
-                found += [("reading", channel, rows[1:]) for channel in ("distance", "alpha", "beta")]
+                found += [("reading", channel, rows[1:], np.ones(1)) for channel in ("distance", "alpha", "beta")]
                 continue
+            commanded = run.position[rows]
+            way = commanded[-1] - commanded[0]
+            travel = (commanded - commanded[0]) @ way / (way @ way)
+            found.append(("factor", "distance", rows, travel))
             for channel in ("distance", "alpha", "beta"):
-                found += [("reading", channel, rows[i : i + 1]) for i in range(len(rows))]
-                found += [("slip", channel, rows[i:]) for i in range(2, len(rows) - 1)]
+                found += [("reading", channel, rows[i : i + 1], np.ones(1)) for i in range(len(rows))]
+                found += [("slip", channel, rows[i:], np.ones(len(rows) - i)) for i in range(2, len(rows) - 1)]
     return found
 
 
@@ -61,25 +65,27 @@ def test_what_is_said_of_faults_is_what_adjustments_of_runs_with_them_show(text:
     sound = values(adjust_scenario(known, run))
     everything = faults(run)
     shown, effects, sizes = [], [], []
-    for _, channel, rows in everything:
+    for _, channel, rows, share in everything:
         size = 0.1 * U[channel]  # small: of first order
-        found = adjust_scenario(known, with_fault(run, channel, rows, size))
+        found = adjust_scenario(known, with_fault(run, channel, rows, size * share))
         # What the adjustment leaves of the fault, in units of the readings, and what of it goes to the values.
         shown.append(np.concatenate([np.nan_to_num(found.residuals[c]) / U[c] for c in U]) / size)
         now = values(found)
         effects.append({kind: (now[kind] - sound[kind]) / size for kind in KINDS})
         sizes.append(size)
     offset = {channel: i * len(run) for i, channel in enumerate(U)}
-    products = np.array([[left[offset[c] + rows].sum() / U[c] for _, c, rows in everything] for left in shown])
+    products = np.array(
+        [[left[offset[c] + rows] @ share / U[c] for _, c, rows, share in everything] for left in shown]
+    )
     u = 1.0 / np.sqrt(np.diag(products))
     correlation = products * np.outer(u, u)
     np.fill_diagonal(correlation, 0.0)
 
     said = {(c.kind, c.channel): c for c in adjust_scenario(known, run, reliability=True).reliability}
-    assert len(said) == 4
+    assert len(said) == 5
     for (kind, name), control in said.items():
         channels = ("distance",) if name == "distance" else ("alpha", "beta")
-        own = [i for i, (k, c, _) in enumerate(everything) if k == kind and c in channels]
+        own = [i for i, (k, c, _, _) in enumerate(everything) if k == kind and c in channels]
         assert control.count == len(own)
         assert control.uncontrolled == 0
         # Rounding of the run's lengths, 1e-14 of a fault of 1e-5 mm by a few hundred; second order.
