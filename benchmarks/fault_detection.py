@@ -197,12 +197,20 @@ CELLS = {
 
 
 def controlled(setting: Setting, seed: int, fault: Fault) -> float:
-    """What a fault of size 1 adds to chi-square, from this run without noise: its set-ups are part of it."""
+    """What a fault of its noise's size adds to chi-square, from this run without noise: its set-ups are part of it.
+
+    0 where it cannot be: one of the two adjustments ended elsewhere.
+    """
     run, _ = setting.run(seed, noisy=False)
-    size = 20.0 * NOISE[{"d": "distance", "s": "spot"}.get(fault.channel[0], "tilt")]
-    left = [setting.adjust(r, outlier_probability=0.0) for r in (run, fault.into(run, size))]
+    few = 5.0  # small: of first order
+    left = [setting.adjust(r, outlier_probability=0.0) for r in (run, fault.into(run, few * noise_of(fault)))]
     sound, faulty = (math.nan if a is None else a.weighted_square_sum for a in left)
-    return (faulty - sound) / size**2
+    added = (faulty - sound) / few**2
+    return added if 0.0 < added <= len(fault.rows) else 0.0
+
+
+def noise_of(fault: Fault) -> float:
+    return NOISE[{"d": "distance", "s": "spot"}.get(fault.channel[0], "tilt")]
 
 
 @functools.cache
@@ -213,8 +221,7 @@ def hypotheses(cell: str, count: int = 24) -> list[Fault]:
     run, _ = setting.run(0)
     while len(found) < count:
         fault = pick(KINDS_OF_FAULTS[len(found) % 4], run, rng)
-        noise = NOISE[{"d": "distance", "s": "spot"}.get(fault.channel[0], "tilt")]
-        if controlled(setting, 0, fault) * noise**2 > 0.02:
+        if controlled(setting, 0, fault) > 0.02:
             found.append(fault)
     return found
 
@@ -226,11 +233,15 @@ def sound(cell: str, seed: int) -> str:
 
 def faulty(cell: str, seed: int) -> tuple[float, bool, bool]:
     """Root of lambda; whether a fault was found; whether it was this one."""
-    known, other = hypotheses(cell), seed // len(LEVELS)
-    fault, level, run_seed = known[other % len(known)], LEVELS[seed % len(LEVELS)], 10_000_000 + seed
-    run, _ = CELLS[cell].run(run_seed)
-    size = (-1) ** other * level / controlled(CELLS[cell], run_seed, fault) ** 0.5
-    adjusted = CELLS[cell].adjust(fault.into(run, size))
+    setting, other = CELLS[cell], seed // len(LEVELS)
+    level, run_seed = LEVELS[seed % len(LEVELS)], 10_000_000 + seed
+    known = hypotheses(cell)
+    for fault in known[other % len(known) :] + known:
+        if (part := controlled(setting, run_seed, fault)) > 0.02:
+            break
+    run, _ = setting.run(run_seed)
+    size = (-1) ** other * level * noise_of(fault) / part**0.5
+    adjusted = setting.adjust(fault.into(run, size))
     return level, adjusted is not None and bool(classes(adjusted)), adjusted is not None and fault.is_in(adjusted)
 
 

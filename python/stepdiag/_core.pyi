@@ -1359,7 +1359,7 @@ class Fault:
     @property
     def kind(self) -> str:
         """
-        "reading", or "slip": an offset of its channel from this reading on.
+        "reading", "slip": an offset of its channel from this reading on, or "factor": distances of its line too long by a part of the travel.
         """
     @property
     def line(self) -> str:
@@ -1571,7 +1571,7 @@ class FaultControl:
     @property
     def kind(self) -> str:
         """
-        "reading", or "slip": an offset of its channel from a reading on.
+        "reading", "slip": an offset of its channel from a reading on, or "factor" on a line's distances.
         """
     @property
     def shared(self) -> dict[str, float]:

@@ -11,7 +11,7 @@ from stepdiag.units import report_value
 FAULT_NAMES: Final = {
     ("reading", "distance"): "wrong distance",
     ("slip", "distance"): "slip of distances",
-    ("factor", "distance"): "factor on a line's distances",
+    ("factor", "distance"): "factor on distances",
     ("reading", "tilt"): "wrong tilt",
     ("slip", "tilt"): "slip of tilts",
     ("reading", "spot"): "wrong spot",
