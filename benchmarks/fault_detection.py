@@ -231,14 +231,16 @@ def sound(cell: str, seed: int) -> str:
     return "error" if adjusted is None else adjusted.verdict.fit
 
 
-def faulty(cell: str, seed: int) -> tuple[float, bool, bool]:
-    """Root of lambda; whether a fault was found; whether it was this one."""
+def faulty(cell: str, seed: int) -> tuple[float, bool, bool] | None:
+    """Root of lambda; whether a fault was found; whether it was this one. None: no fault's root of lambda is known."""
     setting, other = CELLS[cell], seed // len(LEVELS)
     level, run_seed = LEVELS[seed % len(LEVELS)], 10_000_000 + seed
     known = hypotheses(cell)
     for fault in known[other % len(known) :] + known:
         if (part := controlled(setting, run_seed, fault)) > 0.02:
             break
+    else:
+        return None
     run, _ = setting.run(run_seed)
     size = (-1) ** other * level * noise_of(fault) / part**0.5
     adjusted = setting.adjust(fault.into(run, size))
@@ -251,7 +253,7 @@ def detection(tasks: Tasks, runs: int) -> bool:
         fits = Counter(tasks(functools.partial(sound, cell), each))
         good = fits["rejected"] + fits["error"] <= most(0.001, each) and fits["doubtful"] <= most(0.02, each)
         alarms.append([cell, each, *percents(fits), good])
-        found = list(tasks(functools.partial(faulty, cell), each // 2))
+        found = [outcome for outcome in tasks(functools.partial(faulty, cell), each // 2) if outcome]
         shares, good = [], True
         for level in LEVELS:
             seen = [of_fault for at, of_fault, _ in found if at == level]
