@@ -34,8 +34,8 @@ struct FaultHypothesis {
 
 // Every fault that is tested for, each once. The slip before the last reading is that reading's fault. Where an unknown
 // of the set-up takes up a constant of the channel, the slip after the first reading is the opposite of that reading's
-// fault (`as_slip`), and of two readings there is only one fault. A factor is one of a line's only distance. Readings that are left out take no part: make it anew
-// after leaving one out.
+// fault (`as_slip`), and of two readings there is only one fault. A factor is one of a line's only distance. Readings
+// that are left out take no part: make it anew after leaving one out.
 class FaultHypotheses {
 public:
     explicit FaultHypotheses(const AdjustmentProblem& problem);

@@ -205,7 +205,8 @@ void bind_result(py::module_& m) {
     py::class_<Fault>(m, "Fault", "A fault that explains the readings, if it is the one.")
         .def_property_readonly(
             "kind", [](const Fault& f) { return name(f.kind); },
-            "\"reading\", \"slip\": an offset of its channel from this reading on, or \"factor\": distances of its line "
+            "\"reading\", \"slip\": an offset of its channel from this reading on, or \"factor\": distances of its "
+            "line "
             "too long by a part of the travel.")
         .def_readonly("row", &Fault::row)
         .def_readonly("run", &Fault::run)

@@ -126,7 +126,8 @@ Measurement with_fault(const Measurement& run, const Solved& solved, const Fault
         const auto& reading = solved.problem.readings()[r];
         for (auto& channel : channels)
             if (channel.name == solved.problem.channel_name(reading))
-                channel.value[reading.row] = *channel.value[reading.row] + size * solved.hypotheses.share(hypothesis, r);
+                channel.value[reading.row] =
+                    *channel.value[reading.row] + size * solved.hypotheses.share(hypothesis, r);
     }
     return Measurement(run.stations(), channels);
 }

@@ -74,9 +74,7 @@ def test_what_is_said_of_faults_is_what_adjustments_of_runs_with_them_show(text:
         effects.append({kind: (now[kind] - sound[kind]) / size for kind in KINDS})
         sizes.append(size)
     offset = {channel: i * len(run) for i, channel in enumerate(U)}
-    products = np.array(
-        [[left[offset[c] + rows] @ share / U[c] for _, c, rows, share in everything] for left in shown]
-    )
+    products = np.array([[left[offset[c] + rows] @ share / U[c] for _, c, rows, share in everything] for left in shown])
     u = 1.0 / np.sqrt(np.diag(products))
     correlation = products * np.outer(u, u)
     np.fill_diagonal(correlation, 0.0)

@@ -95,8 +95,8 @@ struct ReadingResidual {
 
 // What may be wrong with the readings of one channel in one set-up. A slip is an offset of all of them from a point on,
 // in the order in which they were made: a fringe counter that lost count, a head that was knocked. A factor makes
-// distances too long by a part of the travel: the air of a single line, tilts whose zero is off (a distance is corrected
-// by their squares).
+// distances too long by a part of the travel: the air of a single line, tilts whose zero is off (a distance is
+// corrected by their squares).
 enum class FaultKind { reading, slip, factor };
 std::string name(FaultKind kind);  // "reading", ...
 // One fault that explains the readings, if it is the one.
