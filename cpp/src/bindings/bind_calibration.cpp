@@ -64,7 +64,7 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
                              const std::string& date, const std::optional<std::string>& fit,
                              const std::optional<double>& variance_factor, const Names& fit_reasons,
                              const std::optional<double>& uncertainty_scaled, const Texts& provenance,
-                             const Names& unseen_faults) {
+                             const Names& unseen_faults, const std::optional<double>& between_nodes) {
     Calibration calibration{method, to_chain(chain), to_vector3(volume, "volume"), to_vector3(tool, "tool"), {}, {},
                             {},     undetermined};
     for (const auto& [name, table] : functions)
@@ -99,6 +99,7 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
     calibration.uncertainty_scaled = uncertainty_scaled;
     calibration.provenance = provenance;
     calibration.unseen_faults = unseen_faults;
+    calibration.between_nodes = between_nodes;
     check(calibration);
     return calibration;
 }
@@ -123,6 +124,7 @@ void bind_calibration(py::module_& m) {
              py::arg("date") = "", py::arg("fit") = std::nullopt, py::arg("variance_factor") = std::nullopt,
              py::arg("fit_reasons") = Names{}, py::arg("uncertainty_scaled") = std::nullopt,
              py::arg("provenance") = Texts{}, py::arg("unseen_faults") = Names{},
+             py::arg("between_nodes") = std::nullopt,
              "A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: "
              "name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises "
              "InvalidArgument naming the parameter for what is none: nodes that do not "
@@ -140,6 +142,9 @@ void bind_calibration(py::module_& m) {
         .def_readonly("uncertainty_scaled", &Calibration::uncertainty_scaled,
                       "What all uncertainties were multiplied by, beyond what follows from those of the readings "
                       "(scale_uncertainty); None: by nothing.")
+        .def_readonly("between_nodes", &Calibration::between_nodes,
+                      "Standard uncertainty of the functional point by errors between the nodes, as it was stated, mm; "
+                      "None: nothing was stated. It is in no other uncertainty.")
         .def_readonly("provenance", &Calibration::provenance,
                       "What it was made from, as far as it is known: program and version, SHA-256 of the run, the "
                       "scenario and the descriptions of heads, options that are not the default ones. Keys: program, "
@@ -165,6 +170,16 @@ void bind_calibration(py::module_& m) {
             },
             py::arg("fit"), py::arg("fit_reasons") = Names{},
             "The same calibration with this verdict of its fit. Raises InvalidArgument for another word.")
+        .def(
+            "with_between_nodes",
+            [](Calibration c, const std::optional<double>& between_nodes) {
+                c.between_nodes = between_nodes;
+                check(c);
+                return c;
+            },
+            py::arg("between_nodes"),
+            "The same calibration with this standard uncertainty by errors between the nodes, mm. Raises "
+            "InvalidArgument below 0.")
         .def_static(
             "provenance_keys", [] { return Names(provenance_keys.begin(), provenance_keys.end()); },
             "The keys that a provenance may have.")

@@ -104,12 +104,13 @@ void check_covariance(const Eigen::MatrixXd& covariance, const Uncertainties& va
         }
 }
 
-// What the leading lines say about the fit in numbers.
+// What the leading lines say in single numbers.
 template <class AnyCalibration>
-auto factors(AnyCalibration& calibration) {
+auto numbers(AnyCalibration& calibration) {
     using Entry = std::pair<const char*, decltype((calibration.variance_factor))>;
-    return std::array<Entry, 2>{Entry{"variance_factor", calibration.variance_factor},
-                                Entry{"uncertainty_scaled", calibration.uncertainty_scaled}};
+    return std::array<Entry, 3>{Entry{"variance_factor", calibration.variance_factor},
+                                Entry{"uncertainty_scaled", calibration.uncertainty_scaled},
+                                Entry{"between_nodes_mm", calibration.between_nodes}};
 }
 
 }  // namespace
@@ -120,8 +121,8 @@ void check(const Calibration& calibration) {
     if (!calibration.tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
     check_one_line(calibration.method, "method");
     check_one_line(calibration.date, "date");
-    for (const auto& [key, factor] : factors(calibration))
-        if (factor && !(std::isfinite(*factor) && *factor >= 0.0))
+    for (const auto& [key, number] : numbers(calibration))
+        if (number && !(std::isfinite(*number) && *number >= 0.0))
             throw InvalidArgument(std::string(key) + ": expected a finite number of at least 0");
     check_provenance(calibration.provenance);
     for (const std::string& sentence : calibration.undetermined) check_one_line(sentence, "undetermined");
@@ -247,8 +248,8 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
     if (!calibration.date.empty()) table.header["date"] = calibration.date;
     table.header.insert(calibration.provenance.begin(), calibration.provenance.end());
     if (calibration.fit) table.header["fit"] = name(*calibration.fit);
-    for (const auto& [key, factor] : factors(calibration))
-        if (factor) table.header[key] = format_decimal(*factor, 0);
+    for (const auto& [key, number] : numbers(calibration))
+        if (number) table.header[key] = format_decimal(*number, 0);
     if (!calibration.fit_reasons.empty()) table.header["fit_reasons"] = join(calibration.fit_reasons, sentence_break);
     if (!calibration.unseen_faults.empty())
         table.header["unseen_faults"] = join(calibration.unseen_faults, sentence_break);
@@ -286,11 +287,11 @@ Calibration read_calibration(const std::string& path) {
     for (const char* key : provenance_keys)
         if (std::string text = optional_value(key); !text.empty()) calibration.provenance[key] = std::move(text);
     calibration.fit = fit_of(table.header, path);
-    for (auto& [key, factor] : factors(calibration)) {
+    for (auto& [key, number] : numbers(calibration)) {
         const std::string given = optional_value(key);
         if (given.empty()) continue;
-        factor = parse_decimal(given, 0);
-        if (!factor || *factor < 0.0)
+        number = parse_decimal(given, 0);
+        if (!number || *number < 0.0)
             throw InvalidArgument(path + ": " + key + ": expected a number of at least 0, got \"" + given + "\"");
     }
     const auto slopes = functions_listed(table, "undetermined_slopes", path);

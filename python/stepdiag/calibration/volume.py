@@ -138,9 +138,9 @@ def volume_errors(
     tool: offset of the functional point, mm; none: the calibration's. box: (2, 3), lowest and highest commanded
     positions, mm; none: the whole volume; of a Machine it is needed. grid: at least as many positions an axis,
     besides the nodes of the tables (of more than 201, 201); none: the nodes. limit: of the largest error, mm.
-    between_nodes: standard uncertainty by what lies between the nodes, mm; none: estimated. ranking: whether to
-    compute it. samples: draws of the covariance. progress: called with the number of draws that are done, and of
-    all. Raises InvalidArgument for a box that is not in the volume, and for numbers out of range."""
+    between_nodes: standard uncertainty by what lies between the nodes, mm; none: the calibration's, else estimated.
+    ranking: whether to compute it. samples: draws of the covariance. progress: called with the number of draws that
+    are done, and of all. Raises InvalidArgument for a box that is not in the volume, and for numbers out of range."""
     machine, offset = _machine_of(source, tool)
     corners = _box_of(source, box)
     positions, every_node = _positions(machine, corners, grid)
@@ -154,6 +154,8 @@ def volume_errors(
     found = _core.summarise_volume(machine, *positions)
     missing = _missing(source, offset)
     known = not any(component in missing for component in AXES)
+    if between_nodes is None and isinstance(source, Calibration):
+        between_nodes = source.between_nodes
     between, estimated = between_nodes or 0.0, False
     if between_nodes is None and isinstance(source, Calibration) and known:
         between, estimated = _between_nodes(source, offset, found.largest_at, found.components), True

@@ -115,6 +115,7 @@ def evaluate(
         path,
         measurement=measurement,
         provenance=provenance,
+        between_nodes=known.between_nodes,
     )
     if as_json:
         from stepdiag.objects.evaluation import evaluated_files, evaluation_object

@@ -49,7 +49,8 @@ Examples:
     "--between-nodes",
     type=float,
     metavar="UM",
-    help="Standard uncertainty by errors between the nodes, µm.  [default: estimated from the tables]",
+    help="Standard uncertainty by errors between the nodes, µm.  [default: the scenario's between_nodes_um, which the "
+    "calibration carries; else estimated from the tables]",
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the draws for the intervals.")
 @json_option

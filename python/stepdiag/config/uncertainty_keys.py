@@ -8,7 +8,7 @@ from pydantic_core import PydanticCustomError
 
 from stepdiag.config.distribution_keys import POSITIVE_SPREAD, SPREAD, PositiveSpread, Spread, SpreadsByChannel
 from stepdiag.config.key_errors import OWN_WORDS, show, suggest
-from stepdiag.config.key_types import Section, key, tables
+from stepdiag.config.key_types import DEVIATION, Amplitude, Section, key, tables
 
 
 def _uncertain(meaning: str, example: Any = None) -> Any:
@@ -160,6 +160,14 @@ class UncertaintySection(SetupUncertaintyKeys):
     )
     repeatability_um: Spread | None = _uncertain("Positioning at every point, along X, Y, Z, each.", 0.2)
     repeatability_urad: Spread | None = _uncertain("Orientation of the tool at every point, about X, Y, Z, each.", 0.5)
+    between_nodes_um: Amplitude | None = key(
+        DEVIATION,
+        "Of the functional point along X, Y, Z, each, by errors between the nodes, which no reading shows: a number, no "
+        "distribution. The calibration carries it to `volume` and `report`; no virtual calibration uses it. By default "
+        "they estimate it from second differences of the tables.",
+        None,
+        0.5,
+    )
     correlated: Annotated[tuple[CorrelatedInputs, ...], PlainValidator(_correlations)] = key(
         f"{_correlated}; or [[uncertainty.correlated]]",
         "Inputs that are jointly normal, by the names that `stepdiag uncertainty --inputs` lists.",

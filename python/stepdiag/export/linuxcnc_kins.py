@@ -82,5 +82,6 @@ def _with_tool(calibration: Calibration, tool: FloatArray) -> Calibration:
         fit_reasons=calibration.fit_reasons,
         unseen_faults=calibration.unseen_faults,
         uncertainty_scaled=calibration.uncertainty_scaled,
+        between_nodes=calibration.between_nodes,
         provenance=calibration.provenance,
     )

@@ -57,6 +57,7 @@ def read_what_is_exported(path: Path) -> Calibration:
         fit_reasons=calibration.fit_reasons,
         unseen_faults=calibration.unseen_faults,
         uncertainty_scaled=calibration.uncertainty_scaled,
+        between_nodes=calibration.between_nodes,
     )
 
 

@@ -57,6 +57,7 @@ def write_calibration(
     *,
     measurement: Measurement | None = None,
     provenance: Mapping[str, str] | None = None,
+    between_nodes: float | None = None,
 ) -> Calibration:
     """Write a calibration, CSV or netCDF (.nc), and return it as written. Reading it returns the same bits.
 
@@ -69,6 +70,7 @@ def write_calibration(
         measurement: labels the residuals of an adjustment with run, line, point and direction
             (netCDF).
         provenance: replaces that of the calibration; `provenance_of` makes it.
+        between_nodes: replaces that of the calibration, mm; `Known.between_nodes` has it.
 
     Raises:
         InvalidArgument: the file cannot be written, or the provenance has other keys; names either.
@@ -76,13 +78,18 @@ def write_calibration(
     calibration = result if isinstance(result, Calibration) else result.calibration
     if provenance is not None:
         calibration = calibration.with_provenance(provenance)
+    if between_nodes is not None:
+        calibration = calibration.with_between_nodes(between_nodes)
     dated = calibration.dated(calibration.date or date_of_today())
     if not is_netcdf(path):
         dated.write(path)
         return dated
     from stepdiag.io.netcdf_write import write_calibration_netcdf
 
-    write_calibration_netcdf(result, Path(path), {"date": dated.date} | dated.provenance, measurement)
+    made: dict[str, str | float] = {"date": dated.date, **dated.provenance}
+    if dated.between_nodes is not None:
+        made["between_nodes_mm"] = dated.between_nodes
+    write_calibration_netcdf(result, Path(path), made, measurement)
     return dated
 
 

@@ -115,6 +115,8 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
         verdict["variance_factor"] = calibration.variance_factor
     if calibration.uncertainty_scaled is not None:
         verdict["uncertainty_scaled"] = calibration.uncertainty_scaled
+    if calibration.between_nodes is not None:
+        verdict["between_nodes_mm"] = calibration.between_nodes
     verdict["fit_reasons"] = "\n".join(calibration.fit_reasons)
     verdict["unseen_faults"] = "\n".join(calibration.unseen_faults)
     return xr.Dataset(

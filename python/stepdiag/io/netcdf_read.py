@@ -89,6 +89,7 @@ def read_calibration_netcdf(path: Path) -> Calibration:
             "fit_reasons": list(filter(None, file.text("fit_reasons", "").split("\n"))),
             "unseen_faults": list(filter(None, file.text("unseen_faults", "").split("\n"))),
             "uncertainty_scaled": file.number("uncertainty_scaled"),
+            "between_nodes": file.number("between_nodes_mm"),
         }
         with located(str(path)):
             calibration = Calibration(**parts)

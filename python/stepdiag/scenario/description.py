@@ -72,8 +72,9 @@ def evaluate_scenario(
     """Evaluates a run of a scenario's plan, by what is known."""
     known = scenario.known
     if method == "adjustment":
-        return adjust_scenario(known, measurement, full_covariance=full_covariance).calibration
-    return _core.evaluate(
+        adjustment = adjust_scenario(known, measurement, full_covariance=full_covariance)
+        return adjustment.calibration.with_between_nodes(known.between_nodes)
+    found = _core.evaluate(
         only(measurement, known.signals),
         known.plan,
         of_run(known.heads),
@@ -84,6 +85,7 @@ def evaluate_scenario(
         full_covariance=full_covariance,
         plausible=known.plausible,
     )
+    return found.with_between_nodes(known.between_nodes)
 
 
 @dataclass(frozen=True)

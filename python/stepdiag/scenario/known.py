@@ -13,6 +13,7 @@ from stepdiag.scenario.adjustment import plausible_limits, setup_priors, smoothn
 from stepdiag.scenario.heads import DescribedHead, check_alike, check_mirrors, heads_by_line, make_heads, signals_of
 from stepdiag.scenario.setup import weights
 from stepdiag.scenario.uncertain_inputs import uncertain_inputs
+from stepdiag.units import MICROMETRE
 
 
 @dataclass(frozen=True, repr=False)
@@ -50,6 +51,12 @@ class Known(Displayed):
     def head(self) -> _core.Head:
         """The head of the first line; those of the others have the same readings."""
         return next(iter(self.heads.values()))
+
+    @property
+    def between_nodes(self) -> float | None:
+        """Standard uncertainty of the functional point by errors between the nodes, mm; None: nothing is stated."""
+        stated = self.keys.uncertainty.between_nodes_um
+        return None if stated is None else stated * MICROMETRE
 
     def _facts(self) -> Facts:
         plan = self.plan

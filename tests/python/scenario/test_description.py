@@ -132,7 +132,9 @@ MALFORMED = [
     ('["ppp", "npp", "pnp", "nnp"]', '"ppp"', 'plan.lines: expected a list of lines such as "ppp" (three of p, n, 0), got "ppp"'),
     ("laser_urad = [700, 1000]", "laser_urad = [700]", "misalignment.npp.laser_urad: expected two angles below 0.1 rad, in µrad, got [700]"),
     ("[noise]", "[report]\ncustomer = 3\n[noise]", "report.customer: expected a text of 1 to 400 characters, got 3"),
+    ("[noise]", '[uncertainty]\nbetween_nodes_um = {distribution = "normal", standard = 1.0}\n[noise]', "uncertainty.between_nodes_um: expected a standard deviation of at least 0, got {"),
     # ranges
+    ("[noise]", "[uncertainty]\nbetween_nodes_um = -1\n[noise]", "uncertainty.between_nodes_um: expected a standard deviation of at least 0, got -1"),
     ("[noise]", '[report]\noperator = ""\n[noise]', 'report.operator: expected a text of 1 to 400 characters, got ""'),
     ("x_mm = 800.0", "x_mm = 0", f"volume.x_mm: {EDGE}0"),
     ("x_mm = 800.0", "x_mm = -800.0", f"volume.x_mm: {EDGE}-800.0"),

@@ -77,6 +77,9 @@ struct Calibration {
     std::vector<std::string> unseen_faults = {};
     // What all uncertainties were multiplied by beyond what follows from those of the readings; none: by nothing.
     std::optional<double> uncertainty_scaled = {};
+    // Standard uncertainty of the functional point by errors between the nodes, which no reading shows, as it was
+    // stated, mm; none: nothing was stated. It is in no other uncertainty.
+    std::optional<double> between_nodes = {};
 
     std::map<std::string, std::string> provenance = {};  // by provenance_keys, as far as it is known
 };
@@ -106,8 +109,8 @@ bool is_anything_determined(const Calibration& calibration);
 // - direction. A reversal error without its function has no place in a table.
 ParameterTable to_parameter_table(const Calibration& calibration);
 
-// CSV with format, chain, volume_mm, tool_mm, method, date, fit, variance_factor, uncertainty_scaled, fit_reasons,
-// unseen_faults, straightness_reference, provenance_keys, undetermined_slopes, undetermined_reversal_constants and
+// CSV with format, chain, volume_mm, tool_mm, method, date, fit, variance_factor, uncertainty_scaled,
+// between_nodes_mm, fit_reasons, unseen_faults, straightness_reference, provenance_keys, undetermined_slopes, undetermined_reversal_constants and
 // undetermined in the leading lines; not kept are the covariance and the uncertainty of a reversal error, which is not
 // that of its two tables. Reading throws InvalidArgument naming file and line, also where chain, volume or tool is
 // missing.
