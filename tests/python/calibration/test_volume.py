@@ -1,5 +1,6 @@
 """The error of the tool in the volume, against a brute-force evaluation of the exact pose."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -277,6 +278,35 @@ def test_what_lies_between_the_nodes_widens_interval_and_bounds(certain: sd.Cali
     assert wide.largest_interval[1] == pytest.approx(middle + 1.959964 * np.hypot(half, 1.0), rel=1e-6)
     assert wide.bounds[1] == pytest.approx(middle + 1.644854 * np.hypot(half, 1.0), rel=1e-6)
     assert wide.rms_interval == narrow.rms_interval
+
+
+def test_between_nodes_is_what_the_calibration_carries_unless_it_is_told(certain: sd.Calibration) -> None:
+    stated = sd.volume_errors(certain.with_between_nodes(1.0), ranking=False)
+    told = sd.volume_errors(certain, ranking=False, between_nodes=1.0)
+    assert (stated.between_nodes, stated.between_nodes_estimated) == (1.0, False)
+    assert stated.largest_interval == told.largest_interval
+    assert sd.volume_errors(certain.with_between_nodes(1.0), ranking=False, between_nodes=0.5).between_nodes == 0.5
+    none_at_all = sd.volume_errors(certain.with_between_nodes(0.0), ranking=False)
+    assert (none_at_all.between_nodes, none_at_all.between_nodes_estimated) == (0.0, False)
+    assert sd.volume_errors(certain, ranking=False).between_nodes_estimated
+
+
+@pytest.mark.parametrize("name", ["c.csv", "c.nc"])
+def test_files_carry_what_was_stated_of_between_the_nodes(name: str, tmp_path: Path) -> None:
+    stated = 0.7e-3 / 3.0  # of many digits
+    sd.write_calibration(calibrate(1), tmp_path / name, between_nodes=stated)
+    assert sd.read_calibration(tmp_path / name).between_nodes == stated
+    sd.write_calibration(calibrate(1), tmp_path / name)
+    assert sd.read_calibration(tmp_path / name).between_nodes is None
+    for wrong in (-1.0, float("nan")):
+        refused(calibrate(1).with_between_nodes, wrong, names="between_nodes_mm: expected a finite number of at least 0")
+
+
+def test_file_with_a_bad_statement_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "c.csv"
+    sd.write_calibration(calibrate(1), file, between_nodes=1e-3)
+    file.write_text(file.read_text().replace("# between_nodes_mm=0.001", "# between_nodes_mm=-1"))
+    refused(sd.read_calibration, file, names='between_nodes_mm: expected a number of at least 0, got "-1"')
 
 
 def test_between_nodes_of_a_parabola_is_its_mean_distance_from_its_chords() -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from calibrations import calibrate, parts_of
 from json_objects import printed
+from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag.cli import main
@@ -64,6 +65,28 @@ def test_object_has_the_values_of_the_library(here: Path, capsys: pytest.Capture
     assert found.largest_interval is not None
     assert content["interval_um"] == pytest.approx([end * 1e3 for end in found.largest_interval], rel=1e-12)
     assert len(content["ranking"]) == 24
+
+
+@pytest.mark.parametrize("name", ["e.csv", "e.nc"])
+@pytest.mark.parametrize("method", ["adjustment", "enhanced"])
+def test_scenario_states_what_lies_between_the_nodes(
+    name: str, method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("s.toml").write_text(SCENARIO + "[uncertainty]\nbetween_nodes_um = 0.7\n")
+    assert main(["simulate", "s.toml", "-o", "r.csv"]) == 0
+    assert main(["evaluate", "s.toml", "r.csv", "-o", name, "--method", method]) in (0, 3)
+    capsys.readouterr()
+    assert sd.read_calibration(name).between_nodes == pytest.approx(0.7e-3, rel=1e-15)
+    scenario = sd.read_scenario("s.toml")
+    found = sd.evaluate_scenario(scenario, sd.read_measurement("r.csv"), method=method)  # type: ignore[arg-type]
+    assert found.between_nodes == scenario.known.between_nodes
+    found = sd.volume_errors(sd.read_calibration(name), ranking=False)
+    assert (found.between_nodes, found.between_nodes_estimated) == (scenario.known.between_nodes, False)
+    told = sd.volume_errors(sd.read_calibration(name), between_nodes=1e-4, ranking=False)
+    assert told.between_nodes == 1e-4
+    if name == "e.nc" and method == "adjustment":
+        assert any("between nodes (stated): standard uncertainty 0.7 µm" in line for line in said(capsys, name))
 
 
 def test_object_without_covariance_or_parameters_has_null(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
