@@ -162,8 +162,8 @@ class UncertaintySection(SetupUncertaintyKeys):
     repeatability_urad: Spread | None = _uncertain("Orientation of the tool at every point, about X, Y, Z, each.", 0.5)
     between_nodes_um: Amplitude | None = key(
         DEVIATION,
-        "Of the functional point along X, Y, Z, each, by errors between the nodes, which no reading shows: a number, no "
-        "distribution. The calibration carries it to `volume` and `report`; no virtual calibration uses it. By default "
+        "Of the functional point along X, Y, Z, each, by errors between the nodes, which no reading shows: a number, "
+        "no distribution. The calibration carries it to `volume` and `report`; no virtual calibration uses it. By default "
         "they estimate it from second differences of the tables.",
         None,
         0.5,

@@ -56,9 +56,13 @@ def write_measurement_netcdf(measurement: Measurement, path: Path, date: str) ->
 
 
 def write_calibration_netcdf(
-    result: Calibration | Adjustment, path: Path, made: Mapping[str, str | float], measurement: Measurement | None = None
+    result: Calibration | Adjustment,
+    path: Path,
+    made: Mapping[str, str | float],
+    measurement: Measurement | None = None,
 ) -> None:
-    """Write a calibration, or an adjustment with all its results. `made`: attributes that say when and from what, and what was stated.
+    """Write a calibration, or an adjustment with all its results. `made`: attributes that say when and from what, and
+    what was stated.
 
     Raises InvalidArgument if the file cannot be written."""
     attributes = _OF_CALIBRATION | dict(made)

@@ -299,7 +299,9 @@ def test_files_carry_what_was_stated_of_between_the_nodes(name: str, tmp_path: P
     sd.write_calibration(calibrate(1), tmp_path / name)
     assert sd.read_calibration(tmp_path / name).between_nodes is None
     for wrong in (-1.0, float("nan")):
-        refused(calibrate(1).with_between_nodes, wrong, names="between_nodes_mm: expected a finite number of at least 0")
+        refused(
+            calibrate(1).with_between_nodes, wrong, names="between_nodes_mm: expected a finite number of at least 0"
+        )
 
 
 def test_file_with_a_bad_statement_is_refused(tmp_path: Path) -> None:
