@@ -163,8 +163,8 @@ class UncertaintySection(SetupUncertaintyKeys):
     between_nodes_um: Amplitude | None = key(
         DEVIATION,
         "Of the functional point along X, Y, Z, each, by errors between the nodes, which no reading shows: a number, "
-        "no distribution. The calibration carries it to `volume` and `report`; no virtual calibration uses it. By default "
-        "they estimate it from second differences of the tables.",
+        "no distribution. The calibration carries it to `volume` and `report`; no virtual calibration uses it. By "
+        "default they estimate it from second differences of the tables.",
         None,
         0.5,
     )
