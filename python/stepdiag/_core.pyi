@@ -1051,7 +1051,7 @@ class Calibration:
             Of a function these are arrays (n,), of a squareness numbers without a position. Raises KeyError naming the
             parameters that there are.
         """
-    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None, provenance: collections.abc.Mapping[str, str] = {}, unseen_faults: collections.abc.Sequence[str] = []) -> None:
+    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None, provenance: collections.abc.Mapping[str, str] = {}, unseen_faults: collections.abc.Sequence[str] = [], between_nodes: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         """
         A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises InvalidArgument naming the parameter for what is none: nodes that do not ascend, values that are not finite, a covariance that is not one of these values.
         """
@@ -1083,6 +1083,10 @@ class Calibration:
         """
         The calibration as a labelled table (xarray.Dataset).
         """
+    def with_between_nodes(self, between_nodes: typing.SupportsFloat | typing.SupportsIndex | None) -> Calibration:
+        """
+        The same calibration with this standard uncertainty by errors between the nodes, mm. Raises InvalidArgument below 0.
+        """
     def with_provenance(self, provenance: collections.abc.Mapping[str, str]) -> Calibration:
         """
         The same calibration with this provenance, by the keys of the property. Raises InvalidArgument for other keys, and for texts that are empty or of more than one line.
@@ -1090,6 +1094,11 @@ class Calibration:
     def write(self, path: str | os.PathLike[str]) -> None:
         """
         Writes the calibration CSV (the covariance is not kept). Raises InvalidArgument when it cannot be written.
+        """
+    @property
+    def between_nodes(self) -> float | None:
+        """
+        Standard uncertainty of the functional point by errors between the nodes, as it was stated, mm; None: nothing was stated. It is in no other uncertainty.
         """
     @property
     def chain(self) -> Chain:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from stepdiag._core import Adjustment, Calibration, Measurement
 from stepdiag.io.adjustment_table import adjustment_table
@@ -65,7 +65,7 @@ def write_calibration_netcdf(
     what was stated.
 
     Raises InvalidArgument if the file cannot be written."""
-    attributes = _OF_CALIBRATION | dict(made)
+    attributes: dict[str, Any] = {**_OF_CALIBRATION, **made}
     if isinstance(result, Calibration):
         table = calibration_table(result)
     else:

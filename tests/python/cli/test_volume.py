@@ -75,7 +75,7 @@ def test_scenario_states_what_lies_between_the_nodes(
     monkeypatch.chdir(tmp_path)
     Path("s.toml").write_text(SCENARIO + "[uncertainty]\nbetween_nodes_um = 0.7\n")
     assert main(["simulate", "s.toml", "-o", "r.csv"]) == 0
-    assert main(["evaluate", "s.toml", "r.csv", "-o", name, "--method", method]) in (0, 3)
+    assert main(["evaluate", "s.toml", "r.csv", "-o", name, "-m", method]) in (0, 3)
     capsys.readouterr()
     assert sd.read_calibration(name).between_nodes == pytest.approx(0.7e-3, rel=1e-15)
     scenario = sd.read_scenario("s.toml")
