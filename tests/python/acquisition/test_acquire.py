@@ -241,3 +241,13 @@ def test_a_measurement_without_its_raw_file_is_not_written_over(tmp_path: Path) 
 def test_options_that_make_no_sense_are_refused(given: dict[str, float]) -> None:
     with pytest.raises(InvalidArgument, match=next(iter(given))):
         AcquireOptions(**given)  # type: ignore[arg-type]
+
+
+def test_a_line_that_is_not_on_its_way_is_told_after_it(tmp_path: Path) -> None:
+    described = scenario(plan=LINES, head=IDEAL)
+    operator = Listener()
+    with Twin(described) as twin:
+        acquire_through(described, twin, tmp_path / "run.csv", operator=operator, options=fast(sign=-1))
+    remarks = [text for text in operator.told if text.startswith("warning: line")]
+    assert len(remarks) == 7
+    assert all("the sign of distances is wrong, or the line is reversed" in text for text in remarks)
