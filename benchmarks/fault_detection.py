@@ -23,7 +23,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from statistics import NormalDist
 from types import SimpleNamespace
 from typing import Any
 
@@ -31,6 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "python" 
 
 import numpy as np
 import one_thread  # noqa: F401 (for what its import does)
+from scipy.stats import chi2, norm
 from usual import CHAIN, DIAGONALS, FACES, SCALE_LINES, VOLUME
 
 import stepdiag as sd
@@ -48,7 +48,7 @@ HEADS = {
 # Lines, and how often each is measured.
 PLANS = {"standard": (DIAGONALS, 1), "three faces": (DIAGONALS + FACES[::2], 1), "twice": (DIAGONALS, 2)}
 THRESHOLD = 28.0  # of a fault's gain in chi-square
-CERTAIN = 7.6  # root of lambda from which on 99 % are found
+CERTAIN = 7.6  # root of lambda from which on 99 % are found where the noise is known
 LEVELS = (3.0, 4.5, THRESHOLD**0.5, 6.0, CERTAIN, 10.0)
 FITS = ("accepted", "doubtful", "rejected", "unchecked", "error")
 Tasks = Callable[[Callable[[int], Any], int], Iterable[Any]]  # results of a function for 0, 1, ...
@@ -247,6 +247,13 @@ def faulty(cell: str, seed: int) -> tuple[float, bool, bool] | None:
     return level, adjusted is not None and bool(classes(adjusted)), adjusted is not None and fault.is_in(adjusted)
 
 
+def predicted(root: float, freedom: int) -> float:
+    """The share that is found: the limit grows with the variance factor that is left, where that exceeds 1."""
+    factor = np.maximum(1.0, chi2.ppf((np.arange(1000) + 0.5) / 1000.0, freedom) / freedom)
+    limit = np.sqrt(THRESHOLD * factor)
+    return float(np.mean(norm.sf(limit - root) + norm.cdf(-limit - root)))
+
+
 def detection(tasks: Tasks, runs: int) -> bool:
     each, rows, alarms = max(60, runs // len(CELLS)), [], []
     for cell in CELLS:
@@ -254,13 +261,13 @@ def detection(tasks: Tasks, runs: int) -> bool:
         good = fits["rejected"] + fits["error"] <= most(0.001, each) and fits["doubtful"] <= most(0.02, each)
         alarms.append([cell, each, *percents(fits), good])
         found = [outcome for outcome in tasks(functools.partial(faulty, cell), each // 2) if outcome]
-        shares, good = [], True
-        for level in LEVELS:
+        some = CELLS[cell].adjust(CELLS[cell].run(0)[0])
+        shares, good = [], some is not None
+        for level in LEVELS if some else ():
             seen = [of_fault for at, of_fault, _ in found if at == level]
-            expected = 1.0 - NormalDist(level).cdf(THRESHOLD**0.5) + NormalDist(level).cdf(-(THRESHOLD**0.5))
+            expected = predicted(level, some.degrees_of_freedom)
             off = abs(sum(seen) - expected * len(seen))
-            near = off <= most(expected, len(seen)) - (expected - 0.02) * len(seen)
-            good &= seen.count(False) <= most(0.01, len(seen)) if level >= CERTAIN else near
+            good &= off <= most(expected, len(seen)) - (expected - 0.02) * len(seen)
             shares.append(f"{100 * sum(seen) / len(seen):.1f} ({100 * expected:.1f})")
         named = Counter(right for at, seen_at_all, right in found if at >= CERTAIN and seen_at_all)
         good &= named[False] <= most(0.01, named.total())
