@@ -27,6 +27,7 @@ from stepdiag.mistakes.copies import (
     passes_of,
     permuted,
     places,
+    rows_of,
     scaled,
     tilts_of,
     with_heads,
@@ -246,16 +247,19 @@ def _factor(
     where: str,
     why: str,
     lines: Sequence[str] | None,
-    unknowns: int = 0,
+    chosen: int = 0,
 ) -> Hypothesis:
     verb = "is" if len(channels) == 1 else "are"
+    count = len(copy.run) if lines is None else len(rows_of(copy.run, lines))
     size = f"large by a factor of {factor:.6g}" if factor > 1.0 else f"small by a factor of {1.0 / factor:.6g}"
     return Hypothesis(
         entry,
         f"{_both(channels)} {verb} too {size} {where}: {why}",
         f"in the run multiply {columns(copy, channels)} by {1.0 / factor:.6g}{_rows(lines)}",
         scaled(channels, 1.0 / factor, lines),
-        unknowns,
+        # Of distances nothing is for nothing: any factor leads them off the plan's way.
+        chosen
+        + (0.0 if channels[0] in distances_of(copy.known) else len(channels) * count * max(0.0, 1.0 - factor**-2)),
     )
 
 
@@ -375,7 +379,7 @@ def _volume(entry: str, copy: Copy) -> Hypotheses:
         f"in [volume] {said.split(',')[0] if ' and ' not in said else 'write these'}, "
         "and take the positions of that plan into the run",
         with_plan(volume=list(map(float, edges))),
-        unknowns=int(np.count_nonzero(other)),
+        free=float(np.count_nonzero(other)),
     )
 
 
@@ -412,7 +416,7 @@ def _of_distances(entry: str, copy: Copy, channels: Sequence[str], lines: Sequen
         "against the other lines: wavelength or refractive index (air: 1.00027) was not applied alike, or they drift",
         f"in the run multiply {columns(copy, channels)} by {1.0 / (1.0 + excess):.6f}{_rows(lines)}",
         scaled(channels, 1.0 / (1.0 + excess), lines),
-        unknowns=1,
+        free=1.0,
     )
 
 
@@ -422,7 +426,7 @@ def _wide_beams(entry: str, factor: float) -> Hypothesis:
         f"beam_offsets_mm is wrong by a factor: the beams stand {factor:.4g} times as far apart",
         f"in [head] multiply beam_offsets_mm by {factor:.4g}",
         with_heads(partial(_with_beams, by=np.eye(2) * factor)),
-        unknowns=1,
+        free=1.0,
     )
 
 
@@ -441,7 +445,7 @@ def _psd_distances(entry: str, copy: Copy) -> Families:
             f"psd_distance_mm is about {distance:g}, not {stated:g}: the spots have another lever",
             f"in [head] write psd_distance_mm as it is; {distance:g} fits best",
             with_heads(lambda head: head_like(head, psd_distance=distance)),
-            unknowns=1,
+            free=1.0,
         )
 
     yield Family(make, (-2.3, -0.7, -0.3, 0.3, 0.7, 1.4, 2.3))

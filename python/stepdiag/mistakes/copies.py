@@ -30,14 +30,15 @@ class Hypothesis:
     """A mistake that may have been made: its sentence and an edit to offer, both without a full stop, and the change
     that undoes it.
 
-    `unknowns`: numbers in the change that were chosen for the fit. `last_resort`: says where, not what; named only
+    `free`: what chi-square falls by for nothing: numbers that were chosen for the fit, and the noise of readings that
+    the change makes smaller. `last_resort`: says where, not what; named only
     where nothing else is."""
 
     entry: str  # name in the catalogue
     text: str
     edit: str
     change: Change
-    unknowns: int = 0
+    free: float = 0.0
     last_resort: bool = False
 
 

@@ -76,7 +76,7 @@ class _Tried:
     fit: _Fit
 
     def excess(self, factor: float) -> float:
-        return self.fit.excess(factor) + self.hypothesis.unknowns
+        return self.fit.excess(factor) + self.hypothesis.free
 
 
 def find_mistakes(
@@ -173,7 +173,7 @@ class _Search:
                     f"{a.text}, and {b.text}",
                     f"{a.edit}; then {b.edit}",
                     in_turn(a.change, b.change),
-                    a.unknowns + b.unknowns + 10,  # of so many pairs
+                    a.free + b.free + 10.0,  # of so many pairs
                 ),
                 second.fit,
             )
@@ -186,7 +186,7 @@ class _Search:
         """The best with all that is not told from it, adjusted exactly."""
         if not tried:
             return []
-        first = min(tried, key=lambda one: one.fit.factor)
+        first = min(tried, key=lambda one: one.excess(max(1.0, one.fit.factor)))
         factor = max(1.0, first.fit.factor)
         if self._gain(first) < CLEAR or factor > CREDIBLE:
             return []
@@ -265,7 +265,7 @@ class _Search:
                     f"{text}, which agree without them",
                     "measure this line again, or empty these fields in the run",
                     without(stretch, names),
-                    unknowns=2,
+                    free=2.0,
                     last_resort=True,
                 ),
                 left(stretch),

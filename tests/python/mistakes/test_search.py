@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mistaken import changed, described, rows_of, simulated, step_plan
+from mistaken import NOISE, changed, described, rows_of, simulated, step_plan
 
 import stepdiag as sd
 from stepdiag._core import fit_quality
@@ -33,6 +33,15 @@ def test_nothing_is_named_where_there_is_no_mistake(head: str, noise: float) -> 
     scenario = described(head, steps=6)
     for seed in range(3):
         assert sd.find_mistakes(scenario, simulated(scenario, seed=seed, noise=noise)) == []
+
+
+def test_readings_made_smaller_explain_nothing() -> None:
+    """Their noise falls with them, of which a machine without angles would have little else."""
+    scenario = described("ideal", steps=10)
+    known = scenario.known
+    machine = sd.Machine(known.chain, sd.ErrorMap({}, {}))
+    run = sd.simulate(machine, known.plan, known.head, noise=sd.Noise(seed=1, **{n: 1.3 * v for n, v in NOISE.items()}))
+    assert sd.find_mistakes(scenario, run) == []
 
 
 def test_two_mistakes_at_once_are_named() -> None:
