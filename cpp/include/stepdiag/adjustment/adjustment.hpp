@@ -264,7 +264,7 @@ struct FitQuality {
 };
 // Without search for faults, tests, uncertainties, cross-validation and plausible limits. After `most_steps` of
 // Gauss-Newton it stops where it is: a run that fits is near its minimum after three, of another one nobody needs it.
-// Nothing where there are no readings or no number comes out. Throws InvalidArgument for what does not belong together, as adjust does.
+// Nothing where there are no readings or no number comes out. Throws InvalidArgument as adjust does.
 std::optional<FitQuality> fit_quality(const Measurement& measurement, const Plan& plan, const Chain& chain,
                                       const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                                       const AdjustmentOptions& options, int most_steps);
