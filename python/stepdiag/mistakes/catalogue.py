@@ -318,8 +318,9 @@ def _orders(entry: str, copy: Copy) -> Hypotheses:
 
 def _other_heads(entry: str, copy: Copy) -> Hypotheses:
     described = copy.known.described_heads
-    heads = {described[line].place: head for line, head in copy.known.heads.items()}
-    for line in all_lines(copy.known):
+    # A line that is there because another one may have been measured from its end has no head of its own.
+    heads = {described[line].place: head for line, head in copy.known.heads.items() if line in described}
+    for line in filter(described.__contains__, all_lines(copy.known)):
         for place, head in heads.items():
             if place != described[line].place:
                 name = place.removeprefix("head.")

@@ -186,8 +186,8 @@ class _Search:
         """The best with all that is not told from it, adjusted exactly."""
         if not tried:
             return []
-        first = min(tried, key=lambda one: one.excess(max(1.0, one.fit.factor)))
-        factor = max(1.0, first.fit.factor)
+        factor = max(1.0, min(one.fit.factor for one in tried))
+        first = min(tried, key=lambda one: one.excess(factor))
         if self._gain(first) < CLEAR or factor > CREDIBLE:
             return []
         best = min(one.excess(factor) for one in tried)

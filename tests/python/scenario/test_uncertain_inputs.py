@@ -140,7 +140,7 @@ def test_every_key_reaches_the_core_in_native_units(key: str) -> None:
 def test_every_key_of_the_models_has_a_use() -> None:
     of = {place: {key for key, quantity in QUANTITIES.items() if quantity.of == place} for place in ("line", "part")}
     noise = {"distance_um", "tilt_urad", "spot_um", "channel"}
-    used = QUANTITIES.keys() - of["part"] | noise | {"correlated", "head", "by_line"}
+    used = QUANTITIES.keys() - of["part"] | noise | {"correlated", "head", "by_line", "between_nodes_um"}
     assert set(UncertaintySection.model_fields) == used
     assert set(SetupUncertaintyKeys.model_fields) == of["line"]
     assert set(ComponentUncertaintyKeys.model_fields) == of["part"]
