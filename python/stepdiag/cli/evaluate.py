@@ -107,9 +107,6 @@ def evaluate(
             )
         except InvalidArgument as error:
             raise with_mistake(error, known, measurement) from None
-        adjusted = result.adjustment if isinstance(result, JudgedEvaluation) else result
-        is_odd = adjusted is None or adjusted.verdict.fit in ("doubtful", "rejected")
-        mistakes = find_mistakes(known, measurement, adjusted) if is_odd else []
     written = write_calibration(
         result.calibration if isinstance(result, JudgedEvaluation) else result,
         path,
@@ -117,6 +114,10 @@ def evaluate(
         provenance=provenance,
         between_nodes=known.between_nodes,
     )
+    adjusted = result.adjustment if isinstance(result, JudgedEvaluation) else result
+    is_odd = adjusted is None or adjusted.verdict.fit in ("doubtful", "rejected")
+    with Progress("mistakes"):  # which may take longer than the evaluation: that is written
+        mistakes = find_mistakes(known, measurement, adjusted) if is_odd else []
     if as_json:
         from stepdiag.objects.evaluation import evaluated_files, evaluation_object
         from stepdiag.objects.writer import json_text

@@ -62,7 +62,7 @@ class Mistake:
 TILT_FACTORS: Final = (
     (2.0, "angles of the beam, which turns by twice the mirror's tilt, in place of the mirror's"),
     (0.5, "halved although they were the mirror's already"),
-    (4.84813681109536, "seconds of arc in place of µrad, or the other way round"),
+    (4.84813681109536, "µrad that were converted as if they were seconds of arc"),
     (1 / 4.84813681109536, "seconds of arc in place of µrad"),
     (10.0, "another range of the instrument"),
     (0.1, "another range of the instrument"),
