@@ -28,11 +28,6 @@ void check_options(const AdjustmentOptions& options, const Plan& plan) {
             throw InvalidArgument("adjustment: line \"" + entry.first + "\" is not in the plan");
 }
 
-std::array<double, function_count> smoothness_at_start(const AdjustmentOptions& options) {
-    if (!options.smoothness || options.smoothness->cross_validated) return {};
-    return given_deviations(*options.smoothness);
-}
-
 std::vector<KnownCombination> known_combinations(const Observability& observability, const Eigen::VectorXd& x,
                                                  const BorderedBand& inverse) {
     std::vector<KnownCombination> known;

@@ -10,8 +10,7 @@ std::optional<FitQuality> fit_quality(const Measurement& measurement, const Plan
                                       const AdjustmentOptions& options, int most_steps) {
     const AdjustmentProblem problem(measurement, plan, chain, tool, heads, options);
     if (problem.readings().empty()) return std::nullopt;
-    const bool smooth = options.smoothness && !options.smoothness->cross_validated;
-    GaussNewton solver(problem, smooth ? given_deviations(*options.smoothness) : std::array<double, function_count>{});
+    GaussNewton solver(problem, smoothness_at_start(options));
     solver.assume_usual(std::vector<bool>(std::size_t(problem.size()), false));
     Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
     if (!solver.try_solve(x, most_steps)) solver.equations().linearise(x, false);

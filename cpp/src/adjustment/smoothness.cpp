@@ -69,6 +69,11 @@ std::array<double, function_count> given_deviations(const Smoothness& smoothness
     return deviations;
 }
 
+std::array<double, function_count> smoothness_at_start(const AdjustmentOptions& options) {
+    if (!options.smoothness || options.smoothness->cross_validated) return {};
+    return given_deviations(*options.smoothness);
+}
+
 std::array<double, function_count> cross_validate(GaussNewton& solver, const Eigen::VectorXd& x,
                                                   const AdjustmentOptions& options) {
     constexpr double least_gain = 1e-4;  // of the score: less is not worth a smoother function

@@ -7,8 +7,11 @@
 
 namespace stepdiag {
 
-// The deviations of second differences, by function, in force at the start: those given, or none yet.
+// The deviations of second differences, by function, that are given.
 std::array<double, function_count> given_deviations(const Smoothness& smoothness);
+
+// Those in force at the start: the given ones, or none, or none yet where they are cross-validated.
+std::array<double, function_count> smoothness_at_start(const AdjustmentOptions& options);
 
 // Deviations that make n RSS/(n - tr H)^2 least (G. Wahba, Spline Models for Observational Data, SIAM 1990, ch. 4): RSS
 // the weighted square sum of the residuals, H the matrix that makes adjusted readings of readings. On the problem
