@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "python" 
 
 import numpy as np
 from mistaken import HEADS, changed, described, moved, rows_of, simulated, step_plan
+from usual import CHAIN
 
 import stepdiag as sd
 from stepdiag._core import fit_quality
@@ -67,8 +68,8 @@ def of_rows(new: Callable[[np.ndarray], np.ndarray], line: str, other: str | Non
     return make
 
 
-def really(plan: sd.Plan | None = None, head: sd.Head | None = None) -> Make:
-    return lambda scenario, seed: simulated(scenario, seed=seed, plan=plan, head=head)
+def really(plan: sd.Plan | None = None, head: sd.Head | None = None, chain: str = CHAIN) -> Make:
+    return lambda scenario, seed: simulated(scenario, seed=seed, plan=plan, head=head, chain=chain)
 
 
 def scale_lines_scaled(scenario: sd.Scenario, seed: int) -> sd.Measurement:
@@ -115,6 +116,7 @@ def mistakes(head: str, steps: int) -> Iterator[tuple[str, Make, str]]:
     yield "point read twice", of_rows(lambda rows: rows[[*range(k), *range(k - 1, 3 * steps)]], "pnp"), "read twice"
     yield "point skipped", of_rows(lambda rows: np.append(np.delete(rows, k), -1), "pnp"), "skipped"
     yield "x_mm 800, really 810", really(step_plan(steps, volume=(810.0, 600.0, 500.0))), "x_mm = 810"
+    yield "chain with Y before X", really(chain="[w Y' b X Z t]"), "in the order Y X Z from workpiece to tool"
     yield "index on scale lines alone", scale_lines_scaled, "on the scale lines"
 
 

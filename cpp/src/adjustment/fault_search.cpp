@@ -6,6 +6,8 @@
 #include <unsupported/Eigen/SpecialFunctions>
 #include <utility>
 
+#include "evaluation/fit_test.hpp"
+
 namespace stepdiag {
 namespace {
 
@@ -13,6 +15,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double alternative = 25.0;    // in chi-square: what is less behind the best may be it
 constexpr double gross_scatter = 25.0;  // of the square sum a reading
 constexpr double large_gain = 1000.0;   // where second order may tell
+constexpr double credible = largest_noise_factor * largest_noise_factor;  // variance factor; above it is rejected
 constexpr double twin = 0.99;           // correlation of what shows the same in all other readings
 constexpr std::size_t most_exact = 20;
 constexpr std::size_t most_members = 40;  // which are near enough to what is behind them
@@ -33,6 +36,12 @@ struct FaultSearch::Tested {
     SolutionPointer at = nullptr;  // kept for the tests, where nobody else does
 
     double noise_beside(double gain) const { return noise(square_sum - gain, freedom - 1); }
+    // Whether so many more faults leave a scatter that nobody believes: the worst is found first. One that hides behind
+    // others may be larger than they.
+    bool is_hopeless(double gain, int more) const {
+        constexpr double hidden = 3.0;
+        return square_sum - credible * freedom > hidden * gain * more;
+    }
     // By falling gain.
     std::vector<int> order() const {
         std::vector<int> order;
@@ -56,8 +65,12 @@ FaultSearch::FaultSearch(const AdjustmentProblem& problem, const AdjustmentOptio
 
 FaultSearch::SolutionPointer FaultSearch::run() {
     const bool corrects = options_.outlier_probability > 0.0;
+    // A second's worth, where nobody will use what comes out.
+    constexpr int least_soon = 40, work = 40'000;
+    const int soon = std::clamp(work / problem_.size(), least_soon, GaussNewton::usual_most_steps);
     SolutionPointer plain = solution_of(handled()), solution;
-    if (!plain->solve_from_zero()) plain.reset();
+    if (!plain->solve_from_zero(options_.search_faults ? GaussNewton::usual_most_steps : soon)) plain.reset();
+    if (!options_.search_faults) return plain;
     if (corrects && (!plain || plain->scatter() > gross_scatter)) solution = without_gross(plain);
     if (!solution) solution = plain;
     if (!solution) return nullptr;
@@ -187,8 +200,11 @@ bool FaultSearch::find_linearly(const SolutionPointer& where) {
         result.at = at;
         return result;
     };
-    while (const auto next = worst(tested(-1))) {
-        if (int(found_.size()) == most_) return false;
+    while (true) {
+        const Tested rest = tested(-1);
+        const auto next = worst(rest);
+        if (!next) break;
+        if (rest.is_hopeless(next->score.gain, most_ - int(found_.size()))) return false;
         found_.push_back({{*next}});
     }
     std::vector<Found> open;
@@ -259,8 +275,12 @@ bool FaultSearch::correct(SolutionPointer& solution) {
 bool FaultSearch::find_more(SolutionPointer& solution) {
     for (int step = 0; step < 4 * most_; ++step) {
         explain_by_fewer(solution);
-        const auto next = worst(test(*solution, solution->x()));
-        if (!next) return true;
+        const Tested tested = test(*solution, solution->x());
+        const auto next = worst(tested);
+        // A scatter that nobody believes and no fault explains: then the many that were found explain nothing either.
+        constexpr std::size_t few = 5;
+        if (!next) return found_.size() <= few || tested.noise_beside(0.0) <= credible;
+        if (tested.is_hopeless(next->score.gain, most_ - int(found_.size()))) return false;
         if (int(found_.size()) == most_) return false;
         const std::vector<Found> before = found_;
         found_.push_back({{*next}});
@@ -368,7 +388,7 @@ std::optional<FaultSearch::Found> FaultSearch::class_of(int number, const Soluti
         const bool may_be = best > large_gain && members.size() < most_exact && less < behind + second_order * best;
         if (members.size() < most_members && (less < behind || may_be)) members.push_back(tested.candidate(h));
     }
-    if (best > large_gain) {
+    if (best > large_gain && tested.noise_beside(best) <= credible) {
         add_slips(members);
         adjust_exactly(members, number, solution);
         const std::vector<Candidate> twins = with_twins(members, tested);

@@ -12,9 +12,7 @@ std::optional<FitQuality> fit_quality(const Measurement& measurement, const Plan
     if (problem.readings().empty()) return std::nullopt;
     GaussNewton solver(problem, smoothness_at_start(options));
     solver.assume_usual(std::vector<bool>(std::size_t(problem.size()), false));
-    Eigen::VectorXd x = Eigen::VectorXd::Zero(problem.size());
-    if (!solver.try_solve(x, most_steps)) solver.equations().linearise(x, false);
-    const double square_sum = solver.equations().square_sum(x);
+    const double square_sum = solver.least_on_the_way(most_steps);
     if (!std::isfinite(square_sum)) return std::nullopt;
     return FitQuality{square_sum, degrees_of_freedom(solver)};
 }

@@ -183,6 +183,23 @@ void GaussNewton::follow_set_ups(Eigen::VectorXd& x) {
     x += move;
 }
 
+double GaussNewton::least_on_the_way(int most_steps) {
+    constexpr double settled = 1e-6;  // of the square sum, which another step would take off
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(matrix_.size());
+    double least = std::numeric_limits<double>::infinity();
+    for (int count = 0; equations_.residuals().allFinite(); ++count) {
+        least = std::min(least, equations_.square_sum(x));
+        if (count == most_steps) break;
+        if (count > 0) factorize();
+        const Step step = this->step(x);
+        if (count > 0 && step.decrement < settled) break;
+        x += step.dx;
+        equations_.linearise(x, count + 1 < most_steps);
+    }
+    fresh_ = false;
+    return least;
+}
+
 int GaussNewton::solve(Eigen::VectorXd& x) {
     if (const auto count = try_solve(x)) return *count;
     throw InvalidArgument("adjustment: finds no machine and set-up that explain the readings");

@@ -31,6 +31,8 @@ public:
     std::optional<int> try_solve(Eigen::VectorXd& x, int most_steps = usual_most_steps);
     // Throws InvalidArgument where it is not reached.
     int solve(Eigen::VectorXd& x);
+    // Plain steps from zero, none of them made to fit: the least square sum that was met, infinite where no number was.
+    double least_on_the_way(int most_steps);
     // Derivatives and factor at x, for what has changed (readings left out, smoothness) or for uncertainties.
     void factorize(const Eigen::VectorXd& x);
     // Derivatives at x, and the factor where it is of somewhere else.

@@ -17,9 +17,9 @@ Solution::Solution(AdjustmentProblem problem, const std::array<double, function_
     solver_.assume_usual(observability_.determined());
 }
 
-bool Solution::solve_from_zero() {
+bool Solution::solve_from_zero(int most_steps) {
     Eigen::VectorXd x = Eigen::VectorXd::Zero(problem_.size());
-    const std::optional<int> count = stepdiag::solve_from_zero(solver_, observability_.determined(), x);
+    const std::optional<int> count = stepdiag::solve_from_zero(solver_, observability_.determined(), x, most_steps);
     if (!count) return false;
     iterations_ = *count;
     x_ = x;

@@ -25,7 +25,7 @@ public:
     int iterations() const { return iterations_; }
 
     // Each says whether the minimum was reached; if not, x stays.
-    bool solve_from_zero();
+    bool solve_from_zero(int most_steps = GaussNewton::usual_most_steps);
     bool solve_from(const Eigen::VectorXd& start);  // which is near
     void solve_again();  // for another smoothness; throws InvalidArgument where it is not reached
     // Equations, factor and inverse at any x, with what is open known to be there.

@@ -12,6 +12,7 @@ namespace stepdiag {
 // From zero to the minimum: the number of steps, or none where no minimum is reached. `determined`: the unknowns that
 // the readings determine; the others are assumed to be usual, in the end where they came out. Several paths are tried
 // where the first ends at a square sum that no sound run has; the least minimum counts.
-std::optional<int> solve_from_zero(GaussNewton& solver, const std::vector<bool>& determined, Eigen::VectorXd& x);
+std::optional<int> solve_from_zero(GaussNewton& solver, const std::vector<bool>& determined, Eigen::VectorXd& x,
+                                   int most_steps = GaussNewton::usual_most_steps);
 
 }  // namespace stepdiag

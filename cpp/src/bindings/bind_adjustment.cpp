@@ -129,12 +129,13 @@ void bind_options(py::module_& m) {
         "that. "
         "scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and "
         "the fit is doubtful at best. plausible: what a machine can be. reliability: also which faults the readings "
-        "control.")
+        "control. search_faults: False: it is known already what is wrong with the run as a whole; faults are not "
+        "looked for, and where the minimum is not reached soon, it counts as not found.")
         .def(py::init([](const ReadingUncertainty& uncertainty, const Priors& setup,
                          const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
                          bool rotations, const std::optional<Smoothness>& smoothness, double outlier_probability,
                          const std::string& slips, bool scale_uncertainty, bool full_covariance,
-                         const PlausibleLimits& plausible, bool reliability) {
+                         const PlausibleLimits& plausible, bool reliability, bool search_faults) {
                  AdjustmentOptions options{uncertainty,
                                            setup.value,
                                            {},
@@ -147,7 +148,8 @@ void bind_options(py::module_& m) {
                                            scale_uncertainty,
                                            full_covariance,
                                            plausible,
-                                           reliability};
+                                           reliability,
+                                           search_faults};
                  for (const auto& [line, priors] : setup_by_line) options.setup_by_line[line] = priors.value;
                  return options;
              }),
@@ -158,7 +160,7 @@ void bind_options(py::module_& m) {
              py::arg("outlier_probability") = usual.outlier_probability, py::arg("slips") = name(usual.slips),
              py::arg("scale_uncertainty") = usual.scale_uncertainty, py::arg("full_covariance") = usual.full_covariance,
              py::arg("plausible") = usual.plausible, py::arg("reliability") = usual.reliability,
-             "adjust() checks them.")
+             py::arg("search_faults") = usual.search_faults, "adjust() checks them.")
         .def_readonly("uncertainty", &AdjustmentOptions::uncertainty)
         .def_property_readonly("setup", [](const AdjustmentOptions& o) { return Priors{o.setup}; })
         .def_property_readonly("setup_by_line",
@@ -176,7 +178,8 @@ void bind_options(py::module_& m) {
         .def_readonly("scale_uncertainty", &AdjustmentOptions::scale_uncertainty)
         .def_readonly("full_covariance", &AdjustmentOptions::full_covariance)
         .def_readonly("plausible", &AdjustmentOptions::plausible)
-        .def_readonly("reliability", &AdjustmentOptions::reliability);
+        .def_readonly("reliability", &AdjustmentOptions::reliability)
+        .def_readonly("search_faults", &AdjustmentOptions::search_faults);
 }
 
 void bind_result(py::module_& m) {
@@ -470,8 +473,9 @@ void bind_adjustment(py::module_& m) {
         .def_readonly("degrees_of_freedom", &FitQuality::degrees_of_freedom);
     m.def("fit_quality", &fit_quality_of_run, py::arg("measurement"), py::arg("plan"), py::arg("head"),
           py::arg("chain"), py::arg("tool"), py::arg("options"), py::arg("most_steps"),
-          "How well a run fits, without search for faults and without uncertainties, in a tenth of the time of adjust, "
-          "after so many steps of Gauss-Newton; None where no number comes out. Raises InvalidArgument.");
+          "How well a run fits, without search for faults and without uncertainties, in a tenth of the time of adjust: "
+          "the least square sum that so many plain steps of Gauss-Newton meet; None where no number comes out. Raises "
+          "InvalidArgument.");
 }
 
 }  // namespace stepdiag::bindings

@@ -73,9 +73,8 @@ def evaluate(
     from stepdiag.config.toml_text import located
     from stepdiag.io.data_files import is_netcdf, read_measurement, write_calibration
     from stepdiag.io.whole_files import check_input
-    from stepdiag.mistakes.search import find_mistakes
     from stepdiag.report.evaluation import evaluation_report
-    from stepdiag.report.mistakes import with_mistake
+    from stepdiag.report.mistakes import searchable, with_mistake
     from stepdiag.scenario.description import (
         JudgedEvaluation,
         adjust_scenario,
@@ -99,14 +98,24 @@ def evaluate(
     measurement = read_measurement(run)
     provenance = provenance_of(known, run, method=method)
     with located(str(run)), Progress("evaluate"):
+        search = searchable(known, measurement)
+        mistakes = search.before() if search else []
         try:
             result = (
-                adjust_scenario(known, measurement, full_covariance=with_covariance, reliability=reliability)
+                adjust_scenario(
+                    known,
+                    measurement,
+                    full_covariance=with_covariance,
+                    reliability=reliability,
+                    search_faults=not mistakes,
+                )
                 if method == "adjustment"
-                else evaluate_beside_adjustment(known, measurement, method=method, full_covariance=with_covariance)
+                else evaluate_beside_adjustment(
+                    known, measurement, method=method, full_covariance=with_covariance, search_faults=not mistakes
+                )
             )
         except InvalidArgument as error:
-            raise with_mistake(error, known, measurement) from None
+            raise with_mistake(error, search, mistakes) from None
     written = write_calibration(
         result.calibration if isinstance(result, JudgedEvaluation) else result,
         path,
@@ -117,7 +126,8 @@ def evaluate(
     adjusted = result.adjustment if isinstance(result, JudgedEvaluation) else result
     is_odd = adjusted is None or adjusted.verdict.fit in ("doubtful", "rejected")
     with Progress("mistakes"):  # which may take longer than the evaluation: that is written
-        mistakes = find_mistakes(known, measurement, adjusted) if is_odd else []
+        if search and is_odd and not mistakes:
+            mistakes = search.after(adjusted)
     if as_json:
         from stepdiag.objects.evaluation import evaluated_files, evaluation_object
         from stepdiag.objects.writer import json_text

@@ -6,10 +6,10 @@ tests/python/mistakes/test_catalogue.py."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, permutations
-from typing import Any, Final
+from typing import Any, Final, TypedDict
 
 import numpy as np
 
@@ -316,6 +316,29 @@ def _orders(entry: str, copy: Copy) -> Hypotheses:
             )
 
 
+def _chains(entry: str, copy: Copy) -> Hypotheses:
+    """The order of the axes alone: where the bed stands between them, no reading tells."""
+    chain = copy.known.chain
+    words = chain.name.split()[1:-1]  # without w and t
+    bed = words.index("b")
+    stated = [word[0] for word in words if word != "b"]
+    for order in permutations("XYZ"):
+        if list(order) == stated:
+            continue
+        axes = [axis + "'" for axis in order[:bed]] + ["b"] + list(order[bed:])
+        name = f"[w {' '.join(axes)} t]"
+        yield Hypothesis(
+            entry,
+            f"the chain has its axes in the order {' '.join(order)} from workpiece to tool, not {' '.join(stated)}",
+            f'in [machine] write the chain as it is, such as chain = "{name}"; where b stands, no reading tells',
+            partial(_with_chain, chain=_core.Chain(name)),
+        )
+
+
+def _with_chain(copy: Copy, chain: _core.Chain) -> Copy:
+    return replace(copy, known=replace(copy.known, chain=chain))
+
+
 def _other_heads(entry: str, copy: Copy) -> Hypotheses:
     described = copy.known.described_heads
     # A line that is there because another one may have been measured from its end has no head of its own.
@@ -393,20 +416,30 @@ def _near(entry: str, copy: Copy) -> Families:
     if plan.lines and plan.scale_lines:
         groups.insert(0, list(plan.scale_lines))
     for lines in groups:
-        yield Family(partial(_of_distances, entry, copy, distances, lines), _PPM)
+        yield Family(
+            partial(_of_distances, entry, copy, distances, lines),
+            near=2e-5,
+            limit=1e-3,
+            fault=lines[0] if len(lines) == 1 else None,
+        )
     if pair:
         yield Family(
             lambda log: _factor(
                 entry, copy, pair, math.exp(log), "on all lines", "a gain that is not applied", None, 1
             ),
-            _LOGARITHMS,
+            **_LOGARITHM,
         )
     elif _has_beams(copy):
-        yield Family(lambda log: _wide_beams(entry, math.exp(log)), _LOGARITHMS)
+        yield Family(lambda log: _wide_beams(entry, math.exp(log)), **_LOGARITHM)
 
 
-_PPM: Final = (-1e-3, 1e-3)
-_LOGARITHMS: Final = (-0.4, -0.1, 0.1, 0.4)
+class _Sought(TypedDict):
+    near: float
+    limit: float
+    far: tuple[float, ...]
+
+
+_LOGARITHM: Final[_Sought] = {"near": 0.02, "limit": 0.4, "far": (-0.3, -0.1, 0.1, 0.3)}
 
 
 def _of_distances(entry: str, copy: Copy, channels: Sequence[str], lines: Sequence[str], excess: float) -> Hypothesis:
@@ -440,16 +473,16 @@ def _psd_distances(entry: str, copy: Copy) -> Families:
         return
 
     def make(log: float) -> Hypothesis:
-        distance = float(f"{stated * math.exp(log):.3g}")
+        distance = stated * math.exp(log)
         return Hypothesis(
             entry,
-            f"psd_distance_mm is about {distance:g}, not {stated:g}: the spots have another lever",
-            f"in [head] write psd_distance_mm as it is; {distance:g} fits best",
+            f"psd_distance_mm is about {distance:.3g}, not {stated:g}: the spots have another lever",
+            f"in [head] write psd_distance_mm as it is; {distance:.3g} fits best",
             with_heads(lambda head: head_like(head, psd_distance=distance)),
             free=1.0,
         )
 
-    yield Family(make, (-2.3, -0.7, -0.3, 0.3, 0.7, 1.4, 2.3))
+    yield Family(make, near=0.1, limit=2.5, far=(-2.3, -0.7, -0.3, 0.3, 0.7, 1.4, 2.3))
 
 
 CATALOGUE: Final = (
@@ -461,6 +494,7 @@ CATALOGUE: Final = (
     Mistake("lines exchanged", _lines_exchanged),
     Mistake("reversed", _reversed),
     Mistake("order", _orders),
+    Mistake("chain", _chains),
     Mistake("other head", _other_heads),
     Mistake("shifted", _shifted),
     Mistake("volume", _volume),

@@ -44,10 +44,17 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class Family:
-    """Hypotheses by one number that the readings choose, 0 being no mistake: the best is sought between the trials."""
+    """Hypotheses by one number that the readings choose, 0 being no mistake.
+
+    `near`: a change over which the fit changes as a parabola. `far`: where else the search begins if the run fits badly
+    as it is. `limit`: of the number, either way. `fault`: the line of whose distances the adjustment itself looks for a
+    factor."""
 
     make: Callable[[float], Hypothesis]
-    trials: tuple[float, ...]
+    near: float
+    limit: float
+    far: tuple[float, ...] = ()
+    fault: str | None = None
 
 
 def all_lines(known: Known) -> list[str]:

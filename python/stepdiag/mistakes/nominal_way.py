@@ -40,9 +40,8 @@ class Way:
 
 
 def ways_of(known: Known, run: _core.Measurement) -> list[Way]:
-    """Every line of every run; beams by their mean."""
-    names = [name for name in distances_of(known) if name in run.channels]
-    distance = np.mean([run.channels[name] for name in names], axis=0) if names else np.full(len(run), np.nan)
+    """Every line of every run."""
+    distance = distance_of(known, run)
     along = {line: known.plan.frame(line)[:, 2] for line in set(run.line)}
     return [
         Way(number, line, rows, run.position[rows] @ along[line], distance[rows])
@@ -50,9 +49,11 @@ def ways_of(known: Known, run: _core.Measurement) -> list[Way]:
     ]
 
 
-def gross_lines(known: Known, run: _core.Measurement) -> int:
-    """How many lines are not on their way."""
-    return sum(way.is_gross for way in ways_of(known, run))
+def distance_of(known: Known, run: _core.Measurement) -> Values:
+    """The distance of each row; of beams their mean."""
+    channels = run.channels
+    read = [channels[name] for name in distances_of(known) if name in channels]
+    return np.add.reduce(read) / len(read) if read else np.full(len(run), np.nan)
 
 
 @dataclass(frozen=True)

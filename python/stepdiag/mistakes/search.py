@@ -3,12 +3,16 @@
 A mistake is named where the fit with it undone is better by `CLEAR` in chi-square than with the readings and the
 scenario as they are (relative to the variance factor that is left, so that noise of any size names nothing), is not
 itself rejected, and explains more than the faults of single readings that the adjustment found. What is less than
-`ALTERNATIVE` behind the best is not told from it, and is named with it."""
+`ALTERNATIVE` behind the best is not told from it, and is named with it.
 
+Quick fits take plain steps of Gauss-Newton: what fits is at its minimum after a few, and what does not need not be."""
+
+import math
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
@@ -17,7 +21,7 @@ from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.mistakes.catalogue import CATALOGUE
 from stepdiag.mistakes.copies import Copy, Family, Hypothesis, in_turn, passes_of, without
-from stepdiag.mistakes.nominal_way import gross_lines
+from stepdiag.mistakes.nominal_way import Way, distance_of, ways_of
 from stepdiag.scenario.description import Scenario, adjust_scenario, adjustment_options
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.known import Known
@@ -27,10 +31,12 @@ CLEAR: Final = 60.0  # least gain in chi-square
 ALTERNATIVE: Final = 25.0  # what is less behind the best may be it, as of faults
 FAULT: Final = 28.0  # what one fault of single readings must explain to be one
 CREDIBLE: Final = 9.0  # variance factor above which a fit is rejected: not worth an exact adjustment
+PROMISING: Final = 36.0  # after the screening: what is above is not below `CREDIBLE` at its minimum
 MOST_ADJUSTED: Final = 4
 BEGUN: Final = 2  # singles on which a second mistake is sought
+LARGER: Final = 0.7  # of the square sum, which the larger of two mistakes leaves at most
 SCREENING: Final = 3  # steps of Gauss-Newton after which a run that fits is told from the others
-ENOUGH: Final = 30  # after which it is at its minimum
+ENOUGH: Final = 8  # after which it is at its minimum
 REFINED: Final = 10  # of the best of a screening
 MOST_PARABOLAS: Final = 6
 NEAR: Final = 10.0  # times the least square sum of a screening, above which nothing becomes the best
@@ -43,7 +49,10 @@ class FoundMistake:
     entry: its name in the catalogue; of two at once both.
     text, edit: what happened, and what to change; without a full stop.
     fit, variance_factor: verdict of the adjustment with the mistake undone.
-    variance_factor_before: with it; None where the readings could not be adjusted."""
+    variance_factor_before: with it; None where the readings could not be adjusted.
+    alternatives: of the first of a list: how many more there are that the readings do not tell from it, and that are
+    not in the list.
+    or_faults: the faults of readings that the adjustment found explain as much."""
 
     entry: str
     text: str
@@ -51,6 +60,8 @@ class FoundMistake:
     fit: str
     variance_factor: float
     variance_factor_before: float | None
+    alternatives: int = 0
+    or_faults: bool = False
 
 
 @dataclass(frozen=True)
@@ -101,62 +112,104 @@ def find_mistakes(
     Raises:
         InvalidArgument: a point of the run is not in the scenario's plan.
     """
-    known = scenario.known
-    check_points(measurement, known.plan)
-    copy = Copy(known, only(measurement, known.signals))
-    with ThreadPoolExecutor(min(2, os.cpu_count() or 1)) as pool:
-        return _Search(copy, adjustment, refused, pool).found()
+    return MistakeSearch(scenario, measurement).after(adjustment, refused=refused)
 
 
-class _Search:
-    def __init__(
-        self, copy: Copy, adjustment: _core.Adjustment | None, refused: bool, pool: ThreadPoolExecutor
-    ) -> None:
-        self._copy, self._adjustment, self._pool = copy, adjustment, pool
-        # However well they fit: no machine is off by so much.
-        self._is_impossible = refused or gross_lines(copy.known, copy.run) > 0
-        self._as_read = _NONE if self._is_impossible else _fit_of(copy, ENOUGH)
+class MistakeSearch:
+    """The search in one run, before its adjustment and after it. Raises InvalidArgument for a point that is not in the
+    plan."""
 
-    def found(self) -> list[FoundMistake]:
-        singles = self._singles(self._copy)
-        return (
-            self._named(singles)
-            or self._named(self._of_families())
-            or self._named([pair for first in self._begun(singles) for pair in self._with_second(first)])
-            or self._named(self._disturbed())
-        )
+    def __init__(self, scenario: Scenario | Known, measurement: _core.Measurement) -> None:
+        known = scenario.known
+        check_points(measurement, known.plan)
+        self._copy = Copy(known, only(measurement, known.signals))
+        with np.errstate(all="ignore"):  # of readings that are no numbers of a machine
+            self._ways = ways_of(known, self._copy.run)
+            # However well they fit: no machine is off by so much.
+            self._is_impossible = _gross(self._ways) > 0
+        self._adjustment: _core.Adjustment | None = None
+
+    def before(self) -> list[FoundMistake]:
+        """Mistakes of a run that is far from its scenario, and fits with one of them undone: faults of single readings,
+        which would take long to find, explain no more. None of other runs."""
+        if self._as_read.factor <= CREDIBLE:
+            return []
+        with np.errstate(all="ignore"), _pool() as self._pool:
+            found = self._named(self._single) or self._named(self._pairs())
+        return found if found and found[0].fit == "accepted" else []
+
+    def after(self, adjustment: _core.Adjustment | None, *, refused: bool = False) -> list[FoundMistake]:
+        """As find_mistakes."""
+        self._adjustment = adjustment
+        if refused:
+            self._is_impossible, self._as_read = True, _NONE
+        elif adjustment is not None and not adjustment.faults and adjustment.weighted_square_sum > 0.0:
+            as_adjusted = _Fit(adjustment.weighted_square_sum, adjustment.degrees_of_freedom)
+            self._as_read = min(self._as_read, as_adjusted, key=lambda fit: fit.factor)
+        with np.errstate(all="ignore"), _pool() as self._pool:
+            return (
+                self._named(self._single)
+                or self._named(self._of_families())
+                or self._named(self._pairs())
+                or self._named(self._disturbed())
+            )
+
+    @cached_property
+    def _as_read(self) -> _Fit:
+        return _NONE if self._is_impossible else _fit_of(self._copy, ENOUGH)
+
+    @cached_property
+    def _single(self) -> list[_Tried]:
+        return self._singles(self._copy)
 
     def _singles(self, copy: Copy) -> list[_Tried]:
         """The best of all mistakes without a number of their own, in the order of the catalogue."""
-        gross = gross_lines(copy.known, copy.run)
+        ways = self._ways if copy is self._copy else ways_of(copy.known, copy.run)
+        gross = max(_gross(ways), 1)
 
         def screened(hypothesis: Hypothesis) -> _Tried | None:
             changed = _changed(hypothesis, copy)
             # What leaves distances off by millimetres needs no adjustment.
-            if changed is None or not (left := gross_lines(changed.known, changed.run)) < max(gross, 1):
+            if changed is None or not (left := _gross_of(changed, copy, ways)) < gross:
                 return None
             return _Tried(hypothesis, _fit_of(changed, SCREENING if left == 0 else 1))
 
         tried = [one for one in self._pool.map(screened, _hypotheses(copy)) if one is not None]
         sums = sorted(one.fit.square_sum for one in tried)
         limit = min(sums[:REFINED][-1], NEAR * sums[0]) if sums else 0.0
-        best = [one.hypothesis for one in tried if one.fit.square_sum <= limit]
-        fits = self._pool.map(lambda hypothesis: _fit_of(hypothesis.change(copy), ENOUGH), best)
-        return list(map(_Tried, best, fits))
+
+        def refined(one: _Tried) -> _Tried:
+            if one.fit.factor > PROMISING:
+                return one
+            return replace(one, fit=_fit_of(one.hypothesis.change(copy), ENOUGH))
+
+        return list(self._pool.map(refined, [one for one in tried if one.fit.square_sum <= limit]))
 
     def _of_families(self) -> list[_Tried]:
         """The best of each family."""
         if self._is_impossible:
             return []  # what is no round number does not repair that
-        families = [family for mistake in CATALOGUE for family in mistake.families_of(self._copy)]
+        # Where the adjustment found a factor, or what may be one, its sentence is the one.
+        found = self._adjustment.faults if self._adjustment else []
+        told = {fault.line for each in found for fault in each.members if fault.kind == "factor"}
+        families = [
+            family
+            for mistake in CATALOGUE
+            for family in mistake.families_of(self._copy)
+            if family.fault is None or family.fault not in told
+        ]
         best = self._pool.map(lambda family: _best_of(family, self._copy, self._as_read), families)
         return [one for one in best if one is not None]
+
+    def _pairs(self) -> list[_Tried]:
+        return [pair for first in self._begun(self._single) for pair in self._with_second(first)]
 
     def _begun(self, tried: list[_Tried]) -> list[_Tried]:
         """Mistakes that explain a part. What the readings do not tell apart begins once."""
         begun: list[_Tried] = []
         for one in sorted(tried, key=lambda one: one.fit.square_sum):
-            if self._gain(one) < CLEAR:
+            # The larger of two mistakes makes more of the misfit than the other.
+            if self._gain(one) < CLEAR or one.fit.square_sum > LARGER * self._as_read.square_sum:
                 break
             if all(abs(other.fit.square_sum - one.fit.square_sum) > ALTERNATIVE * one.fit.factor for other in begun):
                 begun.append(one)
@@ -198,15 +251,24 @@ class _Search:
             (one for one in tried if one.excess(factor) - best < ALTERNATIVE),
             key=lambda one: round(one.excess(factor) - best),
         )
-        return [found for one in alike[:MOST_ADJUSTED] if (found := self._adjusted(one.hypothesis)) is not None]
+        adjusted = self._pool.map(self._adjusted, [one.hypothesis for one in alike[:MOST_ADJUSTED]])
+        found = [one for one in adjusted if one is not None]
+        if found:
+            more, by_faults = max(0, len(alike) - MOST_ADJUSTED), self._left_by_faults(factor)
+            found[0] = replace(found[0], alternatives=more, or_faults=by_faults - best < ALTERNATIVE)
+        return found
+
+    def _left_by_faults(self, factor: float) -> float:
+        """What the faults that the adjustment found leave of chi-square; infinite where it found none."""
+        adjustment = self._adjustment
+        if adjustment is None or not adjustment.faults:
+            return math.inf
+        return _Fit(adjustment.weighted_square_sum, adjustment.degrees_of_freedom).excess(factor)
 
     def _is_explained_by_faults(self, best: float, factor: float, *, last: bool) -> bool:
         """Whether the faults that the adjustment found explain as much."""
-        adjustment = self._adjustment
-        if adjustment is None or not adjustment.faults:
-            return False
-        left = _Fit(adjustment.weighted_square_sum, adjustment.degrees_of_freedom).excess(factor)
-        return left + FAULT * len(adjustment.faults) * (not last) < best + (CLEAR if last else 10.0)
+        count = len(self._adjustment.faults) if self._adjustment else 0
+        return self._left_by_faults(factor) + FAULT * count * (not last) < best + (CLEAR if last else 10.0)
 
     def _adjusted(self, hypothesis: Hypothesis) -> FoundMistake | None:
         try:
@@ -225,7 +287,8 @@ class _Search:
     def _disturbed(self) -> list[_Tried]:
         """A stretch of one line without which all others agree: where it is sought, as nothing says what it was."""
         passes = passes_of(self._copy.run)
-        if len(passes) < 2:
+        # A stretch is named for what chi-square has above its expectation, not for what chance takes off.
+        if len(passes) < 2 or self._as_read.excess(1.0) < CLEAR:
             return []
         names = self._copy.known.signals
 
@@ -273,6 +336,23 @@ class _Search:
         ]
 
 
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(min(2, os.cpu_count() or 1), initializer=partial(np.seterr, all="ignore"))
+
+
+def _gross(ways: Sequence[Way]) -> int:
+    """How many lines are not on their way."""
+    return sum(way.is_gross for way in ways)
+
+
+def _gross_of(changed: Copy, copy: Copy, ways: Sequence[Way]) -> int:
+    """The same of a changed copy; what its readings alone differ in, costs less."""
+    if changed.known.plan is not copy.known.plan:
+        return _gross(ways_of(changed.known, changed.run))
+    distance = distance_of(changed.known, changed.run)
+    return _gross([replace(way, distance=distance[way.rows]) for way in ways])
+
+
 def _hypotheses(copy: Copy) -> Iterator[Hypothesis]:
     for mistake in CATALOGUE:
         yield from mistake.of(copy)
@@ -298,36 +378,31 @@ def _fit_of(copy: Copy, steps: int) -> _Fit:
 
 
 def _best_of(family: Family, copy: Copy, as_read: _Fit) -> _Tried | None:
-    """The hypothesis of a family that fits best; None where it is at the end of the trials, or as things are."""
+    """The hypothesis of a family that fits best; None where it is as things are, where so little would be gained that
+    it is not named, or at the family's end."""
     fits = {0.0: as_read}
-    for value in family.trials:
-        fits[value] = _fit_of(family.make(value).change(copy), SCREENING)
+
+    def fit(value: float) -> _Fit:
+        if value not in fits:
+            fits[value] = _fit_of(family.make(value).change(copy), ENOUGH)
+        return fits[value]
+
+    if as_read.excess(1.0) > CLEAR:  # the minimum may be far
+        for value in family.far:
+            fit(value)
     for _ in range(MOST_PARABOLAS):
-        before, least = min(fit.square_sum for fit in fits.values()), _least(fits)
-        if least is None or least in fits:
+        best = min(fits, key=lambda value: fits[value].square_sum)
+        before, middle, after = (fit(best + step).square_sum for step in (-family.near, 0.0, family.near))
+        slope, bend = after - before, after - 2.0 * middle + before
+        if not (math.isfinite(slope) and bend > 0.0):
             break
-        fits[least] = _fit_of(family.make(least).change(copy), ENOUGH)
-        if abs(before - fits[least].square_sum) < 0.1:
+        # A parabola, as the square sum is one to first order, tells the gain before it is tried.
+        if best == 0.0 and slope * slope / (8.0 * bend) < 0.5 * CLEAR:
+            return None
+        least = best - family.near * slope / (2.0 * bend)
+        if abs(least) >= family.limit or middle - fit(least).square_sum < 0.1:
             break
-    values = sorted(fits)
-    best = min(values, key=lambda value: fits[value].square_sum)
-    if best in (values[0], values[-1], 0.0):
+    best = min(fits, key=lambda value: fits[value].square_sum)
+    if best == 0.0 or abs(best) >= family.limit:
         return None
     return _Tried(family.make(best), fits[best])
-
-
-def _least(fits: dict[float, _Fit]) -> float | None:
-    """Where the parabola through the best value and its neighbours is least; None at the end."""
-    values = sorted(fits)
-    k = min(range(len(values)), key=lambda i: fits[values[i]].square_sum)
-    if not 0 < k < len(values) - 1:
-        return None
-    x = np.array(values[k - 1 : k + 2])
-    y = np.array([fits[value].square_sum for value in x])
-    if not np.isfinite(y).all():
-        return None
-    left, right = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
-    if not right > left:
-        return None
-    bend = (right - left) / (x[2] - x[0])
-    return float(np.clip(0.5 * (x[0] + x[1]) - left / (2.0 * bend), x[0], x[2]))

@@ -8,6 +8,7 @@ from typing_extensions import TypedDict
 
 from stepdiag._core import InvalidArgument, __version__
 from stepdiag.objects.calibration import Fit, fit_of
+from stepdiag.objects.evaluation import NamedMistake, mistake_of
 from stepdiag.report.file_check import Finding
 from stepdiag.report.scenario_and_run import FoundTogether
 
@@ -35,6 +36,8 @@ class CheckedRun(TypedDict):
     """Why the two do not belong together."""
     fit: Fit | None
     """null: nothing was read yet, or not valid"""
+    mistakes: list[NamedMistake]
+    """Of which one would explain a run that could be adjusted; of one that is refused the error says it."""
     text: list[str]
     """What the report says."""
 
@@ -101,5 +104,6 @@ def _run(run: Path, scenario: str, found: FoundTogether | InvalidArgument) -> Ch
         "valid": not refused,
         "error": str(found) if refused else None,
         "fit": None if calibration is None else fit_of(calibration),
+        "mistakes": [] if isinstance(found, InvalidArgument) else list(map(mistake_of, found.mistakes)),
         "text": [] if isinstance(found, InvalidArgument) else list(found.text),
     }

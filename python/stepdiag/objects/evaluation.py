@@ -223,6 +223,10 @@ class NamedMistake(TypedDict):
     fit: Verdict
     """With the mistake undone, as the next."""
     variance_factor: float | None
+    more_alternatives: int
+    """Of the first of a list: how many more fit as well and are not listed."""
+    or_faults: bool
+    """Of the first of a list: whether the faults that were found explain as much."""
 
 
 class EvaluationObject(TypedDict):
@@ -261,7 +265,7 @@ def evaluation_object(
         "stepdiag": __version__,
         "format": "stepdiag evaluation 1",
         "fit": fit_of(written),
-        "mistakes": [_mistake(found) for found in mistakes],
+        "mistakes": [mistake_of(found) for found in mistakes],
         "warnings": list(warnings),
         "files": files,
         "readings": readings_of(measurement, known),
@@ -273,7 +277,8 @@ def evaluation_object(
     }
 
 
-def _mistake(found: FoundMistake) -> NamedMistake:
+def mistake_of(found: FoundMistake) -> NamedMistake:
+    """A mistake as an object."""
     fit: Any = found.fit
     return {
         "entry": found.entry,
@@ -281,6 +286,8 @@ def _mistake(found: FoundMistake) -> NamedMistake:
         "edit": found.edit,
         "fit": fit,
         "variance_factor": number(found.variance_factor),
+        "more_alternatives": found.alternatives,
+        "or_faults": found.or_faults,
     }
 
 

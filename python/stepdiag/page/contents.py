@@ -9,15 +9,17 @@ from typing import Final
 
 import numpy as np
 
-from stepdiag._core import Calibration, InvalidArgument, Measurement
+from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement
 from stepdiag.calibration.comparison import Comparison, compare_calibrations
 from stepdiag.calibration.volume_change import VolumeChange, volume_change
 from stepdiag.io.adjustment_read import FitDetails, details_of, read_fit_details
 from stepdiag.io.data_files import date_of_today, read_calibration, read_measurement
 from stepdiag.io.whole_files import check_input, read_bytes
+from stepdiag.mistakes.search import FoundMistake
 from stepdiag.page.budget import Budget, read_budget
 from stepdiag.page.header import ReportHeader, header_of
 from stepdiag.parameters import in_report_units, kind_of, units_of
+from stepdiag.report.mistakes import searchable
 from stepdiag.scenario.description import adjust_scenario, read_scenario
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.provenance import provenance_of
@@ -74,6 +76,7 @@ class Contents:
     measurement: Measurement | None
     budget: Budget | None
     notes: tuple[str, ...]
+    mistakes: tuple[FoundMistake, ...] = ()  # of which one would explain a fit that is not accepted
 
     @property
     def lines(self) -> list[str]:
@@ -92,15 +95,24 @@ def read_contents(request: ReportRequest) -> Contents:
     for path in request.inputs:
         check_input(path)
     calibration = read_calibration(request.calibration)
-    details = read_fit_details(request.calibration)
+    details, adjustment = read_fit_details(request.calibration), None
     known = None if request.scenario is None else read_scenario(request.scenario).known
     measurement = None if request.run is None else read_measurement(request.run)
     notes: list[str] = []
     if known is not None:
         _check_machine(request, calibration, known)
     _check_fingerprints(request, calibration, known, notes)
-    if details is None and known is not None and measurement is not None and calibration.method == "adjustment":
-        details = _evaluated_again(request, calibration, known, measurement)
+    mistakes: list[FoundMistake] = []
+    if known is not None and measurement is not None:
+        is_odd = calibration.fit in ("doubtful", "rejected")
+        search = searchable(known, measurement) if is_odd else None
+        mistakes = search.before() if search else []
+        if details is None and calibration.method == "adjustment":
+            adjustment = _evaluated_again(request, calibration, known, measurement, search_faults=not mistakes)
+            details = details_of(adjustment, measurement)
+        if search and not mistakes:
+            mistakes = search.after(adjustment or _adjusted(known, measurement))
+    if adjustment is not None:
         notes.append("Residuals and set-up were computed again from scenario and run; the values are the file's.")
     before = comparison = None
     if request.before is not None:
@@ -123,7 +135,16 @@ def read_contents(request: ReportRequest) -> Contents:
         measurement=measurement,
         budget=None if request.uncertainty is None else read_budget(request.uncertainty, calibration),
         notes=tuple(notes),
+        mistakes=tuple(mistakes),
     )
+
+
+def _adjusted(known: Known, measurement: Measurement) -> Adjustment | None:
+    """Of faults that it finds, no mistake is made; None where the run cannot be adjusted."""
+    try:
+        return adjust_scenario(known, measurement)
+    except InvalidArgument:
+        return None
 
 
 def _check_machine(request: ReportRequest, calibration: Calibration, known: Known) -> None:
@@ -173,11 +194,11 @@ def _check_fingerprints(
 
 
 def _evaluated_again(
-    request: ReportRequest, calibration: Calibration, known: Known, measurement: Measurement
-) -> FitDetails:
-    """Residuals and set-up by the same evaluation, which must give the file's values."""
+    request: ReportRequest, calibration: Calibration, known: Known, measurement: Measurement, *, search_faults: bool
+) -> Adjustment:
+    """The same evaluation once more, which must give the file's values."""
     try:
-        adjustment = adjust_scenario(known, measurement)
+        adjustment = adjust_scenario(known, measurement, search_faults=search_faults)
     except InvalidArgument as error:
         raise InvalidArgument(f"{request.run}: does not belong to {request.scenario}: {error}") from None
     again = adjustment.calibration
@@ -196,7 +217,7 @@ def _evaluated_again(
     for name, (angle, _) in calibration.squareness.items():
         if abs(again.squareness[name][0] - angle) > SAME_VALUE:
             _refuse(request, name, abs(again.squareness[name][0] - angle))
-    return details_of(adjustment, measurement)
+    return adjustment
 
 
 def _refuse(request: ReportRequest, name: str, difference: float) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from stepdiag._core import Calibration, InvalidArgument, __version__
 from stepdiag.calibration.volume import judged
 from stepdiag.io.file_kind import PAGE_BEGINS
+from stepdiag.objects.evaluation import mistake_of
 from stepdiag.objects.report import report_object
 from stepdiag.objects.volume import volume_object
 from stepdiag.page.budget import budget_section
@@ -76,7 +77,7 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
     ]
     body = [
         element("a", "Skip to the verdict", href="#verdict", class_="skip"),
-        element("div", header_block(contents), verdict_block(calibration), class_="opening"),
+        element("div", header_block(contents), verdict_block(contents), class_="opening"),
         _contents_list(contents),
         element("main", *sections, id="main"),
         element("footer", element("p", f"Made by stepdiag {__version__}, {moment(contents.date)}.")),
@@ -98,6 +99,7 @@ def report_values(contents: Contents, found: ErrorInVolume, before: ErrorInVolum
     values: dict[str, Any] = {
         **report_object(contents.calibration, Path(request.calibration.name), contents.notes),
         "format": "stepdiag report page 1",
+        "mistakes": [mistake_of(mistake) for mistake in contents.mistakes],
         "volume": volume_object(found.figures, Path(request.calibration.name), []),
     }
     if request.before is not None and contents.before is not None and before is not None:

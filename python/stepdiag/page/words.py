@@ -18,6 +18,7 @@ from stepdiag.page.html import Markup, definitions, element, listed, markup, sec
 from stepdiag.page.numbers import COVERAGE_FACTOR, NBSP, NOT_KNOWN, moment, position, shown, with_interval
 from stepdiag.page.volume import ErrorInVolume, place_of_largest, why_not_known, with_ends
 from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, in_report_units, kind_of
+from stepdiag.report.mistakes import mistake_rows
 from stepdiag.units import MICROMETRE
 
 HEADLINE: Final = {
@@ -66,8 +67,9 @@ def header_block(contents: Contents) -> Markup:
     )
 
 
-def verdict_block(calibration: Calibration) -> Markup:
-    """The verdict of the fit with its reasons, before anything else."""
+def verdict_block(contents: Contents) -> Markup:
+    """The verdict of the fit with its reasons and the mistake that would explain it, before anything else."""
+    calibration = contents.calibration
     fit = calibration.fit
     parts: list[Any] = [
         element(
@@ -92,6 +94,11 @@ def verdict_block(calibration: Calibration) -> Markup:
         parts.append(listed(first))
         if others:
             parts.append(element("details", element("summary", f"{len(others)} more reasons"), listed(others)))
+    if contents.mistakes:
+        what, *edits = [row.partition(": ")[2] for row in mistake_rows(contents.mistakes)]
+        parts.append(element("p", element("strong", "Mistake that would explain it: "), f"{what}."))
+        parts.append(element("p", element("strong", "To change: " if len(edits) == 1 else "To change if so:")))
+        parts.append(listed(map(_sentence, edits)))
     notes = []
     if calibration.uncertainty_scaled is not None:
         notes.append(f"All standard uncertainties were multiplied by {calibration.uncertainty_scaled:.3g}.")

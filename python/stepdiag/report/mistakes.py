@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from stepdiag._core import InvalidArgument, Measurement
 from stepdiag.display import point_text
-from stepdiag.mistakes.search import FoundMistake, find_mistakes
+from stepdiag.mistakes.search import FoundMistake, MistakeSearch
 from stepdiag.scenario.known import Known
 
 
@@ -21,17 +21,29 @@ def mistake_text(found: Sequence[FoundMistake]) -> str:
     """One sentence of all alternatives, without a full stop."""
     texts = [one.text for one in found]
     best = found[0]
+    if best.alternatives:
+        texts.append(f"one of {best.alternatives} more")
     said = texts[0] if len(texts) == 1 else f"either {'; or '.join(texts)}"
+    if best.or_faults:
+        said += ", or it is the faults below, which no reading tells from that"
     before = "" if best.variance_factor_before is None else f" in place of {best.variance_factor_before:.3g}"
     return f"{said}; with that undone the fit is {best.fit} (variance factor {best.variance_factor:.3g}{before})"
 
 
-def with_mistake(error: InvalidArgument, known: Known, measurement: Measurement) -> InvalidArgument:
-    """The refusal of a run, with the mistake that explains it, if one does."""
+def searchable(known: Known, measurement: Measurement) -> MistakeSearch | None:
+    """The search for mistakes in a run; None where the run does not belong to the plan at all."""
     try:
-        found = find_mistakes(known, measurement, refused=True)
-    except InvalidArgument:  # the run does not belong to the plan at all
-        return error
+        return MistakeSearch(known, measurement)
+    except InvalidArgument:
+        return None
+
+
+def with_mistake(
+    error: InvalidArgument, search: MistakeSearch | None, found: Sequence[FoundMistake] = ()
+) -> InvalidArgument:
+    """The refusal of a run, with the mistake that explains it, if one does. `found`: what is known of that already."""
+    if search is not None and not found:
+        found = search.after(None, refused=True)
     return InvalidArgument(f"{error}\n{chr(10).join(mistake_rows(found))}") if found else error
 
 
@@ -41,7 +53,7 @@ def unchecked_row(known: Known) -> str:
     standoffs = ", ".join(dict.fromkeys(f"{head.standoff:g}" for head in heads))
     wavelengths = ", ".join(dict.fromkeys(f"{head.wavelength:g}" for head in heads))
     return (
-        f"check by hand, as no reading shows it: chain {known.chain.name}, tool offset {point_text(known.tool)}, "
-        f"standoff {standoffs} mm, wavelength {wavelengths} nm, and the index of air and the temperature that all "
-        "distances were reduced with"
+        f"check by hand, as no reading shows it: place of b in the chain {known.chain.name}, tool offset "
+        f"{point_text(known.tool)}, standoff {standoffs} mm, wavelength {wavelengths} nm, and the index of air and the "
+        "temperature that all distances were reduced with"
     )

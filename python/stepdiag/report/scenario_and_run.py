@@ -1,6 +1,6 @@
 """Whether a scenario and a measurement belong together."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,8 +9,8 @@ import numpy as np
 from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement
 from stepdiag.calibration.finding_text import verdict_rows
 from stepdiag.io.data_files import read_measurement
-from stepdiag.mistakes.search import find_mistakes
-from stepdiag.report.mistakes import mistake_rows, with_mistake
+from stepdiag.mistakes.search import FoundMistake
+from stepdiag.report.mistakes import mistake_rows, searchable, with_mistake
 from stepdiag.scenario.description import adjust_scenario, read_scenario
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import check_points, lost_readings
@@ -22,6 +22,7 @@ class FoundTogether:
 
     text: tuple[str, ...]
     calibration: Calibration | None = None
+    mistakes: tuple[FoundMistake, ...] = ()
 
     @property
     def fit(self) -> str | None:
@@ -44,15 +45,19 @@ def adjust_run(scenario_file: Path, run_file: Path) -> FoundTogether:
 
 
 def _adjusted(known: Known, run: Measurement) -> FoundTogether:
+    search = searchable(known, run)
+    mistakes = search.before() if search else []
     try:
-        adjustment = adjust_scenario(known, run)
+        adjustment = adjust_scenario(known, run, search_faults=not mistakes)
     except InvalidArgument as error:
-        raise with_mistake(error, known, run) from None
-    return FoundTogether(tuple(_said(known, run, adjustment)), adjustment.calibration)
+        raise with_mistake(error, search, mistakes) from None
+    if search and not mistakes:
+        mistakes = search.after(adjustment)
+    return FoundTogether(tuple(_said(known, run, adjustment, mistakes)), adjustment.calibration, tuple(mistakes))
 
 
-def _said(known: Known, run: Measurement, adjustment: Adjustment) -> Iterator[str]:
+def _said(known: Known, run: Measurement, adjustment: Adjustment, mistakes: Sequence[FoundMistake]) -> Iterator[str]:
     incomplete, missing = lost_readings(run, known.plan, known.signals)
     yield f"{len(run)} rows, {incomplete} without a complete reading; {missing} points of the plan without a row"
     yield from verdict_rows(adjustment)
-    yield from mistake_rows(find_mistakes(known, run, adjustment))
+    yield from mistake_rows(mistakes)

@@ -108,13 +108,14 @@ def evaluate_beside_adjustment(
     *,
     method: Literal["conventional", "enhanced"],
     full_covariance: bool = False,
+    search_faults: bool = True,
 ) -> JudgedEvaluation:
-    """Evaluates a run by a linear method, and adjusts it for its verdict."""
+    """Evaluates a run by a linear method, and adjusts it for its verdict. `search_faults`: as of adjust_scenario."""
     calibration = evaluate_scenario(scenario, measurement, method=method, full_covariance=full_covariance)
     own = calibration.fit or "unchecked"
     adjustment, refusal = None, ""
     try:
-        adjustment = adjust_scenario(scenario, measurement)
+        adjustment = adjust_scenario(scenario, measurement, search_faults=search_faults)
     except InvalidArgument as error:
         refusal = str(error)
     other = adjustment.verdict.fit if adjustment is not None else "unchecked"
@@ -132,10 +133,12 @@ def adjust_scenario(
     *,
     full_covariance: bool = False,
     reliability: bool = False,
+    search_faults: bool = True,
 ) -> _core.Adjustment:
     """The exact adjustment of a run, with the unknowns that the scenario's [adjustment] and [smoothness] name: the
     calibration, and with it the set-up that was found, residuals, faults and how well it all fits. `reliability`:
-    also which faults the readings control."""
+    also which faults the readings control. `search_faults` False: it is known already what is wrong with the run as a
+    whole; no faults of single readings are looked for."""
     known = scenario.known
     return _core.adjust(
         only(measurement, known.signals),
@@ -143,7 +146,9 @@ def adjust_scenario(
         of_run(known.heads),
         known.chain,
         known.tool,
-        adjustment_options(known, full_covariance=full_covariance, reliability=reliability),
+        adjustment_options(
+            known, full_covariance=full_covariance, reliability=reliability, search_faults=search_faults
+        ),
     )
 
 
@@ -163,7 +168,12 @@ def simulation_options(scenario: Scenario) -> _core.SimulationOptions:
 
 
 def adjustment_options(
-    known: Known, *, full_covariance: bool = False, of_samples: bool = False, reliability: bool = False
+    known: Known,
+    *,
+    full_covariance: bool = False,
+    of_samples: bool = False,
+    reliability: bool = False,
+    search_faults: bool = True,
 ) -> _core.AdjustmentOptions:
     """What an adjustment of the scenario's runs takes for known and unknown. `of_samples`: of many simulated runs,
     whose noise is what is stated: none of their readings is left out, no uncertainty is scaled."""
@@ -182,6 +192,7 @@ def adjustment_options(
         full_covariance=full_covariance,
         plausible=known.plausible,
         reliability=reliability,
+        search_faults=search_faults,
     )
 
 

@@ -61,16 +61,17 @@ def simulated(
     seed: int,
     plan: sd.Plan | None = None,
     head: sd.Head | None = None,
+    chain: str = CHAIN,
     noise: float = 1.0,
 ) -> sd.Measurement:
-    """A run of a random machine. `plan`, `head`: what was really measured with; the points then have the positions of
-    the scenario's plan all the same, and the lines its names."""
+    """A run of a random machine. `plan`, `head`, `chain`: what was really measured with; the points then have the
+    positions of the scenario's plan all the same, and the lines its names."""
     known = scenario.known
     real, stated = plan or known.plan, [*known.plan.lines, *known.plan.scale_lines]
     lines = [*real.lines, *real.scale_lines]
     drawn = list(set_ups(known.head.layout, stated, seed=seed).values())
     run = sd.simulate(
-        sd.Machine(CHAIN, sd.random_error_map(real.volume, seed=seed, intervals=real.steps)),
+        sd.Machine(chain, sd.random_error_map(real.volume, seed=seed, intervals=real.steps)),
         real,
         head or known.head,
         misalignment=dict(zip(lines, drawn, strict=True)),

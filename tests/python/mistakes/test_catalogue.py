@@ -62,9 +62,9 @@ def of_line(line: str, new: Callable[[np.ndarray], np.ndarray]) -> Make:
     return rows_moved(source)
 
 
-def really(plan: sd.Plan | None = None, head: sd.Head | None = None) -> Make:
-    """Another plan or head than the scenario has."""
-    return lambda name: simulated(described(name, steps=STEPS), seed=4, plan=plan, head=head)
+def really(plan: sd.Plan | None = None, head: sd.Head | None = None, chain: str = CHAIN) -> Make:
+    """Another plan, head or chain than the scenario has."""
+    return lambda name: simulated(described(name, steps=STEPS), seed=4, plan=plan, head=head, chain=chain)
 
 
 BEAMS = described("multi_beam", steps=STEPS).known.head.beam_offsets
@@ -108,12 +108,13 @@ CASES: list[tuple[str, str, Make, str]] = [
         "line nnp is reversed: it was measured as ppn",
     ),
     ("order", "multi_beam", really(step_plan(STEPS, order="ZXY")), "the step order is ZXY, not XYZ"),
+    ("chain", "ideal", really(chain="[w Y' b X Z t]"), "its axes in the order Y X Z from workpiece to tool, not X Y Z"),
     ("shifted", "ideal", of_line("pnp", lambda rows: rows[TWICE]),
      "line pnp: a point was read twice before point 8"),
     ("shifted", "psd", of_line("ppp", lambda rows: np.append(np.delete(rows, 9), -1)),
      "line ppp: a point was skipped before point 9"),
     ("volume", "ideal", really(step_plan(STEPS, volume=(810.0, 600.0, 500.0))), "x_mm = 810"),
-    ("psd distance", "psd", really(head=sd.Head("psd", psd_distance=300.0)), "psd_distance_mm is about 298, not 100"),
+    ("psd distance", "psd", really(head=sd.Head("psd", psd_distance=300.0)), "psd_distance_mm is about 299, not 100"),
     ("near factor", "ideal", lambda head: scale_lines_scaled(run_of(head)), "distance on the scale lines has a factor"),
 ]  # fmt: skip
 

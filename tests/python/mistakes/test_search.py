@@ -1,11 +1,15 @@
 """What is named and what is not: sound and noisy runs, two mistakes at once, faults of single readings, lost lines."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mistaken import NOISE, changed, described, rows_of, simulated, step_plan
 
 import stepdiag as sd
 from stepdiag._core import fit_quality
+from stepdiag.mistakes.search import MistakeSearch
+from stepdiag.report.mistakes import mistake_text
 from stepdiag.scenario.description import adjustment_options
 
 HEADS = ["ideal", "psd", "multi_beam"]
@@ -25,6 +29,9 @@ def test_quick_fit_is_that_of_the_adjustment(head: str) -> None:
     screened = fit_quality(run, known.plan, known.head, known.chain, known.tool, options, 3)
     assert screened is not None
     assert screened.weighted_square_sum < 4.0 * quick.weighted_square_sum
+    enough = fit_quality(run, known.plan, known.head, known.chain, known.tool, options, 8)
+    assert enough is not None
+    assert enough.weighted_square_sum == pytest.approx(quick.weighted_square_sum, abs=0.1)  # of gains of 60
 
 
 @pytest.mark.parametrize("head", HEADS)
@@ -104,3 +111,55 @@ def test_same_names_on_any_number_of_threads(monkeypatch: pytest.MonkeyPatch) ->
     several = sd.find_mistakes(scenario, wrong)
     monkeypatch.setattr("os.cpu_count", lambda: 1)
     assert sd.find_mistakes(scenario, wrong) == several
+
+
+def test_a_factor_on_one_line_is_named_once() -> None:
+    """The adjustment finds it as a fault, and its sentence is the one; what no reading tells from it refers to that."""
+    scenario = described("ideal", steps=6)
+    run = simulated(scenario, seed=5)
+    factors = np.ones(len(run))
+    factors[rows_of(run, "npp")] = 1.00005
+    wrong = changed(run, {"distance": run.channels["distance"] * factors})
+    adjustment = sd.adjust_scenario(scenario, wrong)
+    assert {fault.kind for found in adjustment.faults for fault in found.members} >= {"factor"}
+    (found,) = sd.find_mistakes(scenario, wrong, adjustment)
+    assert "on the scale lines" in found.text
+    assert "or it is the faults below, which no reading tells from that" in mistake_text([found])
+    # Without an adjustment nobody else says so.
+    assert any("on line npp has a factor of 1.00005" in found.text for found in sd.find_mistakes(scenario, wrong))
+
+
+@pytest.mark.parametrize("channel", ["distance", "alpha"])
+def test_a_reading_that_is_no_length_warns_of_nothing(channel: str, recwarn: pytest.WarningsRecorder) -> None:
+    scenario = described("ideal", steps=6)
+    run = simulated(scenario, seed=5)
+    values = run.channels[channel].copy()
+    values[4] = 1e308
+    sd.find_mistakes(scenario, changed(run, {channel: values}))
+    assert not recwarn.list
+
+
+def test_a_gross_mistake_is_known_before_the_adjustment() -> None:
+    scenario = described("ideal", steps=6)
+    run = simulated(scenario, seed=5)
+    wrong = changed(run, {"alpha": -run.channels["alpha"]})
+    (found,) = MistakeSearch(scenario, wrong).before()
+    assert found.text == "alpha has the wrong sign on all lines"
+    adjustment = sd.adjust_scenario(scenario, wrong, search_faults=False)
+    assert adjustment.faults == []
+    assert adjustment.verdict.fit == "rejected"
+
+
+@pytest.mark.parametrize(("size", "row"), [(5.0, 8), (5.0, -1), (0.1, 3)])
+def test_gross_faults_are_not_taken_for_a_mistake(size: float, row: int) -> None:
+    scenario = described("ideal", steps=6)
+    run = simulated(scenario, seed=5)
+    distance = run.channels["distance"].copy()
+    distance[rows_of(run, "npp")[row]] += size
+    assert MistakeSearch(scenario, changed(run, {"distance": distance})).before() == []
+
+
+def test_of_many_alternatives_some_are_counted() -> None:
+    one = sd.FoundMistake("sign", "alpha has the wrong sign", "change it", "accepted", 1.0, 90.0)
+    text = mistake_text([replace(one, alternatives=3), one])
+    assert text.startswith("either alpha has the wrong sign; or alpha has the wrong sign; or one of 3 more; with")

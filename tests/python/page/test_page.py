@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mistaken import changed
 from small_scenario import SCENARIO
 
 import stepdiag as sd
@@ -216,6 +217,17 @@ def test_verdict_is_the_first_thing_that_is_said(fit: str, evaluated: Path) -> N
     if fit == "rejected":
         assert page.text.startswith("Fit REJECTED: do not use this calibration"), "the title"
         assert "the figures below are not to be used" in page.text
+
+
+def test_mistake_is_said_beside_the_verdict(here: Path) -> None:
+    run = sd.read_measurement("run.csv")
+    changed(run, {"beta": -run.channels["beta"]}).write("run.csv")
+    for name in ("calibration.nc", "calibration.csv"):
+        assert main(["evaluate", "scenario.toml", "run.csv", "-o", name]) == 3
+        page = page_of(calibration=Path(name), scenario=Path("scenario.toml"), run=Path("run.csv"))
+        said = page.text.index("Mistake that would explain it: beta has the wrong sign on all lines; with that undone")
+        assert page.text.index("Fit REJECTED") < said < page.text.index("Summary")
+        assert "In the run multiply beta_urad by -1." in page.text
 
 
 def test_words_of_files_and_flags_are_escaped(evaluated: Path) -> None:

@@ -68,6 +68,9 @@ struct AdjustmentOptions {
     bool full_covariance = false;
     PlausibleLimits plausible = {};
     bool reliability = false;  // also say which faults the readings control: Adjustment::reliability
+    // false: where it is known already what is wrong with the run as a whole. No faults of readings are looked for, and
+    // where the minimum is not reached soon, it counts as not found.
+    bool search_faults = true;
 };
 
 // One set-up unknown, as it was found.
@@ -262,8 +265,9 @@ struct FitQuality {
     double weighted_square_sum;  // of residuals and priors
     int degrees_of_freedom;
 };
-// Without search for faults, tests, uncertainties, cross-validation and plausible limits. After `most_steps` of
-// Gauss-Newton it stops where it is: a run that fits is near its minimum after three, of another one nobody needs it.
+// Without search for faults, tests, uncertainties, cross-validation and plausible limits. At most `most_steps` plain
+// steps of Gauss-Newton from zero, and the least square sum on the way: a run that fits is near its minimum after three
+// of them and at it after eight; of another one it is no less than that of its minimum, and nobody needs more.
 // Nothing where there are no readings or no number comes out. Throws InvalidArgument as adjust does.
 std::optional<FitQuality> fit_quality(const Measurement& measurement, const Plan& plan, const Chain& chain,
                                       const Eigen::Vector3d& tool, const HeadCalibrations& heads,
