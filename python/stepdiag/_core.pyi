@@ -1231,9 +1231,9 @@ class Smoothness:
         ...
 class AdjustmentOptions:
     """
-    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of a false alarm among a thousand tests for faults; 0: they are named and not corrected. slips: "report" rejects a run with a slip, "estimate" makes it an unknown and accepts that. scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best. plausible: what a machine can be. reliability: also which faults the readings control.
+    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of a false alarm among a thousand tests for faults; 0: they are named and not corrected. slips: "report" rejects a run with a slip, "estimate" makes it an unknown and accepts that. scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best. plausible: what a machine can be. reliability: also which faults the readings control. search_faults: False: it is known already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not reached soon, it counts as not found.
     """
-    def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.00012, slips: str = 'report', scale_uncertainty: bool = False, full_covariance: bool = False, plausible: PlausibleLimits = ..., reliability: bool = False) -> None:
+    def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.00012, slips: str = 'report', scale_uncertainty: bool = False, full_covariance: bool = False, plausible: PlausibleLimits = ..., reliability: bool = False, search_faults: bool = True) -> None:
         """
         adjust() checks them.
         """
@@ -1260,6 +1260,9 @@ class AdjustmentOptions:
         ...
     @property
     def scale_uncertainty(self) -> bool:
+        ...
+    @property
+    def search_faults(self) -> bool:
         ...
     @property
     def setup(self) -> SetupPriors:
@@ -2777,7 +2780,7 @@ def expose(camera: Camera, spots: collections.abc.Sequence[BeamSpot], *, seed: t
     """
 def fit_quality(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike, options: AdjustmentOptions, most_steps: typing.SupportsInt | typing.SupportsIndex) -> FitQuality | None:
     """
-    How well a run fits, without search for faults and without uncertainties, in a tenth of the time of adjust, after so many steps of Gauss-Newton; None where no number comes out. Raises InvalidArgument.
+    How well a run fits, without search for faults and without uncertainties, in a tenth of the time of adjust: the least square sum that so many plain steps of Gauss-Newton meet; None where no number comes out. Raises InvalidArgument.
     """
 def head_sensitivities(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment | None = None) -> list[Sensitivity]:
     """

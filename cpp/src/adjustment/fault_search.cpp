@@ -16,7 +16,7 @@ constexpr double alternative = 25.0;    // in chi-square: what is less behind th
 constexpr double gross_scatter = 25.0;  // of the square sum a reading
 constexpr double large_gain = 1000.0;   // where second order may tell
 constexpr double credible = largest_noise_factor * largest_noise_factor;  // variance factor; above it is rejected
-constexpr double twin = 0.99;           // correlation of what shows the same in all other readings
+constexpr double twin = 0.99;  // correlation of what shows the same in all other readings
 constexpr std::size_t most_exact = 20;
 constexpr std::size_t most_members = 40;  // which are near enough to what is behind them
 

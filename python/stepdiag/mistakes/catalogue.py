@@ -420,6 +420,7 @@ def _near(entry: str, copy: Copy) -> Families:
             partial(_of_distances, entry, copy, distances, lines),
             near=2e-5,
             limit=1e-3,
+            far=(-2.7e-4, 2.7e-4),  # the index of air
             fault=lines[0] if len(lines) == 1 else None,
         )
     if pair:

@@ -220,14 +220,17 @@ def test_verdict_is_the_first_thing_that_is_said(fit: str, evaluated: Path) -> N
 
 
 def test_mistake_is_said_beside_the_verdict(here: Path) -> None:
-    run = sd.read_measurement("run.csv")
-    changed(run, {"beta": -run.channels["beta"]}).write("run.csv")
+    Path("scenario.toml").write_text(SCENARIO.replace("seed = 3", "tilt_urad = 1.0\nseed = 3"))
+    run = sd.simulate_scenario(sd.read_scenario("scenario.toml"))
+    changed(run, {name: -run.channels[name] for name in ("alpha", "beta")}).write("run.csv")
     for name in ("calibration.nc", "calibration.csv"):
         assert main(["evaluate", "scenario.toml", "run.csv", "-o", name]) == 3
         page = page_of(calibration=Path(name), scenario=Path("scenario.toml"), run=Path("run.csv"))
-        said = page.text.index("Mistake that would explain it: beta has the wrong sign on all lines; with that undone")
+        said = page.text.index(
+            "Mistake that would explain it: the head is turned by 180° about its beam (upside down) on all lines"
+        )
         assert page.text.index("Fit REJECTED") < said < page.text.index("Summary")
-        assert "In the run multiply beta_urad by -1." in page.text
+        assert "Turn the head, or in the run multiply alpha_urad, beta_urad by -1." in page.text
 
 
 def test_words_of_files_and_flags_are_escaped(evaluated: Path) -> None:
