@@ -30,8 +30,10 @@ UNITS: Final[Mapping[str, Unit]] = {
     "urad": Unit("µrad", MICRORADIAN),
     "um_per_h": Unit("µm/h", MICROMETRE / HOUR),
     "um_per_sqrt_h": Unit("µm/√h", MICROMETRE / HOUR**0.5),
+    "um_per_m_k": Unit("µm/(m·K)", PPM),
     "ppm": Unit("ppm", PPM),
     "c": Unit("°C", 1.0),
+    "c_per_h": Unit("K/h", 1.0 / HOUR),
     "hpa": Unit("hPa", HECTOPASCAL),
     "percent": Unit("%", PERCENT),
 }

@@ -5,8 +5,10 @@
 
 #include "adjustment/adjustment_result.hpp"
 #include "adjustment/fault_search.hpp"
+#include "adjustment/fault_tests.hpp"
 #include "adjustment/prior_scatter.hpp"
 #include "adjustment/reliability.hpp"
+#include "adjustment/sensor_deviations.hpp"
 #include "adjustment/smoothness.hpp"
 #include "adjustment/verdict.hpp"
 #include "evaluation/fit_test.hpp"
@@ -37,6 +39,22 @@ std::vector<KnownCombination> known_combinations(const Observability& observabil
         known.back().standard_uncertainty = std::sqrt(std::max(0.0, form.variance(inverse)));
     }
     return known;
+}
+
+// A wrong coefficient makes lines that are measured at other temperatures grow otherwise, as faults do, which cost less
+// than a coefficient far from its prior. Where the readings fit as well without the faults that were found, it is the
+// coefficient.
+std::vector<FitReason> coefficients_in_place_of_faults(const AdjustmentProblem& of_all,
+                                                       const AdjustmentOptions& options, const Adjustment& found) {
+    if (of_all.coefficients().empty() || found.faults.empty()) return {};
+    Solution without(of_all, smoothness_at_start(options));
+    if (!without.solve_from_zero()) return {};
+    double of_readings = without.square_sum();
+    for (const CoefficientUnknown& of : of_all.coefficients())
+        of_readings -= std::pow(without.x()[of.unknown] / of.prior, 2);
+    if (of_readings > found.weighted_square_sum + FaultTests::significant * std::max(1.0, found.variance_factor()))
+        return {};
+    return far_coefficients(expansion_estimates(without.problem(), without.x(), without.inverse()));
 }
 
 [[noreturn]] void refuse_unsolved(const Measurement& measurement, const Plan& plan) {
@@ -95,6 +113,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     refuse_implausible(result.calibration, measurement, plan, options.plausible);
     if (options.full_covariance) result.calibration.covariance = full_covariance(problem, forms, solver.factor());
     result.setup = setup_estimates(problem, known, x, inverse);
+    result.expansion = expansion_estimates(problem, x, inverse);
     result.residuals = reading_residuals(solver.equations(), inverse);
     std::stable_sort(result.residuals.begin(), result.residuals.end(),
                      [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
@@ -105,10 +124,16 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
         result.chi_square_probability = chi_square_probability(result.weighted_square_sum, result.degrees_of_freedom);
     const auto patterns = residual_patterns(result, measurement, solver.equations(), solver.factor());
     result.verdict = judge(result, patterns, prior_scatter(problem, x, inverse));
+    for (const FitReason& reason : coefficients_in_place_of_faults(of_all, options, result)) {
+        result.verdict.fit = Fit::rejected;
+        result.verdict.reasons.push_back(reason);
+    }
     const double noise = std::sqrt(std::max(1.0, result.variance_factor()));
     result.unseen = unseen_faults(solver, inverse, forms, noise);
     if (options.reliability) result.reliability = reliability(solver, inverse, forms, noise);
     if (options.scale_uncertainty) scale_uncertainties(result);
+    add_sensor_effects(sensor_effects(solver), problem, forms, observability, result);
+    state_temperature(measurement, options.expansion, result.calibration);
     result.calibration.fit = result.verdict.fit;
     if (result.degrees_of_freedom > 0) result.calibration.variance_factor = result.variance_factor();
     return result;

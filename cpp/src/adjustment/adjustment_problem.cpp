@@ -10,6 +10,7 @@
 #include "evaluation/measurement_rows.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/measurement/reading.hpp"
+#include "stepdiag/measurement/temperatures.hpp"
 
 namespace stepdiag {
 namespace {
@@ -130,9 +131,11 @@ AdjustmentProblem::AdjustmentProblem(const Measurement& measurement, const Plan&
       tool_(tool),
       heads_(std::make_shared<const HeadCalibrations>(heads)),
       kind_(kind_of(measurement)),
-      rotations_(options.rotations) {
+      rotations_(options.rotations),
+      expansion_(options.expansion) {
     if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
     check_uncertainty(options.uncertainty);
+    if (expansion_) check(*expansion_);
     check_heads_fit(measurement, heads, true);
     for (auto& list : node_at_) list.assign(plan.steps() + 1, no_unknown);
     for (const Station& station : measurement.stations())
@@ -195,6 +198,11 @@ int AdjustmentProblem::node_index(Axis axis, int node, bool negative) {
 void AdjustmentProblem::collect_points(const Measurement& measurement, const AdjustmentOptions& options) {
     std::map<std::pair<std::string, StepOrder>, std::vector<PlanPoint>> planned;
     const Channel* time = measurement.find("time");
+    std::vector<Eigen::Vector3d> temperature;
+    if (expansion_) {
+        temperature = scale_temperatures(measurement, expansion_->temperature);
+        sensors_ = sensor_groups(measurement, *expansion_);
+    }
     std::vector<std::string> names;
     for (int c = 0; c < std::max(3, measurement.beam_count()); ++c) names.push_back(stepdiag::channel_name(kind_, c));
     for (std::size_t row = 0; row < measurement.size(); ++row) {
@@ -217,6 +225,10 @@ void AdjustmentProblem::collect_points(const Measurement& measurement, const Adj
         point.place.commanded = target.commanded;
         point.place.travel = plan_.frame(station.line).col(2).dot(target.commanded - line.front().commanded);
         if (setup.first_time) point.place.time = *time->value[row] - *setup.first_time;
+        if (expansion_) {
+            point.place.from_fixed = target.commanded - expansion_->expansion.fixed_point;
+            point.place.stretch = expansion_->expansion.stretch(target.commanded, temperature[row]);
+        }
         for (const Axis axis : all_axes) {
             const int sign = station.line.sign(axis) * (station.direction == Direction::backward ? -1 : 1);
             const bool negative = reversal_ && sign < 0;
@@ -254,6 +266,12 @@ MachineErrors AdjustmentProblem::errors(const AdjustedPoint& point, const Eigen:
         const AxisNode& node = nodes_[point.node[a]];
         for (int c = 0; c < 6; ++c)
             if (node.unknown[c] != no_unknown) errors[a][c] = x[node.unknown[c]];
+    }
+    if (expansion_) {
+        Eigen::Vector3d coefficient = expansion_->expansion.coefficient;
+        for (const CoefficientUnknown& of : coefficients_)
+            for (const int a : of.axes) coefficient[a] += x[of.unknown];
+        for (int a = 0; a < 3; ++a) errors[a][a] += coefficient[a] * point.place.stretch[a];
     }
     return errors;
 }
@@ -311,6 +329,11 @@ void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options) {
                 setup.active.push_back(c);
             }
 
+    if (expansion_)
+        for (const AxisGroup& axes : coefficient_groups(*expansion_))
+            if (const double prior = expansion_->standard_uncertainty[axes.front()]; prior > 0.0)
+                coefficients_.push_back({axes, prior, banded_unknowns + border_++});
+
     if (border_ > largest_border)
         throw InvalidArgument("adjustment: " + std::to_string(setups_.size()) + " set-ups have more than " +
                               std::to_string(largest_border) +
@@ -363,10 +386,15 @@ void AdjustmentProblem::weigh_unknowns() {
             usual_[j] = of.usual;
             if (of.unit == "rad" || of.unit == "1") change_scale_[j] = 1.0;
         }
+    constexpr double usual_kelvins = 10.0;  // that make a coefficient a part of lengths
+    for (const CoefficientUnknown& of : coefficients_) {
+        prior_[of.unknown] = usual_[of.unknown] = of.prior;
+        change_scale_[of.unknown] = usual_kelvins;
+    }
 }
 
 int AdjustmentProblem::informative_priors() const {
-    int count = 0;
+    int count = int(coefficients_.size());
     for (const LineSetup& setup : setups_)
         for (const int c : setup.active) count += setup.prior[c] < record(setup::component(c).quantity).broadest;
     std::set<int> groups;

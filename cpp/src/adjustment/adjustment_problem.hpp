@@ -52,6 +52,13 @@ struct AdjustedReading {
     bool used() const { return outlier == 0; }
 };
 
+// An expansion coefficient: its deviation from what is stated.
+struct CoefficientUnknown {
+    AxisGroup axes;
+    PriorUncertainty prior;  // 1/K
+    int unknown = no_unknown;
+};
+
 // What each of some readings reads too much by a fault of size 1.
 struct ReadingPattern {
     std::vector<int> readings;
@@ -101,6 +108,9 @@ public:
     const std::vector<int>& reach() const { return reach_; }  // of the band's block columns
     int blocks() const { return int(reach_.size()); }
     int border() const { return border_; }
+    const std::vector<CoefficientUnknown>& coefficients() const { return coefficients_; }
+    const std::optional<KnownExpansion>& expansion() const { return expansion_; }
+    const std::vector<AxisGroup>& sensors() const { return sensors_; }  // of the scales' temperatures
     const std::vector<EstimatedFault>& faults() const { return faults_; }
     // Instead of those that there were; their unknowns are the last ones.
     void estimate(std::vector<EstimatedFault> faults);
@@ -108,7 +118,8 @@ public:
     int unknowns() const { return size() - (has_rotations() ? 0 : 3 * blocks()); }  // the band has places without one
 
     int block_of(int node) const { return node == no_unknown ? no_unknown : nodes_[node].block; }
-    // The errors of the three axes at a point, for the unknowns' values `x`.
+    // The errors of the three axes at a point, for the unknowns' values `x`; the scales' expansion is in their
+    // translations.
     MachineErrors errors(const AdjustedPoint& point, const Eigen::VectorXd& x) const;
     Eigen::VectorXd setup_values(const LineSetup& setup, const Eigen::VectorXd& x) const;
     // Of an unknown of the set-ups or a fault: its prior's standard uncertainty; infinite elsewhere.
@@ -142,6 +153,9 @@ private:
     std::vector<AdjustedReading> readings_;
     std::vector<int> reach_;
     int border_ = 0;
+    std::optional<KnownExpansion> expansion_;
+    std::vector<CoefficientUnknown> coefficients_;
+    std::vector<AxisGroup> sensors_;
     std::vector<EstimatedFault> faults_;
     std::vector<double> prior_, usual_, change_scale_;
 };

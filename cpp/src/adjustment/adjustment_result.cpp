@@ -147,6 +147,17 @@ std::vector<SetupEstimate> setup_estimates(const AdjustmentProblem& problem, con
     return estimates;
 }
 
+std::vector<ExpansionEstimate> expansion_estimates(const AdjustmentProblem& problem, const Eigen::VectorXd& x,
+                                                   const BorderedBand& inverse) {
+    std::vector<ExpansionEstimate> estimates;
+    for (const CoefficientUnknown& of : problem.coefficients()) {
+        const double stated = problem.expansion()->expansion.coefficient[of.axes.front()];
+        estimates.push_back({of.axes, stated + x[of.unknown], std::sqrt(element(inverse, of.unknown, of.unknown)),
+                             stated, of.prior});
+    }
+    return estimates;
+}
+
 int degrees_of_freedom(const GaussNewton& solver) {
     const AdjustmentProblem& problem = solver.equations().problem();
     int count = int(solver.equations().smooth_rows().size()) - problem.unknowns() + int(solver.dependent().size());

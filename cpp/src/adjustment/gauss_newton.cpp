@@ -22,6 +22,7 @@ GaussNewton::GaussNewton(const AdjustmentProblem& problem, const std::array<doub
             const SetupQuantityRecord& of = record(setup::component(c).quantity);
             stiffness_[setup.unknown[c]] = std::pow(std::min(setup.prior[c], of.usual), -2);
         }
+    for (const CoefficientUnknown& of : problem.coefficients()) stiffness_[of.unknown] = std::pow(of.prior, -2);
     equations_.linearise(Eigen::VectorXd::Zero(problem.size()));
     equations_.drop_roundings();
     factorize();

@@ -52,7 +52,8 @@ NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&p
                 unknowns_.push_back(node == no_unknown ? no_unknown : problem.nodes()[node].unknown[c]);
         const LineSetup& setup = problem.setups()[point.setup];
         for (const int c : setup.active) unknowns_.push_back(setup.unknown[c]);
-        const std::size_t known = 18 + setup.active.size();
+        for (const CoefficientUnknown& of : problem.coefficients()) unknowns_.push_back(of.unknown);
+        const std::size_t known = 18 + setup.active.size() + problem.coefficients().size();
         std::size_t count = known;
         for (int r = point.first_reading; r < point.end_reading; ++r)
             for (const auto& [unknown, share] : faults[r]) {
@@ -77,6 +78,7 @@ NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&p
     derivatives_.assign(weights, 0.0);
     for (const auto& [place, derivative] : of_faults) derivatives_[place] = derivative;
     residuals_.setZero(Eigen::Index(problem.readings().size()));
+    if (problem.expansion()) by_shift_.resize(problem.readings().size());
     prior_weight_.resize(problem.size());
     for (int j = 0; j < problem.size(); ++j) prior_weight_[j] = std::pow(problem.prior()[j], -2);
     usual_weight_ = centre_ = Eigen::VectorXd::Zero(problem.size());
@@ -139,13 +141,21 @@ void NormalEquations::linearise(const Eigen::VectorXd& x, bool derivatives) {
             const int p = point_of_reading_[r];
             double* row = derivatives_.data() + first_weight_[r];
             const int* unknown = unknowns_.data() + first_unknown_[p];
-            for (int c = 18 + int(setup.active.size()); c < first_unknown_[p + 1] - first_unknown_[p]; ++c)
+            const int first_fault = 18 + int(setup.active.size() + problem.coefficients().size());
+            for (int c = first_fault; c < first_unknown_[p + 1] - first_unknown_[p]; ++c)
                 residuals_[r] -= row[c] * x[unknown[c]];
             if (!derivatives) continue;
             for (int c = 0; c < 18; ++c)
                 row[c] = unknown[c] == no_unknown ? 0.0 : weight * derivative(reading.channel, c);
             for (std::size_t c = 0; c < setup.active.size(); ++c)
                 row[18 + c] = weight * derivative(reading.channel, 18 + setup.active[c]);
+            if (!problem.expansion()) continue;
+            for (int a = 0; a < 3; ++a) by_shift_[r][a] = weight * derivative(reading.channel, 7 * a);
+            for (std::size_t k = 0; k < problem.coefficients().size(); ++k) {
+                double& by_coefficient = row[18 + setup.active.size() + k] = 0.0;
+                for (const int a : problem.coefficients()[k].axes)
+                    by_coefficient += by_shift_[r][a] * point.place.stretch[a];
+            }
         }
     }
 }
@@ -347,6 +357,16 @@ Eigen::VectorXd NormalEquations::transposed(const Eigen::VectorXd& w, const Eige
             if (row.unknown[i] != no_unknown) gradient[row.unknown[i]] -= row.coefficient[i] * value;
     }
     return gradient;
+}
+
+Eigen::VectorXd NormalEquations::gradient_of_shifts(
+    const std::function<Eigen::Vector3d(const AdjustedPoint&)>& shift) const {
+    Eigen::VectorXd change(residuals_.size());
+    for (const AdjustedPoint& point : problem_->points()) {
+        const Eigen::Vector3d here = shift(point);
+        for (int r = point.first_reading; r < point.end_reading; ++r) change[r] = by_shift_[r].dot(here);
+    }
+    return transposed(change, Eigen::VectorXd::Zero(problem_->size()));
 }
 
 Eigen::VectorXd NormalEquations::image(const Eigen::VectorXd& v) const {

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 #include <vector>
 
 #include "adjustment/adjustment_problem.hpp"
@@ -64,6 +65,9 @@ public:
     // Adds what the readings' second derivatives by the set-ups make of the residuals at x, the last linearise.
     void add_curvature(const Eigen::VectorXd& x, BorderedBand& matrix);
     Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;  // J^T w - P x
+    // J^T of what the readings change by where each axis stands further along itself by shift(point), mm. Of a problem
+    // with expansion.
+    Eigen::VectorXd gradient_of_shifts(const std::function<Eigen::Vector3d(const AdjustedPoint&)>& shift) const;
     Eigen::VectorXd image(const Eigen::VectorXd& v) const;     // J v, of all readings
     Eigen::VectorXd product(const Eigen::VectorXd& v) const;   // (J^T J + P) v
 
@@ -90,10 +94,11 @@ private:
     const AdjustmentProblem* problem_;
     std::vector<ChannelModel> models_;       // by set-up
     std::vector<int> first_unknown_;         // by point, into unknowns_
-    std::vector<int> unknowns_;              // 18 + active columns of the set-up, by point
+    std::vector<int> unknowns_;  // by point: 18, active columns of the set-up, coefficients, faults
     std::vector<std::size_t> first_weight_;  // by reading, into derivatives_
     std::vector<int> point_of_reading_;
     std::vector<double> derivatives_;
+    std::vector<Eigen::Vector3d> by_shift_;  // by reading, weighted: by the axes' shifts along themselves
     Eigen::VectorXd residuals_;
     std::vector<SmoothRow> smooth_;
     Eigen::VectorXd prior_weight_, usual_weight_, centre_;  // of each unknown

@@ -38,16 +38,21 @@ void take_patterns(const std::vector<ResidualPattern>& patterns, double limit, s
 
 // A value that stands further from its prior than the readings' own uncertainty of it lets chance explain. Five
 // standard deviations: of dozens of unknowns in a sound run, one stands beyond four in every 250 runs.
-void compare_with_priors(const Adjustment& adjustment, std::vector<FitReason>& reasons) {
+double distance_from_prior(double value, double standard_uncertainty, double prior) {
     constexpr double least_share = 1e-3;  // of the prior: below it the readings say nothing that could contradict it
+    const double known = std::max(prior * prior - standard_uncertainty * standard_uncertainty,
+                                  least_share * least_share * prior * prior);
+    return std::abs(value) / std::sqrt(known);
+}
+
+void compare_with_priors(const Adjustment& adjustment, std::vector<FitReason>& reasons) {
     for (const SetupEstimate& e : adjustment.setup) {
         if (!e.value || !std::isfinite(e.prior) || e.prior == 0.0) continue;
-        const double known = std::max(e.prior * e.prior - e.standard_uncertainty * e.standard_uncertainty,
-                                      least_share * least_share * e.prior * e.prior);
-        const double distance = std::abs(*e.value) / std::sqrt(known);
+        const double distance = distance_from_prior(*e.value, e.standard_uncertainty, e.prior);
         if (!(distance <= farthest_prior))
             reasons.push_back({FitFinding::prior, distance, farthest_prior, e.line, name(e.quantity), e.component});
     }
+    for (const FitReason& reason : far_coefficients(adjustment.expansion)) reasons.push_back(reason);
 }
 
 void judge_faults(const Adjustment& adjustment, std::vector<FitReason>& reasons) {
@@ -97,6 +102,16 @@ std::string name(FitAspect aspect) {
     return "";
 }
 
+std::vector<FitReason> far_coefficients(const std::vector<ExpansionEstimate>& expansion) {
+    std::vector<FitReason> reasons;
+    for (const ExpansionEstimate& e : expansion)
+        if (const double distance = distance_from_prior(e.value - e.stated, e.standard_uncertainty, e.prior);
+            !(distance <= farthest_prior))
+            reasons.push_back({FitFinding::prior, distance, farthest_prior, "", "expansion",
+                               e.axes.size() == 1 ? e.axes.front() : -1});
+    return reasons;
+}
+
 Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& patterns,
               const std::vector<ResidualPattern>& prior_scatter) {
     std::vector<FitReason> reasons;
@@ -140,6 +155,7 @@ void scale_uncertainties(Adjustment& adjustment) {
     calibration.covariance *= factor * factor;
     for (SetupEstimate& estimate : adjustment.setup) estimate.standard_uncertainty *= factor;
     for (KnownCombination& combination : adjustment.combinations) combination.standard_uncertainty *= factor;
+    for (ExpansionEstimate& estimate : adjustment.expansion) estimate.standard_uncertainty *= factor;
     calibration.uncertainty_scaled = factor;
     Verdict& verdict = adjustment.verdict;
     if (verdict.fit == Fit::accepted) verdict.fit = Fit::doubtful;

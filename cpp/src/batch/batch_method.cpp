@@ -8,8 +8,7 @@ BatchMethod::BatchMethod(Calibration calibration)
 std::vector<int> signal_channels(const Measurement& measurement) {
     std::vector<int> signals;
     for (std::size_t c = 0; c < measurement.channels().size(); ++c)
-        if (const std::string& name = measurement.channels()[c].name; name != "time" && name != "temperature")
-            signals.push_back(int(c));
+        if (is_signal(measurement.channels()[c].name)) signals.push_back(int(c));
     return signals;
 }
 

@@ -38,7 +38,7 @@ struct BatchPattern {
     const BatchOptions& options;
 };
 
-// Places in Measurement::channels() of the channels of a set of readings: all but time and temperature.
+// Places in Measurement::channels() of the channels of a set of readings (is_signal).
 std::vector<int> signal_channels(const Measurement& measurement);
 
 }  // namespace stepdiag

@@ -21,13 +21,13 @@ LengthKind length_kind(const BatchPattern& pattern) {
 
 Calibration evaluate(const BatchPattern& p) {
     // This only sets the point at which the maps are linear, so no limits apply: samples may lie anywhere.
-    const EvaluationOptions options{p.options.uncertainty, false, PlausibleLimits::none()};
+    const EvaluationOptions options{p.options.uncertainty, false, PlausibleLimits::none(), p.options.expansion};
     return is_enhanced(p) ? evaluate_enhanced(p.measurement, p.plan, p.chain, p.tool, p.heads, options)
                           : evaluate_conventional(p.measurement, p.plan, p.chain, p.tool, p.heads, options);
 }
 
 std::vector<Pass> passes_of(const BatchPattern& p, const ReadingUncertainty& uncertainty) {
-    return collect_passes(p.measurement, p.plan, p.heads, uncertainty, length_kind(p));
+    return collect_passes(p.measurement, p.plan, p.heads, uncertainty, length_kind(p), p.options.expansion);
 }
 
 // The same readings; the standard uncertainty of each one follows from its quantity alone.

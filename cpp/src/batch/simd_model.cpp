@@ -84,6 +84,22 @@ STEPDIAG_INLINE MirrorPull pull_mirror(const Chunk& chunk, const SimdProblem::Po
     return pull;
 }
 
+STEPDIAG_INLINE Vector& along(Lanes3& vector, int axis) { return axis == 0 ? vector.x : axis == 1 ? vector.y : vector.z; }
+
+// What the scale's expansion adds to an axis, and the force on that back to the coefficients.
+STEPDIAG_INLINE void expand(const Chunk& chunk, const SimdProblem::Point& point, int axis, Lanes3& shift) {
+    Vector& position = along(shift, axis);
+    position = position + hn::Set(Tag(), point.expansion[axis]);
+    for (const SimdProblem::Coefficient& of : chunk.problem.coefficients)
+        if (std::find(of.axes.begin(), of.axes.end(), axis) != of.axes.end())
+            position = mul_add(hn::Set(Tag(), point.stretch[axis]), chunk.unknown(of.unknown), position);
+}
+STEPDIAG_INLINE void pull_expansion(const Chunk& chunk, const SimdProblem::Point& point, int axis, Lanes3 force) {
+    for (const SimdProblem::Coefficient& of : chunk.problem.coefficients)
+        if (std::find(of.axes.begin(), of.axes.end(), axis) != of.axes.end())
+            chunk.pull(of.unknown, hn::Set(Tag(), point.stretch[axis]) * along(force, axis));
+}
+
 // Follows the chain from the tool to the workpiece, and carries the forces back to the tool.
 STEPDIAG_INLINE void pull_point(const Chunk& chunk, const SimdProblem::Point& point) {
     const SimdProblem& problem = chunk.problem;
@@ -93,8 +109,9 @@ STEPDIAG_INLINE void pull_point(const Chunk& chunk, const SimdProblem::Point& po
     Lanes3 position_arm[3], normal_arm[3];  // vectors that turn with an axis
     for (int place = 2; place >= 0; --place) {
         const double* node = chunk.node(point.node[place]);
-        const AxisMotion<Vector> axis{part9(node, node_rotation), part3(node, node_shift),
-                                      problem.carries_workpiece[place]};
+        Lanes3 shift = part3(node, node_shift);
+        if (problem.expands) expand(chunk, point, problem.axis[place], shift);
+        const AxisMotion<Vector> axis{part9(node, node_rotation), shift, problem.carries_workpiece[place]};
         const MovedPoint<Vector> moved = move_point(axis, position);
         position_arm[place] = moved.arm, position = moved.point;
         normal = normal_arm[place] = axis.rotation * normal;
@@ -104,9 +121,12 @@ STEPDIAG_INLINE void pull_point(const Chunk& chunk, const SimdProblem::Point& po
         double* node = chunk.node(point.node[place]);
         const Lanes9 rotation = part9(node, node_rotation);
         add3(node, node_turn_pull, cross(position_arm[place], pull.point) + cross(normal_arm[place], pull.normal));
-        if (!problem.carries_workpiece[place]) add3(node, node_shift_pull, pull.point);
-        pull = {transposed_product(rotation, pull.point), transposed_product(rotation, pull.normal)};
-        if (problem.carries_workpiece[place]) add3(node, node_shift_pull, pull.point);
+        const MirrorPull inside = {transposed_product(rotation, pull.point),
+                                   transposed_product(rotation, pull.normal)};
+        const Lanes3 on_shift = problem.carries_workpiece[place] ? inside.point : pull.point;
+        add3(node, node_shift_pull, on_shift);
+        if (problem.expands) pull_expansion(chunk, point, problem.axis[place], on_shift);
+        pull = inside;
     }
     add3(setup, normal_pull, pull.normal);
 }
@@ -184,7 +204,7 @@ HWY_EXPORT(scratch_numbers);
 }  // namespace
 
 SimdProblem::SimdProblem(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input)
-    : kind(HeadLayout::ideal), unknowns(problem.size()), channels(0), tool(problem.tool()), setup_size(0) {
+    : kind(HeadLayout::ideal), unknowns(problem.size()), channels(0), tool(problem.tool()), expands(problem.expansion()), setup_size(0) {
     const auto place = [&](int unknown) { return unknown == no_unknown ? unknowns : unknown; };
     for (const LineSetup& setup : problem.setups()) {
         const ChannelModel& model = setup.model;
@@ -202,10 +222,18 @@ SimdProblem::SimdProblem(const AdjustmentProblem& problem, const std::vector<std
     }
     nodes.push_back({{unknowns, unknowns, unknowns, unknowns, unknowns, unknowns}, {}});  // home
     const auto& order = problem.chain().order();
-    for (int p = 0; p < 3; ++p) carries_workpiece[p] = problem.chain().carries_workpiece(order[p]);
+    for (int p = 0; p < 3; ++p) {
+        carries_workpiece[p] = problem.chain().carries_workpiece(order[p]);
+        axis[p] = index(order[p]);
+    }
+    for (const CoefficientUnknown& of : problem.coefficients()) coefficients.push_back({of.unknown, of.axes});
     for (const AdjustedPoint& point : problem.points()) {
         Point& to = points.emplace_back();
-        to = {point.setup, {}, point.place.travel, point.place.time, int(of_points.size())};
+        to = {point.setup, {}, point.place.travel, point.place.time, int(of_points.size()), {}, {}};
+        for (int a = 0; expands && a < 3; ++a) {
+            to.stretch[a] = point.place.stretch[a];
+            to.expansion[a] = problem.expansion()->expansion.coefficient[a] * to.stretch[a];
+        }
         for (int p = 0; p < 3; ++p) {
             const int node = point.node[index(order[p])];
             to.node[p] = node == no_unknown ? int(nodes.size()) - 1 : node;

@@ -28,6 +28,11 @@ struct SimdProblem {
         std::array<int, 3> node;  // for each place in the chain; home is the last node
         double travel, time;
         int first_channel;
+        std::array<double, 3> expansion, stretch;  // of each axis along itself, mm; by its coefficient, mm K
+    };
+    struct Coefficient {
+        int unknown;
+        std::vector<int> axes;
     };
     struct Node {
         std::array<int, 6> unknown;
@@ -45,7 +50,10 @@ struct SimdProblem {
     int unknowns;
     int channels;                           // per point
     std::array<bool, 3> carries_workpiece;  // for each place in the chain
+    std::array<int, 3> axis;                // likewise: 0, 1, 2
     Eigen::Vector3d tool;
+    bool expands;
+    std::vector<Coefficient> coefficients;
     std::vector<Point> points;
     std::vector<Channel> of_points;
     std::vector<Node> nodes;

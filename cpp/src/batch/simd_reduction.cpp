@@ -257,7 +257,7 @@ SimdReduction::SimdReduction(const Measurement& pattern, const HeadCalibrations&
             reduced.place = std::uint32_t(values_per_reading * (pass.first_reading + number));
             reduced.by_distance_alone = kind == LengthKind::distance;
             reduced.lateral_x = point.lateral.x(), reduced.lateral_y = point.lateral.y();
-            reduced.travel = pass.direction().dot(point.plan.commanded - pass.points.front().plan.commanded);
+            reduced.travel = point.travel;
             reduced.psd_distance = head.psd_distance.value_or(0.0);
             reduced.spot_beam_x = head.spot_beam.x(), reduced.spot_beam_y = head.spot_beam.y();
             reduced.is_beside = !head.spot_beam.isZero(0.0);

@@ -128,14 +128,16 @@ void bind_options(py::module_& m) {
         "and not corrected. slips: \"report\" rejects a run with a slip, \"estimate\" makes it an unknown and accepts "
         "that. "
         "scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and "
-        "the fit is doubtful at best. plausible: what a machine can be. reliability: also which faults the readings "
-        "control. search_faults: False: it is known already what is wrong with the run as a whole; faults are not "
-        "looked for, and where the minimum is not reached soon, it counts as not found.")
+        "the fit is doubtful at best. plausible: what a machine can be. expansion: of the scales; coefficients that are "
+        "uncertain are unknowns. reliability: also which faults the readings control. search_faults: False: it is known "
+        "already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not reached "
+        "soon, it counts as not found.")
         .def(py::init([](const ReadingUncertainty& uncertainty, const Priors& setup,
                          const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
                          bool rotations, const std::optional<Smoothness>& smoothness, double outlier_probability,
                          const std::string& slips, bool scale_uncertainty, bool full_covariance,
-                         const PlausibleLimits& plausible, bool reliability, bool search_faults) {
+                         const PlausibleLimits& plausible, const std::optional<KnownExpansion>& expansion,
+                         bool reliability, bool search_faults) {
                  AdjustmentOptions options{uncertainty,
                                            setup.value,
                                            {},
@@ -148,6 +150,7 @@ void bind_options(py::module_& m) {
                                            scale_uncertainty,
                                            full_covariance,
                                            plausible,
+                                           expansion,
                                            reliability,
                                            search_faults};
                  for (const auto& [line, priors] : setup_by_line) options.setup_by_line[line] = priors.value;
@@ -159,8 +162,9 @@ void bind_options(py::module_& m) {
              py::arg("rotations") = usual.rotations, py::arg("smoothness") = std::nullopt,
              py::arg("outlier_probability") = usual.outlier_probability, py::arg("slips") = name(usual.slips),
              py::arg("scale_uncertainty") = usual.scale_uncertainty, py::arg("full_covariance") = usual.full_covariance,
-             py::arg("plausible") = usual.plausible, py::arg("reliability") = usual.reliability,
-             py::arg("search_faults") = usual.search_faults, "adjust() checks them.")
+             py::arg("plausible") = usual.plausible, py::arg("expansion") = std::nullopt,
+             py::arg("reliability") = usual.reliability, py::arg("search_faults") = usual.search_faults,
+             "adjust() checks them.")
         .def_readonly("uncertainty", &AdjustmentOptions::uncertainty)
         .def_property_readonly("setup", [](const AdjustmentOptions& o) { return Priors{o.setup}; })
         .def_property_readonly("setup_by_line",
@@ -178,6 +182,7 @@ void bind_options(py::module_& m) {
         .def_readonly("scale_uncertainty", &AdjustmentOptions::scale_uncertainty)
         .def_readonly("full_covariance", &AdjustmentOptions::full_covariance)
         .def_readonly("plausible", &AdjustmentOptions::plausible)
+        .def_readonly("expansion", &AdjustmentOptions::expansion)
         .def_readonly("reliability", &AdjustmentOptions::reliability)
         .def_readonly("search_faults", &AdjustmentOptions::search_faults);
 }
@@ -194,6 +199,13 @@ void bind_result(py::module_& m) {
             "prior", &SetupEstimate::prior,
             "Standard uncertainty of its prior; infinite where it is free (1 m, 1 rad, 1 for a free lateral offset, "
             "roll, gain).");
+
+    py::class_<ExpansionEstimate>(m, "ExpansionEstimate", "An expansion coefficient as it was found, 1/K.")
+        .def_readonly("axes", &ExpansionEstimate::axes, "That have it in common: 0, 1, 2 of X, Y, Z.")
+        .def_readonly("value", &ExpansionEstimate::value)
+        .def_readonly("standard_uncertainty", &ExpansionEstimate::standard_uncertainty)
+        .def_readonly("stated", &ExpansionEstimate::stated, "Value of its prior.")
+        .def_readonly("prior", &ExpansionEstimate::prior, "Standard uncertainty of its prior.");
 
     py::class_<Outlier>(m, "Outlier", "A reading that was left out.")
         .def_readonly("row", &Outlier::row)
@@ -343,6 +355,8 @@ void bind_result(py::module_& m) {
     py::class_<Result>(m, "Adjustment", "What an adjustment found: calibration, set-ups, and how the readings fit.")
         .def_property_readonly("calibration", [](const Result& r) { return r.adjustment.calibration; })
         .def_property_readonly("setup", [](const Result& r) { return r.adjustment.setup; })
+        .def_property_readonly("expansion", [](const AdjustmentOfRun& a) { return a.adjustment.expansion; },
+                               "Expansion coefficients that were unknowns.")
         .def_property_readonly(
             "residuals",
             [](const Result& r) -> ChannelArrays {

@@ -23,7 +23,7 @@ struct EvaluatorOfPattern {
 std::vector<std::string> signal_names(const Measurement& measurement) {
     std::vector<std::string> names;
     for (const Channel& channel : measurement.channels())
-        if (channel.name != "time" && channel.name != "temperature") names.push_back(channel.name);
+        if (is_signal(channel.name)) names.push_back(channel.name);
     return names;
 }
 
@@ -116,6 +116,7 @@ BatchOptions to_batch_options(const std::string& method, const AdjustmentOptions
     BatchOptions options;
     options.method = to_evaluation_method(method);
     options.uncertainty = adjustment.uncertainty;
+    options.expansion = adjustment.expansion;
     options.adjustment = adjustment;
     return options;
 }

@@ -64,7 +64,9 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
                              const std::string& date, const std::optional<std::string>& fit,
                              const std::optional<double>& variance_factor, const Names& fit_reasons,
                              const std::optional<double>& uncertainty_scaled, const Texts& provenance,
-                             const Names& unseen_faults, const std::optional<double>& between_nodes) {
+                             const Names& unseen_faults, const std::optional<double>& between_nodes,
+                             const std::optional<double>& temperature_reference,
+                             const std::optional<ArrayLike>& temperature_as_found) {
     Calibration calibration{method, to_chain(chain), to_vector3(volume, "volume"), to_vector3(tool, "tool"), {}, {},
                             {},     undetermined};
     for (const auto& [name, table] : functions)
@@ -100,6 +102,9 @@ Calibration make_calibration(const std::string& method, const ChainLike& chain, 
     calibration.provenance = provenance;
     calibration.unseen_faults = unseen_faults;
     calibration.between_nodes = between_nodes;
+    calibration.temperature_reference = temperature_reference;
+    if (temperature_as_found)
+        calibration.temperature_as_found = to_vector3(*temperature_as_found, "temperature_as_found");
     check(calibration);
     return calibration;
 }
@@ -124,7 +129,8 @@ void bind_calibration(py::module_& m) {
              py::arg("date") = "", py::arg("fit") = std::nullopt, py::arg("variance_factor") = std::nullopt,
              py::arg("fit_reasons") = Names{}, py::arg("uncertainty_scaled") = std::nullopt,
              py::arg("provenance") = Texts{}, py::arg("unseen_faults") = Names{},
-             py::arg("between_nodes") = std::nullopt,
+             py::arg("between_nodes") = std::nullopt, py::arg("temperature_reference") = std::nullopt,
+             py::arg("temperature_as_found") = std::nullopt,
              "A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: "
              "name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises "
              "InvalidArgument naming the parameter for what is none: nodes that do not "
@@ -145,6 +151,16 @@ void bind_calibration(py::module_& m) {
         .def_readonly("between_nodes", &Calibration::between_nodes,
                       "Standard uncertainty of the functional point by errors between the nodes, as it was stated, mm; "
                       "None: nothing was stated. It is in no other uncertainty.")
+        .def_readonly("temperature_reference", &Calibration::temperature_reference,
+                      "Temperature of the scales that positioning errors are referred to, degrees Celsius; None: they "
+                      "are as found.")
+        .def_property_readonly(
+            "temperature_as_found",
+            [](const Calibration& c) {
+                return c.temperature_as_found ? std::optional(to_numpy_vector(*c.temperature_as_found)) : std::nullopt;
+            },
+            "Temperatures of the scales of X, Y, Z (3,) where errors are as found, means over all readings, degrees "
+            "Celsius; None: nothing was recorded, or they are referred to temperature_reference.")
         .def_readonly("provenance", &Calibration::provenance,
                       "What it was made from, as far as it is known: program and version, SHA-256 of the run, the "
                       "scenario and the descriptions of heads, options that are not the default ones. Keys: program, "

@@ -27,7 +27,8 @@ std::vector<std::string> names_of() {
 
 Calibration evaluate(const Measurement& measurement, const Plan& plan, const HeadLike& head, const ChainLike& chain,
                      const ArrayLike& tool, const std::string& method, const ReadingUncertainty& uncertainty,
-                     bool full_covariance, const PlausibleLimits& plausible) {
+                     bool full_covariance, const PlausibleLimits& plausible,
+                     const std::optional<KnownExpansion>& expansion) {
     const auto evaluator = method == "enhanced"       ? &evaluate_enhanced
                            : method == "conventional" ? &evaluate_conventional
                                                       : nullptr;
@@ -43,12 +44,13 @@ Calibration evaluate(const Measurement& measurement, const Plan& plan, const Hea
     };
     if (evaluator)
         return worded(without_lock([&] {
-            return evaluator(measurement, plan, kinematics, offset, heads, {uncertainty, full_covariance, plausible});
+            return evaluator(measurement, plan, kinematics, offset, heads, {uncertainty, full_covariance, plausible, expansion});
         }));
     AdjustmentOptions options;
     options.uncertainty = uncertainty;
     options.full_covariance = full_covariance;
     options.plausible = plausible;
+    options.expansion = expansion;
     return worded(without_lock([&] { return adjust(measurement, plan, kinematics, offset, heads, options); }));
 }
 
@@ -100,6 +102,36 @@ std::vector<std::pair<std::string, std::optional<double>>> covariance_labels(con
 }  // namespace
 
 void bind_evaluation(py::module_& m) {
+    py::class_<KnownExpansion>(
+        m, "KnownExpansion",
+        "What is known of the expansion of the scales. With it, positioning errors are referred to the reference "
+        "temperature, by the temperatures in the run's channels.")
+        .def(py::init([](const Expansion& expansion, const ArrayLike& standard_uncertainty, bool one_coefficient,
+                         double sensor_uncertainty, const std::optional<ArrayLike>& temperature,
+                         bool one_temperature) {
+                 KnownExpansion known{expansion, to_vector3(standard_uncertainty, "standard_uncertainty"),
+                                      one_coefficient, sensor_uncertainty};
+                 if (temperature) known.temperature = to_vector3(*temperature, "temperature");
+                 known.one_temperature = one_temperature;
+                 check(known);
+                 return known;
+             }),
+             py::arg("expansion"), py::arg("standard_uncertainty"), py::kw_only(), py::arg("one_coefficient"),
+             py::arg("sensor_uncertainty"), py::arg("temperature") = std::nullopt, py::arg("one_temperature") = false,
+             "standard_uncertainty (3,): of the coefficients, 1/K; one_coefficient: it is common to the axes; "
+             "sensor_uncertainty: of each sensor's constant deviation, K; temperature (3,): of the scales where the run "
+             "says nothing, degrees Celsius, and whether one sensor measured it. Raises InvalidArgument.")
+        .def_readonly("expansion", &KnownExpansion::expansion)
+        .def_property_readonly("standard_uncertainty",
+                               [](const KnownExpansion& k) { return to_numpy_vector(k.standard_uncertainty); })
+        .def_readonly("one_coefficient", &KnownExpansion::one_coefficient)
+        .def_readonly("sensor_uncertainty", &KnownExpansion::sensor_uncertainty)
+        .def_property_readonly("temperature",
+                               [](const KnownExpansion& k) {
+                                   return k.temperature ? std::optional(to_numpy_vector(*k.temperature)) : std::nullopt;
+                               })
+        .def_readonly("one_temperature", &KnownExpansion::one_temperature);
+
     py::class_<ReadingUncertainty>(m, "ReadingUncertainty",
                                    "Standard uncertainty of a reading where the run gives none: distance (mm; also d1 "
                                    "...), tilt (rad), spot (mm).")
@@ -231,10 +263,11 @@ void bind_evaluation(py::module_& m) {
     m.def("evaluate", &evaluate, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
           py::arg("tool") = zeros(3), py::kw_only(), py::arg("method") = "adjustment",
           py::arg("uncertainty") = ReadingUncertainty{}, py::arg("full_covariance") = false,
-          py::arg("plausible") = PlausibleLimits{},
+          py::arg("plausible") = PlausibleLimits{}, py::arg("expansion") = std::nullopt,
           "Calibration from a run. Of the head only its calibration is used, of the machine only chain "
           "and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan, "
-          "and for a result that is not plausible.");
+          "for a result that is not plausible, and for a pass without temperatures where an expansion is "
+          "given.");
 }
 
 }  // namespace stepdiag::bindings

@@ -177,6 +177,32 @@ void bind_machine(py::module_& m) {
         "A random machine with peaks of `translation` mm and `rotation` rad at equidistant nodes, squarenesses uniform "
         "within +-`squareness` rad, in the frame choice of the conventions. Same arguments, same bits.");
 
+    py::class_<Expansion>(
+        m, "Expansion",
+        "Thermal expansion of the axes' scales: position p stands at p + coefficient (T - reference)(p - fixed_point).")
+        .def(py::init([](const ArrayLike& coefficient, const ArrayLike& fixed_point, double reference) {
+                 const Expansion expansion{to_vector3(coefficient, "coefficient"),
+                                           to_vector3(fixed_point, "fixed_point"), reference};
+                 check(expansion);
+                 return expansion;
+             }),
+             py::arg("coefficient"), py::kw_only(), py::arg("fixed_point") = zeros(3),
+             py::arg("reference") = Expansion{}.reference,
+             "coefficient (3,) of X, Y, Z, 1/K; fixed_point (3,), mm; reference, degrees Celsius. Raises "
+             "InvalidArgument for a coefficient beyond 1e-3, and for what is not finite.")
+        .def_property_readonly("coefficient", [](const Expansion& e) { return to_numpy_vector(e.coefficient); })
+        .def_property_readonly("fixed_point", [](const Expansion& e) { return to_numpy_vector(e.fixed_point); })
+        .def_readonly("reference", &Expansion::reference)
+        .def(
+            "shift",
+            [](const Expansion& e, const ArrayLike& commanded, const ArrayLike& temperature) {
+                return to_numpy_vector(
+                    e.shift(to_vector3(commanded, "commanded"), to_vector3(temperature, "temperature")));
+            },
+            py::arg("commanded"), py::arg("temperature"),
+            "What the expansion adds to the positions of X, Y, Z (3,), mm, at the scales' temperatures (3,), degrees "
+            "Celsius.");
+
     py::class_<Machine>(m, "Machine", "A three-axis machine: chain, the 21 errors, tool offset (mm).")
         .def(py::init([](const ChainLike& chain, const ErrorMap& errors, const ArrayLike& tool) {
                  return Machine(to_chain(chain), errors, to_vector3(tool, "tool"));
@@ -187,25 +213,29 @@ void bind_machine(py::module_& m) {
         .def_property_readonly("tool", [](const Machine& machine) { return to_numpy_vector(machine.tool()); })
         .def(
             "pose",
-            [](const Machine& machine, const ArrayLike& commanded, const std::string& approach) {
+            [](const Machine& machine, const ArrayLike& commanded, const std::string& approach,
+               const ArrayLike& scale_expansion) {
                 const Points points = to_commanded(commanded);
                 const Approaches came = to_approaches(approach);
+                const Eigen::Vector3d expansion = to_vector3(scale_expansion, "expansion");
+                if (!expansion.allFinite()) throw InvalidArgument("expansion: expected three finite lengths in mm");
                 DoubleArray rotation({points.rows(), Eigen::Index(3), Eigen::Index(3)}),
                     position({points.rows(), Eigen::Index(3)});
                 double *r = rotation.mutable_data(), *p = position.mutable_data();
                 {
                     py::gil_scoped_release release;
                     for (Eigen::Index i = 0; i < points.rows(); ++i) {
-                        const Pose pose = machine.pose(points.row(i).transpose(), came);
+                        const Pose pose = machine.pose(points.row(i).transpose(), came, expansion);
                         Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r + 9 * i) = pose.rotation;
                         Eigen::Map<Eigen::Vector3d>(p + 3 * i) = pose.position;
                     }
                 }
                 return std::make_pair(rotation, position);
             },
-            py::arg("commanded"), py::arg("approach") = "+++",
+            py::arg("commanded"), py::arg("approach") = "+++", py::arg("expansion") = zeros(3),
             "Exact pose of the tool in the machine frame: (rotation (n, 3, 3), functional point (n, 3), mm) at "
-            "commanded positions (n, 3), mm. approach: the direction + or - in which X, Y, Z came there.")
+            "commanded positions (n, 3), mm. approach: the direction + or - in which X, Y, Z came there. expansion: "
+            "what that of the scales adds to the positions of X, Y, Z, mm (Expansion.shift).")
         .def(
             "error",
             [](const Machine& machine, const ArrayLike& commanded, const std::string& approach) {

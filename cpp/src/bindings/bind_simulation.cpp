@@ -65,6 +65,22 @@ void bind_simulation(py::module_& m) {
         .def_readonly("common", &Noise::common)
         .def_readonly("seed", &Noise::seed);
 
+    py::class_<ScaleTemperatures>(
+        m, "ScaleTemperatures",
+        "How warm the scales of the axes are, and how they expand. Makes the channels temperature_x, temperature_y and "
+        "temperature_z, or temperature alone of one sensor.")
+        .def(py::init([](const Expansion& expansion, const ArrayLike& start, const ArrayLike& rate, bool one_sensor) {
+                 return ScaleTemperatures{expansion, to_vector3(start, "start"), to_vector3(rate, "rate"), one_sensor};
+             }),
+             py::arg("expansion"), py::arg("start"), py::arg("rate") = zeros(3), py::kw_only(),
+             py::arg("one_sensor") = false,
+             "start (3,): of X, Y, Z at the run's first reading, degrees Celsius; rate (3,), K/s. simulate() checks "
+             "them.")
+        .def_readonly("expansion", &ScaleTemperatures::expansion)
+        .def_property_readonly("start", [](const ScaleTemperatures& s) { return to_numpy_vector(s.start); })
+        .def_property_readonly("rate", [](const ScaleTemperatures& s) { return to_numpy_vector(s.rate); })
+        .def_readonly("one_sensor", &ScaleTemperatures::one_sensor);
+
     m.attr("largest_repeat_count") = SimulationOptions::largest_repeat_count;
     py::class_<SimulationOptions>(
         m, "SimulationOptions",
@@ -73,20 +89,23 @@ void bind_simulation(py::module_& m) {
         "1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: "
         "of a traced head's replayed poses, traced again and compared. repeats: how often each line is measured, runs "
         "0, 1, 2, ...; backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; "
-        "seconds_per_reading: makes the channel time.")
+        "seconds_per_reading: makes the channel time; scales: they expand, and their temperatures are recorded.")
         .def(py::init([](const std::map<std::string, Misalignment>& misalignment, const Noise& noise,
                          const std::optional<Environment>& environment, const std::optional<Environment>& assumed,
                          double verified_share, const IntegerLike& repeats, bool backward,
-                         const std::optional<double>& seconds_per_reading) {
+                         const std::optional<double>& seconds_per_reading,
+                         const std::optional<ScaleTemperatures>& scales) {
                  return SimulationOptions{misalignment,   noise,
                                           environment,    assumed,
                                           verified_share, to_int(repeats, "repeats"),
-                                          backward,       seconds_per_reading};
+                                          backward,       seconds_per_reading,
+                                          scales};
              }),
              py::kw_only(), py::arg("misalignment") = std::map<std::string, Misalignment>{}, py::arg("noise") = Noise{},
              py::arg("environment") = std::nullopt, py::arg("assumed_environment") = std::nullopt,
              py::arg("verified_share") = SimulationOptions{}.verified_share, py::arg("repeats") = integer(1),
              py::arg("backward") = false, py::arg("seconds_per_reading") = std::nullopt,
+             py::arg("scales") = std::nullopt,
              "Raises InvalidArgument for repeats that are no small number; simulate() checks the rest.")
         .def_readonly("misalignment", &SimulationOptions::misalignment)
         .def_readonly("noise", &SimulationOptions::noise)
@@ -95,7 +114,8 @@ void bind_simulation(py::module_& m) {
         .def_readonly("verified_share", &SimulationOptions::verified_share)
         .def_readonly("repeats", &SimulationOptions::repeats)
         .def_readonly("backward", &SimulationOptions::backward)
-        .def_readonly("seconds_per_reading", &SimulationOptions::seconds_per_reading);
+        .def_readonly("seconds_per_reading", &SimulationOptions::seconds_per_reading)
+        .def_readonly("scales", &SimulationOptions::scales);
 
     m.def(
         "simulate",

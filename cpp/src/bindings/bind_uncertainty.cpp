@@ -22,7 +22,7 @@ static void bind_uncertain_inputs(py::module_& m) {
         .def_property_readonly(
             "of",
             [](const Quantity& q) {
-                constexpr const char* names[] = {"line", "part", "head", "air", "machine", "noise"};
+                constexpr const char* names[] = {"line", "part", "head", "air", "machine", "scale", "noise"};
                 return names[int(q.of)];
             },
             "\"line\", \"part\" (of the head), \"head\", \"air\", \"machine\" or \"noise\".")

@@ -250,6 +250,10 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
     if (calibration.fit) table.header["fit"] = name(*calibration.fit);
     for (const auto& [key, number] : numbers(calibration))
         if (number) table.header[key] = format_decimal(*number, 0);
+    if (const auto& reference = calibration.temperature_reference)
+        table.header["temperature_reference_c"] = format_decimal(*reference, 0);
+    else if (const auto& found = calibration.temperature_as_found)
+        table.header["temperature_as_found_c"] = format_lengths(*found);
     if (!calibration.fit_reasons.empty()) table.header["fit_reasons"] = join(calibration.fit_reasons, sentence_break);
     if (!calibration.unseen_faults.empty())
         table.header["unseen_faults"] = join(calibration.unseen_faults, sentence_break);
@@ -294,6 +298,13 @@ Calibration read_calibration(const std::string& path) {
         if (!number || *number < 0.0)
             throw InvalidArgument(path + ": " + key + ": expected a number of at least 0, got \"" + given + "\"");
     }
+    if (const std::string given = optional_value("temperature_reference_c"); !given.empty()) {
+        calibration.temperature_reference = parse_decimal(given, 0);
+        if (!calibration.temperature_reference)
+            throw InvalidArgument(path + ": temperature_reference_c: expected a temperature, got \"" + given + "\"");
+    }
+    if (!optional_value("temperature_as_found_c").empty())
+        calibration.temperature_as_found = lengths_of(table, "temperature_as_found_c", path);
     const auto slopes = functions_listed(table, "undetermined_slopes", path);
     const auto constants = functions_listed(table, "undetermined_reversal_constants", path);
     for (int i = 0; i < function_count; ++i) {

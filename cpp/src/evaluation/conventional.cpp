@@ -11,7 +11,7 @@ Calibration evaluate_conventional(const Measurement& measurement, const Plan& pl
                                   const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                                   const EvaluationOptions& options) {
     if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
-    const auto passes = collect_passes(measurement, plan, heads, options.uncertainty, LengthKind::distance);
+    const auto passes = collect_passes(measurement, plan, heads, options.uncertainty, LengthKind::distance, options.expansion);
     check(options.plausible);
     refuse_foreign_distances(measurement, plan);
     if (const std::string far = far_reading(measurement, plan); !far.empty()) throw InvalidArgument(far);
@@ -25,6 +25,7 @@ Calibration evaluate_conventional(const Measurement& measurement, const Plan& pl
     Calibration calibration{"conventional", chain, plan.volume(), tool, {}, {}};
     evaluate_linear(map, passes, plan, options.full_covariance, calibration);
     test_fit(map, passes, calibration);
+    state_temperature(measurement, options.expansion, calibration);
     for (const Axis axis : all_axes)
         if (auto gap = map.lengths(axis).gap) {
             gap->reason = OpenReason::few_diagonals;

@@ -52,7 +52,7 @@ Calibration evaluate_enhanced(const Measurement& measurement, const Plan& plan, 
                               const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                               const EvaluationOptions& options) {
     if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
-    const auto passes = collect_passes(measurement, plan, heads, options.uncertainty, LengthKind::lever_arm_corrected);
+    const auto passes = collect_passes(measurement, plan, heads, options.uncertainty, LengthKind::lever_arm_corrected, options.expansion);
     check(options.plausible);
     refuse_foreign_distances(measurement, plan);
     if (const std::string far = far_reading(measurement, plan); !far.empty()) throw InvalidArgument(far);
@@ -60,6 +60,7 @@ Calibration evaluate_enhanced(const Measurement& measurement, const Plan& plan, 
     Calibration calibration{"enhanced", chain, plan.volume(), tool, {}, {}, findings_of(map, plan)};
     evaluate_linear(map, passes, plan, options.full_covariance, calibration);
     test_fit(map, passes, calibration);
+    state_temperature(measurement, options.expansion, calibration);
     if (!is_anything_determined(calibration)) throw NothingDetermined("enhanced evaluation", calibration.findings);
     refuse_implausible(calibration, measurement, plan, options.plausible);
     return calibration;

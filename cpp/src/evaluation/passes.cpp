@@ -6,6 +6,7 @@
 
 #include "evaluation/measurement_rows.hpp"
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/measurement/temperatures.hpp"
 
 namespace stepdiag {
 namespace {
@@ -125,7 +126,7 @@ private:
 // Length and tilts of a point, from the reduced reading. The length is linear in the parameters only without the
 // product of tilt and lever arm: L = q_z + beta q_x - alpha q_y, where q is the vector from beam origin to functional
 // point.
-void fill_point(PassPoint& point, const Reduced& reduced, double travel, bool is_scale_line, LengthKind kind) {
+void fill_point(PassPoint& point, const Reduced& reduced, bool is_scale_line, LengthKind kind) {
     const Reading& reading = reduced.reading;
     point.has_tilt = reduced.has_tilt;
     // A scale line is parallel to its beam: without a lever arm it needs no tilts.
@@ -137,7 +138,7 @@ void fill_point(PassPoint& point, const Reduced& reduced, double travel, bool is
         by_reading << 1.0 - reading.tan2_phi(), -2.0 * reading.distance * reading.alpha + point.lateral.y(),
             -2.0 * reading.distance * reading.beta - point.lateral.x();
     }
-    if (point.has_length) point.reading[0] = length - travel;
+    if (point.has_length) point.reading[0] = length - point.travel;
     if (point.has_tilt) point.reading.tail<2>() << reading.alpha, reading.beta;
     for (Eigen::Vector3d effect : reduced.effects) {
         effect[0] = point.has_length ? by_reading * effect : 0.0;
@@ -154,8 +155,14 @@ Eigen::Vector3d PassPoint::variance() const {
 }
 
 std::vector<Pass> collect_passes(const Measurement& measurement, const Plan& plan, const HeadCalibrations& heads,
-                                 const ReadingUncertainty& uncertainty, LengthKind kind) {
+                                 const ReadingUncertainty& uncertainty, LengthKind kind,
+                                 const std::optional<KnownExpansion>& expansion) {
     check_uncertainty(uncertainty);
+    std::vector<Eigen::Vector3d> temperature;
+    if (expansion) {
+        check(*expansion);
+        temperature = scale_temperatures(measurement, expansion->temperature);
+    }
     const Reducer reducer(measurement, heads, uncertainty, kind);
     const auto rows = rows_by_pass(measurement);
 
@@ -175,7 +182,11 @@ std::vector<Pass> collect_passes(const Measurement& measurement, const Plan& pla
             // The position in the file only identifies the point, because it may have been rounded when it was written.
             const Eigen::Vector3d travel = pass.frame.transpose() * (planned[station.point].commanded - start);
             point.lateral = travel.head<2>();
-            fill_point(point, reducer.reduce(row), travel.z(), pass.is_scale_line, kind);
+            point.travel = travel.z();
+            if (expansion)
+                point.travel += pass.direction().dot(
+                    expansion->expansion.shift(planned[station.point].commanded, temperature[row]));
+            fill_point(point, reducer.reduce(row), pass.is_scale_line, kind);
         }
         readings += int(pass.points.size());
         passes.push_back(std::move(pass));

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "stepdiag/evaluation/evaluation.hpp"
@@ -18,9 +19,10 @@ struct PassPoint {
     PlanPoint plan;
     Eigen::Vector2d lateral =
         Eigen::Vector2d::Zero();  // commanded travel from the line's first point, in local x and y, mm
+    double travel = 0.0;  // along the line from its first point, as commanded and as the scales expand, mm
     bool has_length = false;
     bool has_tilt = false;
-    Eigen::Vector3d reading = Eigen::Vector3d::Zero();  // length less the commanded travel (mm), alpha, beta (rad)
+    Eigen::Vector3d reading = Eigen::Vector3d::Zero();  // length less travel (mm), alpha, beta (rad)
     std::vector<ChannelEffect> effects;                 // one for each raw channel that was read
 
     Eigen::Vector3d variance() const;
@@ -37,14 +39,15 @@ struct Pass {
 };
 
 enum class LengthKind {
-    distance,             // the distance itself, less the commanded travel
-    lever_arm_corrected,  // beam length L less commanded travel and lever arm times tilts; needs both tilts
+    distance,             // the distance itself, less travel
+    lever_arm_corrected,  // beam length L less travel and lever arm times tilts; needs both tilts
 };
 
 // Throws InvalidArgument naming the row if a line or point is not in the plan, a commanded position differs from the
-// plan by more than 1 um, channels do not fit the head, or no mirror gives the readings.
+// plan by more than 1 um, channels do not fit the head, no mirror gives the readings, or a pass has no temperatures.
 std::vector<Pass> collect_passes(const Measurement& measurement, const Plan& plan, const HeadCalibrations& heads,
-                                 const ReadingUncertainty& uncertainty, LengthKind kind);
+                                 const ReadingUncertainty& uncertainty, LengthKind kind,
+                                 const std::optional<KnownExpansion>& expansion);
 
 // A step of one axis over one of its intervals, as measured in one pass. Scale lines have no steps.
 struct Step {

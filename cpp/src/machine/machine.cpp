@@ -23,12 +23,14 @@ Machine::Machine(Chain chain, ErrorMap errors, const Eigen::Vector3d& tool)
     if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
 }
 
-Pose Machine::pose(const Eigen::Vector3d& commanded, const Approaches& approach) const {
+Pose Machine::pose(const Eigen::Vector3d& commanded, const Approaches& approach,
+                   const Eigen::Vector3d& expansion) const {
     const auto motion = [&](int rank) -> AxisMotion<double> {
         const Axis axis = chain_.order()[rank];
         const double p = commanded[index(axis)];
         const Approach came = approach[index(axis)];
-        const Eigen::Vector3d shift = p * Eigen::Vector3d::Unit(index(axis)) + errors_.delta(axis, p, came);
+        const Eigen::Vector3d shift =
+            (p + expansion[index(axis)]) * Eigen::Vector3d::Unit(index(axis)) + errors_.delta(axis, p, came);
         return {rotation_exp(broadcast3<double>(errors_.theta(axis, p, came))), broadcast3<double>(shift),
                 chain_.carries_workpiece(axis)};
     };

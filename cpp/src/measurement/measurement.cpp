@@ -17,7 +17,8 @@ void check_names(const std::vector<Channel>& channels) {
     for (const Channel& channel : channels) {
         if (!channel_column(channel.name))
             throw InvalidArgument("channel \"" + channel.name +
-                                  "\": expected distance, alpha, beta, spot_x, spot_y, d1 ... dn, time or temperature");
+                                  "\": expected distance, alpha, beta, spot_x, spot_y, d1 ... dn, time, temperature, "
+                                  "temperature_x ... temperature_z, air_temperature, air_pressure or air_humidity");
         if (!names.insert(channel.name).second)
             throw InvalidArgument("channel \"" + channel.name + "\" is given twice");
         beams += is_beam_channel(channel.name);

@@ -192,8 +192,17 @@ std::optional<ChannelColumn> channel_column(std::string_view channel) {
     if (channel == "distance" || channel == "spot_x" || channel == "spot_y" || is_beam_channel(channel))
         return ChannelColumn{"mm", 0, "um", -3};
     if (channel == "time") return ChannelColumn{"s", 0, "", 0};
-    if (channel == "temperature") return ChannelColumn{"c", 0, "", 0};
+    if (channel == "temperature" || channel == "temperature_x" || channel == "temperature_y" ||
+        channel == "temperature_z" || channel == "air_temperature")
+        return ChannelColumn{"c", 0, "", 0};
+    if (channel == "air_pressure") return ChannelColumn{"hpa", 2, "", 0};
+    if (channel == "air_humidity") return ChannelColumn{"percent", -2, "", 0};
     return std::nullopt;
+}
+
+bool is_signal(std::string_view name) {
+    const auto column = channel_column(name);
+    return column && !column->uncertainty_unit.empty();  // records state none
 }
 
 Measurement parse_measurement(std::string_view text, const std::string& file_name) {

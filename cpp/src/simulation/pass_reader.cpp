@@ -39,10 +39,17 @@ LinePlace place_on_line(const Machine& machine, const Plan& plan, const Heads& h
     return {&head, plan.frame(line), plan.points(line).front().commanded + machine.tool(), mirror_size(head, plan)};
 }
 
-std::vector<Pose> tool_poses(const Machine& machine, const PlannedPass& pass) {
+std::vector<Pose> tool_poses(const Machine& machine, const PlannedPass& pass, const SimulationOptions& options) {
     const Approaches approach = approaches(pass.line, pass.direction);
     std::vector<Pose> poses;
-    for (const PlanPoint& point : pass.points) poses.push_back(machine.pose(point.commanded, approach));
+    for (const PlanPoint& point : pass.points) {
+        Eigen::Vector3d expansion = Eigen::Vector3d::Zero();
+        if (const auto& scales = options.scales) {
+            const double time = double(pass.first_row + poses.size()) * options.seconds_per_reading.value_or(0.0);
+            expansion = scales->expansion.shift(point.commanded, scales->at(time));
+        }
+        poses.push_back(machine.pose(point.commanded, approach, expansion));
+    }
     return poses;
 }
 

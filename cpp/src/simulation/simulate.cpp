@@ -22,6 +22,17 @@ void check_misalignment(const Misalignment& misalignment, const Head& head, cons
                               "pose errors put them");
 }
 
+void check_scales(const ScaleTemperatures& scales, bool has_times) {
+    check(scales.expansion);
+    if (!scales.start.allFinite() || !scales.rate.allFinite())
+        throw InvalidArgument("scales: expected finite temperatures and rates");
+    if (!scales.rate.isZero(0.0) && !has_times)
+        throw InvalidArgument("scales: a temperature that changes: expected seconds_per_reading as well");
+    const auto same = [](const Eigen::Vector3d& of_axes) { return (of_axes.array() == of_axes[0]).all(); };
+    if (scales.one_sensor && !(same(scales.start) && same(scales.rate)))
+        throw InvalidArgument("scales: one_sensor: expected the same temperature and rate for all axes");
+}
+
 void check_options(const Plan& plan, const Heads& heads, const SimulationOptions& options) {
     for (const auto& [line, misalignment] : options.misalignment) {
         if (!plan.contains(Line::parse(line)))
@@ -39,6 +50,7 @@ void check_options(const Plan& plan, const Heads& heads, const SimulationOptions
         check_misalignment(misalignment, heads.of(Line::parse(line)), line);
     }
     check_noise(options.noise);
+    if (options.scales) check_scales(*options.scales, options.seconds_per_reading.has_value());
     if (options.repeats < 1 || options.repeats > SimulationOptions::largest_repeat_count)
         throw InvalidArgument("repeats: expected 1 to " + std::to_string(SimulationOptions::largest_repeat_count) +
                               ", got " + std::to_string(options.repeats));
@@ -130,16 +142,16 @@ Measurement simulate(const Machine& machine, const Plan& plan, const Heads& head
         std::vector<double> elapsed(pass.points.size());
         for (std::size_t k = 0; k < elapsed.size(); ++k)
             elapsed[k] = double(pass.first_row + k - pass.setup_row) * options.seconds_per_reading.value_or(0.0);
-        for (SignalRow& row : reader.read(tool_poses(machine, pass), elapsed, pass.first_row, count)) {
+        for (SignalRow& row : reader.read(tool_poses(machine, pass, options), elapsed, pass.first_row, count)) {
             options.noise.add(row, signals, rows.size());
             rows.push_back(std::move(row));
         }
     }
-    return as_measured(passes, signals, rows, options.seconds_per_reading);
+    return as_measured(passes, signals, rows, options);
 }
 
 Measurement as_measured(const std::vector<PlannedPass>& passes, const std::vector<std::string>& signals,
-                        const std::vector<SignalRow>& rows, const std::optional<double>& seconds_per_reading) {
+                        const std::vector<SignalRow>& rows, const SimulationOptions& options) {
     std::vector<Station> stations;
     for (const PlannedPass& pass : passes)
         for (const PlanPoint& point : pass.points)
@@ -149,9 +161,17 @@ Measurement as_measured(const std::vector<PlannedPass>& passes, const std::vecto
         Channel& channel = channels.emplace_back(Channel{signals[c], {}});
         for (const SignalRow& row : rows) channel.value.push_back(row[c]);
     }
-    if (seconds_per_reading) {
-        Channel& time = channels.emplace_back(Channel{"time", {}});
-        for (std::size_t row = 0; row < rows.size(); ++row) time.value.push_back(double(row) * *seconds_per_reading);
+    const double seconds = options.seconds_per_reading.value_or(0.0);
+    const auto record = [&](const char* name, const auto& value_at) {
+        Channel& channel = channels.emplace_back(Channel{name, {}});
+        for (std::size_t row = 0; row < rows.size(); ++row) channel.value.push_back(value_at(double(row) * seconds));
+    };
+    if (options.seconds_per_reading) record("time", [](double time) { return time; });
+    if (const auto& scales = options.scales) {
+        const char* const names[] = {"temperature_x", "temperature_y", "temperature_z"};
+        if (scales->one_sensor) record("temperature", [&](double time) { return scales->at(time)[0]; });
+        else
+            for (int a = 0; a < 3; ++a) record(names[a], [&](double time) { return scales->at(time)[a]; });
     }
     return Measurement(std::move(stations), std::move(channels));
 }

@@ -20,11 +20,15 @@ VirtualReadout::VirtualReadout(Machine machine, const Plan& plan, const Heads& h
                                SimulationOptions options)
     : machine_(std::move(machine)),
       noise_(options.noise),
+      scales_(options.scales),
+      seconds_(options.seconds_per_reading.value_or(0.0)),
       reader_(reader_on(machine_, plan, heads, line, std::move(options))) {}
 
 SignalRow VirtualReadout::read(const Eigen::Vector3d& position, const Approaches& approach, std::uint64_t row,
                                double elapsed) const {
-    SignalRow signals = reader_.read({machine_.pose(position, approach)}, {elapsed}, row).front();
+    const Eigen::Vector3d expansion =
+        scales_ ? scales_->expansion.shift(position, scales_->at(double(row) * seconds_)) : Eigen::Vector3d::Zero();
+    SignalRow signals = reader_.read({machine_.pose(position, approach, expansion)}, {elapsed}, row).front();
     noise_.add(signals, reader_.signals(), row);
     return signals;
 }

@@ -13,7 +13,7 @@ namespace {
 using Of = UncertainQuantity::Of;
 
 // Order of SharedQuantity.
-constexpr std::array<UncertainQuantity, 11> shared_quantities = {{
+constexpr std::array<UncertainQuantity, 15> shared_quantities = {{
     {"part_shift", "shift_um", "shift", Of::part, "xyz"},
     {"part_rotation", "rotation_urad", "rotation", Of::part, "xyz"},
     {"psd_distance", "psd_distance_mm", "PSD distance", Of::head, "", HeadLayout::psd},
@@ -25,8 +25,12 @@ constexpr std::array<UncertainQuantity, 11> shared_quantities = {{
     {"refractive_index", "refractive_index_ppm", "refractive index", Of::air},
     {"wavelength", "wavelength_ppm", "wavelength", Of::air},
     {"machine_drift", "machine_drift_um_per_h", "machine drift", Of::machine, "xyz"},
+    {"expansion", "expansion_um_per_m_k", "expansion coefficient", Of::scale, "xyz"},
+    {"common_expansion", "", "expansion coefficient", Of::scale},
+    {"scale_temperature", "scale_temperature_c", "temperature of the scale", Of::scale, "xyz"},
+    {"common_scale_temperature", "", "temperature of the scales", Of::scale},
 }};
-static_assert(shared_quantities.size() == std::size_t(SharedQuantity::machine_drift) + 1);
+static_assert(shared_quantities.size() == std::size_t(SharedQuantity::common_scale_temperature) + 1);
 
 // Order of NoiseQuantity.
 constexpr std::array<UncertainQuantity, 6> noise_quantities = {{

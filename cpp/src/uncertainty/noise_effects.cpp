@@ -31,7 +31,7 @@ Machine displaced(const Machine& machine, FunctionId id, double step) {
 std::vector<std::string> signals_of(const Measurement& measurement) {
     std::vector<std::string> names;
     for (const Channel& channel : measurement.channels())
-        if (channel.name != "time" && channel.name != "temperature") names.push_back(channel.name);
+        if (is_signal(channel.name)) names.push_back(channel.name);
     return names;
 }
 
@@ -187,6 +187,10 @@ std::string budget_group(const UncertainInput& input) {
         case SharedQuantity::pressure:
         case SharedQuantity::humidity:
         case SharedQuantity::refractive_index: return "air";
+        case SharedQuantity::expansion:
+        case SharedQuantity::common_expansion: return "expansion of the scales";
+        case SharedQuantity::scale_temperature:
+        case SharedQuantity::common_scale_temperature: return "temperature of the scales";
         default: return name(input.quantity);
     }
 }

@@ -21,13 +21,18 @@ std::optional<int> shared_column(SharedQuantity quantity) {
         case SharedQuantity::refractive_index: return shared_field::refractive_index;
         case SharedQuantity::wavelength: return shared_field::wavelength;
         case SharedQuantity::machine_drift: return shared_field::machine_drift;
+        case SharedQuantity::expansion:
+        case SharedQuantity::common_expansion: return shared_field::expansion;
+        case SharedQuantity::scale_temperature:
+        case SharedQuantity::common_scale_temperature: return shared_field::scale_temperature;
         default: return std::nullopt;
     }
 }
 
-// A caller's own times come first.
+// A caller's own times come first; temperatures that change need them.
 SimulationOptions with_times(SimulationOptions options, double seconds) {
-    if (!options.seconds_per_reading) options.seconds_per_reading = seconds;
+    const bool stays = !options.scales || options.scales->rate.isZero(0.0);
+    if (stays && !options.seconds_per_reading) options.seconds_per_reading = seconds;
     return options;
 }
 
@@ -70,11 +75,16 @@ RunModel::RunModel(const VirtualRun& given, std::uint64_t seed) : run(given), dr
         const LinePlace place = place_on_line(run.machine, run.plan, run.heads, pass.line);
         const bool forward = pass.direction == Direction::forward;
         const Eigen::Vector3d first = (forward ? pass.points.front() : pass.points.back()).commanded;
-        for (const PlanPoint& point : pass.points)
-            rows.push_back({double(rows.size() - pass.setup_row) * seconds,
-                            place.frame.col(2).dot(point.commanded - first),
-                            point.number + 1 == int(pass.points.size())});
-        for (const Pose& pose : tool_poses(run.machine, pass)) poses.push_back(pose);
+        for (const PlanPoint& point : pass.points) {
+            RunRow row{double(rows.size() - pass.setup_row) * seconds, place.frame.col(2).dot(point.commanded - first),
+                       point.number + 1 == int(pass.points.size())};
+            if (const auto& scales = run.simulation.scales) {
+                row.warmth = scales->at(double(rows.size()) * seconds).array() - scales->expansion.reference;
+                row.from_fixed = point.commanded - scales->expansion.fixed_point;
+            }
+            rows.push_back(row);
+        }
+        for (const Pose& pose : tool_poses(run.machine, pass, run.simulation)) poses.push_back(pose);
         passes.push_back({pass, place});
     }
     if (rows.size() > Draws::most_rows)
@@ -117,7 +127,13 @@ void RunModel::add_input(const UncertainInput& input, int index) {
             if (of_air && !std::holds_alternative<Air>(run.simulation.environment_of(*pass.place.head).air))
                 throw InvalidArgument(what + ": expected a state of the air as environment, got a constant index");
         }
-        shared.uncertain.push_back({*column + input.component, index});
+        const bool of_scales = *column == shared_field::expansion || *column == shared_field::scale_temperature;
+        if (of_scales && !run.simulation.scales)
+            throw InvalidArgument(what + ": expected scales that expand, the run has none");
+        const bool of_all_axes =
+            quantity == SharedQuantity::common_expansion || quantity == SharedQuantity::common_scale_temperature;
+        for (int axis = 0; axis < (of_all_axes ? 3 : 1); ++axis)
+            shared.uncertain.push_back({*column + input.component + axis, index});
         return;
     }
     check_component(what, input.component, 3);
@@ -153,8 +169,10 @@ bool RunModel::has(NoiseQuantity quantity) const {
 
 bool RunModel::moves_poses() const {
     return has(NoiseQuantity::machine_walk) || has(NoiseQuantity::position) || has(NoiseQuantity::orientation) ||
-           shared.is_uncertain(shared_field::machine_drift, 3);
+           shared.is_uncertain(shared_field::machine_drift, 3) || has_uncertain_scales();
 }
+
+bool RunModel::has_uncertain_scales() const { return shared.is_uncertain(shared_field::expansion, 6); }
 
 bool RunModel::has_uncertain_air() const { return shared.is_uncertain(shared_field::temperature, 4); }
 

@@ -20,9 +20,11 @@ enum : int {
     humidity = 3,
     refractive_index = 4,
     wavelength = 5,
-    machine_drift = 6,  // x, y, z
-    psd_distance = 9,
-    beam_offset = 10,  // u, v of d1 ... dn
+    machine_drift = 6,       // x, y, z, as the next two
+    expansion = 9,
+    scale_temperature = 12,
+    psd_distance = 15,
+    beam_offset = 16,  // u, v of d1 ... dn
 };
 }
 
@@ -52,6 +54,8 @@ struct RunRow {
     double elapsed;  // s, since the first reading of its set-up
     double travel;   // mm, commanded, along the line from its first point
     bool is_last_point;
+    // By axis: kelvins above the reference temperature, and mm from the scale's fixed point.
+    Eigen::Vector3d warmth = Eigen::Vector3d::Zero(), from_fixed = Eigen::Vector3d::Zero();
 };
 
 struct RunPass {
@@ -87,6 +91,14 @@ struct RunModel {
 
     bool has(NoiseQuantity quantity) const;
     bool moves_poses() const;  // something displaces the tool by sample
+    bool has_uncertain_scales() const;
+    // What an axis moves by in this row where its coefficient and its temperature are by so much other than stated. The
+    // turn of the axis's direction by other axes' rotations is left out: a part of 1e-4.
+    double moved_by_scale(const RunRow& row, int axis, double expansion, double temperature) const {
+        const double stated = run.simulation.scales->expansion.coefficient[axis];
+        return ((stated + expansion) * (row.warmth[axis] + temperature) - stated * row.warmth[axis]) *
+               row.from_fixed[axis];
+    }
     bool has_uncertain_air() const;
 
     // Of one head, at these numbers of the shared fields.

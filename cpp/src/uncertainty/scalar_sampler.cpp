@@ -44,7 +44,13 @@ std::vector<Displacement> ScalarSampler::displacements(const Eigen::VectorXd& de
     const std::vector<double> shared = model_.shared.with(deviations);
     const Eigen::Vector3d drift(shared[shared_field::machine_drift], shared[shared_field::machine_drift + 1],
                                 shared[shared_field::machine_drift + 2]);
-    for (std::size_t r = 0; r < rows; ++r) displaced[r].shift = drift * (double(r) * model_.seconds);
+    const bool of_scales = model_.has_uncertain_scales();
+    for (std::size_t r = 0; r < rows; ++r) {
+        displaced[r].shift = drift * (double(r) * model_.seconds);
+        for (int k = 0; of_scales && k < 3; ++k)
+            displaced[r].shift[k] += model_.moved_by_scale(model_.rows[r], k, shared[shared_field::expansion + k],
+                                                           shared[shared_field::scale_temperature + k]);
+    }
     if (!sample) return displaced;
     const auto& noise = model_.run.inputs.noise;
     for (std::size_t e = 0; e < noise.size(); ++e) {

@@ -98,12 +98,18 @@ void SimdSampler::fill_fields(const Fields& fields, const double* deviations, st
 }
 
 void SimdSampler::displace(std::optional<std::uint64_t> first_sample, Scratch& scratch) const {
+    const bool of_scales = model_.has_uncertain_scales();
     for (std::size_t r = 0; r < model_.rows.size(); ++r)
         for (std::size_t k = 0; k < 6; ++k)
-            for (std::size_t lane = 0; lane < lane_group; ++lane)
-                scratch.displaced[6 * r + k].value[lane] =
-                    k < 3 ? scratch.shared[shared_field::machine_drift + k].value[lane] * (double(r) * model_.seconds)
-                          : 0.0;
+            for (std::size_t lane = 0; lane < lane_group; ++lane) {
+                double& to = scratch.displaced[6 * r + k].value[lane] = 0.0;
+                if (k >= 3) continue;
+                const auto shared = [&](int field) { return scratch.shared[field + k].value[lane]; };
+                to = shared(shared_field::machine_drift) * (double(r) * model_.seconds);
+                if (of_scales)
+                    to += model_.moved_by_scale(model_.rows[r], int(k), shared(shared_field::expansion),
+                                                shared(shared_field::scale_temperature));
+            }
     if (!first_sample) return;
     const auto& noise = model_.run.inputs.noise;
     for (std::size_t e = 0; e < noise.size(); ++e) {

@@ -27,7 +27,7 @@ Measurement measurement_of(const RunModel& model, const Eigen::VectorXd& reading
             const double value = readings[Eigen::Index(r * model.channels.size() + c)];
             rows[r].push_back(std::isnan(value) ? std::nullopt : std::optional(value));
         }
-    return as_measured(passes, model.channels, rows, model.run.simulation.seconds_per_reading);
+    return as_measured(passes, model.channels, rows, model.run.simulation);
 }
 
 std::string unit_of(const std::string& parameter) {

@@ -239,6 +239,12 @@ def reason_text(reason: FitReason) -> str:
             )
         case "trend":
             return _trend(reason)
+        case "prior" if reason.channel == "expansion":
+            scales = "the scales" if reason.component < 0 else f"the scale of {'XYZ'[reason.component]}"
+            return (
+                f"the expansion coefficient of {scales} is {reason.value:.3g} standard uncertainties from what "
+                f"[temperature] states (at most {reason.limit:g} is credible)"
+            )
         case "prior":
             name = f"{reason.channel.replace('_', ' ')}{_component(reason)}"
             return (

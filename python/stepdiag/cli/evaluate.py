@@ -70,6 +70,7 @@ def evaluate(
     enhanced      distances, tilts and scale lines, to first order
     conventional  the distances of body diagonals
     """
+    from stepdiag.calibration.temperature_text import temperature_warnings
     from stepdiag.config.toml_text import located
     from stepdiag.io.data_files import is_netcdf, read_measurement, write_calibration
     from stepdiag.io.whole_files import check_input
@@ -123,6 +124,7 @@ def evaluate(
         provenance=provenance,
         between_nodes=known.between_nodes,
     )
+    of_temperature = temperature_warnings(written, measurement)
     adjusted = result.adjustment if isinstance(result, JudgedEvaluation) else result
     is_odd = adjusted is None or adjusted.verdict.fit in ("doubtful", "rejected")
     with Progress("mistakes"):  # which may take longer than the evaluation: that is written
@@ -132,11 +134,13 @@ def evaluate(
         from stepdiag.objects.evaluation import evaluated_files, evaluation_object
         from stepdiag.objects.writer import json_text
 
-        files, warnings = evaluated_files(scenario, run, path), fit_warnings(path, written.fit)
+        files, warnings = evaluated_files(scenario, run, path), [*of_temperature, *fit_warnings(path, written.fit)]
         click.echo(json_text(evaluation_object(result, written, files, measurement, known, warnings, mistakes)))
     else:
         for line in evaluation_report(result, measurement, known, mistakes):
             say(line)
+    for warning in of_temperature:
+        tell("warning", warning)
     tell_fit(context, path, written.fit)
 
 
@@ -184,7 +188,7 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
     path = None if output is None else output.claim(scenario, error_map=described.truth.error_map)
     known = described.known
     with Progress("observe"):
-        run, found = observe(known)
+        run, found = observe(described)
     if not as_json:
         for line in [*observation_report(found, run, known), *control_rows(found.reliability)]:
             say(line)

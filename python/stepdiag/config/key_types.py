@@ -1,6 +1,6 @@
 """What the keys of our TOML files (scenarios, heads) are made of: sections, and the kinds of values that keys take."""
 
-from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -61,6 +61,9 @@ def narrowed(section: Section, model: type[Narrow]) -> Narrow:
     """The keys that `model` has, of a section that has others beside them; so of the sections in it."""
     kept: dict[str, Any] = {}
     for name in section.model_fields_set & model.model_fields.keys():
-        value, narrow = getattr(section, name), model.model_fields[name].annotation
-        kept[name] = narrowed(value, narrow) if isinstance(narrow, type) and issubclass(narrow, Section) else value
+        value, kinds = getattr(section, name), model.model_fields[name].annotation
+        sections = [
+            kind for kind in (get_args(kinds) or (kinds,)) if isinstance(kind, type) and issubclass(kind, Section)
+        ]
+        kept[name] = narrowed(value, sections[0]) if sections and isinstance(value, Section) else value
     return model.model_construct(**kept)

@@ -34,6 +34,7 @@ from stepdiag.config.key_types import (
 from stepdiag.config.plan_by_time_keys import PlanByTimeSection
 from stepdiag.config.report_keys import ReportSection
 from stepdiag.config.scenario_head_keys import EnvironmentSection, HeadSection, KnownHeadKeys, LineKeys
+from stepdiag.config.temperature_keys import KnownTemperatureKeys, TemperatureSection, TrueTemperatureKeys
 from stepdiag.config.uncertainty_keys import UncertaintySection
 
 # Limits that the core checks as well; here they keep numbers inside the integer types behind the bindings.
@@ -218,6 +219,7 @@ class KnownKeys(Section):
     plan: PlanSection
     head: KnownHeadKeys
     line: dict[str, LineKeys] = tables("LINE")
+    temperature: KnownTemperatureKeys | None = None
     noise: NoiseKeys = NoiseKeys()
     uncertainty: UncertaintySection = UncertaintySection()
     adjustment: AdjustmentSection = AdjustmentSection()
@@ -233,6 +235,7 @@ class TruthKeys(Section):
     machine: MachineErrorsKeys = MachineErrorsKeys()
     noise: NoiseSection = NoiseSection()
     misalignment: MisalignmentSection = MisalignmentSection()
+    temperature: TrueTemperatureKeys | None = None
     environment: EnvironmentSection = EnvironmentSection()
 
 
@@ -241,6 +244,7 @@ class ScenarioKeys(TruthKeys, KnownKeys):
 
     machine: MachineSection
     head: HeadSection
+    temperature: TemperatureSection | None = None
     noise: NoiseSection = NoiseSection()
 
 

@@ -158,6 +158,16 @@ class UncertaintySection(SetupUncertaintyKeys):
     machine_drift_um_per_h: Spread | None = _uncertain(
         "Drift of the functional point along X, Y, Z, each, linear in time since the run's first reading.", 2.0
     )
+    expansion_um_per_m_k: Spread | None = _uncertain(
+        "Expansion coefficient of the scales; by default normal with `temperature.u_expansion_um_per_m_k`. Of each "
+        "axis, or of all together, as `[temperature]` has it.",
+        {"distribution": "rectangular", "half_width": 2.0},
+    )
+    scale_temperature_c: Spread | None = _uncertain(
+        "True temperature of the scales beside that of the run, likewise; by default normal with "
+        "`temperature.u_temperature_c`.",
+        0.1,
+    )
     repeatability_um: Spread | None = _uncertain("Positioning at every point, along X, Y, Z, each.", 0.2)
     repeatability_urad: Spread | None = _uncertain("Orientation of the tool at every point, about X, Y, Z, each.", 0.5)
     between_nodes_um: Amplitude | None = key(

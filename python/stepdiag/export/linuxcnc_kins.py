@@ -83,5 +83,7 @@ def _with_tool(calibration: Calibration, tool: FloatArray) -> Calibration:
         unseen_faults=calibration.unseen_faults,
         uncertainty_scaled=calibration.uncertainty_scaled,
         between_nodes=calibration.between_nodes,
+        temperature_reference=calibration.temperature_reference,
+        temperature_as_found=calibration.temperature_as_found,
         provenance=calibration.provenance,
     )

@@ -58,6 +58,8 @@ def read_what_is_exported(path: Path) -> Calibration:
         unseen_faults=calibration.unseen_faults,
         uncertainty_scaled=calibration.uncertainty_scaled,
         between_nodes=calibration.between_nodes,
+        temperature_reference=calibration.temperature_reference,
+        temperature_as_found=calibration.temperature_as_found,
     )
 
 

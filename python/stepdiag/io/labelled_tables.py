@@ -18,7 +18,13 @@ _CHANNEL = {
     "spot_x": ("mm", "spot position along local x"),
     "spot_y": ("mm", "spot position along local y"),
     "time": ("s", "time of the reading"),
-    "temperature": ("degC", "temperature"),
+    "temperature": ("degC", "temperature of the scales"),
+    "temperature_x": ("degC", "temperature of the scale of X"),
+    "temperature_y": ("degC", "temperature of the scale of Y"),
+    "temperature_z": ("degC", "temperature of the scale of Z"),
+    "air_temperature": ("degC", "temperature of the air"),
+    "air_pressure": ("Pa", "pressure of the air"),
+    "air_humidity": ("1", "relative humidity of the air"),
 }
 
 
@@ -117,6 +123,10 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
         verdict["uncertainty_scaled"] = calibration.uncertainty_scaled
     if calibration.between_nodes is not None:
         verdict["between_nodes_mm"] = calibration.between_nodes
+    if calibration.temperature_reference is not None:
+        verdict["temperature_reference_c"] = calibration.temperature_reference
+    elif calibration.temperature_as_found is not None:
+        verdict["temperature_as_found_c"] = calibration.temperature_as_found
     verdict["fit_reasons"] = "\n".join(calibration.fit_reasons)
     verdict["unseen_faults"] = "\n".join(calibration.unseen_faults)
     return xr.Dataset(

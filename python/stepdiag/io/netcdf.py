@@ -139,7 +139,7 @@ class NetcdfFile:
         return value
 
     def lengths(self, attribute: str) -> npt.NDArray[np.float64]:
-        """A global attribute with three lengths."""
+        """A global attribute with three numbers, as a rule lengths."""
         value = self._dataset.attrs.get(attribute)
         if value is None:
             raise self.fail(f"attribute {attribute}", "missing")
@@ -147,6 +147,9 @@ class NetcdfFile:
         if lengths.dtype.kind not in "fiu" or lengths.shape != (3,):
             raise self.fail(f"attribute {attribute}", f"expected three numbers, got {_show(value)}")
         return lengths.astype(np.float64)
+
+    def lengths_if_there(self, attribute: str) -> npt.NDArray[np.float64] | None:
+        return self.lengths(attribute) if attribute in self._dataset.attrs else None
 
     def number(self, attribute: str) -> float | None:
         """A global attribute with a number; None if it is missing."""

@@ -90,6 +90,8 @@ def read_calibration_netcdf(path: Path) -> Calibration:
             "unseen_faults": list(filter(None, file.text("unseen_faults", "").split("\n"))),
             "uncertainty_scaled": file.number("uncertainty_scaled"),
             "between_nodes": file.number("between_nodes_mm"),
+            "temperature_reference": file.number("temperature_reference_c"),
+            "temperature_as_found": file.lengths_if_there("temperature_as_found_c"),
         }
         with located(str(path)):
             calibration = Calibration(**parts)

@@ -10,6 +10,7 @@ import numpy as np
 from stepdiag._core import Calibration
 from stepdiag.calibration.finding_text import MEANING, NOISE_ALONE, NOT_SEEN, PROVENANCE
 from stepdiag.calibration.largest_by_kind import largest_entries, largest_uncertainties
+from stepdiag.calibration.temperature_text import temperature_text
 from stepdiag.calibration.volume import VolumeErrors
 from stepdiag.calibration.volume_change import VolumeChange
 from stepdiag.page.contents import Contents
@@ -104,6 +105,7 @@ def verdict_block(contents: Contents) -> Markup:
         notes.append(f"All standard uncertainties were multiplied by {calibration.uncertainty_scaled:.3g}.")
     if calibration.method in NOISE_ALONE:
         notes.append(_sentence(NOISE_ALONE[calibration.method]))
+    notes.append(_sentence(temperature_text(calibration)))
     if fit == "accepted":
         notes.append(_sentence(NOT_SEEN))
     parts += [element("p", note, class_="note") for note in notes]

@@ -39,7 +39,9 @@ def observe(scenario: Scenario | Known) -> tuple[_core.Measurement, Adjustment]:
     """The error-free run of a scenario, and what is found in it, with the faults that its readings control. Raises
     InvalidArgument where nothing is."""
     known = not_measured(scenario.known)
-    run = simulate_scenario(Scenario(known, Truth()))
+    # Temperatures that change tell something of expansion coefficients.
+    truth = Truth(scales=scenario.truth.scales) if isinstance(scenario, Scenario) else Truth()
+    run = simulate_scenario(Scenario(known, truth))
     with located(str(known.path)):
         return run, adjust_scenario(known, run, reliability=True)
 

@@ -9,6 +9,7 @@ from stepdiag._core import Calibration
 from stepdiag.calibration.finding_text import fit_rows, provenance_rows
 from stepdiag.calibration.functional_point import functional_point_straightness
 from stepdiag.calibration.largest_by_kind import LargestEntry, largest_entries
+from stepdiag.calibration.temperature_text import temperature_rows
 from stepdiag.calibration.unseen_text import unseen_rows
 from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.parameters import REPORT_UNIT, Kind, in_report_units
@@ -29,6 +30,7 @@ def calibration_report(calibration: Calibration) -> Iterator[str]:
         " ".join(f"{t:g}" for t in calibration.tool),
     )
     yield f"machine: chain {calibration.chain}, volume {volume} mm, tool offset {tool} mm"
+    yield from temperature_rows(calibration)
     yield f"{'':<14}{'largest value':<32}largest standard uncertainty"
     uncertain = largest_entries(calibration, uncertainty=True)
     for kind, entry in largest_entries(calibration).items():

@@ -5,19 +5,21 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from stepdiag._core import Adjustment, Calibration, Measurement, straightness_reference
+from stepdiag._core import Adjustment, Calibration, ExpansionEstimate, Measurement, straightness_reference
 from stepdiag.calibration.finding_text import NOISE_ALONE, combination_text, fault_rows, fit_rows, verdict_rows
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
+from stepdiag.calibration.temperature_text import temperature_rows
 from stepdiag.calibration.unseen_text import unseen_rows
 from stepdiag.mistakes.search import FoundMistake
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.fault_control import control_rows
 from stepdiag.report.mistakes import mistake_rows, unchecked_row
 from stepdiag.report.prior_effects import cosine_rows, drift_rows
-from stepdiag.report.setup_table import setup_rows
+from stepdiag.report.setup_table import NOTHING_LEARNT, setup_rows
 from stepdiag.scenario.description import JudgedEvaluation
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
+from stepdiag.units import MICRO
 
 
 def evaluation_report(
@@ -70,6 +72,7 @@ def _adjusted(
     if rows:
         yield "set-up found, 12.3(45) being 12.3 with a standard uncertainty of 4.5:"
         yield from rows
+    yield from expansion_rows(adjustment.expansion)
     yield from undetermined_rows(calibration, map(combination_text, adjustment.combinations))
     yield from smoothness_rows(adjustment.smoothness)
     yield from cosine_rows(measurement, known)
@@ -83,9 +86,22 @@ def _adjusted(
 def _what_was_done(calibration: Calibration, measurement: Measurement, known: Known) -> Iterator[str]:
     yield f"method: {calibration.method}, chain {calibration.chain.name}"
     yield f"readings: {len(measurement)} points on {len(set(measurement.line))} lines"
+    yield from temperature_rows(calibration)
     incomplete, missing = lost_readings(measurement, known.plan, known.signals)
     if incomplete or missing:
         yield f"lost: {incomplete} rows without a complete reading, {missing} points of the plan without a row"
+
+
+def expansion_rows(estimates: Iterable[ExpansionEstimate]) -> Iterator[str]:
+    """Expansion coefficients that were unknowns: what was stated, and what the readings made of it."""
+    for estimate in estimates:
+        numbers = (estimate.stated, estimate.prior, estimate.value, estimate.standard_uncertainty)
+        stated, prior, value, u = (number * MICRO for number in numbers)
+        scales = "the scales" if len(estimate.axes) == 3 else f"the scale of {'XYZ'[estimate.axes[0]]}"
+        found = "the readings tell nothing more"
+        if u < NOTHING_LEARNT * prior:
+            found = f"found {value:.4g} ± {u:.2g}"
+        yield f"expansion of {scales}: stated {stated:.4g} ± {prior:.2g} µm/(m·K), {found}"
 
 
 def undetermined_rows(calibration: Calibration, combinations: Iterable[str] = ()) -> Iterator[str]:

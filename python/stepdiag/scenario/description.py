@@ -22,6 +22,7 @@ from stepdiag.io.whole_files import read_text
 from stepdiag.scenario.heads import describe_heads, make_heads, of_run
 from stepdiag.scenario.known import Known, known_of, runs_of
 from stepdiag.scenario.planned_readings import only
+from stepdiag.scenario.temperature import scales_of
 from stepdiag.scenario.truth import Truth, errors_of, truth_of
 
 
@@ -84,6 +85,7 @@ def evaluate_scenario(
         uncertainty=known.uncertainty,
         full_covariance=full_covariance,
         plausible=known.plausible,
+        expansion=known.expansion,
     )
     return found.with_between_nodes(known.between_nodes)
 
@@ -154,7 +156,8 @@ def adjust_scenario(
 
 def simulation_options(scenario: Scenario) -> _core.SimulationOptions:
     """How the scenario's run is simulated."""
-    keys, truth = scenario.known.keys, scenario.truth
+    known, truth = scenario.known, scenario.truth
+    keys = known.keys
     return _core.SimulationOptions(
         misalignment=dict(truth.misalignment),
         noise=truth.noise,
@@ -164,6 +167,7 @@ def simulation_options(scenario: Scenario) -> _core.SimulationOptions:
         repeats=runs_of(keys.plan),
         backward=keys.plan.backward,
         seconds_per_reading=keys.plan.seconds_per_reading,
+        scales=truth.scales or (None if known.expansion is None else scales_of(known.expansion)),
     )
 
 
@@ -191,6 +195,7 @@ def adjustment_options(
         scale_uncertainty=keys.scale_uncertainty and not of_samples,
         full_covariance=full_covariance,
         plausible=known.plausible,
+        expansion=known.expansion,
         reliability=reliability,
         search_faults=search_faults,
     )

@@ -12,6 +12,7 @@ from stepdiag.display import Displayed, Facts, lengths_text, point_text
 from stepdiag.scenario.adjustment import plausible_limits, setup_priors, smoothness_of
 from stepdiag.scenario.heads import DescribedHead, check_alike, check_mirrors, heads_by_line, make_heads, signals_of
 from stepdiag.scenario.setup import weights
+from stepdiag.scenario.temperature import known_expansion
 from stepdiag.scenario.uncertain_inputs import uncertain_inputs
 from stepdiag.units import MICROMETRE
 
@@ -24,7 +25,8 @@ class Known(Displayed):
     `described`: the heads by design, by the place of their keys, also those that measure no line. The other fields
     follow from the first three: chain, tool and plan; by line the head that measures it, as it is described and as it
     is by design; the channels of a run; weights of readings, priors of the set-up, smoothness and limits of what is
-    plausible; what is uncertain."""
+    plausible; what is known of the scales' expansion, None where the scenario has no [temperature]; what is
+    uncertain."""
 
     path: Path
     keys: KnownKeys
@@ -40,6 +42,7 @@ class Known(Displayed):
     setup_by_line: Mapping[str, _core.SetupPriors] = field(compare=False)
     smoothness: _core.Smoothness | None = field(compare=False)
     plausible: _core.PlausibleLimits = field(compare=False)
+    expansion: _core.KnownExpansion | None = field(compare=False)
     uncertain: _core.UncertainInputs = field(compare=False)
 
     @property
@@ -109,6 +112,7 @@ def known_of(keys: KnownKeys, described: Mapping[str, DescribedHead], path: Path
         setup_by_line=MappingProxyType({line: own for line, own in setup_by_line.items() if line in heads}),
         smoothness=smoothness_of(keys.smoothness, path),
         plausible=plausible_limits(keys.plausible),
+        expansion=known_expansion(keys.temperature, path),
         uncertain=uncertain_inputs(keys, described_heads, heads, path),
     )
 

@@ -7,6 +7,17 @@ import numpy as np
 
 from stepdiag._core import InvalidArgument, Measurement, Plan
 
+# Channels that are no readings of the head.
+RECORDS: Final = (
+    "time",
+    "temperature",
+    "temperature_x",
+    "temperature_y",
+    "temperature_z",
+    "air_temperature",
+    "air_pressure",
+    "air_humidity",
+)
 SAME_POINT: Final = 1e-3  # mm, as in the evaluations: positions in files may have been rounded
 
 
@@ -37,8 +48,8 @@ def lost_readings(measurement: Measurement, plan: Plan, signals: Sequence[str]) 
 
 
 def only(measurement: Measurement, signals: Sequence[str]) -> Measurement:
-    """The run without its other readings; what is no reading (time, temperature) stays."""
-    kept = {*signals, "time", "temperature"}
+    """The run without its other readings; what is no reading (time, temperatures, air) stays."""
+    kept = {*signals, *RECORDS}
     if kept >= measurement.channels.keys():
         return measurement
     return Measurement(

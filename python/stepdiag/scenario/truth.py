@@ -15,6 +15,7 @@ from stepdiag.io.whole_files import check_input
 from stepdiag.scenario.heads import PoseErrors
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.setup import environments, misalignments, noise_of
+from stepdiag.scenario.temperature import true_scales
 from stepdiag.scenario.uncertain_inputs import STATE_OF_AIR
 from stepdiag.units import MICROMETRE, MICRORADIAN
 
@@ -25,7 +26,8 @@ class Truth(Displayed):
 
     Truth() is that of a perfect machine and a perfect set-up, read without noise. `error_map`: the file that [machine]
     names, read when the machine is simulated. `pose_errors`: by the place of a head's keys. `assumed_environment`: what
-    the instrument takes the air for, with which it reduces its readings; the true air, where nothing else is said."""
+    the instrument takes the air for, with which it reduces its readings; the true air, where nothing else is said.
+    `scales`: how warm they are; None where they do not expand."""
 
     keys: TruthKeys = field(default_factory=TruthKeys)
     error_map: Path | None = None
@@ -34,6 +36,7 @@ class Truth(Displayed):
     noise: _core.Noise = field(default_factory=_core.Noise)
     environment: _core.Environment | None = None
     assumed_environment: _core.Environment | None = None
+    scales: _core.ScaleTemperatures | None = None
 
     def _facts(self) -> Facts:
         random = self.keys.machine.random
@@ -44,6 +47,7 @@ class Truth(Displayed):
             ("noise (mm, rad)", ", ".join(f"{name} {size:g}" for name, size in noise.items() if size) or "none"),
             ("misaligned", ", ".join(self.misalignment) or "no line"),
             ("components out of place", str(sum(map(len, self.pose_errors.values())))),
+            ("scales", "do not expand" if self.scales is None else "expand"),
             ("air", "not stated" if self.environment is None else "stated"),
         ]
 
@@ -65,6 +69,7 @@ def truth_of(keys: TruthKeys, pose_errors: Mapping[str, PoseErrors], known: Know
         noise=noise_of(keys.noise),
         environment=environment,
         assumed_environment=assumed,
+        scales=true_scales(known.expansion, keys.temperature, known.keys.plan.seconds_per_reading, path),
     )
 
 

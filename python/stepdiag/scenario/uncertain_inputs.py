@@ -36,6 +36,7 @@ def uncertain_inputs(
         if line in described:
             _check_fit(own, keys, {line: described[line]}, head, f"{place}.{line}")
     inputs = [*_of_lines(keys, head), *_of_components(section, described, head, place), *_of_all(section, head)]
+    inputs += _of_scales(keys, place)
     noise, correlations = list(_noise(keys, head, place)), list(_correlations(section, inputs, place))
     with located(place):
         return _core.UncertainInputs(inputs, noise, correlations)
@@ -104,6 +105,27 @@ def _of_all(section: UncertaintySection, head: _core.Head) -> Iterator[_core.Unc
     for name, quantity in QUANTITIES.items():
         if quantity.of in ("head", "air", "machine"):
             yield from _inputs(getattr(section, name), name, head)
+
+
+def _of_scales(keys: KnownKeys, place: str) -> Iterator[_core.UncertainInput]:
+    """By axis where [temperature] has a number for each, else in common."""
+    scales, section = keys.temperature, keys.uncertainty
+    if scales is None:
+        for name in ("expansion_um_per_m_k", "scale_temperature_c"):
+            if getattr(section, name) is not None:
+                raise InvalidArgument(f"{place}.{name}: goes with [temperature], which is missing")
+        return
+    sensors = 3 if isinstance(scales.axes_c, tuple) else 1
+    coefficients = scales.u_expansion_um_per_m_k
+    for name, by_axis in (
+        ("expansion_um_per_m_k", coefficients if isinstance(coefficients, tuple) else (coefficients,)),
+        ("scale_temperature_c", (scales.u_temperature_c,) * sensors),
+    ):
+        quantity = QUANTITIES[name].name if len(by_axis) == 3 else f"common_{QUANTITIES[name].name}"
+        for axis, uncertainty in enumerate(by_axis):
+            stated = getattr(section, name) or StatedDistribution("normal", uncertainty)
+            if not stated.is_certain:
+                yield _core.UncertainInput(quantity, stated.native(unit_of(name).native), component=axis)
 
 
 def _inputs(
@@ -176,4 +198,5 @@ def key_unit(one: _core.UncertainInput | _core.ReadingNoise) -> Unit:
     """The unit of the key that an input or noise comes from."""
     if isinstance(one, _core.ReadingNoise) and one.channel:
         return unit_of(KEY_OF_READING[kind_of_channel(one.channel)])
-    return unit_of(next(key for key, quantity in QUANTITIES.items() if quantity.name == one.quantity))
+    of_axes = one.quantity.removeprefix("common_")  # of scales
+    return unit_of(next(key for key, q in QUANTITIES.items() if q.name in (one.quantity, of_axes)))

@@ -7,7 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 import reference
-from adjusted import adjust, distance_from, error_map, is_complete
+from adjusted import (
+    LIMIT,
+    adjust,
+    assert_recovered,
+    error_map,
+    is_complete,
+    knowledge_of,
+)
 from dense_adjustment import Knowledge
 from places import RUNS
 from reference_files import read_error_table, read_scenario
@@ -15,25 +22,6 @@ from usual import DIAGONALS, FACES, SCALE_LINES
 from virtual_runs import head_of, measured, plan_of, random_scenario, random_table
 
 import stepdiag as sd
-
-# The figures of the project, mm and rad. Readings near 1 m are rounded to 1e-13 mm, and steps add up as a random walk.
-# Tilts from differences of beams: 1e-13 mm over 20 mm and 50 steps.
-LIMIT = {"ideal": (2e-11, 1e-13), "psd": (2e-11, 1e-13), "multi_beam": (1e-10, 1e-12)}
-MOST_ITERATIONS = 6
-
-
-def assert_recovered(adjustment: sd.Adjustment, table: reference.ErrorTable, limit: tuple[float, float]) -> None:
-    assert is_complete(adjustment.calibration), adjustment.calibration.undetermined
-    error = distance_from(adjustment, table)
-    assert error.position <= limit[0], error
-    assert error.angle <= limit[1], error
-    assert adjustment.iterations <= MOST_ITERATIONS
-    assert adjustment.outliers == []
-
-
-def knowledge_of(layout: str) -> Knowledge:
-    """The beams' constants are common to all; a prior on the laser would pull it away from its 2 mrad."""
-    return Knowledge({"beam_constants": "fixed"} if layout == "multi_beam" else {})
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -14,6 +14,11 @@ from virtual_runs import head_of, plan_of
 import stepdiag as sd
 from stepdiag.parameters import FUNCTIONS
 
+# The figures of the project, mm and rad. Readings near 1 m are rounded to 1e-13 mm, and steps add up as a random walk.
+# Tilts from differences of beams: 1e-13 mm over 20 mm and 50 steps.
+LIMIT = {"ideal": (2e-11, 1e-13), "psd": (2e-11, 1e-13), "multi_beam": (1e-10, 1e-12)}
+MOST_ITERATIONS = 6
+
 
 def adjust(
     run: sd.Measurement, scenario: reference.Scenario, knowledge: Knowledge | None = None, **options: Any
@@ -209,3 +214,17 @@ def assert_as_dense(
     assert adjustment.degrees_of_freedom == dense.degrees_of_freedom
     assert abs(found_sum - dense.square_sum) <= limit
     assert abs(adjustment.chi_square_probability - dense.chi_square_probability) <= limit / 2
+
+
+def assert_recovered(adjustment: sd.Adjustment, table: reference.ErrorTable, limit: tuple[float, float]) -> None:
+    assert is_complete(adjustment.calibration), adjustment.calibration.undetermined
+    error = distance_from(adjustment, table)
+    assert error.position <= limit[0], error
+    assert error.angle <= limit[1], error
+    assert adjustment.iterations <= MOST_ITERATIONS
+    assert adjustment.outliers == []
+
+
+def knowledge_of(layout: str) -> Knowledge:
+    """The beams' constants are common to all; a prior on the laser would pull it away from its 2 mrad."""
+    return Knowledge({"beam_constants": "fixed"} if layout == "multi_beam" else {})

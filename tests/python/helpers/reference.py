@@ -112,8 +112,34 @@ def axis_errors(
     return delta, theta
 
 
+@dataclass(frozen=True)
+class Scales:
+    """How the scales of X, Y, Z expand (1/K, mm, °C), and how warm they are: at the first reading (°C), and K/s."""
+
+    coefficient: tuple[float, float, float]
+    start: tuple[float, float, float]
+    rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    fixed_point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    reference: float = 20.0
+
+    def temperature(self, time: float) -> list[float]:
+        return [start + rate * time for start, rate in zip(self.start, self.rate, strict=True)]
+
+    def position(self, axis: int, p: Number, time: float, a: Arithmetic) -> Number:
+        """Where an axis stands that is told to go to p."""
+        warmth = a.number(self.temperature(time)[axis]) - a.number(self.reference)
+        return p + a.number(self.coefficient[axis]) * warmth * (p - a.number(self.fixed_point[axis]))
+
+
 def pose(
-    chain: str, table: ErrorTable, tool: Any, commanded: Any, a: Arithmetic = DOUBLE, approach: Approach = FORWARD
+    chain: str,
+    table: ErrorTable,
+    tool: Any,
+    commanded: Any,
+    a: Arithmetic = DOUBLE,
+    approach: Approach = FORWARD,
+    scales: Scales | None = None,
+    time: float = 0.0,
 ) -> tuple[Any, Vector]:
     """(rotation, functional point) by homogeneous 4x4 matrices, from w to t; each axis approached as said."""
     links = re.findall(r"[XYZ]|b", chain)
@@ -124,7 +150,7 @@ def pose(
             continue
         p = a.number(commanded[AXES.index(link)])
         delta, theta = axis_errors(table, link, p, a, approach[AXES.index(link)])
-        delta[AXES.index(link)] += p
+        delta[AXES.index(link)] += scales.position(AXES.index(link), p, time, a) if scales else p
         rotation, shift = homogeneous(turn(theta, a), None, a), homogeneous(None, delta, a)
         total = total @ rotation @ shift if place < bed else total @ shift @ rotation
     total = total @ homogeneous(None, a.vector(tool), a)
@@ -161,6 +187,7 @@ class Scenario:
     repeats: int = 1
     backward: bool = False
     seconds_per_reading: float | None = None
+    scales: Scales | None = None
 
 
 def commanded_points(scenario: Scenario, line: str) -> list[tuple[float, float, float]]:
@@ -199,11 +226,18 @@ def head_of(scenario: Scenario, line: str, a: Arithmetic = DOUBLE) -> tuple[Vect
 
 
 def mirror_of(
-    scenario: Scenario, table: ErrorTable, line: str, commanded: Any, a: Arithmetic = DOUBLE, backward: bool = False
+    scenario: Scenario,
+    table: ErrorTable,
+    line: str,
+    commanded: Any,
+    a: Arithmetic = DOUBLE,
+    backward: bool = False,
+    time: float = 0.0,
 ) -> tuple[Vector, Vector]:
-    """The functional point and the mirror's normal, in the machine frame."""
+    """The functional point and the mirror's normal, in the machine frame; `time` since the run's first reading."""
     reflector = scenario.misalignment.get(line, {}).get("reflector", (0.0, 0.0))
-    rotation, point = pose(scenario.chain, table, scenario.tool, commanded, a, approach_of(line, backward))
+    approach = approach_of(line, backward)
+    rotation, point = pose(scenario.chain, table, scenario.tool, commanded, a, approach, scenario.scales, time)
     local = frame(line, scenario.volume, a)
     return point, rotation @ local @ turn([*reflector, 0.0], a) @ a.vector([0, 0, 1])
 
@@ -272,6 +306,10 @@ def simulate(scenario: Scenario, table: ErrorTable, a: Arithmetic = DOUBLE) -> I
                     row["direction"] = "backward" if backward else "forward"
                     if scenario.seconds_per_reading is not None:
                         row["time"] = count * seconds
-                    elapsed = (count - first) * seconds
-                    yield {**row, **readings(scenario, table, line, commanded, a, backward, elapsed)}
+                    elapsed, time = (count - first) * seconds, count * seconds
+                    if scenario.scales is not None:
+                        warm = scenario.scales.temperature(time)
+                        row |= {f"temperature_{axis}": t for axis, t in zip("xyz", warm, strict=True)}
+                    mirror = mirror_of(scenario, table, line, commanded, a, backward, time)
+                    yield {**row, **readings(scenario, table, line, commanded, a, backward, elapsed, mirror)}
                     count += 1

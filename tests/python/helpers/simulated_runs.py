@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import reference
@@ -39,8 +40,18 @@ def simulated(scenario: reference.Scenario, errors: sd.ErrorMap, **more: Any) ->
         "repeats": scenario.repeats,
         "backward": scenario.backward,
         "seconds_per_reading": scenario.seconds_per_reading,
+        "scales": scales_of(scenario),
     }
     return sd.simulate(machine, plan_of(scenario), head_of(scenario), misalignment=misalignment, **runs, **more)
+
+
+def expansion_of(scales: reference.Scales) -> sd.Expansion:
+    return sd.Expansion(scales.coefficient, fixed_point=scales.fixed_point, reference=scales.reference)
+
+
+def scales_of(scenario: reference.Scenario) -> sd.ScaleTemperatures | None:
+    scales = scenario.scales
+    return None if scales is None else sd.ScaleTemperatures(expansion_of(scales), scales.start, scales.rate)
 
 
 def table_of(errors: sd.ErrorMap) -> reference.ErrorTable:
@@ -76,6 +87,20 @@ def scenarios(draw: st.DrawFn, layouts: tuple[str, ...] = ("ideal",)) -> referen
             if draw(st.booleans())
         },
     )
+
+
+@st.composite
+def warm(draw: st.DrawFn, layouts: tuple[str, ...] = ("ideal",)) -> reference.Scenario:
+    """A scenario whose scales expand from anywhere while they get warmer or colder."""
+    three = st.tuples
+    scales = reference.Scales(
+        coefficient=draw(three(*[symmetric(3e-5)] * 3)),
+        start=draw(three(*[st.floats(0.0, 40.0)] * 3)),
+        rate=draw(three(*[symmetric(1e-2)] * 3)),
+        fixed_point=draw(three(*[symmetric(500.0)] * 3)),
+        reference=draw(st.sampled_from([20.0, 23.5])),
+    )
+    return replace(draw(scenarios(layouts)), scales=scales, seconds_per_reading=5.0, backward=draw(st.booleans()))
 
 
 def errors_of(scenario: reference.Scenario, seed: int, intervals: int) -> sd.ErrorMap:

@@ -121,11 +121,11 @@ def noisy(
 ) -> sd.Measurement:
     """Independent Gaussians on every field."""
     deviation = {"alpha": tilt, "beta": tilt, "spot_x": spot, "spot_y": spot}
-    channels = {
-        name: np.asarray(value)
-        + (0.0 if name in ("time", "temperature") else deviation.get(name, distance)) * rng.normal(size=len(run))
-        for name, value in run.channels.items()
-    }
+    channels = {name: np.array(value) for name, value in run.channels.items()}
+    for name in channels:
+        noise = rng.normal(size=len(run))
+        if name != "time" and not name.startswith("temperature"):
+            channels[name] += deviation.get(name, distance) * noise
     return sd.Measurement(
         run.line,
         run.point,

@@ -20,6 +20,12 @@ from stepdiag.scenario.uncertain_inputs import QUANTITIES, kind_of_channel
 TIMED = SCENARIO.replace("[plan]", "[plan]\nseconds_per_reading = 2.0")
 PSD = TIMED.replace('"ideal"', '"psd"\npsd_distance_mm = 50.0')
 BEAMS = TIMED.replace('"ideal"', '"multi_beam"\nbeam_offsets_mm = [[0, 0], [20, 0], [0, 20]]')
+WARM = """[temperature]
+expansion_um_per_m_k = [11.5, 11.5, 8.0]
+u_expansion_um_per_m_k = [1.0, 0.5, 0.0]
+u_temperature_c = 0.1
+axes_c = [23.0, 22.0, 21.0]
+"""
 TRACED = TIMED.replace('layout = "ideal"', 'description = "beam_and_psd"')
 
 
@@ -125,12 +131,14 @@ EVERYTHING = [key for key, quantity in QUANTITIES.items() if quantity.of != "par
 @pytest.mark.parametrize("key", EVERYTHING)
 def test_every_key_reaches_the_core_in_native_units(key: str) -> None:
     text = BEAMS if "beam" in key else PSD
+    if QUANTITIES[key].of == "scale":
+        text += WARM
     found = uncertain(f"{key} = 3.6", text)
     ours = [one for one in [*found.inputs, *found.noise] if one.quantity == QUANTITIES[key].name]
     assert ours
     unit = {  # written out, so that a wrong factor is not compared with itself
         "um": 1e-3, "mm": 1.0, "urad": 1e-6, "ppm": 1e-6, "c": 1.0, "hpa": 100.0, "percent": 0.01, "um_per_h": 1e-3 / 3600,
-        "um_per_sqrt_h": 1e-3 / 60,
+        "um_per_m_k": 1e-6,         "um_per_sqrt_h": 1e-3 / 60,
     }  # fmt: skip
     ending = next((e for e in sorted(unit, key=len, reverse=True) if key.endswith(f"_{e}")), None)
     assert (ending is None) == (key in ("gain", "reading_model"))
@@ -144,6 +152,22 @@ def test_every_key_of_the_models_has_a_use() -> None:
     assert set(UncertaintySection.model_fields) == used
     assert set(SetupUncertaintyKeys.model_fields) == of["line"]
     assert set(ComponentUncertaintyKeys.model_fields) == of["part"]
+
+
+def test_scales_are_as_uncertain_as_their_section_says_by_axis_or_in_common() -> None:
+    of_axes = [(one.name, one.distribution.spread) for one in parse_scenario(TIMED + WARM).known.uncertain.inputs]
+    assert of_axes == [
+        ("expansion coefficient x", 1e-6),
+        ("expansion coefficient y", 0.5e-6),
+        ("temperature of the scale x", 0.1),
+        ("temperature of the scale y", 0.1),
+        ("temperature of the scale z", 0.1),
+    ]
+    one = "[temperature]\nexpansion_um_per_m_k = 11.5\nu_expansion_um_per_m_k = 1.0\nu_temperature_c = 0.1\n"
+    found = parse_scenario(TIMED + one).known.uncertain.inputs
+    assert [each.quantity for each in found] == ["common_expansion", "common_scale_temperature"]
+    with pytest.raises(sd.InvalidArgument, match=r"uncertainty.scale_temperature_c: goes with \[temperature\]"):
+        uncertain("scale_temperature_c = 0.2")
 
 
 def test_correlated_inputs_are_found_by_their_names() -> None:

@@ -11,7 +11,7 @@ import reference_files
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from places import RUNS
-from simulated_runs import LIMIT, errors_of, plan_of, scenarios, simulated, table_of
+from simulated_runs import LIMIT, errors_of, plan_of, scenarios, simulated, table_of, warm
 from usual import ALL_LINES
 
 import stepdiag as sd
@@ -75,6 +75,17 @@ def test_raw_layouts_read_the_closed_form(scenario: reference.Scenario, seed: in
     for i, row in enumerate(reference.simulate(scenario, table_of(errors))):
         for channel in LIMIT.keys() & row.keys():
             assert abs(run.channels[channel][i] - row[channel]) <= LIMIT[channel]
+
+
+@settings(max_examples=40, deadline=None)
+@given(warm(("ideal", "psd", "multi_beam")), st.integers(0, 2**32))
+def test_scales_that_expand_read_the_closed_form(scenario: reference.Scenario, seed: int) -> None:
+    errors = errors_of(scenario, seed, 7)
+    run = simulated(scenario, errors)
+    for i, row in enumerate(reference.simulate(scenario, table_of(errors))):
+        for channel in run.channels.keys() - {"time"}:
+            limit = LIMIT.get(channel, 1e-12)  # temperatures of 40 °C and 10 K/h: a few roundings
+            assert abs(run.channels[channel][i] - row[channel]) <= limit
 
 
 @settings(max_examples=12, deadline=None)

@@ -67,6 +67,9 @@ struct AdjustmentOptions {
     bool scale_uncertainty = false;
     bool full_covariance = false;
     PlausibleLimits plausible = {};
+    // Coefficients of which the standard uncertainty is not 0 are unknowns, with it as their prior. Deviations of the
+    // sensors are no unknowns, because no reading tells them from a scale error: they enter the uncertainties.
+    std::optional<KnownExpansion> expansion = {};
     bool reliability = false;  // also say which faults the readings control: Adjustment::reliability
     // false: where it is known already what is wrong with the run as a whole. No faults of readings are looked for, and
     // where the minimum is not reached soon, it counts as not found.
@@ -82,6 +85,15 @@ struct SetupEstimate {
     std::optional<double> value;  // none where it is not determined
     double standard_uncertainty;
     PriorUncertainty prior;
+};
+
+// An expansion coefficient, as it was found.
+struct ExpansionEstimate {
+    std::vector<int> axes;        // that have it in common: 0, 1, 2
+    double value;                 // 1/K
+    double standard_uncertainty;  // 1/K
+    double stated;                // 1/K: the prior's value
+    PriorUncertainty prior;       // 1/K: its standard uncertainty
 };
 
 // One reading: by row of the measurement and channel.
@@ -170,7 +182,7 @@ struct FitReason {
     double limit;  // of an uneven misfit that of the other readings; of noise, trends, prior_scatter what is expected
     std::string line = {};     // of an uneven misfit, a trend or a prior; empty: all
     std::string channel = {};  // of an uneven misfit or a trend: "distance", ..., empty: all; of priors: the quantity
-    int component = 0;         // of a prior
+    int component = 0;         // of a prior; of "expansion" the axis, -1: of all in common
     double standard_uncertainty = 0.0;  // of the value of a misfit, no_misfit, trend, scaled
     int run = -1;                       // of an uneven misfit: this run alone; -1: all
     FitAspect aspect = FitAspect::whole;
@@ -249,6 +261,7 @@ struct Adjustment {
     Verdict verdict = {};
     std::vector<FaultControl> reliability = {};  // if it was asked for
     std::vector<UnseenFault> unseen = {};
+    std::vector<ExpansionEstimate> expansion = {};
 
     double variance_factor() const;             // weighted_square_sum/degrees_of_freedom; 1 without freedom
     std::vector<std::size_t> outliers() const;  // readings that were left out: into `residuals`, by their number

@@ -81,6 +81,11 @@ struct Calibration {
     // stated, mm; none: nothing was stated. It is in no other uncertainty.
     std::optional<double> between_nodes = {};
 
+    // Positioning errors are referred to this temperature of the scales, degrees Celsius; or they are as found at these
+    // (by axis, means over all readings); neither: nothing was recorded.
+    std::optional<double> temperature_reference = {};
+    std::optional<Eigen::Vector3d> temperature_as_found = {};
+
     std::map<std::string, std::string> provenance = {};  // by provenance_keys, as far as it is known
 };
 
@@ -110,7 +115,7 @@ bool is_anything_determined(const Calibration& calibration);
 ParameterTable to_parameter_table(const Calibration& calibration);
 
 // CSV with format, chain, volume_mm, tool_mm, method, date, fit, variance_factor, uncertainty_scaled,
-// between_nodes_mm, fit_reasons, unseen_faults, straightness_reference, provenance_keys, undetermined_slopes,
+// between_nodes_mm, temperature_reference_c or temperature_as_found_c, fit_reasons, unseen_faults, straightness_reference, provenance_keys, undetermined_slopes,
 // undetermined_reversal_constants and undetermined in the leading lines; not kept are the covariance and the
 // uncertainty of a reversal error, which is not that of its two tables. Reading throws InvalidArgument naming file and
 // line, also where chain, volume or tool is missing.

@@ -3,7 +3,8 @@
 //   axis before the bed:  Rot(Exp theta_a) Trans(p e_a + delta_a)
 //   axis after the bed:   Trans(p e_a + delta_a) Rot(Exp theta_a)
 //   last:                 Trans(tool offset)
-// with the errors of the direction in which each axis came to where it stands.
+// with the errors of the direction in which each axis came to where it stands. What the scales' expansion
+// (machine/expansion.hpp) adds to a position p is added to delta_a along the axis.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,7 +30,9 @@ public:
     // `tool` is the offset of the functional point from the tool's origin, mm.
     Machine(Chain chain, ErrorMap errors, const Eigen::Vector3d& tool = Eigen::Vector3d::Zero());
 
-    Pose pose(const Eigen::Vector3d& commanded, const Approaches& approach = all_positive) const;
+    // `expansion`: what that of each axis's scale adds to its position, mm.
+    Pose pose(const Eigen::Vector3d& commanded, const Approaches& approach = all_positive,
+              const Eigen::Vector3d& expansion = Eigen::Vector3d::Zero()) const;
     // Actual minus nominal functional point, exact / to first order in the errors, mm.
     Eigen::Vector3d error(const Eigen::Vector3d& commanded, const Approaches& approach = all_positive) const;
     Eigen::Vector3d first_order_error(const Eigen::Vector3d& commanded,

@@ -3,7 +3,9 @@
 //   line,point,x_mm,y_mm,z_mm,distance_mm,alpha_urad,beta_urad  layout ideal
 //   spot_x_mm,spot_y_mm                                         layout psd: instead of alpha and beta
 //   d1_mm,d2_mm,d3_mm[,...]                                     layout multi_beam: instead of distance, alpha and beta
-//   run, direction, time_s, temperature_c                       optional
+//   run, direction, time_s                                      optional
+//   temperature_c, or temperature_x_c, _y_c, _z_c               optional: of the axes' scales
+//   air_temperature_c, air_pressure_hpa, air_humidity_percent   optional
 //   u_<field>                                                   optional: standard uncertainty of a field
 // An empty field is a lost reading and a missing row is a lost point. Neither is an error.
 #pragma once
@@ -28,13 +30,17 @@ struct Station {
 };
 
 // Values of one quantity for all rows, in native units (mm, rad). `name` is without unit: distance, alpha, beta,
-// spot_x, spot_y, d1, d2, ..., time (s), temperature (degrees Celsius). A lost reading is empty. `standard_uncertainty`
-// is an empty vector if the measurement does not state it.
+// spot_x, spot_y, d1, d2, ..., time (s), temperature, temperature_x, ... air_temperature (degrees Celsius), air_pressure
+// (Pa), air_humidity (0 to 1). A lost reading is empty. `standard_uncertainty` is an empty vector if the measurement does
+// not state it.
 struct Channel {
     std::string name;
     std::vector<std::optional<double>> value;
     std::vector<std::optional<double>> standard_uncertainty = {};
 };
+
+// Whether a channel of this name is read by the head, and not a record of time, temperatures or air.
+bool is_signal(std::string_view name);
 
 // A standard uncertainty outside these bounds (mm, rad) is a mistake. The bounds also keep weights in the range of a
 // double.

@@ -24,8 +24,8 @@ struct LinePlace {
 // Throws InvalidArgument for a mirror smaller than the plan's smallest.
 LinePlace place_on_line(const Machine& machine, const Plan& plan, const Heads& heads, const Line& line);
 
-// Of the tool, at the points of a pass, as the machine's errors have them.
-std::vector<Pose> tool_poses(const Machine& machine, const PlannedPass& pass);
+// Of the tool, at the points of a pass, as the machine's errors and the scales' expansion have them.
+std::vector<Pose> tool_poses(const Machine& machine, const PlannedPass& pass, const SimulationOptions& options);
 
 class PassReader {
 public:

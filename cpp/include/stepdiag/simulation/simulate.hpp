@@ -11,6 +11,7 @@
 
 #include "stepdiag/core/air.hpp"
 #include "stepdiag/head/traced_reading.hpp"
+#include "stepdiag/machine/expansion.hpp"
 #include "stepdiag/machine/machine.hpp"
 #include "stepdiag/measurement/measurement.hpp"
 #include "stepdiag/plan/run_order.hpp"
@@ -33,6 +34,17 @@ struct Noise {
 // Throws InvalidArgument for a deviation that is negative or not finite.
 void check_noise(const Noise& noise);
 
+// The scales of the machine: they expand, and are as warm as this. Makes the channels temperature_x, temperature_y and
+// temperature_z, or temperature of one sensor.
+struct ScaleTemperatures {
+    Expansion expansion;
+    Eigen::Vector3d start = Eigen::Vector3d::Constant(20.0);  // by axis, at the run's first reading, degrees Celsius
+    Eigen::Vector3d rate = Eigen::Vector3d::Zero();           // K/s
+    bool one_sensor = false;                                  // the same for all axes
+
+    Eigen::Vector3d at(double time) const { return start + time * rate; }
+};
+
 struct SimulationOptions {
     std::map<std::string, Misalignment> misalignment = {};  // by line name; a line without an entry is aligned
     Noise noise = {};
@@ -42,6 +54,7 @@ struct SimulationOptions {
     int repeats = 1;                                 // how often each line is measured; its set-up stays as it is
     bool backward = false;                           // each forward run of a line is followed by a backward run
     std::optional<double> seconds_per_reading = {};  // makes the channel time, which counts from the first reading
+    std::optional<ScaleTemperatures> scales = {};    // none: they do not expand, and nothing is recorded
 
     static constexpr int largest_repeat_count = 1'000;
 
@@ -73,8 +86,8 @@ Measurement simulate(const Machine& machine, const Plan& plan, const Heads& head
 // Throws InvalidArgument as simulate() does.
 void check_run(const Plan& plan, const Heads& heads, const SimulationOptions& options);
 
-// The rows of these passes, in their order, as a measurement. `seconds_per_reading` makes the channel time.
+// The rows of these passes, in their order, as a measurement, with the records that the options make.
 Measurement as_measured(const std::vector<PlannedPass>& passes, const std::vector<std::string>& signals,
-                        const std::vector<SignalRow>& rows, const std::optional<double>& seconds_per_reading);
+                        const std::vector<SignalRow>& rows, const SimulationOptions& options);
 
 }  // namespace stepdiag

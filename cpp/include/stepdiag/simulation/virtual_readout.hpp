@@ -16,13 +16,16 @@ public:
                    SimulationOptions options = {});
 
     // One value a signal, in the order of signal_names; lost ones are empty. `row` says which draws the noise takes, as
-    // the number of a simulated row does; `elapsed`: seconds since the set-up's first reading, which its drift counts.
+    // the number of a simulated row does, and how warm the scales are; `elapsed`: seconds since the set-up's first
+    // reading, which its drift counts.
     SignalRow read(const Eigen::Vector3d& position, const Approaches& approach = all_positive, std::uint64_t row = 0,
                    double elapsed = 0.0) const;
 
 private:
     Machine machine_;
     Noise noise_;
+    std::optional<ScaleTemperatures> scales_;
+    double seconds_;  // from row to row
     PassReader reader_;
 };
 

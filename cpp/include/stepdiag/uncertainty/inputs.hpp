@@ -31,10 +31,15 @@ enum class SharedQuantity {
     wavelength,        // 1, relative: true wavelength; the counter uses the nominal one
     // Machine.
     machine_drift,  // mm/s, component x, y, z, of the functional point since the first reading of the run
+    // Scales (machine/expansion.hpp), component x, y, z; or the same deviation of all axes.
+    expansion,                // 1/K: true minus stated coefficient
+    common_expansion,         // 1/K
+    scale_temperature,        // K: true temperature minus that of the run's channels
+    common_scale_temperature  // K
 };
 
 using InputQuantity = std::variant<SetupQuantity, SharedQuantity>;
-std::string name(InputQuantity quantity);  // "reflector", ..., "machine_drift"
+std::string name(InputQuantity quantity);  // "reflector", ..., "common_scale_temperature"
 InputQuantity parse_input_quantity(const std::string& name);
 
 struct UncertainInput {
@@ -70,7 +75,7 @@ std::string name(const ReadingNoise& noise);
 
 // What there is to be uncertain: the set-up quantities, then the shared ones and the noises.
 struct UncertainQuantity {
-    enum class Of { line, part, head, air, machine, noise };
+    enum class Of { line, part, head, air, machine, scale, noise };
     std::string_view name;
     std::string_view key;   // in scenarios, with its unit; empty: it has others
     std::string_view text;  // what reports call it

@@ -1,0 +1,99 @@
+#include "stepdiag/measurement/temperatures.hpp"
+
+#include <array>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+namespace {
+
+constexpr std::array<const char*, 3> own_channel = {"temperature_x", "temperature_y", "temperature_z"};
+
+const Channel* channel_of(const Measurement& measurement, int axis) {
+    const Channel* own = measurement.find(own_channel[axis]);
+    return own ? own : measurement.find("temperature");
+}
+
+// What is empty, between what is there; false where nothing is.
+bool fill(std::vector<std::optional<double>>& values, const std::vector<double>& place) {
+    const std::size_t count = values.size();
+    std::size_t before = count;  // the last one that was read
+    for (std::size_t k = 0; k < count; ++k) {
+        if (!values[k]) continue;
+        for (std::size_t i = before == count ? 0 : before + 1; i < k; ++i) {
+            const double span = before == count ? 0.0 : place[k] - place[before];
+            const double share = span > 0.0 ? (place[i] - place[before]) / span : 1.0;
+            values[i] = before == count ? *values[k] : *values[before] + share * (*values[k] - *values[before]);
+        }
+        before = k;
+    }
+    if (before == count) return false;
+    for (std::size_t i = before + 1; i < count; ++i) values[i] = values[before];
+    return true;
+}
+
+// Times of the rows, or their numbers where one has no time or times do not ascend.
+std::vector<double> places(const Measurement& measurement, const std::vector<std::size_t>& rows) {
+    const Channel* time = measurement.find("time");
+    std::vector<double> place;
+    for (const std::size_t row : rows) {
+        if (!time || !time->value[row] || (!place.empty() && !(*time->value[row] >= place.back()))) break;
+        place.push_back(*time->value[row]);
+    }
+    if (place.size() == rows.size()) return place;
+    place.clear();
+    for (std::size_t k = 0; k < rows.size(); ++k) place.push_back(double(k));
+    return place;
+}
+
+}  // namespace
+
+std::vector<Eigen::Vector3d> scale_temperatures(const Measurement& measurement,
+                                                const std::optional<Eigen::Vector3d>& otherwise) {
+    std::map<std::pair<int, std::string>, std::vector<std::size_t>> passes;
+    for (std::size_t row = 0; row < measurement.size(); ++row)
+        passes[{measurement.stations()[row].run, measurement.stations()[row].line.name()}].push_back(row);
+    std::vector<Eigen::Vector3d> temperatures(measurement.size());
+    for (const auto& [pass, rows] : passes) {
+        const std::vector<double> place = places(measurement, rows);
+        for (int axis = 0; axis < 3; ++axis) {
+            const Channel* channel = channel_of(measurement, axis);
+            std::vector<std::optional<double>> values(rows.size());
+            for (std::size_t k = 0; channel && k < rows.size(); ++k) values[k] = channel->value[rows[k]];
+            if (!fill(values, place)) {
+                if (!otherwise)
+                    throw InvalidArgument("run " + std::to_string(pass.first) + ", line " + pass.second +
+                                          ": expected temperatures (column " + own_channel[axis] +
+                                          "_c or temperature_c, or the scales' usual temperature), got none");
+                values.assign(rows.size(), (*otherwise)[axis]);
+            }
+            for (std::size_t k = 0; k < rows.size(); ++k) temperatures[rows[k]][axis] = *values[k];
+        }
+    }
+    return temperatures;
+}
+
+bool has_one_sensor(const Measurement& measurement) {
+    for (const char* name : own_channel)
+        if (measurement.find(name)) return false;
+    return true;
+}
+
+std::optional<Eigen::Vector3d> mean_scale_temperatures(const Measurement& measurement) {
+    Eigen::Vector3d mean;
+    for (int axis = 0; axis < 3; ++axis) {
+        const Channel* channel = channel_of(measurement, axis);
+        double sum = 0.0;
+        int count = 0;
+        for (std::size_t row = 0; channel && row < measurement.size(); ++row)
+            if (const auto& value = channel->value[row]) sum += *value, ++count;
+        if (count == 0) return std::nullopt;
+        mean[axis] = sum / count;
+    }
+    return mean;
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,49 @@
+"""At which temperature a calibration holds, in words: referred to one, as found, or not known."""
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from stepdiag._core import Calibration, Measurement
+
+REFERENCE: Final = 20.0  # °C, ISO 1
+STEEL: Final = 11.5  # µm/(m K)
+MATTERS: Final = 0.1  # K: below it nothing is worth a warning
+
+
+def temperature_rows(calibration: Calibration) -> Iterator[str]:
+    """One line."""
+    yield f"temperature: {temperature_text(calibration)}"
+
+
+def temperature_text(calibration: Calibration) -> str:
+    """To which temperature positioning errors belong; without a full stop."""
+    if calibration.temperature_reference is not None:
+        return f"positioning errors are referred to {calibration.temperature_reference:g} °C"
+    found = calibration.temperature_as_found
+    if found is not None:
+        return (
+            f"positioning errors are as found, with the scales of X, Y, Z at {', '.join(f'{t:.1f}' for t in found)} °C"
+        )
+    return (
+        "no temperature was recorded, positioning errors are as found; a scale of steel grows by "
+        f"{STEEL * max(calibration.volume) * 1e-3:.2g} µm a kelvin on {max(calibration.volume):g} mm"
+    )
+
+
+def temperature_warnings(calibration: Calibration, measurement: Measurement) -> list[str]:
+    """Of a run with temperatures that no [temperature] refers to a reference: how much is at stake."""
+    if calibration.temperature_reference is not None or calibration.temperature_as_found is None:
+        return []
+    columns = [values for name, values in measurement.channels.items() if name.startswith("temperature")]
+    warmth = np.concatenate(columns) - REFERENCE
+    farthest = float(warmth[np.nanargmax(np.abs(warmth))])
+    if abs(farthest) < MATTERS:
+        return []
+    edge = max(calibration.volume)
+    return [
+        f"temperatures of the run are up to {abs(farthest):.2g} K from {REFERENCE:g} °C, and the scenario has no "
+        f"[temperature]: positioning errors are as found, up to {STEEL * abs(farthest) * edge * 1e-3:.2g} µm on "
+        f"{edge:g} mm of steel"
+    ]
