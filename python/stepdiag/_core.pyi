@@ -10,7 +10,7 @@ import os
 import stepdiag.io.displays
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'trace_beams', 'uncertain_quantities', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'trace_beams', 'uncertain_quantities', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -29,6 +29,11 @@ class Environment:
     def refractive_index(self, wavelength: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
         Phase index at a vacuum wavelength (nm).
+        """
+    @property
+    def state(self) -> dict[str, float] | None:
+        """
+        Arguments of from_air, without the equation; None of a constant index.
         """
 class Chain:
     """
@@ -95,6 +100,31 @@ class ErrorMap:
     @property
     def squareness(self) -> dict[str, float]:
         ...
+class Expansion:
+    """
+    Thermal expansion of the axes' scales: position p stands at p + coefficient (T - reference)(p - fixed_point).
+    """
+    def __init__(self, coefficient: numpy.typing.ArrayLike, *, fixed_point: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), reference: typing.SupportsFloat | typing.SupportsIndex = 20.0) -> None:
+        """
+        coefficient (3,) of X, Y, Z, 1/K; fixed_point (3,), mm; reference, degrees Celsius. Raises InvalidArgument for a coefficient beyond 1e-3, and for what is not finite.
+        """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
+    def shift(self, commanded: numpy.typing.ArrayLike, temperature: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        What the expansion adds to the positions of X, Y, Z (3,), mm, at the scales' temperatures (3,), degrees Celsius.
+        """
+    @property
+    def coefficient(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def fixed_point(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def reference(self) -> float:
+        ...
 class Machine:
     """
     A three-axis machine: chain, the 21 errors, tool offset (mm).
@@ -113,9 +143,9 @@ class Machine:
         """
         The same to first order in the errors: sum over axes of delta + theta x L.
         """
-    def pose(self, commanded: numpy.typing.ArrayLike, approach: str = '+++') -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    def pose(self, commanded: numpy.typing.ArrayLike, approach: str = '+++', expansion: numpy.typing.ArrayLike = (0.0, 0.0, 0.0)) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
-        Exact pose of the tool in the machine frame: (rotation (n, 3, 3), functional point (n, 3), mm) at commanded positions (n, 3), mm. approach: the direction + or - in which X, Y, Z came there.
+        Exact pose of the tool in the machine frame: (rotation (n, 3, 3), functional point (n, 3), mm) at commanded positions (n, 3), mm. approach: the direction + or - in which X, Y, Z came there. expansion: what that of the scales adds to the positions of X, Y, Z, mm (Expansion.shift).
         """
     @property
     def chain(self) -> Chain:
@@ -878,11 +908,35 @@ class Noise:
     @property
     def tilt(self) -> float:
         ...
+class ScaleTemperatures:
+    """
+    How warm the scales of the axes are, and how they expand. Makes the channels temperature_x, temperature_y and temperature_z, or temperature alone of one sensor.
+    """
+    def __init__(self, expansion: Expansion, start: numpy.typing.ArrayLike, rate: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, one_sensor: bool = False) -> None:
+        """
+        start (3,): of X, Y, Z at the run's first reading, degrees Celsius; rate (3,), K/s. simulate() checks them.
+        """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
+    @property
+    def expansion(self) -> Expansion:
+        ...
+    @property
+    def one_sensor(self) -> bool:
+        ...
+    @property
+    def rate(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def start(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
 class SimulationOptions:
     """
-    What simulate() takes beside machine, plan and head. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace (none: of 20 degrees Celsius for a head with a design, an index of 1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's replayed poses, traced again and compared. repeats: how often each line is measured, runs 0, 1, 2, ...; backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; seconds_per_reading: makes the channel time.
+    What simulate() takes beside machine, plan and head. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace (none: of 20 degrees Celsius for a head with a design, an index of 1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's replayed poses, traced again and compared. repeats: how often each line is measured, runs 0, 1, 2, ...; backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; seconds_per_reading: makes the channel time; scales: they expand, and their temperatures are recorded.
     """
-    def __init__(self, *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment | None = None, assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001, repeats: typing.SupportsIndex = 1, backward: bool = False, seconds_per_reading: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment | None = None, assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001, repeats: typing.SupportsIndex = 1, backward: bool = False, seconds_per_reading: typing.SupportsFloat | typing.SupportsIndex | None = None, scales: ScaleTemperatures | None = None) -> None:
         """
         Raises InvalidArgument for repeats that are no small number; simulate() checks the rest.
         """
@@ -905,6 +959,9 @@ class SimulationOptions:
     def repeats(self) -> int:
         ...
     @property
+    def scales(self) -> ScaleTemperatures | None:
+        ...
+    @property
     def seconds_per_reading(self) -> float | None:
         ...
     @property
@@ -922,6 +979,36 @@ class VirtualReadout:
         """
         The head's signals (n,), mm and rad, NaN where lost, with the axes at `position` (mm). approach: the directions that the axes came from, + or - of each. row: which draws the noise takes, as the number of a simulated row; elapsed: seconds since the set-up's first reading.
         """
+class KnownExpansion:
+    """
+    What is known of the expansion of the scales. With it, positioning errors are referred to the reference temperature, by the temperatures in the run's channels.
+    """
+    def __init__(self, expansion: Expansion, standard_uncertainty: numpy.typing.ArrayLike, *, one_coefficient: bool, sensor_uncertainty: typing.SupportsFloat | typing.SupportsIndex, temperature: numpy.typing.ArrayLike | None = None, one_temperature: bool = False) -> None:
+        """
+        standard_uncertainty (3,): of the coefficients, 1/K; one_coefficient: it is common to the axes; sensor_uncertainty: of each sensor's constant deviation, K; temperature (3,): of the scales where the run says nothing, degrees Celsius, and whether one sensor measured it. Raises InvalidArgument.
+        """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
+    @property
+    def expansion(self) -> Expansion:
+        ...
+    @property
+    def one_coefficient(self) -> bool:
+        ...
+    @property
+    def one_temperature(self) -> bool:
+        ...
+    @property
+    def sensor_uncertainty(self) -> float:
+        ...
+    @property
+    def standard_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def temperature(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        ...
 class ReadingUncertainty:
     """
     Standard uncertainty of a reading where the run gives none: distance (mm; also d1 ...), tilt (rad), spot (mm).
@@ -1051,7 +1138,7 @@ class Calibration:
             Of a function these are arrays (n,), of a squareness numbers without a position. Raises KeyError naming the
             parameters that there are.
         """
-    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None, provenance: collections.abc.Mapping[str, str] = {}, unseen_faults: collections.abc.Sequence[str] = [], between_nodes: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None, provenance: collections.abc.Mapping[str, str] = {}, unseen_faults: collections.abc.Sequence[str] = [], between_nodes: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_reference: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_as_found: numpy.typing.ArrayLike | None = None) -> None:
         """
         A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises InvalidArgument naming the parameter for what is none: nodes that do not ascend, values that are not finite, a covariance that is not one of these values.
         """
@@ -1167,6 +1254,16 @@ class Calibration:
         One line: to which point the straightnesses refer, and what they are at the functional point.
         """
     @property
+    def temperature_as_found(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        Temperatures of the scales of X, Y, Z (3,) where errors are as found, means over all readings, degrees Celsius; None: nothing was recorded, or they are referred to temperature_reference.
+        """
+    @property
+    def temperature_reference(self) -> float | None:
+        """
+        Temperature of the scales that positioning errors are referred to, degrees Celsius; None: they are as found.
+        """
+    @property
     def tool(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
     @property
@@ -1231,12 +1328,15 @@ class Smoothness:
         ...
 class AdjustmentOptions:
     """
-    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of a false alarm among a thousand tests for faults; 0: they are named and not corrected. slips: "report" rejects a run with a slip, "estimate" makes it an unknown and accepts that. scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best. plausible: what a machine can be. reliability: also which faults the readings control. search_faults: False: it is known already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not reached soon, it counts as not found.
+    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of a false alarm among a thousand tests for faults; 0: they are named and not corrected. slips: "report" rejects a run with a slip, "estimate" makes it an unknown and accepts that. scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best. plausible: what a machine can be. expansion: of the scales; coefficients that are uncertain are unknowns. reliability: also which faults the readings control.
     """
-    def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.00012, slips: str = 'report', scale_uncertainty: bool = False, full_covariance: bool = False, plausible: PlausibleLimits = ..., reliability: bool = False, search_faults: bool = True) -> None:
+    def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.00012, slips: str = 'report', scale_uncertainty: bool = False, full_covariance: bool = False, plausible: PlausibleLimits = ..., expansion: KnownExpansion | None = None, reliability: bool = False) -> None:
         """
         adjust() checks them.
         """
+    @property
+    def expansion(self) -> KnownExpansion | None:
+        ...
     @property
     def full_covariance(self) -> bool:
         ...
@@ -1314,6 +1414,35 @@ class SetupEstimate:
         """
         None where it is not determined.
         """
+class ExpansionEstimate:
+    """
+    An expansion coefficient as it was found, 1/K.
+    """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
+    @property
+    def axes(self) -> list[int]:
+        """
+        That have it in common: 0, 1, 2 of X, Y, Z.
+        """
+    @property
+    def prior(self) -> float:
+        """
+        Standard uncertainty of its prior.
+        """
+    @property
+    def standard_uncertainty(self) -> float:
+        ...
+    @property
+    def stated(self) -> float:
+        """
+        Value of its prior.
+        """
+    @property
+    def value(self) -> float:
+        ...
 class Outlier:
     """
     A reading that was left out.
@@ -1658,6 +1787,11 @@ class Adjustment:
     @property
     def degrees_of_freedom(self) -> int:
         ...
+    @property
+    def expansion(self) -> list[ExpansionEstimate]:
+        """
+        Expansion coefficients that were unknowns.
+        """
     @property
     def faults(self) -> list[FaultClass]:
         """
@@ -2770,9 +2904,9 @@ def errors_at(machine: Machine, points: numpy.typing.ArrayLike) -> numpy.typing.
     """
     Error of the functional point (mm) and rotation vector of the tool (rad) at commanded points (n, 3), mm: (n, 6), exact, of axes that came in + direction.
     """
-def evaluate(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'adjustment', uncertainty: ReadingUncertainty = ..., full_covariance: bool = False, plausible: PlausibleLimits = ...) -> Calibration:
+def evaluate(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), *, method: str = 'adjustment', uncertainty: ReadingUncertainty = ..., full_covariance: bool = False, plausible: PlausibleLimits = ..., expansion: KnownExpansion | None = None) -> Calibration:
     """
-    Calibration from a run. Of the head only its calibration is used, of the machine only chain and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan, and for a result that is not plausible.
+    Calibration from a run. Of the head only its calibration is used, of the machine only chain and tool offset (mm). Raises InvalidArgument for readings that do not belong to the plan, for a result that is not plausible, and for a pass without temperatures where an expansion is given.
     """
 def expose(camera: Camera, spots: collections.abc.Sequence[BeamSpot], *, seed: typing.SupportsIndex = 0, counter: typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -2785,6 +2919,10 @@ def fit_quality(measurement: Measurement, plan: Plan, head: Head | collections.a
 def head_sensitivities(head: Head, *, distance: typing.SupportsFloat | typing.SupportsIndex, tilt: numpy.typing.ArrayLike = (0.0, 0.0), lateral: numpy.typing.ArrayLike = (0.0, 0.0), environment: Environment | None = None) -> list[Sensitivity]:
     """
     Derivatives of a traced head's readings by the six degrees of freedom of every component (along the head's axes, rotations about its own origin) and of the mirror, by indices, and by the state of the air: exact, by forward mode through the replay. Raises InvalidArgument where a beam is lost.
+    """
+def in_recorded_air(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], assumed_environment: Environment) -> Measurement:
+    """
+    The run of an instrument that counted with the constant index of the assumed air, with distances in the air that the run's channels air_temperature, air_pressure and air_humidity recorded. Raises InvalidArgument for a run without any of them, an assumed air that is no state, and air out of the equation's range.
     """
 def instruction_set() -> str:
     """

@@ -10,7 +10,7 @@
 #include "evaluation/measurement_rows.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/measurement/reading.hpp"
-#include "stepdiag/measurement/temperatures.hpp"
+#include "stepdiag/measurement/records.hpp"
 
 namespace stepdiag {
 namespace {

@@ -152,8 +152,8 @@ std::vector<ExpansionEstimate> expansion_estimates(const AdjustmentProblem& prob
     std::vector<ExpansionEstimate> estimates;
     for (const CoefficientUnknown& of : problem.coefficients()) {
         const double stated = problem.expansion()->expansion.coefficient[of.axes.front()];
-        estimates.push_back({of.axes, stated + x[of.unknown], std::sqrt(element(inverse, of.unknown, of.unknown)),
-                             stated, of.prior});
+        estimates.push_back(
+            {of.axes, stated + x[of.unknown], std::sqrt(element(inverse, of.unknown, of.unknown)), stated, of.prior});
     }
     return estimates;
 }

@@ -68,8 +68,8 @@ public:
     // J^T of what the readings change by where each axis stands further along itself by shift(point), mm. Of a problem
     // with expansion.
     Eigen::VectorXd gradient_of_shifts(const std::function<Eigen::Vector3d(const AdjustedPoint&)>& shift) const;
-    Eigen::VectorXd image(const Eigen::VectorXd& v) const;     // J v, of all readings
-    Eigen::VectorXd product(const Eigen::VectorXd& v) const;   // (J^T J + P) v
+    Eigen::VectorXd image(const Eigen::VectorXd& v) const;    // J v, of all readings
+    Eigen::VectorXd product(const Eigen::VectorXd& v) const;  // (J^T J + P) v
 
     // The derivative of a reading, weighted: unknowns of its point (no_unknown where there is none), and its row.
     struct Row {
@@ -94,7 +94,7 @@ private:
     const AdjustmentProblem* problem_;
     std::vector<ChannelModel> models_;       // by set-up
     std::vector<int> first_unknown_;         // by point, into unknowns_
-    std::vector<int> unknowns_;  // by point: 18, active columns of the set-up, coefficients, faults
+    std::vector<int> unknowns_;              // by point: 18, active columns of the set-up, coefficients, faults
     std::vector<std::size_t> first_weight_;  // by reading, into derivatives_
     std::vector<int> point_of_reading_;
     std::vector<double> derivatives_;

@@ -1,5 +1,5 @@
-// What deviations of the temperature sensors do to the values of an adjustment. No reading tells them from scale errors,
-// so that they are no unknowns, and the weights of the readings stay: their effects are added to the covariance
+// What deviations of the temperature sensors do to the values of an adjustment. No reading tells them from scale
+// errors, so that they are no unknowns, and the weights of the readings stay: their effects are added to the covariance
 // ("considered" parameters: S. F. Schmidt, Advances in Control Systems 3 (1966) 293). Internal: not installed.
 #pragma once
 

@@ -84,7 +84,9 @@ STEPDIAG_INLINE MirrorPull pull_mirror(const Chunk& chunk, const SimdProblem::Po
     return pull;
 }
 
-STEPDIAG_INLINE Vector& along(Lanes3& vector, int axis) { return axis == 0 ? vector.x : axis == 1 ? vector.y : vector.z; }
+STEPDIAG_INLINE Vector& along(Lanes3& vector, int axis) {
+    return axis == 0 ? vector.x : axis == 1 ? vector.y : vector.z;
+}
 
 // What the scale's expansion adds to an axis, and the force on that back to the coefficients.
 STEPDIAG_INLINE void expand(const Chunk& chunk, const SimdProblem::Point& point, int axis, Lanes3& shift) {
@@ -121,8 +123,7 @@ STEPDIAG_INLINE void pull_point(const Chunk& chunk, const SimdProblem::Point& po
         double* node = chunk.node(point.node[place]);
         const Lanes9 rotation = part9(node, node_rotation);
         add3(node, node_turn_pull, cross(position_arm[place], pull.point) + cross(normal_arm[place], pull.normal));
-        const MirrorPull inside = {transposed_product(rotation, pull.point),
-                                   transposed_product(rotation, pull.normal)};
+        const MirrorPull inside = {transposed_product(rotation, pull.point), transposed_product(rotation, pull.normal)};
         const Lanes3 on_shift = problem.carries_workpiece[place] ? inside.point : pull.point;
         add3(node, node_shift_pull, on_shift);
         if (problem.expands) pull_expansion(chunk, point, problem.axis[place], on_shift);
@@ -204,7 +205,12 @@ HWY_EXPORT(scratch_numbers);
 }  // namespace
 
 SimdProblem::SimdProblem(const AdjustmentProblem& problem, const std::vector<std::ptrdiff_t>& input)
-    : kind(HeadLayout::ideal), unknowns(problem.size()), channels(0), tool(problem.tool()), expands(problem.expansion()), setup_size(0) {
+    : kind(HeadLayout::ideal),
+      unknowns(problem.size()),
+      channels(0),
+      tool(problem.tool()),
+      expands(problem.expansion()),
+      setup_size(0) {
     const auto place = [&](int unknown) { return unknown == no_unknown ? unknowns : unknown; };
     for (const LineSetup& setup : problem.setups()) {
         const ChannelModel& model = setup.model;

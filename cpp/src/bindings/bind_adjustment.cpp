@@ -355,8 +355,9 @@ void bind_result(py::module_& m) {
     py::class_<Result>(m, "Adjustment", "What an adjustment found: calibration, set-ups, and how the readings fit.")
         .def_property_readonly("calibration", [](const Result& r) { return r.adjustment.calibration; })
         .def_property_readonly("setup", [](const Result& r) { return r.adjustment.setup; })
-        .def_property_readonly("expansion", [](const AdjustmentOfRun& a) { return a.adjustment.expansion; },
-                               "Expansion coefficients that were unknowns.")
+        .def_property_readonly(
+            "expansion", [](const AdjustmentOfRun& a) { return a.adjustment.expansion; },
+            "Expansion coefficients that were unknowns.")
         .def_property_readonly(
             "residuals",
             [](const Result& r) -> ChannelArrays {

@@ -55,18 +55,15 @@ Entry& known(std::optional<Entry>& entry, const std::string& name, const char* a
     return *entry;
 }
 
-Calibration make_calibration(const std::string& method, const ChainLike& chain, const ArrayLike& volume,
-                             const ArrayLike& tool, const Tables& functions,
-                             const std::map<std::string, std::pair<double, double>>& squareness,
-                             const Names& undetermined_slopes, const Names& undetermined,
-                             const std::optional<ArrayLike>& covariance, const Tables& reversal,
-                             const Arrays& reversal_negative_uncertainty, const Names& undetermined_reversal_constants,
-                             const std::string& date, const std::optional<std::string>& fit,
-                             const std::optional<double>& variance_factor, const Names& fit_reasons,
-                             const std::optional<double>& uncertainty_scaled, const Texts& provenance,
-                             const Names& unseen_faults, const std::optional<double>& between_nodes,
-                             const std::optional<double>& temperature_reference,
-                             const std::optional<ArrayLike>& temperature_as_found) {
+Calibration make_calibration(
+    const std::string& method, const ChainLike& chain, const ArrayLike& volume, const ArrayLike& tool,
+    const Tables& functions, const std::map<std::string, std::pair<double, double>>& squareness,
+    const Names& undetermined_slopes, const Names& undetermined, const std::optional<ArrayLike>& covariance,
+    const Tables& reversal, const Arrays& reversal_negative_uncertainty, const Names& undetermined_reversal_constants,
+    const std::string& date, const std::optional<std::string>& fit, const std::optional<double>& variance_factor,
+    const Names& fit_reasons, const std::optional<double>& uncertainty_scaled, const Texts& provenance,
+    const Names& unseen_faults, const std::optional<double>& between_nodes,
+    const std::optional<double>& temperature_reference, const std::optional<ArrayLike>& temperature_as_found) {
     Calibration calibration{method, to_chain(chain), to_vector3(volume, "volume"), to_vector3(tool, "tool"), {}, {},
                             {},     undetermined};
     for (const auto& [name, table] : functions)

@@ -26,6 +26,17 @@ void bind_core(py::module_& m) {
             py::arg("equation") = "ciddor",
             "From the state of the air: degrees Celsius, Pa, 0..1, ppm; equation: \"ciddor\", \"modified_edlen\" or "
             "\"edlen_1966\". Raises InvalidArgument outside their ranges.")
+        .def_property_readonly(
+            "state",
+            [](const Environment& environment) -> std::optional<std::map<std::string, double>> {
+                const Air* air = std::get_if<Air>(&environment.air);
+                if (!air) return std::nullopt;
+                return std::map<std::string, double>{{"temperature", air->temperature},
+                                                     {"pressure", air->pressure},
+                                                     {"relative_humidity", air->relative_humidity},
+                                                     {"carbon_dioxide", air->carbon_dioxide}};
+            },
+            "Arguments of from_air, without the equation; None of a constant index.")
         .def(
             "refractive_index",
             [](const Environment& environment, double wavelength) { return refractive_index(environment, wavelength); },

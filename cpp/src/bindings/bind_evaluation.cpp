@@ -1,5 +1,6 @@
 #include "bindings.hpp"
 #include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/evaluation/constant_index.hpp"
 #include "stepdiag/evaluation/conventional.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
 
@@ -44,7 +45,8 @@ Calibration evaluate(const Measurement& measurement, const Plan& plan, const Hea
     };
     if (evaluator)
         return worded(without_lock([&] {
-            return evaluator(measurement, plan, kinematics, offset, heads, {uncertainty, full_covariance, plausible, expansion});
+            return evaluator(measurement, plan, kinematics, offset, heads,
+                             {uncertainty, full_covariance, plausible, expansion});
         }));
     AdjustmentOptions options;
     options.uncertainty = uncertainty;
@@ -106,21 +108,21 @@ void bind_evaluation(py::module_& m) {
         m, "KnownExpansion",
         "What is known of the expansion of the scales. With it, positioning errors are referred to the reference "
         "temperature, by the temperatures in the run's channels.")
-        .def(py::init([](const Expansion& expansion, const ArrayLike& standard_uncertainty, bool one_coefficient,
-                         double sensor_uncertainty, const std::optional<ArrayLike>& temperature,
-                         bool one_temperature) {
-                 KnownExpansion known{expansion, to_vector3(standard_uncertainty, "standard_uncertainty"),
-                                      one_coefficient, sensor_uncertainty};
-                 if (temperature) known.temperature = to_vector3(*temperature, "temperature");
-                 known.one_temperature = one_temperature;
-                 check(known);
-                 return known;
-             }),
-             py::arg("expansion"), py::arg("standard_uncertainty"), py::kw_only(), py::arg("one_coefficient"),
-             py::arg("sensor_uncertainty"), py::arg("temperature") = std::nullopt, py::arg("one_temperature") = false,
-             "standard_uncertainty (3,): of the coefficients, 1/K; one_coefficient: it is common to the axes; "
-             "sensor_uncertainty: of each sensor's constant deviation, K; temperature (3,): of the scales where the run "
-             "says nothing, degrees Celsius, and whether one sensor measured it. Raises InvalidArgument.")
+        .def(
+            py::init([](const Expansion& expansion, const ArrayLike& standard_uncertainty, bool one_coefficient,
+                        double sensor_uncertainty, const std::optional<ArrayLike>& temperature, bool one_temperature) {
+                KnownExpansion known{expansion, to_vector3(standard_uncertainty, "standard_uncertainty"),
+                                     one_coefficient, sensor_uncertainty};
+                if (temperature) known.temperature = to_vector3(*temperature, "temperature");
+                known.one_temperature = one_temperature;
+                check(known);
+                return known;
+            }),
+            py::arg("expansion"), py::arg("standard_uncertainty"), py::kw_only(), py::arg("one_coefficient"),
+            py::arg("sensor_uncertainty"), py::arg("temperature") = std::nullopt, py::arg("one_temperature") = false,
+            "standard_uncertainty (3,): of the coefficients, 1/K; one_coefficient: it is common to the axes; "
+            "sensor_uncertainty: of each sensor's constant deviation, K; temperature (3,): of the scales where the run "
+            "says nothing, degrees Celsius, and whether one sensor measured it. Raises InvalidArgument.")
         .def_readonly("expansion", &KnownExpansion::expansion)
         .def_property_readonly("standard_uncertainty",
                                [](const KnownExpansion& k) { return to_numpy_vector(k.standard_uncertainty); })
@@ -260,6 +262,20 @@ void bind_evaluation(py::module_& m) {
     m.def(
         "read_calibration", [](const PathLike& path) { return read_calibration(to_path(path)); }, py::arg("path"),
         "Reads a calibration CSV. Raises InvalidArgument naming file and line.");
+    m.def(
+        "in_recorded_air",
+        [](const Measurement& measurement, const Plan& plan, const HeadLike& head, const Environment& assumed) {
+            const Heads heads = to_heads(head, plan);
+            std::map<std::string, CountingHead> of_line;
+            for (const auto* lines : {&plan.lines(), &plan.scale_lines()})
+                for (const Line& line : *lines)
+                    of_line[line.name()] = {heads.of(line).standoff, heads.of(line).wavelength};
+            return in_recorded_air(measurement, plan, of_line, assumed);
+        },
+        py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("assumed_environment"),
+        "The run of an instrument that counted with the constant index of the assumed air, with distances in the air "
+        "that the run's channels air_temperature, air_pressure and air_humidity recorded. Raises InvalidArgument for a "
+        "run without any of them, an assumed air that is no state, and air out of the equation's range.");
     m.def("evaluate", &evaluate, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
           py::arg("tool") = zeros(3), py::kw_only(), py::arg("method") = "adjustment",
           py::arg("uncertainty") = ReadingUncertainty{}, py::arg("full_covariance") = false,

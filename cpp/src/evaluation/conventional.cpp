@@ -11,7 +11,8 @@ Calibration evaluate_conventional(const Measurement& measurement, const Plan& pl
                                   const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                                   const EvaluationOptions& options) {
     if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
-    const auto passes = collect_passes(measurement, plan, heads, options.uncertainty, LengthKind::distance, options.expansion);
+    const auto passes =
+        collect_passes(measurement, plan, heads, options.uncertainty, LengthKind::distance, options.expansion);
     check(options.plausible);
     refuse_foreign_distances(measurement, plan);
     if (const std::string far = far_reading(measurement, plan); !far.empty()) throw InvalidArgument(far);

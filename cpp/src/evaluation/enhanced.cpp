@@ -52,7 +52,8 @@ Calibration evaluate_enhanced(const Measurement& measurement, const Plan& plan, 
                               const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                               const EvaluationOptions& options) {
     if (!tool.allFinite()) throw InvalidArgument("tool: expected three finite lengths in mm");
-    const auto passes = collect_passes(measurement, plan, heads, options.uncertainty, LengthKind::lever_arm_corrected, options.expansion);
+    const auto passes = collect_passes(measurement, plan, heads, options.uncertainty, LengthKind::lever_arm_corrected,
+                                       options.expansion);
     check(options.plausible);
     refuse_foreign_distances(measurement, plan);
     if (const std::string far = far_reading(measurement, plan); !far.empty()) throw InvalidArgument(far);

@@ -2,14 +2,15 @@
 
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/evaluation/evaluation.hpp"
-#include "stepdiag/measurement/temperatures.hpp"
+#include "stepdiag/measurement/records.hpp"
 
 namespace stepdiag {
 
 void check(const KnownExpansion& known) {
     check(known.expansion);
     if (!(known.standard_uncertainty.allFinite() && known.standard_uncertainty.minCoeff() >= 0.0))
-        throw InvalidArgument("expansion standard_uncertainty: expected three finite numbers of at least 0, per kelvin");
+        throw InvalidArgument(
+            "expansion standard_uncertainty: expected three finite numbers of at least 0, per kelvin");
     if (!(std::isfinite(known.sensor_uncertainty) && known.sensor_uncertainty >= 0.0))
         throw InvalidArgument("expansion sensor_uncertainty: expected a finite number of at least 0, in kelvin");
     if (known.temperature && !known.temperature->allFinite())

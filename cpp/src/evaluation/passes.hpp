@@ -19,7 +19,7 @@ struct PassPoint {
     PlanPoint plan;
     Eigen::Vector2d lateral =
         Eigen::Vector2d::Zero();  // commanded travel from the line's first point, in local x and y, mm
-    double travel = 0.0;  // along the line from its first point, as commanded and as the scales expand, mm
+    double travel = 0.0;          // along the line from its first point, as commanded and as the scales expand, mm
     bool has_length = false;
     bool has_tilt = false;
     Eigen::Vector3d reading = Eigen::Vector3d::Zero();  // length less travel (mm), alpha, beta (rad)

@@ -20,7 +20,7 @@ enum : int {
     humidity = 3,
     refractive_index = 4,
     wavelength = 5,
-    machine_drift = 6,       // x, y, z, as the next two
+    machine_drift = 6,  // x, y, z, as the next two
     expansion = 9,
     scale_temperature = 12,
     psd_distance = 15,

@@ -162,12 +162,25 @@ class AssumedAirKeys(AirKeys):
     Keys that are not named are as in `[environment]`. By default the true air."""
 
 
-class EnvironmentSection(AirKeys):
+class KnownEnvironmentKeys(Section):
+    """What the instrument does about the air."""
+
+    readings: Literal["compensated", "constant_index"] = key(
+        '"compensated" or "constant_index"',
+        "The instrument has reduced its distances with the true air; or it counted with the constant index of the "
+        "assumed air, and evaluations reduce distances with the run's columns `air_temperature_c`, "
+        "`air_pressure_hpa`, `air_humidity_percent`: docs/temperature.md.",
+        "compensated",
+    )
+
+
+class EnvironmentSection(KnownEnvironmentKeys, AirKeys):
     """The air around machine and head, constant over a run: a `refractive_index`, or the state of the air.
 
     Without any key: air of 20 °C before a described head, an index of 1 before one by its layout; but with a key in
     `[environment.assumed]` air of 20 °C before every head.
 
-    Used by `simulate` only. The equations hold for wavelengths of 300 to 1700 nm."""
+    Used by `simulate` only, but for `readings`, and for the assumed air with `constant_index`. The equations hold for
+    wavelengths of 300 to 1700 nm."""
 
     assumed: AssumedAirKeys | None = None

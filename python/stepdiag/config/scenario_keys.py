@@ -33,7 +33,13 @@ from stepdiag.config.key_types import (
 )
 from stepdiag.config.plan_by_time_keys import PlanByTimeSection
 from stepdiag.config.report_keys import ReportSection
-from stepdiag.config.scenario_head_keys import EnvironmentSection, HeadSection, KnownHeadKeys, LineKeys
+from stepdiag.config.scenario_head_keys import (
+    EnvironmentSection,
+    HeadSection,
+    KnownEnvironmentKeys,
+    KnownHeadKeys,
+    LineKeys,
+)
 from stepdiag.config.temperature_keys import KnownTemperatureKeys, TemperatureSection, TrueTemperatureKeys
 from stepdiag.config.uncertainty_keys import UncertaintySection
 
@@ -220,6 +226,7 @@ class KnownKeys(Section):
     head: KnownHeadKeys
     line: dict[str, LineKeys] = tables("LINE")
     temperature: KnownTemperatureKeys | None = None
+    environment: KnownEnvironmentKeys = KnownEnvironmentKeys()
     noise: NoiseKeys = NoiseKeys()
     uncertainty: UncertaintySection = UncertaintySection()
     adjustment: AdjustmentSection = AdjustmentSection()
@@ -245,6 +252,7 @@ class ScenarioKeys(TruthKeys, KnownKeys):
     machine: MachineSection
     head: HeadSection
     temperature: TemperatureSection | None = None
+    environment: EnvironmentSection = EnvironmentSection()
     noise: NoiseSection = NoiseSection()
 
 

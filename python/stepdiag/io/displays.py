@@ -131,11 +131,11 @@ _FACTS: Final[Mapping[type, Callable[[Any], Facts]]] = {
 }
 # They show their properties, in native units.
 _PLAIN: Final = """
-BeamSegment BeamSpot CalibrationEntry Camera Compensator DiagonalErrors Distribution ErrorAtPoint Fault FaultClass
-FaultControl FitReason GaussianMode HeadBeam HeadBody HeadCalibration HeadDesign Interferometer KnownCombination
-LateralEffect Misalignment MonteCarloResult Noise Outlier PlausibleLimits Propagation ReadingNoise ReadingUncertainty
-ReturnedBeam Sensitivity SetupEstimate Smoothness SpotSensor UncertainInput UncertainInputs Undetermined Validation
-VirtualCalibrations VolumetricAccuracy
+BeamSegment BeamSpot CalibrationEntry Camera Compensator DiagonalErrors Distribution ErrorAtPoint Expansion
+ExpansionEstimate Fault FaultClass FaultControl FitReason GaussianMode HeadBeam HeadBody HeadCalibration HeadDesign
+Interferometer KnownCombination KnownExpansion LateralEffect Misalignment MonteCarloResult Noise Outlier
+PlausibleLimits Propagation ReadingNoise ReadingUncertainty ReturnedBeam ScaleTemperatures Sensitivity SetupEstimate
+Smoothness SpotSensor UncertainInput UncertainInputs Undetermined Validation VirtualCalibrations VolumetricAccuracy
 """
 
 

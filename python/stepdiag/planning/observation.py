@@ -93,7 +93,7 @@ def not_measured(known: Known, plan: Mapping[str, Any] | None = None) -> Known:
     adjustment = keys.adjustment.model_copy(update={"outlier_probability": 0.0})
     of_lines = {line: own for line, own in keys.line.items() if line in (*planned.lines, *planned.scale_lines)}
     changes = {"plan": planned, "line": of_lines, "adjustment": adjustment, "uncertainty": uncertainty}
-    return known_of(keys.model_copy(update=changes), known.described, known.path)
+    return known_of(keys.model_copy(update=changes), known.described, known.path, known.assumed_air)
 
 
 def growth(found: Sequence[Prospect], kind: Kind) -> float | None:

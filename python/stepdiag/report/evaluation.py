@@ -10,13 +10,14 @@ from stepdiag.calibration.finding_text import NOISE_ALONE, combination_text, fau
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.calibration.temperature_text import temperature_rows
 from stepdiag.calibration.unseen_text import unseen_rows
+from stepdiag.mistakes.copies import passes_of
 from stepdiag.mistakes.search import FoundMistake
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.fault_control import control_rows
 from stepdiag.report.mistakes import mistake_rows, unchecked_row
 from stepdiag.report.prior_effects import cosine_rows, drift_rows
 from stepdiag.report.setup_table import NOTHING_LEARNT, setup_rows
-from stepdiag.scenario.description import JudgedEvaluation
+from stepdiag.scenario.description import JudgedEvaluation, readings_of
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
 from stepdiag.units import MICRO
@@ -87,6 +88,7 @@ def _what_was_done(calibration: Calibration, measurement: Measurement, known: Kn
     yield f"method: {calibration.method}, chain {calibration.chain.name}"
     yield f"readings: {len(measurement)} points on {len(set(measurement.line))} lines"
     yield from temperature_rows(calibration)
+    yield from air_rows(measurement, known)
     incomplete, missing = lost_readings(measurement, known.plan, known.signals)
     if incomplete or missing:
         yield f"lost: {incomplete} rows without a complete reading, {missing} points of the plan without a row"
@@ -102,6 +104,23 @@ def expansion_rows(estimates: Iterable[ExpansionEstimate]) -> Iterator[str]:
         if u < NOTHING_LEARNT * prior:
             found = f"found {value:.4g} ± {u:.2g}"
         yield f"expansion of {scales}: stated {stated:.4g} ± {prior:.2g} µm/(m·K), {found}"
+
+
+def air_rows(measurement: Measurement, known: Known) -> Iterator[str]:
+    """The largest correction for the air, where evaluations make it."""
+    if known.assumed_air is None:
+        return
+    corrected, largest = readings_of(known, measurement), 0.0
+    for name in (name for name in corrected.channels if name.startswith("d")):
+        change = corrected.channels[name] - measurement.channels[name]
+        for rows in passes_of(measurement).values():
+            read = change[rows][np.isfinite(change[rows])]
+            if read.size:  # a constant of a line is none of its length
+                largest = max(largest, float(np.ptp(read)))
+    yield (
+        "air: the instrument counted with a constant index; distances were corrected by up to "
+        f"{largest * 1e3:.3g} µm along a line"
+    )
 
 
 def undetermined_rows(calibration: Calibration, combinations: Iterable[str] = ()) -> Iterator[str]:

@@ -10,6 +10,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.calibration.finding_text import FITS, MEANING
@@ -22,6 +24,7 @@ from stepdiag.io.whole_files import read_text
 from stepdiag.scenario.heads import describe_heads, make_heads, of_run
 from stepdiag.scenario.known import Known, known_of, runs_of
 from stepdiag.scenario.planned_readings import only
+from stepdiag.scenario.setup import counted_with
 from stepdiag.scenario.temperature import scales_of
 from stepdiag.scenario.truth import Truth, errors_of, truth_of
 
@@ -60,7 +63,46 @@ def simulate_scenario(scenario: Scenario) -> _core.Measurement:
             of_run(heads),
             simulation_options(scenario),
         )
-    return only(run, scenario.known.signals)
+    return only(_with_air(run, scenario), scenario.known.signals)
+
+
+def _with_air(run: _core.Measurement, scenario: Scenario) -> _core.Measurement:
+    """The run with the columns of the air that an instrument with a constant index needs."""
+    assumed = scenario.known.assumed_air
+    if assumed is None:
+        return run
+    state = (scenario.truth.environment or assumed).state
+    if state is None:
+        raise InvalidArgument(
+            f'{scenario.path}: environment.readings: "constant_index" goes with a state of the air, got an index'
+        )
+    channels = {
+        f"air_{name}": np.full(len(run), state[quantity])
+        for name, quantity in (
+            ("temperature", "temperature"),
+            ("pressure", "pressure"),
+            ("humidity", "relative_humidity"),
+        )
+    }
+    return _core.Measurement(
+        run.line,
+        run.point.tolist(),
+        run.position,
+        {**run.channels, **channels},
+        run=run.run.tolist(),
+        direction=run.direction,
+        standard_uncertainty=run.standard_uncertainty,
+    )
+
+
+def readings_of(known: Known, measurement: _core.Measurement) -> _core.Measurement:
+    """A run as evaluations take it: with the channels that the scenario's head has, distances in the air of the run
+    where the instrument counted with a constant index."""
+    run = only(measurement, known.signals)
+    if known.assumed_air is None:
+        return run
+    with located(f"{known.path}: environment.readings"):
+        return _core.in_recorded_air(run, known.plan, of_run(known.heads), known.assumed_air)
 
 
 def evaluate_scenario(
@@ -76,7 +118,7 @@ def evaluate_scenario(
         adjustment = adjust_scenario(known, measurement, full_covariance=full_covariance)
         return adjustment.calibration.with_between_nodes(known.between_nodes)
     found = _core.evaluate(
-        only(measurement, known.signals),
+        readings_of(known, measurement),
         known.plan,
         of_run(known.heads),
         known.chain,
@@ -143,7 +185,7 @@ def adjust_scenario(
     whole; no faults of single readings are looked for."""
     known = scenario.known
     return _core.adjust(
-        only(measurement, known.signals),
+        readings_of(known, measurement),
         known.plan,
         of_run(known.heads),
         known.chain,
@@ -161,8 +203,8 @@ def simulation_options(scenario: Scenario) -> _core.SimulationOptions:
     return _core.SimulationOptions(
         misalignment=dict(truth.misalignment),
         noise=truth.noise,
-        environment=truth.environment,
-        assumed_environment=truth.assumed_environment,
+        environment=truth.environment or known.assumed_air,
+        assumed_environment=truth.assumed_environment if known.assumed_air is None else known.assumed_air,
         verified_share=keys.head.verified_share,
         repeats=runs_of(keys.plan),
         backward=keys.plan.backward,
@@ -238,7 +280,7 @@ def _is_table(value: Any) -> bool:
 
 def _build(keys: ScenarioKeys, path: Path) -> Scenario:
     described, pose_errors = describe_heads(keys.head, path)
-    known = known_of(narrowed(keys, KnownKeys), described, path)
+    known = known_of(narrowed(keys, KnownKeys), described, path, counted_with(keys.environment, path))
     lines = list(known.heads)
     for section in SECTIONS_BY_LINE:
         for line in getattr(keys, section).by_line:

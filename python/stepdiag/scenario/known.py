@@ -23,14 +23,15 @@ class Known(Displayed):
     programs and the acquisition are given. What a run was simulated with is in no attribute of it.
 
     `described`: the heads by design, by the place of their keys, also those that measure no line. The other fields
-    follow from the first three: chain, tool and plan; by line the head that measures it, as it is described and as it
+    follow from the first four: chain, tool and plan; by line the head that measures it, as it is described and as it
     is by design; the channels of a run; weights of readings, priors of the set-up, smoothness and limits of what is
     plausible; what is known of the scales' expansion, None where the scenario has no [temperature]; what is
-    uncertain."""
+    uncertain. `assumed_air`: with whose constant index the instrument counts; None where it compensates for the air."""
 
     path: Path
     keys: KnownKeys
     described: Mapping[str, DescribedHead]
+    assumed_air: _core.Environment | None = field(compare=False)
     chain: _core.Chain = field(compare=False)
     tool: tuple[float, float, float] = field(compare=False)
     plan: _core.Plan = field(compare=False)
@@ -75,7 +76,9 @@ class Known(Displayed):
         ]
 
 
-def known_of(keys: KnownKeys, described: Mapping[str, DescribedHead], path: Path) -> Known:
+def known_of(
+    keys: KnownKeys, described: Mapping[str, DescribedHead], path: Path, assumed_air: _core.Environment | None = None
+) -> Known:
     """Makes the core's types, whose own checks get file and section put in front. What is said of the set-up of lines
     that are not measured is passed over."""
     with located(f"{path}: machine.chain"):
@@ -101,6 +104,7 @@ def known_of(keys: KnownKeys, described: Mapping[str, DescribedHead], path: Path
         path=path,
         keys=keys,
         described=MappingProxyType(dict(described)),
+        assumed_air=assumed_air,
         chain=chain,
         tool=keys.machine.tool_mm,
         plan=plan,

@@ -67,6 +67,13 @@ def environments(keys: EnvironmentSection, path: Path) -> tuple[Air, Air]:
     return true, environment(AirKeys.model_validate(others | mine), f"{path}: environment.assumed")
 
 
+def counted_with(keys: EnvironmentSection, path: Path) -> Air:
+    """The air with whose constant index the instrument counts; None where it compensates for the true one."""
+    if keys.readings == "compensated":
+        return None
+    return environments(keys, path)[1] or _core.Environment.from_air()
+
+
 def environment(keys: AirKeys, place: str) -> Air:
     """Air of the given state, at 20 °C and so on where it is not; or of the given index; None without either."""
     state = keys.model_fields_set & AirKeys.model_fields.keys() - {"refractive_index"}

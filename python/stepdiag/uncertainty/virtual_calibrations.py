@@ -38,7 +38,7 @@ def virtual_calibrations(
             method=method,
             seed=seed,
             derived=list(derived),
-            simulation=simulation_options(replace(scenario, truth=truth)),
+            simulation=simulation_options(replace(scenario, known=replace(known, assumed_air=None), truth=truth)),
             adjustment=adjustment_options(known, of_samples=True),
         )
 
@@ -46,6 +46,9 @@ def virtual_calibrations(
 def _air(scenario: Scenario) -> tuple[_core.Environment | None, _core.Environment | None]:
     """The true and the assumed air; where nothing is said of it, but its state is uncertain, that of 20 °C."""
     section, truth = scenario.known.keys.uncertainty, scenario.truth
+    if scenario.known.assumed_air is not None:  # whose readings are reduced with what is recorded
+        air = truth.environment or scenario.known.assumed_air
+        return air, air
     is_uncertain = any(getattr(section, name) is not None for name in STATE_OF_AIR)
     if truth.environment is None and is_uncertain:
         usual = _core.Environment.from_air()

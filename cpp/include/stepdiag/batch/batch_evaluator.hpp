@@ -18,7 +18,7 @@ enum class EvaluationMethod { conventional, enhanced, adjustment, one_step };
 
 struct BatchOptions {
     EvaluationMethod method = EvaluationMethod::enhanced;
-    ReadingUncertainty uncertainty = {};           // conventional, enhanced, as the next
+    ReadingUncertainty uncertainty = {};  // conventional, enhanced, as the next
     std::optional<KnownExpansion> expansion = {};
     // Of adjustment and one_step. Nothing is left out as an outlier, and no uncertainty is scaled: options that ask for
     // it are refused. full_covariance and plausible concern the pattern alone.

@@ -22,7 +22,7 @@ struct ReadingUncertainty {
 };
 
 // What is known of the expansion of the scales. With it, an evaluation refers positioning errors to the reference
-// temperature, by the temperatures of the run's own channels (measurement/temperatures.hpp).
+// temperature, by the temperatures of the run's own channels (measurement/records.hpp).
 struct KnownExpansion {
     Expansion expansion;
     Eigen::Vector3d standard_uncertainty = Eigen::Vector3d::Zero();  // of the coefficients, 1/K

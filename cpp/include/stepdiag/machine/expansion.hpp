@@ -1,5 +1,5 @@
-// Thermal expansion of whatever positions the axes, as a rule their scales. From its fixed point f_a the scale of axis a
-// expands by its coefficient alpha_a, so that the axis, told to go to p, stands at
+// Thermal expansion of whatever positions the axes, as a rule their scales. From its fixed point f_a the scale of axis
+// a expands by its coefficient alpha_a, so that the axis, told to go to p, stands at
 //   p + alpha_a (T_a - T_ref)(p - f_a)
 // T_a the scale's temperature. In the pose (machine/machine.hpp) the last term is added to the axis's translation along
 // itself; delta_a and theta_a are those of the commanded p. Positioning errors of which this is taken off are referred

@@ -30,9 +30,9 @@ struct Station {
 };
 
 // Values of one quantity for all rows, in native units (mm, rad). `name` is without unit: distance, alpha, beta,
-// spot_x, spot_y, d1, d2, ..., time (s), temperature, temperature_x, ... air_temperature (degrees Celsius), air_pressure
-// (Pa), air_humidity (0 to 1). A lost reading is empty. `standard_uncertainty` is an empty vector if the measurement does
-// not state it.
+// spot_x, spot_y, d1, d2, ..., time (s), temperature, temperature_x, ... air_temperature (degrees Celsius),
+// air_pressure (Pa), air_humidity (0 to 1). A lost reading is empty. `standard_uncertainty` is an empty vector if the
+// measurement does not state it.
 struct Channel {
     std::string name;
     std::vector<std::optional<double>> value;

@@ -1,4 +1,4 @@
-#include "stepdiag/measurement/temperatures.hpp"
+#include "stepdiag/measurement/records.hpp"
 
 #include <array>
 #include <map>
@@ -49,30 +49,44 @@ std::vector<double> places(const Measurement& measurement, const std::vector<std
     return place;
 }
 
-}  // namespace
-
-std::vector<Eigen::Vector3d> scale_temperatures(const Measurement& measurement,
-                                                const std::optional<Eigen::Vector3d>& otherwise) {
+// The rows of each pass, in their order.
+std::vector<std::vector<std::size_t>> recorded_passes(const Measurement& measurement) {
     std::map<std::pair<int, std::string>, std::vector<std::size_t>> passes;
     for (std::size_t row = 0; row < measurement.size(); ++row)
         passes[{measurement.stations()[row].run, measurement.stations()[row].line.name()}].push_back(row);
+    std::vector<std::vector<std::size_t>> list;
+    for (auto& [pass, rows] : passes) list.push_back(std::move(rows));
+    return list;
+}
+
+}  // namespace
+
+std::vector<double> recorded(const Measurement& measurement, const Channel* channel,
+                             const std::vector<std::size_t>& rows) {
+    if (!channel) return {};
+    std::vector<std::optional<double>> values;
+    for (const std::size_t row : rows) values.push_back(channel->value[row]);
+    if (!fill(values, places(measurement, rows))) return {};
+    std::vector<double> all;
+    for (const auto& value : values) all.push_back(*value);
+    return all;
+}
+
+std::vector<Eigen::Vector3d> scale_temperatures(const Measurement& measurement,
+                                                const std::optional<Eigen::Vector3d>& otherwise) {
     std::vector<Eigen::Vector3d> temperatures(measurement.size());
-    for (const auto& [pass, rows] : passes) {
-        const std::vector<double> place = places(measurement, rows);
+    for (const std::vector<std::size_t>& rows : recorded_passes(measurement))
         for (int axis = 0; axis < 3; ++axis) {
-            const Channel* channel = channel_of(measurement, axis);
-            std::vector<std::optional<double>> values(rows.size());
-            for (std::size_t k = 0; channel && k < rows.size(); ++k) values[k] = channel->value[rows[k]];
-            if (!fill(values, place)) {
-                if (!otherwise)
-                    throw InvalidArgument("run " + std::to_string(pass.first) + ", line " + pass.second +
-                                          ": expected temperatures (column " + own_channel[axis] +
-                                          "_c or temperature_c, or the scales' usual temperature), got none");
-                values.assign(rows.size(), (*otherwise)[axis]);
+            std::vector<double> values = recorded(measurement, channel_of(measurement, axis), rows);
+            if (values.empty() && !otherwise) {
+                const Station& station = measurement.stations()[rows.front()];
+                throw InvalidArgument("run " + std::to_string(station.run) + ", line " + station.line.name() +
+                                      ": expected temperatures (column " + own_channel[axis] +
+                                      "_c or temperature_c, or the scales' usual temperature), got none");
             }
-            for (std::size_t k = 0; k < rows.size(); ++k) temperatures[rows[k]][axis] = *values[k];
+            if (values.empty()) values.assign(rows.size(), (*otherwise)[axis]);
+            for (std::size_t k = 0; k < rows.size(); ++k) temperatures[rows[k]][axis] = values[k];
         }
-    }
     return temperatures;
 }
 
