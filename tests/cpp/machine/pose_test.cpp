@@ -66,6 +66,22 @@ void expect_pose(const char* chain, const std::function<Matrix4d(const ErrorMap&
     }
 }
 
+TEST(Pose, ExpansionOfAScaleIsATranslationOfItsAxisWithinTheChain) {
+    const Vector3d expansion(0.03, -0.02, 0.01);
+    for (const char* text : {"[w X' b Y Z t]", "[w b X Y Z t]", "[w Z' Y' X' b t]"})
+        for (const Vector3d& p : commands()) {
+            stepdiag::ParameterTable longer = random_map(1.0).table();
+            for (int a = 0; a < 3; ++a)
+                for (double& value : longer.functions[7 * a]->value) value += expansion[a];  // EXX, EYY, EZZ
+            const Vector3d tool(10.0, -20.0, 150.0);
+            const Machine machine(Chain::parse(text), random_map(1.0), tool),
+                other(Chain::parse(text), ErrorMap(longer), tool);
+            const stepdiag::Pose found = machine.pose(p, stepdiag::all_positive, expansion), expected = other.pose(p);
+            EXPECT_LE((found.position - expected.position).cwiseAbs().maxCoeff(), 1e-12);  // a few roundings of 1 m
+            EXPECT_EQ(found.rotation, expected.rotation);
+        }
+}
+
 }  // namespace
 
 // The products are written out by hand, one a chain.
