@@ -22,7 +22,7 @@ from stepdiag._core import InvalidArgument
 from stepdiag.mistakes.catalogue import CATALOGUE
 from stepdiag.mistakes.copies import Copy, Family, Hypothesis, in_turn, passes_of, without
 from stepdiag.mistakes.nominal_way import Way, distance_of, ways_of
-from stepdiag.scenario.description import Scenario, adjust_scenario, adjustment_options, readings_of
+from stepdiag.scenario.description import Scenario, adjust_scenario, adjustment_options, reduced_run
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import check_points
@@ -122,7 +122,7 @@ class MistakeSearch:
     def __init__(self, scenario: Scenario | Known, measurement: _core.Measurement) -> None:
         known = scenario.known
         check_points(measurement, known.plan)
-        self._copy = Copy(known, readings_of(known, measurement))
+        self._copy = Copy(replace(known, assumed_air=None), reduced_run(known, measurement))
         with np.errstate(all="ignore"):  # of readings that are no numbers of a machine
             self._ways = ways_of(known, self._copy.run)
             # However well they fit: no machine is off by so much.

@@ -107,6 +107,10 @@ class CalibrationTables(TypedDict):
     volume_mm: list[float]
     tool_mm: list[float]
     straightness_reference: str
+    temperature_reference_c: float | None
+    """Positioning errors are referred to it; null: they are as found."""
+    temperature_as_found_c: list[float] | None
+    """Of the scales of X, Y, Z; null: not recorded, or referred to a temperature."""
     functions: list[LengthFunction | AngleFunction]
     """Values by node; approached in + direction if there are reversal errors."""
     reversal_errors: list[LengthReversal | AngleReversal]
@@ -170,6 +174,10 @@ def tables_of(calibration: Calibration) -> CalibrationTables:
         "volume_mm": calibration.volume.tolist(),
         "tool_mm": calibration.tool.tolist(),
         "straightness_reference": calibration.straightness_reference,
+        "temperature_reference_c": calibration.temperature_reference,
+        "temperature_as_found_c": None
+        if calibration.temperature_as_found is None
+        else calibration.temperature_as_found.tolist(),
         "functions": _by_node(calibration.functions, "slope_determined", slopes),
         "reversal_errors": _by_node(calibration.reversal, "constant_determined", constants),
         "squarenesses": _squarenesses(calibration.squareness),

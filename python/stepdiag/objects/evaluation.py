@@ -9,6 +9,7 @@ from typing_extensions import TypedDict
 from stepdiag._core import (
     Adjustment,
     Calibration,
+    ExpansionEstimate,
     Fault,
     FaultClass,
     FaultControl,
@@ -189,6 +190,18 @@ class AngleControl(_Control):
     told_from_urad: float | None
 
 
+class Expansion(TypedDict):
+    """A coefficient of the scales' expansion, which was an unknown."""
+
+    axes: list[str]
+    """That have it in common."""
+    value_um_per_m_k: float | None
+    standard_uncertainty_um_per_m_k: float | None
+    stated_um_per_m_k: float | None
+    prior_um_per_m_k: float | None
+    """Standard uncertainty before the run."""
+
+
 class AdjustmentPart(TypedDict):
     """What an adjustment finds beside the calibration."""
 
@@ -197,6 +210,7 @@ class AdjustmentPart(TypedDict):
     chi_square_probability: float | None
     iterations: int
     setup: list[SetupLength | SetupOffset | SetupAngle | SetupShare | SetupRate]
+    expansion: list[Expansion]
     faults: list[Faults]
     combinations: list[SlopeCombination | SetupCombination]
     """What is known of unknowns that are not determined one by one."""
@@ -296,6 +310,16 @@ def evaluated_files(scenario: Path, run: Path, calibration: Path) -> EvaluatedFi
     return {"scenario": str(scenario), "run": str(run), "calibration": str(calibration)}
 
 
+def _expansion(found: ExpansionEstimate) -> Expansion:
+    return {
+        "axes": ["XYZ"[axis] for axis in found.axes],
+        "value_um_per_m_k": in_unit("um_per_m_k", found.value),
+        "standard_uncertainty_um_per_m_k": in_unit("um_per_m_k", found.standard_uncertainty),
+        "stated_um_per_m_k": in_unit("um_per_m_k", found.stated),
+        "prior_um_per_m_k": in_unit("um_per_m_k", found.prior),
+    }
+
+
 def readings_of(measurement: Measurement, known: Known) -> Readings:
     """How much was read."""
     incomplete, missing = lost_readings(measurement, known.plan, known.signals)
@@ -381,6 +405,7 @@ def _adjustment(found: Adjustment) -> AdjustmentPart:
         "chi_square_probability": number(found.chi_square_probability),
         "iterations": found.iterations,
         "setup": setup_of(found.setup),
+        "expansion": [_expansion(one) for one in found.expansion],
         "faults": [_faults(one) for one in found.faults],
         "combinations": combinations_of(found.combinations),
         "smoothness": _smoothness(found.smoothness),

@@ -17,7 +17,7 @@ from stepdiag.report.fault_control import control_rows
 from stepdiag.report.mistakes import mistake_rows, unchecked_row
 from stepdiag.report.prior_effects import cosine_rows, drift_rows
 from stepdiag.report.setup_table import NOTHING_LEARNT, setup_rows
-from stepdiag.scenario.description import JudgedEvaluation, readings_of
+from stepdiag.scenario.description import JudgedEvaluation, reduced_run
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
 from stepdiag.units import MICRO
@@ -94,15 +94,16 @@ def _what_was_done(calibration: Calibration, measurement: Measurement, known: Kn
         yield f"lost: {incomplete} rows without a complete reading, {missing} points of the plan without a row"
 
 
-def expansion_rows(estimates: Iterable[ExpansionEstimate]) -> Iterator[str]:
-    """Expansion coefficients that were unknowns: what was stated, and what the readings made of it."""
+def expansion_rows(estimates: Iterable[ExpansionEstimate], *, values: bool = True) -> Iterator[str]:
+    """Expansion coefficients that were unknowns: what was stated, and what the readings made of it; without `values`
+    its standard uncertainty alone."""
     for estimate in estimates:
         numbers = (estimate.stated, estimate.prior, estimate.value, estimate.standard_uncertainty)
         stated, prior, value, u = (number * MICRO for number in numbers)
         scales = "the scales" if len(estimate.axes) == 3 else f"the scale of {'XYZ'[estimate.axes[0]]}"
         found = "the readings tell nothing more"
         if u < NOTHING_LEARNT * prior:
-            found = f"found {value:.4g} ± {u:.2g}"
+            found = f"found {value:.4g} ± {u:.2g}" if values else f"found to ± {u:.2g}"
         yield f"expansion of {scales}: stated {stated:.4g} ± {prior:.2g} µm/(m·K), {found}"
 
 
@@ -110,7 +111,7 @@ def air_rows(measurement: Measurement, known: Known) -> Iterator[str]:
     """The largest correction for the air, where evaluations make it."""
     if known.assumed_air is None:
         return
-    corrected, largest = readings_of(known, measurement), 0.0
+    corrected, largest = reduced_run(known, measurement), 0.0
     for name in (name for name in corrected.channels if name.startswith("d")):
         change = corrected.channels[name] - measurement.channels[name]
         for rows in passes_of(measurement).values():

@@ -52,8 +52,12 @@ def unchecked_row(known: Known) -> str:
     heads = list(known.heads.values())
     standoffs = ", ".join(dict.fromkeys(f"{head.standoff:g}" for head in heads))
     wavelengths = ", ".join(dict.fromkeys(f"{head.wavelength:g}" for head in heads))
+    scales = ""
+    if known.expansion is not None:
+        numbers = dict.fromkeys(f"{1e6 * c:g}" for c in known.expansion.expansion.coefficient)
+        scales = f", expansion of the scales {', '.join(numbers)} µm/(m·K)"
     return (
         f"check by hand, as no reading shows it: place of b in the chain {known.chain.name}, tool offset "
-        f"{point_text(known.tool)}, standoff {standoffs} mm, wavelength {wavelengths} nm, and the index of air and the "
-        "temperature that all distances were reduced with"
+        f"{point_text(known.tool)}, standoff {standoffs} mm, wavelength {wavelengths} nm{scales}, and the index of air "
+        "and the temperature that all distances were reduced with"
     )

@@ -9,7 +9,7 @@ from stepdiag.calibration.finding_text import combination_text
 from stepdiag.io.csv_text import csv_text
 from stepdiag.parameters import KINDS, REPORT_UNIT, in_report_units
 from stepdiag.planning.observation import Prospect, extents, growth
-from stepdiag.report.evaluation import uncertainty_rows, undetermined_rows
+from stepdiag.report.evaluation import expansion_rows, uncertainty_rows, undetermined_rows
 from stepdiag.report.prior_effects import cosine_rows, drift_rows
 from stepdiag.report.setup_table import setup_rows
 from stepdiag.scenario.known import Known
@@ -43,6 +43,7 @@ def observation_report(found: Adjustment, run: _core.Measurement, known: Known) 
     if rows:
         yield "set-up, standard uncertainties:"
         yield from rows
+    yield from expansion_rows(found.expansion, values=False)
     yield from cosine_rows(run, known)
     yield from drift_rows(run, known)
 

@@ -95,7 +95,7 @@ def _with_air(run: _core.Measurement, scenario: Scenario) -> _core.Measurement:
     )
 
 
-def readings_of(known: Known, measurement: _core.Measurement) -> _core.Measurement:
+def reduced_run(known: Known, measurement: _core.Measurement) -> _core.Measurement:
     """A run as evaluations take it: with the channels that the scenario's head has, distances in the air of the run
     where the instrument counted with a constant index."""
     run = only(measurement, known.signals)
@@ -118,7 +118,7 @@ def evaluate_scenario(
         adjustment = adjust_scenario(known, measurement, full_covariance=full_covariance)
         return adjustment.calibration.with_between_nodes(known.between_nodes)
     found = _core.evaluate(
-        readings_of(known, measurement),
+        reduced_run(known, measurement),
         known.plan,
         of_run(known.heads),
         known.chain,
@@ -185,7 +185,7 @@ def adjust_scenario(
     whole; no faults of single readings are looked for."""
     known = scenario.known
     return _core.adjust(
-        readings_of(known, measurement),
+        reduced_run(known, measurement),
         known.plan,
         of_run(known.heads),
         known.chain,

@@ -8,7 +8,7 @@ from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag import _core
-from stepdiag.scenario.description import parse_scenario, readings_of
+from stepdiag.scenario.description import parse_scenario, reduced_run
 
 PERFECT = SCENARIO.split("[misalignment]")[0]
 COUNTED = (
@@ -68,7 +68,7 @@ def test_distances_are_those_of_the_formula_with_a_drifting_air() -> None:
         read[rows] = 12.5 + (optical - optical[0]) / used  # a counter starts anywhere
         # The machine stands at the line's start by its errors, which the nominal first distance does not have.
         expected[rows] -= index[rows[0]] / index[rows] * (truth[rows[0]] - standoff)
-    found = readings_of(scenario.known, with_channels(sound, {"distance": read, **air}))
+    found = reduced_run(scenario.known, with_channels(sound, {"distance": read, **air}))
     assert np.max(np.abs(found.channels["distance"] - expected)) <= 1e-12  # a few roundings of 200 mm
 
 
@@ -77,7 +77,7 @@ def test_a_simulated_run_is_found_as_it_was() -> None:
     run, sound = sd.simulate_scenario(scenario), sd.simulate_scenario(parse_scenario(PERFECT))
     assert run.channels["air_temperature"] == pytest.approx(26.0)
     raw, reduced, truth = (
-        without_constants(run, one.channels["distance"]) for one in (run, readings_of(scenario.known, run), sound)
+        without_constants(run, one.channels["distance"]) for one in (run, reduced_run(scenario.known, run), sound)
     )
     assert np.max(np.abs(raw - truth)) > 1e-3  # 11.6 ppm of 112 mm
     assert np.max(np.abs(reduced - truth)) <= OF_NOMINAL
@@ -89,7 +89,7 @@ def test_a_lost_first_reading_and_empty_fields_do_no_harm() -> None:
     first = [i for i in range(len(run)) if run.point[i] == 0]
     distance, warm = run.channels["distance"].copy(), run.channels["air_temperature"].copy()
     distance[first], warm[3:9] = np.nan, np.nan
-    found = readings_of(scenario.known, with_channels(run, {"distance": distance, "air_temperature": warm}))
+    found = reduced_run(scenario.known, with_channels(run, {"distance": distance, "air_temperature": warm}))
     sound = sd.simulate_scenario(parse_scenario(PERFECT)).channels["distance"].copy()
     sound[first] = np.nan
     difference = without_constants(run, found.channels["distance"]) - without_constants(run, sound)
