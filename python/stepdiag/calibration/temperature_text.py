@@ -47,3 +47,26 @@ def temperature_warnings(calibration: Calibration, measurement: Measurement) -> 
         f"[temperature]: positioning errors are as found, up to {STEEL * abs(farthest) * edge * 1e-3:.2g} µm on "
         f"{edge:g} mm of steel"
     ]
+
+
+def workpiece_rows(calibration: Calibration, expansion: float, temperature: float) -> Iterator[str]:
+    """What parts as long as each axis travels will measure at 20 °C.
+
+    expansion: of the workpiece, µm/(m K); temperature: at which it is machined or measured, °C. With ISO 1, a part is
+    as long as it is at 20 °C."""
+    reference = calibration.temperature_reference
+    scales = "as they were" if reference is None else f"at {reference:g} °C"
+    yield (
+        f"a part of {expansion:g} µm/(m·K) that is machined at {temperature:g} °C, with the scales {scales}, at 20 °C"
+    )
+    for axis, name in (("X", "EXX"), ("Y", "EYY"), ("Z", "EZZ")):
+        if name not in calibration.functions or name in calibration.undetermined_slopes:
+            yield f"  along {axis}: not known, as the slope of {name} is not determined"
+            continue
+        position, value, _ = calibration.functions[name]
+        length = float(position[-1])
+        moved, shrunk = float(value[-1]) * 1e3, expansion * (temperature - REFERENCE) * length * 1e-3
+        yield (
+            f"  along {axis}: {moved - shrunk:+.3g} µm on {length:g} mm "
+            f"({moved:+.3g} by the machine, {-shrunk:+.3g} by its own temperature)"
+        )

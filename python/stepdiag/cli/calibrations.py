@@ -43,6 +43,7 @@ def _header_options(command: Command) -> Command:
     cls=Grouped,
     groups={
         "Output": ["output", "functional_point", "as_json"],
+        "Workpiece": ["workpiece_expansion", "workpiece_temperature"],
         "Content of a page": ["scenario", "run", "uncertainty", "limit"],
         "Header of a page (by default that of the scenario)": [*_WORDS, "logo"],
     },
@@ -62,6 +63,18 @@ def _header_options(command: Command) -> Command:
     metavar="FILE",
     help="Also write the straightness of the functional point and that of the table (CSV).",
 )
+@click.option(
+    "--workpiece-expansion",
+    type=click.FloatRange(-1000.0, 1000.0),
+    metavar="A",
+    help="Also report what a part of this expansion coefficient, µm/(m K), measures at 20 °C.",
+)
+@click.option(
+    "--workpiece-temperature",
+    type=click.FloatRange(-273.15, 1000.0),
+    metavar="T",
+    help="Temperature in °C at which that part is machined.",
+)
 @click.option("--scenario", type=PATH, metavar="FILE", help="Scenario: header ([report]) and measured lines.")
 @click.option("--run", type=PATH, metavar="FILE", help="Run: temperatures, and residuals of a CSV calibration.")
 @click.option("--uncertainty", type=PATH, metavar="FILE", help="Uncertainty result (.nc): the budget.")
@@ -76,6 +89,8 @@ def report(
     calibrations: tuple[Path, ...],
     output: OutputFile | None,
     functional_point: OutputFile | None,
+    workpiece_expansion: float | None,
+    workpiece_temperature: float | None,
     scenario: Path | None,
     run: Path | None,
     uncertainty: Path | None,
@@ -94,12 +109,15 @@ def report(
     volume in three dimensions, residuals, set-up and provenance. With an earlier calibration BEFORE
     it shows before and after. Calibrations in CSV have no residuals; --scenario and --run give them.
     """
+    from stepdiag.calibration.temperature_text import workpiece_rows
     from stepdiag.io.data_files import read_calibration
     from stepdiag.io.whole_files import check_input, write_whole
     from stepdiag.report.calibration import calibration_report, functional_point_csv
 
     if len(calibrations) > 2:
         raise InvalidArgument(f"expected one calibration, or an earlier one before it, got {len(calibrations)}")
+    if (workpiece_expansion is None) != (workpiece_temperature is None):
+        raise InvalidArgument("`workpiece_expansion`, `workpiece_temperature`: expected both, got one")
     calibration = calibrations[-1]
     path = None if functional_point is None else functional_point.claim(*calibrations)
     before = None
@@ -126,6 +144,9 @@ def report(
     else:
         for line in calibration_report(read):
             say(line)
+        if workpiece_expansion is not None and workpiece_temperature is not None:
+            for line in workpiece_rows(read, workpiece_expansion, workpiece_temperature):
+                say(line)
     if before is not None:
         for warning in fit_warnings(calibrations[0], before.fit):
             tell("warning", warning)
