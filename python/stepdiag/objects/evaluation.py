@@ -190,7 +190,7 @@ class AngleControl(_Control):
     told_from_urad: float | None
 
 
-class Expansion(TypedDict):
+class FoundExpansion(TypedDict):
     """A coefficient of the scales' expansion, which was an unknown."""
 
     axes: list[str]
@@ -210,7 +210,7 @@ class AdjustmentPart(TypedDict):
     chi_square_probability: float | None
     iterations: int
     setup: list[SetupLength | SetupOffset | SetupAngle | SetupShare | SetupRate]
-    expansion: list[Expansion]
+    expansion: list[FoundExpansion]
     faults: list[Faults]
     combinations: list[SlopeCombination | SetupCombination]
     """What is known of unknowns that are not determined one by one."""
@@ -310,7 +310,7 @@ def evaluated_files(scenario: Path, run: Path, calibration: Path) -> EvaluatedFi
     return {"scenario": str(scenario), "run": str(run), "calibration": str(calibration)}
 
 
-def _expansion(found: ExpansionEstimate) -> Expansion:
+def _expansion(found: ExpansionEstimate) -> FoundExpansion:
     return {
         "axes": ["XYZ"[axis] for axis in found.axes],
         "value_um_per_m_k": in_unit("um_per_m_k", found.value),
