@@ -28,9 +28,17 @@ void add_sensor_effects(const std::vector<Eigen::VectorXd>& effects, const Adjus
     Calibration& calibration = result.calibration;
     for (const Eigen::VectorXd& effect : effects) {
         const auto add = [](double& uncertainty, double more) { uncertainty = std::hypot(uncertainty, more); };
-        for (int i = 0; i < function_count; ++i)
-            for (std::size_t k = 0; forms.functions[i] && k < forms.functions[i]->value.size(); ++k)
-                add(calibration.functions[i]->standard_uncertainty[k], forms.functions[i]->value[k].value(effect));
+        for (int i = 0; i < function_count; ++i) {
+            if (!forms.functions[i]) continue;
+            auto& reversal = calibration.reversal[i];
+            for (std::size_t k = 0; k < forms.functions[i]->value.size(); ++k) {
+                const double change = forms.functions[i]->value[k].value(effect);
+                add(calibration.functions[i]->standard_uncertainty[k], change);
+                for (std::size_t r = 0; reversal && r < reversal->position.size(); ++r)  // both directions alike
+                    if (reversal->position[r] == forms.functions[i]->position[k])
+                        add(reversal->negative_standard_uncertainty[r], change);
+            }
+        }
         for (int s = 0; s < squareness_count; ++s)
             if (forms.squarenesses[s])
                 add(calibration.squarenesses[s]->standard_uncertainty, forms.squarenesses[s]->value(effect));
