@@ -128,9 +128,12 @@ void bind_options(py::module_& m) {
         "and not corrected. slips: \"report\" rejects a run with a slip, \"estimate\" makes it an unknown and accepts "
         "that. "
         "scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and "
-        "the fit is doubtful at best. plausible: what a machine can be. expansion: of the scales; coefficients that are "
-        "uncertain are unknowns. reliability: also which faults the readings control. search_faults: False: it is known "
-        "already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not reached "
+        "the fit is doubtful at best. plausible: what a machine can be. expansion: of the scales; coefficients that "
+        "are "
+        "uncertain are unknowns. reliability: also which faults the readings control. search_faults: False: it is "
+        "known "
+        "already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not "
+        "reached "
         "soon, it counts as not found.")
         .def(py::init([](const ReadingUncertainty& uncertainty, const Priors& setup,
                          const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,

@@ -78,10 +78,9 @@ struct Heads {
 // Rows in the order in which they are read (plan/run_order.hpp). The drift of distances counts from the first reading
 // of each forward run. Lost readings are empty fields. Throws InvalidArgument for a head that makes no sense, a mirror
 // smaller than the plan's smallest, misalignments of 0.1 rad or more or of lines that are not in the plan, drifts or
-// temperatures that change
-// without seconds_per_reading, a gain of a traced multi_beam head, heads of lines that are not in the plan, heads that
-// do not give the same signals, negative noise, an index below 1. Throws ReplayMismatch where a traced head's replay
-// and its trace differ.
+// temperatures that change without seconds_per_reading, a gain of a traced multi_beam head, heads of lines that are not
+// in the plan, heads that do not give the same signals, negative noise, an index below 1. Throws ReplayMismatch where a
+// traced head's replay and its trace differ.
 Measurement simulate(const Machine& machine, const Plan& plan, const Heads& heads,
                      const SimulationOptions& options = {}, ReplayCount* count = nullptr);
 // Throws InvalidArgument as simulate() does.
