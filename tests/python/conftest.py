@@ -3,12 +3,15 @@
 import os
 from pathlib import Path
 
+import hypothesis
 import one_thread  # noqa: F401 (for what its import does)
 import pytest
 from small_scenario import SCENARIO
 
 from stepdiag.cli import main
 
+hypothesis.settings.register_profile("untimed", deadline=None)  # machines may be busy
+hypothesis.settings.load_profile("untimed")
 os.environ["SOURCE_DATE_EPOCH"] = "1795252980"  # files carry dates, and are compared byte by byte
 
 

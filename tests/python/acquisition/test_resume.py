@@ -191,7 +191,7 @@ def test_wherever_a_power_cut_falls_the_readings_before_it_are_there(whole: Path
     complete = measurement_of(read_raw(raw))
     cut = raw.with_name("cut.raw.jsonl")
 
-    @settings(max_examples=60, deadline=None)
+    @settings(max_examples=60)
     @given(end=st.integers(0, len(data)))
     def check(end: int) -> None:
         cut.write_bytes(data[:end])
@@ -215,7 +215,7 @@ def test_damaged_raw_files_are_refused_with_their_line(whole: Path) -> None:
     data = raw.read_bytes()
     bad = raw.with_name("bad.raw.jsonl")
 
-    @settings(max_examples=150, deadline=None)
+    @settings(max_examples=150)
     @given(at=st.integers(0, len(data) - 1), byte=st.integers(0, 255))
     def check(at: int, byte: int) -> None:
         bad.write_bytes(data[:at] + bytes([byte]) + data[at + 1 :])

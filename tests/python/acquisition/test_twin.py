@@ -219,7 +219,7 @@ ANY = st.recursive(
 )
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     name=st.sampled_from(["moveTo", "setUp", "visit", "state"]) | st.text(max_size=5),
     params=st.lists(ANY, max_size=4) | ANY,

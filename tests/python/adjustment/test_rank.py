@@ -158,7 +158,7 @@ def test_lost_points_lines_and_nodes(lines: list[str], gone: tuple[tuple[str, in
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(data=st.data())
 def test_any_plan_with_any_losses_claims_what_the_rank_allows(data: st.DataObject) -> None:
     pool = data.draw(st.sampled_from([ALL_LINES, DIAGONALS, [*FACES, *DIAGONALS]]))

@@ -42,7 +42,7 @@ def spoil(run: sd.Measurement, data: st.DataObject) -> sd.Measurement:
 
 
 @pytest.mark.parametrize("method", ["enhanced", "conventional"])
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=250)
 @given(setup=setups(), seed=st.integers(0, 10**6), data=st.data())
 def test_what_is_claimed_is_true_and_what_is_not_is_said(
     method: str, setup: Setup, seed: int, data: st.DataObject

@@ -106,7 +106,7 @@ def test_few_lines_determine_what_they_see_and_no_more(lines: list[str], some: s
     assert_clean(calibration, truth)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.data())
 def test_four_lines_bridge_a_lost_reading_anywhere(data: st.DataObject) -> None:
     setup = Setup(steps=8)
@@ -126,7 +126,7 @@ def test_four_lines_bridge_a_lost_reading_anywhere(data: st.DataObject) -> None:
     assert_clean(calibration, truth)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @example({("ppp", 0), ("pnp", 0)})  # once gave EYX with angles of the laser that nobody knew
 @given(st.sets(st.tuples(st.sampled_from(DIAGONALS + SCALE_LINES), st.integers(0, 24)), max_size=40))
 def test_whatever_is_lost_nothing_is_invented(places: set[tuple[str, int]]) -> None:

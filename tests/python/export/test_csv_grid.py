@@ -44,7 +44,7 @@ def test_one_error_is_found_where_it_is(tmp_path: Path) -> None:
     assert grid.columns["ez_um"] == pytest.approx([0.0] * 4 + [8.0] * 4, abs=MICRO)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 1000), nodes=st.tuples(*[st.integers(2, 15)] * 3), chain=st.sampled_from(CHAINS))
 def test_interpolation_between_points_keeps_the_loss_that_is_said(
     tmp_path_factory: pytest.TempPathFactory, seed: int, nodes: tuple[int, int, int], chain: str

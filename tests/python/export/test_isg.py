@@ -67,7 +67,7 @@ def test_straightness_of_an_axis_that_carries_the_workpiece_is_that_of_the_funct
         assert [file.constants[f"P0{axis}"] for axis in "XYZ"] == list(TOOL)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(seed=st.integers(0, 1000), rows=st.integers(20, 60))
 def test_resampling_keeps_the_rows_and_the_loss_that_is_said(
     tmp_path_factory: pytest.TempPathFactory, seed: int, rows: int

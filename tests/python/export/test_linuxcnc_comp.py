@@ -104,7 +104,7 @@ def test_rows_are_in_the_controllers_coordinates(tmp_path: Path) -> None:
         assert b.forward == pytest.approx(a.forward + shift, abs=2 * WRITTEN)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(count=st.integers(250, 500), seed=st.integers(0, 10))
 def test_tables_with_many_uneven_nodes_fit_into_256_rows_with_the_loss_that_is_said(
     tmp_path_factory: pytest.TempPathFactory, count: int, seed: int

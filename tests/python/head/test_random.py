@@ -32,7 +32,7 @@ tilts = st.tuples(symmetric(2e-3), symmetric(2e-3))
 distances = st.floats(200.0, 1000.0)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(glass, glass, triples(0.1), triples(0.3), symmetric(0.01), triples(1e-3), tilts, distances)
 def test_beams_through_wedge_and_plate_hold_against_forty_digits(
     index: float,
@@ -82,7 +82,7 @@ def test_beams_through_wedge_and_plate_hold_against_forty_digits(
 
 
 @pytest.mark.parametrize("shipped", SHIPPED, ids=lambda shipped: shipped.file)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32), tilts, distances)
 def test_shipped_heads_far_out_of_place_hold_against_forty_digits(
     shipped: Shipped, seed: int, tilt: tuple[float, float], distance: float

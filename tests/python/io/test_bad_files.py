@@ -161,7 +161,7 @@ def test_file_without_end_is_refused(name: str) -> None:
 
 
 @pytest.mark.parametrize("reader", READERS)
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(content=st.binary(max_size=400))
 def test_random_bytes_are_read_or_refused(tmp_path: Path, reader: Reader, content: bytes) -> None:
     path = tmp_path / "random.csv"
@@ -197,7 +197,7 @@ def sample(kind: str) -> str:
 
 
 @pytest.mark.parametrize("kind", ["measurement", "error_map", "calibration"])
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_spoiled_files_are_read_whole_or_refused(tmp_path: Path, kind: str, data: st.DataObject) -> None:
     path = tmp_path / "spoiled.csv"

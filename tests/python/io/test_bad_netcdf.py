@@ -252,9 +252,7 @@ def test_values_that_were_never_written_are_lost_readings(folder: Path, tmp_path
 
 
 @pytest.mark.parametrize("kind", READERS)
-@settings(
-    max_examples=100, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=100, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_damaged_files_are_refused_or_read_as_written(
     folder: Path, tmp_path: Path, kind: str, data: st.DataObject

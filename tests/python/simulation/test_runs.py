@@ -45,7 +45,7 @@ def whole_runs(draw: st.DrawFn) -> reference.Scenario:
     )
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(whole_runs(), st.integers(0, 2**32), st.integers(0, 18))
 def test_whole_runs_read_the_closed_form(scenario: reference.Scenario, seed: int, directed: int) -> None:
     errors = with_reversal(errors_of(scenario, seed, 7), errors_of(scenario, seed + 1, 5), directed)
@@ -64,7 +64,7 @@ def test_whole_runs_read_the_closed_form(scenario: reference.Scenario, seed: int
         assert np.array_equal(run.channels["time"], [row["time"] for row in rows])
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(whole_runs(), st.integers(0, 2**32), st.integers(0, 10**6))
 def test_whole_runs_hold_against_forty_digits(scenario: reference.Scenario, seed: int, pick: int) -> None:
     errors = with_reversal(errors_of(scenario, seed, 7), errors_of(scenario, seed + 1, 5), 9)
@@ -109,7 +109,7 @@ def test_file_of_both_directions_is_the_machine_that_wrote_it(tmp_path: Path) ->
             assert np.max(np.abs(again.function(name, positions, sign) - expected)) <= 1e-17  # of 0.02 mm at most
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     scenarios(), st.integers(0, 2**32), st.tuples(*[st.floats(-0.2, 1.2)] * 3), st.tuples(*[st.sampled_from("+-")] * 3)
 )

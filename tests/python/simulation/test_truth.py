@@ -54,7 +54,7 @@ def test_reference_reproduces_the_runs_too(case: str) -> None:
             assert value is None or abs(value - row[channel]) <= LIMIT[channel] / 2
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(scenarios(), st.integers(0, 2**32), st.integers(2, 20), st.floats(1.0, 1.5))
 def test_traced_readings_are_the_closed_form(
     scenario: reference.Scenario, seed: int, intervals: int, index: float
@@ -67,7 +67,7 @@ def test_traced_readings_are_the_closed_form(
             assert abs(run.channels[channel][i] - row[channel]) <= LIMIT[channel]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(scenarios(("psd", "multi_beam")), st.integers(0, 2**32))
 def test_raw_layouts_read_the_closed_form(scenario: reference.Scenario, seed: int) -> None:
     errors = errors_of(scenario, seed, 7)
@@ -77,7 +77,7 @@ def test_raw_layouts_read_the_closed_form(scenario: reference.Scenario, seed: in
             assert abs(run.channels[channel][i] - row[channel]) <= LIMIT[channel]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(warm(("ideal", "psd", "multi_beam")), st.integers(0, 2**32))
 def test_scales_that_expand_read_the_closed_form(scenario: reference.Scenario, seed: int) -> None:
     errors = errors_of(scenario, seed, 7)
@@ -88,7 +88,7 @@ def test_scales_that_expand_read_the_closed_form(scenario: reference.Scenario, s
             assert abs(run.channels[channel][i] - row[channel]) <= limit
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(scenarios(("ideal", "psd", "multi_beam")), st.integers(0, 2**32), st.integers(0, 10**6))
 def test_readings_hold_against_forty_digits(scenario: reference.Scenario, seed: int, pick: int) -> None:
     errors = errors_of(scenario, seed, 7)
@@ -102,7 +102,7 @@ def test_readings_hold_against_forty_digits(scenario: reference.Scenario, seed: 
             assert abs(float(run.channels[channel][i] - value)) <= LIMIT[channel]
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(scenarios(), st.integers(0, 2**32), st.tuples(*[st.floats(-0.2, 1.2)] * 3))
 def test_pose_holds_against_forty_digits(
     scenario: reference.Scenario, seed: int, share: tuple[float, float, float]
@@ -127,7 +127,7 @@ def test_frame_of_every_line_is_the_one_built_from_cross_products(
     assert np.max(np.abs(frame - reference.frame(line, volume))) <= 5e-16  # a few roundings below 1
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(scenarios())
 def test_plan_visits_the_points_of_the_conventions(scenario: reference.Scenario) -> None:
     plan = plan_of(scenario)
