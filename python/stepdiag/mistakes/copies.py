@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from stepdiag import _core
 from stepdiag.scenario.known import Known
+from stepdiag.scenario.planned_readings import RECORDS
 
 Rows = npt.NDArray[np.int_]
 Values = npt.NDArray[np.float64]
@@ -147,9 +148,9 @@ def moved_rows(source: Rows) -> Change:
         run = copy.run
 
         def taken(fields: Fields) -> dict[str, Values]:
-            # Time stays: it belongs to the order of the rows.
+            # Times, temperatures and air stay: they belong to the order of the rows.
             return {
-                name: np.where(source >= 0, values[source], np.nan) if name != "time" else values
+                name: np.where(source >= 0, values[source], np.nan) if name not in RECORDS else values
                 for name, values in fields.items()
             }
 
