@@ -124,6 +124,10 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
         result.chi_square_probability = chi_square_probability(result.weighted_square_sum, result.degrees_of_freedom);
     const auto patterns = residual_patterns(result, measurement, solver.equations(), solver.factor());
     result.verdict = judge(result, patterns, prior_scatter(problem, x, inverse));
+    if (!solution->is_minimum()) {
+        const double factor = std::sqrt(result.variance_factor());
+        result.verdict = {Fit::rejected, {{FitFinding::noise_factor, factor, largest_noise_factor}}};
+    }
     for (const FitReason& reason : coefficients_in_place_of_faults(of_all, options, result)) {
         result.verdict.fit = Fit::rejected;
         result.verdict.reasons.push_back(reason);

@@ -66,11 +66,11 @@ FaultSearch::FaultSearch(const AdjustmentProblem& problem, const AdjustmentOptio
 FaultSearch::SolutionPointer FaultSearch::run() {
     const bool corrects = options_.outlier_probability > 0.0;
     // A second's worth, where nobody will use what comes out.
-    constexpr int least_soon = 40, work = 40'000;
+    constexpr int least_soon = 40, work = 40'000, rough = 10;
     const int soon = std::clamp(work / problem_.size(), least_soon, GaussNewton::usual_most_steps);
     SolutionPointer plain = solution_of(handled()), solution;
-    if (!plain->solve_from_zero(options_.search_faults ? GaussNewton::usual_most_steps : soon)) plain.reset();
-    if (!options_.search_faults) return plain;
+    if (!options_.search_faults) return plain->solve_from_zero(soon) || plain->go_from_zero(rough) ? plain : nullptr;
+    if (!plain->solve_from_zero()) plain.reset();
     if (corrects && (!plain || plain->scatter() > gross_scatter)) solution = without_gross(plain);
     if (!solution) solution = plain;
     if (!solution) return nullptr;

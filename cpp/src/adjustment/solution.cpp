@@ -1,5 +1,6 @@
 #include "adjustment/solution.hpp"
 
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -25,6 +26,16 @@ bool Solution::solve_from_zero(int most_steps) {
     x_ = x;
     look();
     return true;
+}
+
+bool Solution::go_from_zero(int most_steps) {
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(problem_.size());
+    is_minimum_ = solver_.try_solve(x, most_steps).has_value();
+    if (!x.allFinite()) return false;
+    iterations_ = most_steps;
+    x_ = x;
+    look();
+    return std::isfinite(square_sum_);
 }
 
 bool Solution::solve_from(const Eigen::VectorXd& start) {

@@ -27,6 +27,9 @@ public:
     // Each says whether the minimum was reached; if not, x stays.
     bool solve_from_zero(int most_steps = GaussNewton::usual_most_steps);
     bool solve_from(const Eigen::VectorXd& start);  // which is near
+    // To where so many steps from zero lead, where that is no minimum; false where it is no number.
+    bool go_from_zero(int most_steps);
+    bool is_minimum() const { return is_minimum_; }
     void solve_again();  // for another smoothness; throws InvalidArgument where it is not reached
     // Equations, factor and inverse at any x, with what is open known to be there.
     void linearise(const Eigen::VectorXd& x);
@@ -45,6 +48,7 @@ private:
     Eigen::VectorXd x_;
     BorderedBand inverse_;
     int iterations_ = 0;
+    bool is_minimum_ = true;
     double square_sum_ = 0.0;
 };
 

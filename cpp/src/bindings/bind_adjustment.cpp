@@ -134,7 +134,7 @@ void bind_options(py::module_& m) {
         "known "
         "already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not "
         "reached "
-        "soon, it counts as not found.")
+        "soon, values are those that were, and rejected.")
         .def(py::init([](const ReadingUncertainty& uncertainty, const Priors& setup,
                          const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
                          bool rotations, const std::optional<Smoothness>& smoothness, double outlier_probability,

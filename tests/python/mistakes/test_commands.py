@@ -36,6 +36,20 @@ def test_evaluate_names_the_mistake_of_a_rejected_fit(folder: Path, capsys: pyte
     assert "to change: turn the head, or in the run multiply alpha_urad, beta_urad by -1" in said
 
 
+def test_where_the_adjustment_does_not_settle_the_calibration_is_rejected(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Tilts of 50 steps that contradict distances: no machine is found in a second."""
+    large = STATED.replace("_mm = 80.0", "_mm = 800.0").replace("_mm = 60.0", "_mm = 600.0")
+    Path("scenario.toml").write_text(large.replace("_mm = 50.0", "_mm = 500.0").replace("steps = 5", "steps = 50"))
+    write(-1.0, "alpha")
+    assert main(["evaluate", "scenario.toml", "run.csv", "-o", "calibration.csv"]) == 3
+    said = capsys.readouterr().out
+    assert said.startswith("fit: REJECTED")
+    assert "mistake: alpha has the wrong sign on all lines" in said
+    assert sd.read_calibration("calibration.csv").fit == "rejected"
+
+
 def test_evaluate_has_it_as_an_object(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(2.0, "alpha", "beta")
     assert main(["evaluate", "scenario.toml", "run.csv", "-o", "calibration.csv", "--json"]) == 0  # doubtful

@@ -72,7 +72,7 @@ struct AdjustmentOptions {
     std::optional<KnownExpansion> expansion = {};
     bool reliability = false;  // also say which faults the readings control: Adjustment::reliability
     // false: where it is known already what is wrong with the run as a whole. No faults of readings are looked for, and
-    // where the minimum is not reached soon, it counts as not found.
+    // where the minimum is not reached soon, values are those that were, and rejected.
     bool search_faults = true;
 };
 
