@@ -1631,7 +1631,7 @@ class FitReason:
         ...
 class Verdict:
     """
-    Whether the readings of an adjustment agree with each other, with their uncertainties and with the priors. It does not see what the parameters absorb: a wrong wavelength, chain or tool.
+    Whether the readings of an adjustment agree with each other, with their uncertainties and with the priors. It does not see what the parameters absorb: a wrong wavelength, tool or place of b in the chain.
     """
     def __repr__(self) -> str:
         ...

@@ -280,7 +280,8 @@ void bind_result(py::module_& m) {
     py::class_<Verdict>(
         m, "Verdict",
         "Whether the readings of an adjustment agree with each other, with their uncertainties and with "
-        "the priors. It does not see what the parameters absorb: a wrong wavelength, chain or tool.")
+        "the priors. It does not see what the parameters absorb: a wrong wavelength, tool or place of b in the "
+        "chain.")
         .def_property_readonly(
             "fit", [](const Verdict& v) { return name(v.fit); },
             "\"accepted\", \"doubtful\", \"rejected\" or \"unchecked\".")

@@ -192,7 +192,7 @@ struct FitReason {
 };
 
 // Whether the readings of an adjustment agree with each other, with their uncertainties and with the priors. It does
-// not see what the parameters absorb: a wrong wavelength, chain or tool.
+// not see what the parameters absorb: a wrong wavelength, tool or place of b in the chain.
 struct Verdict {
     Fit fit = Fit::unchecked;
     std::vector<FitReason> reasons = {};
