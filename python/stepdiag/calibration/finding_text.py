@@ -97,10 +97,7 @@ NOISE_ALONE: Final = {
     "neither in them nor corrected",
 }
 # Of what is accepted.
-NOT_SEEN: Final = (
-    "note: no fit shows a wrong wavelength, temperature, tool offset or place of b in the chain: the parameters absorb "
-    "them"
-)
+NOT_SEEN: Final = "note: no fit shows a wrong wavelength, temperature, tool offset or place of b in the chain"
 
 
 def undetermined_text(finding: Undetermined) -> str:

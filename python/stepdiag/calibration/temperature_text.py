@@ -26,10 +26,9 @@ def temperature_text(calibration: Calibration) -> str:
         return (
             f"positioning errors are as found, with the scales of X, Y, Z at {', '.join(f'{t:.1f}' for t in found)} °C"
         )
-    return (
-        "no temperature was recorded, positioning errors are as found; a scale of steel grows by "
-        f"{STEEL * max(calibration.volume) * 1e-3:.2g} µm a kelvin on {max(calibration.volume):g} mm"
-    )
+    edge = max(calibration.volume)
+    grows = f"{STEEL * edge * 1e-3:.2g} µm a kelvin on {edge:g} mm"
+    return f"no temperature was recorded; errors are as found (steel: {grows})"
 
 
 def temperature_warnings(calibration: Calibration, measurement: Measurement) -> list[str]:

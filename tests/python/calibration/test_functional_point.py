@@ -159,8 +159,9 @@ def test_report_of_a_calibration_that_knows_little(tmp_path: Path, capsys: pytes
     assert said[0] == "fit: not known"
     assert said[1].startswith("method: not known")
     assert said[2] == "made from: not known"
-    assert [line.split()[0] for line in said[5:]] == ["positioning", "signs:", "reference:"]
-    assert said[5].endswith("not known")
+    assert said[4].startswith("temperature: no temperature was recorded")
+    assert [line.split()[0] for line in said[6:]] == ["positioning", "signs:", "reference:"]
+    assert said[6].endswith("not known")
 
 
 def test_report_tells_shapes_from_errors_and_what_reversal_there_is(
