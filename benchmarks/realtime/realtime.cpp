@@ -55,23 +55,29 @@ std::string write_table(const std::string& path) {
     stepdiag::ParameterTable table = stepdiag::make_random_error_map(volume, {}).table();
     table.header = {
         {"chain", "[w X' b Y Z t]"}, {"volume_mm", stepdiag::format_lengths(volume)}, {"tool_mm", "0.0 0.0 120.0"}};
+    table.header["temperature_reference_c"] = "20.0";
+    table.header["expansion_per_k"] = "1.15e-05 1.15e-05 8e-06";
     stepdiag::write_parameter_table(table, path);
     return path;
 }
 
-// Makes `count` calls, a third of each kind. This function must not touch memory for the first time.
+// Makes `count` calls, a third of each kind, every other pair with temperatures. This function must not touch memory
+// for the first time.
 template <bool timed>
 void call(const stepdiag_compensator* compensator, const std::vector<Position>& targets, long count,
           Findings& findings) {
-    const double tool[3] = {10.0, -20.0, 150.0};
+    const double tool[3] = {10.0, -20.0, 150.0}, warm[3] = {24.0, 31.5, 18.0};
     double error[3], orientation[3], command[3], actual[3];
     for (long i = 0; 3 * i < count; ++i) {
         const double* target = targets[std::size_t(i) % targets.size()].data();
+        const double* const temperature = i % 4 < 2 ? warm : nullptr;
         const double start = timed ? now() : 0.0;
-        unsigned status = stepdiag_command(compensator, target, i % 2 ? tool : nullptr, command);
+        unsigned status =
+            stepdiag_command_at_temperature(compensator, target, i % 2 ? tool : nullptr, temperature, command);
         const double middle = timed ? now() : 0.0;
-        status |= stepdiag_error(compensator, command, i % 2 ? tool : nullptr, error, orientation);
-        status |= stepdiag_forward(compensator, command, i % 2 ? tool : nullptr, actual);
+        status |= stepdiag_error_at_temperature(compensator, command, i % 2 ? tool : nullptr, temperature, error,
+                                                orientation);
+        status |= stepdiag_forward_at_temperature(compensator, command, i % 2 ? tool : nullptr, temperature, actual);
         const double took = timed ? std::max(middle - start, 0.5 * (now() - middle)) : 0.0;
         findings.wrong += status != 0;
         for (int a = 0; a < 3; ++a)
@@ -150,8 +156,10 @@ int main(int count, char** arguments) {
     const std::string path = write_table((count > 2 ? std::string(arguments[2]) : std::string("/tmp")) + "/realtime-" +
                                          std::to_string(getpid()) + ".csv");
     char message[300] = "";
+    stepdiag_options options = stepdiag_default_options();
+    options.temperatures[0] = 5.0, options.temperatures[1] = 40.0;
     stepdiag_compensator* compensator =
-        stepdiag_compensator_load(path.c_str(), "wX'bYZt", nullptr, message, sizeof message);
+        stepdiag_compensator_load(path.c_str(), "wX'bYZt", &options, message, sizeof message);
     unlink(path.c_str());
     if (!compensator || calls < 1) {
         std::fprintf(stderr, "realtime: %s\n", compensator ? "usage: realtime [CALLS [FOLDER]]" : message);

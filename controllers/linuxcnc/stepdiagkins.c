@@ -5,7 +5,8 @@
 //   forward   world  = forward(joints)     position of the tool if the axes are at joints
 // Both use a share s in 0..1 of the correction and a tool, which are the same in both directions at any time:
 //   joints = world + s (command(world) - world)
-// s and tool change only by ramps, in one small step per servo cycle. See docs/linuxcnc.md.
+// s and tool change only by ramps, in one small step per servo cycle; so do the temperatures of the scales, if the
+// argument `temperatures` lets the pins state them, at a limited rate. See docs/linuxcnc.md.
 //
 // LinuxCNC calls both directions from its servo thread only. It calls the inverse also for targets that it only checks.
 // As soon as all joints are homed, it calls the forward once per cycle with the joints' feedback (in joint mode a
@@ -40,6 +41,10 @@ static char* approach = "mean";
 RTAPI_MP_STRING(approach, "of a table with reversal: mean, positive or negative");
 static char* accept_rejected = "0";
 RTAPI_MP_STRING(accept_rejected, "1: takes a calibration whose fit was rejected");
+static char* temperatures = "";
+RTAPI_MP_STRING(temperatures, "lowest and highest temperature of the scales, degrees Celsius: 10,35; none: no pins");
+static char* temperature_rate = "0.1";
+RTAPI_MP_STRING(temperature_rate, "fastest change of the temperatures in force, K/s");
 static char* ramp = "1";
 RTAPI_MP_STRING(ramp, "duration of a change of enable or tool, s");
 static char* coordinates = "XYZ";
@@ -57,8 +62,9 @@ typedef struct {
 } setting;
 
 typedef struct {
-    hal_bit_t *enable, *use_tool, *inside;
+    hal_bit_t *enable, *use_tool, *inside, *temperature_enable, *temperature_fault;
     hal_float_t *tool_offset[3], *error[3], *correction[3], *tool[3], *applied;
+    hal_float_t *temperature[3], *temperature_applied[3];  // with the argument `temperatures` only
     hal_u32_t *status, *refusals, *table_id_low, *table_id_high;
 } pins;
 
@@ -71,6 +77,12 @@ static setting before, now, wanted;  // a ramp changes `now` from `before` to `w
 static double own_tool[3];           // tool of the calibration
 static long long begun;
 static int ramping, started;
+
+// Temperatures of the scales, degrees Celsius.
+static int takes_temperatures;
+static double coldest, warmest, reference, kelvin_per_ns;
+static double in_force[3];  // the reference: as the calibration says, the scales add nothing
+static long long warmed;    // time of the last change
 
 // --- current setting ---
 // Reads the tool from the pins; returns 0 if it is not a valid tool. The sign changes, because LinuxCNC adds
@@ -86,6 +98,39 @@ static int tool_of_pins(double tool[3]) {
 
 static int same(const setting* a, const setting* b) { return memcmp(a, b, sizeof *a) == 0; }
 
+// Moves the temperatures in force towards those of the pins or, without temperature-enable, towards the reference. The
+// rate is limited: neither a sensor that jumps nor the switch makes the joints jump. A sensor that is not in the range,
+// or not a number, holds its axis at the temperature in force. Returns flags for the status.
+static unsigned advance_temperatures(long long time) {
+    static const double longest_ns = 1e8;  // a pause, such as an axis that is homed again, does not add up
+    unsigned flags = 0;
+    if (!takes_temperatures) return 0;
+    const double step = kelvin_per_ns * fmin((double)(time - warmed), longest_ns);
+    warmed = time;
+    for (int i = 0; i < 3; ++i) {
+        double asked = reference;
+        if (*pin->temperature_enable) {
+            asked = *pin->temperature[i];
+            if (!(coldest <= asked && asked <= warmest)) {
+                asked = in_force[i];
+                flags = STEPDIAG_TEMPERATURE;
+            }
+        }
+        const double change = asked - in_force[i];
+        if (!started || fabs(change) <= step) in_force[i] = asked;
+        else in_force[i] += copysign(step, change);
+        *pin->temperature_applied[i] = in_force[i];
+    }
+    *pin->temperature_fault = flags != 0;
+    return flags;
+}
+
+// NULL where all scales are at the reference: the calibration as it is.
+static const double* temperature_in_force(void) {
+    const int cold = in_force[0] == reference && in_force[1] == reference && in_force[2] == reference;
+    return takes_temperatures && !cold ? in_force : NULL;
+}
+
 // Makes one step of the ramp 3u² - 2u³, which has no jump of speed at its ends. A ramp always finishes before the pins
 // are read again. Returns flags for the status.
 static unsigned advance(void) {
@@ -97,9 +142,10 @@ static unsigned advance(void) {
         memcpy(asked.tool, now.tool, sizeof asked.tool);
         flags = TOOL_IGNORED;
     }
+    const long long time = rtapi_get_time();
+    flags |= advance_temperatures(time);
     if (!started) now = asked;  // first cycle after homing: kinematics do not move the machine yet
     started = 1;
-    const long long time = rtapi_get_time();
     if (!ramping && !same(&asked, &now)) {
         before = now;
         wanted = asked;
@@ -124,7 +170,8 @@ static unsigned advance(void) {
 
 // --- both directions, mm ---
 static unsigned joints_of(const double world[3], double joints[3]) {
-    const unsigned status = stepdiag_command(compensator, world, now.tool, joints);
+    const unsigned status =
+        stepdiag_command_at_temperature(compensator, world, now.tool, temperature_in_force(), joints);
     if (now.share < 1.0)
         for (int i = 0; i < 3; ++i) joints[i] = world[i] + now.share * (joints[i] - world[i]);
     return status;
@@ -135,16 +182,17 @@ static unsigned joints_of(const double world[3], double joints[3]) {
 // edge of the volume, the forward of the full correction may be refused although the world is inside.
 static unsigned world_of(const double joints[3], double world[3]) {
     enum { TURNS = 16 };
-    unsigned status = stepdiag_forward(compensator, joints, now.tool, world);
+    const double* const temperature = temperature_in_force();
+    unsigned status = stepdiag_forward_at_temperature(compensator, joints, now.tool, temperature, world);
     if (now.share == 1.0) return status;
     if (now.share == 0.0) {
         memcpy(world, joints, 3 * sizeof *world);
-        return stepdiag_error(compensator, joints, now.tool, NULL, NULL);
+        return stepdiag_error_at_temperature(compensator, joints, now.tool, temperature, NULL, NULL);
     }
     for (int i = 0; i < 3; ++i) world[i] = joints[i] + now.share * (world[i] - joints[i]);
     for (int turn = 0; turn < TURNS; ++turn) {
         double command[3], change = 0.0;
-        const unsigned inverse = stepdiag_command(compensator, world, now.tool, command);
+        const unsigned inverse = stepdiag_command_at_temperature(compensator, world, now.tool, temperature, command);
         if (inverse & STEPDIAG_REFUSED) break;
         status = inverse;
         for (int i = 0; i < 3; ++i) {
@@ -159,7 +207,7 @@ static unsigned world_of(const double joints[3], double world[3]) {
 
 static void publish(const double joints[3], const double world[3], unsigned status) {
     double error[3];
-    stepdiag_error(compensator, joints, now.tool, error, NULL);
+    stepdiag_error_at_temperature(compensator, joints, now.tool, temperature_in_force(), error, NULL);
     for (int i = 0; i < 3; ++i) {
         *pin->error[i] = error[i] / mm_per_unit;
         *pin->correction[i] = (joints[i] - world[i]) / mm_per_unit;
@@ -238,6 +286,14 @@ static int make_pins(void) {
         bad |= hal_pin_float_newf(HAL_OUT, &pin->error[i], component, "stepdiagkins.error-%c", axis[i]);
         bad |= hal_pin_float_newf(HAL_OUT, &pin->correction[i], component, "stepdiagkins.correction-%c", axis[i]);
     }
+    if (!takes_temperatures) return bad ? -1 : 0;
+    bad |= hal_pin_bit_newf(HAL_IN, &pin->temperature_enable, component, "stepdiagkins.temperature-enable");
+    bad |= hal_pin_bit_newf(HAL_OUT, &pin->temperature_fault, component, "stepdiagkins.temperature-fault");
+    for (int i = 0; i < 3; ++i) {
+        bad |= hal_pin_float_newf(HAL_IN, &pin->temperature[i], component, "stepdiagkins.temperature-%c", axis[i]);
+        bad |= hal_pin_float_newf(HAL_OUT, &pin->temperature_applied[i], component,
+                                  "stepdiagkins.temperature-applied-%c", axis[i]);
+    }
     return bad ? -1 : 0;
 }
 
@@ -261,6 +317,7 @@ int rtapi_app_main(void) {
     *pin->table_id_high = (hal_u32_t)(id >> 32);
     memcpy(now.tool, own_tool, sizeof now.tool);
     now.share = 1.0;
+    for (int i = 0; i < 3; ++i) in_force[i] = reference;
     rtapi_print("stepdiagkins: table %s, id %08x%08x, forward of inverse within %.0e mm\n", table, (unsigned)(id >> 32),
                 (unsigned)(id & 0xffffffffu), stepdiag_inverse_bound(compensator));
     hal_ready(component);

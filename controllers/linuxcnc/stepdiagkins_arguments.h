@@ -6,14 +6,15 @@
 
 #define COMPLAIN(...) rtapi_print_msg(RTAPI_MSG_ERR, "stepdiagkins: " __VA_ARGS__)
 
-// Reads `count` numbers separated by commas: "1.5", or "0,0,-200" for count = 3.
+// Reads `count` numbers separated by commas: "1.5", "10,35" for count = 2, or "0,0,-200" for count = 3.
 static int read_numbers(const char* name, const char* text, double* values, int count) {
     const char* rest = text;
     for (int i = 0; i < count; ++i) {
         char* end;
         values[i] = strtod(rest, &end);
         if (end == rest || *end != (i + 1 < count ? ',' : '\0') || !isfinite(values[i])) {
-            COMPLAIN("%s: expected %s, got \"%s\"\n", name, count == 1 ? "a number" : "three numbers x,y,z", text);
+            static const char* const expected[] = {"a number", "two numbers lowest,highest", "three numbers x,y,z"};
+            COMPLAIN("%s: expected %s, got \"%s\"\n", name, expected[count - 1], text);
             return -1;
         }
         rest = end + 1;
@@ -67,20 +68,30 @@ static int read_arguments(void) {
     static const char* const lengths[] = {"mm", "inch", NULL};
     static const char* const switches[] = {"0", "1", NULL};
     char spelled[64], reason[900];
-    double seconds;
+    double seconds, rate;
     int inch;
     stepdiag_options options = stepdiag_default_options();
     if (read_chain(spelled, sizeof spelled) || read_coordinates() ||
         read_numbers("origin", origin, options.origin, 3) || read_numbers("margin", margin, &options.margin, 1) ||
         read_numbers("largest_correction", largest_correction, &options.largest_correction, 1) ||
         read_numbers("largest_tool", largest_tool, &options.largest_tool, 1) ||
-        read_numbers("ramp", ramp, &seconds, 1) || read_choice("outside", outside, outsides, &options.outside) ||
+        read_numbers("ramp", ramp, &seconds, 1) || read_numbers("temperature_rate", temperature_rate, &rate, 1) ||
+        (*temperatures && read_numbers("temperatures", temperatures, options.temperatures, 2)) ||
+        read_choice("outside", outside, outsides, &options.outside) ||
         read_choice("approach", approach, approaches, &options.approach) ||
         read_choice("accept_rejected", accept_rejected, switches, &options.accept_rejected) ||
         read_choice("units", units, lengths, &inch))
         return -1;
     if (!(seconds >= 0.0 && seconds <= 60.0)) {
         COMPLAIN("ramp: expected 0 to 60 s, got \"%s\"\n", ramp);
+        return -1;
+    }
+    if (!(rate > 0.0 && rate <= 10.0)) {
+        COMPLAIN("temperature_rate: expected a number above 0 and up to 10 K/s, got \"%s\"\n", temperature_rate);
+        return -1;
+    }
+    if (*temperatures && options.temperatures[0] == 0.0 && options.temperatures[1] == 0.0) {
+        COMPLAIN("temperatures: expected the lowest below the highest, got \"%s\"\n", temperatures);
         return -1;
     }
     if (!*table) {
@@ -92,6 +103,19 @@ static int read_arguments(void) {
         COMPLAIN("%s\n", reason);
         return -1;
     }
+    takes_temperatures = *temperatures != '\0';
+    coldest = options.temperatures[0];
+    warmest = options.temperatures[1];
+    reference = takes_temperatures ? stepdiag_temperature_reference(compensator) : 0.0;
+    // Temperatures in force start and end at the reference, and pass all between it and the range.
+    if (takes_temperatures && !(coldest <= reference && reference <= warmest)) {
+        COMPLAIN("temperatures: expected a range with the calibration's reference %g in it, got \"%s\"\n", reference,
+                 temperatures);
+        stepdiag_compensator_free(compensator);
+        compensator = NULL;
+        return -1;
+    }
+    kelvin_per_ns = rate * 1e-9;
     const char* const fit = stepdiag_fit(compensator);
     if (*fit && strcmp(fit, "accepted") != 0)
         rtapi_print_msg(RTAPI_MSG_WARN, "stepdiagkins: warning: %s: fit=%s, not accepted\n", table, fit);

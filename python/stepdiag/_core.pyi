@@ -10,7 +10,7 @@ import os
 import stepdiag.io.displays
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'Machine', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'trace_beams', 'uncertain_quantities', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'trace_beams', 'uncertain_quantities', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -191,19 +191,41 @@ class PlannedPass:
     @property
     def run(self) -> int:
         ...
-class Plan:
+class CheckPoints:
     """
-    The lines measured through a volume, in single-axis steps. Lines are named by the travel signs of X, Y, Z: three of p n 0.
+    Returns to one point of each line but scale lines, which tell a drift from the machine's errors.
     """
-    largest_step_count: typing.ClassVar[int] = 2000
-    def __init__(self, volume: numpy.typing.ArrayLike, lines: collections.abc.Sequence[str], steps: typing.SupportsIndex, order: str | collections.abc.Sequence[str] = 'XYZ', scale_lines: collections.abc.Sequence[str] = []) -> None:
+    def __init__(self, every: typing.SupportsIndex = 0, at: typing.SupportsIndex = 0) -> None:
         """
-        volume: edges in mm. steps: per axis. order: in which a step moves the axes, "XYZ" ...; of several, run r goes in the order r modulo their number. Raises InvalidArgument for an unknown or doubled line, a volume without extent, steps outside 1 .. 2000.
+        every: after so many steps, each a move of every axis; 0: there are none. at: the point is that after so many steps, 0 the line's first.
         """
     def __repr__(self) -> str:
         ...
     def _repr_html_(self) -> str:
         ...
+    @property
+    def at(self) -> int:
+        ...
+    @property
+    def every(self) -> int:
+        ...
+class Plan:
+    """
+    The lines measured through a volume, in single-axis steps. Lines are named by the travel signs of X, Y, Z: three of p n 0.
+    """
+    largest_step_count: typing.ClassVar[int] = 2000
+    def __init__(self, volume: numpy.typing.ArrayLike, lines: collections.abc.Sequence[str], steps: typing.SupportsIndex, order: str | collections.abc.Sequence[str] = 'XYZ', scale_lines: collections.abc.Sequence[str] = [], *, check_points: CheckPoints = ...) -> None:
+        """
+        volume: edges in mm. steps: per axis. order: in which a step moves the axes, "XYZ" ...; of several, run r goes in the order r modulo their number. Raises InvalidArgument for an unknown or doubled line, a volume without extent, steps outside 1 .. 2000, check points that are outside 0 .. steps.
+        """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
+    def check_numbers(self, line: str) -> list[int]:
+        """
+        Numbers of the points of a line that are returns to its check point.
+        """
     def frame(self, line: str) -> numpy.typing.NDArray[numpy.float64]:
         """
         Local frame of a line in machine coordinates, (3, 3), columns local x, y, z (eq. 2 of the paper).
@@ -222,12 +244,15 @@ class Plan:
         """
     def points(self, line: str, run: typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Commanded points of a line of this plan, (n, 3), mm.
+        Commanded points of a line of this plan in the order of travel, returns to its check point included, (n, 3), mm.
         """
     def smallest_mirror(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Width and height (local x and y) of the smallest mirror, centred on the functional point, (2,), mm; a beam of finite diameter needs that much more.
         """
+    @property
+    def check_points(self) -> CheckPoints:
+        ...
     @property
     def lines(self) -> list[str]:
         ...
@@ -934,9 +959,9 @@ class ScaleTemperatures:
         ...
 class SimulationOptions:
     """
-    What simulate() takes beside machine, plan and head. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace (none: of 20 degrees Celsius for a head with a design, an index of 1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's replayed poses, traced again and compared. repeats: how often each line is measured, runs 0, 1, 2, ...; backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; seconds_per_reading: makes the channel time; scales: they expand, and their temperatures are recorded.
+    What simulate() takes beside machine, plan and head. misalignment: by line name; a line without an entry is aligned. environment: the air of the trace (none: of 20 degrees Celsius for a head with a design, an index of 1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: of a traced head's replayed poses, traced again and compared. repeats: how often each line is measured, runs 0, 1, 2, ...; backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; seconds_per_reading: makes the channel time; scales: they expand, and their temperatures are recorded; machine_drift (3,): of the functional point along the axes since the first reading, mm/s.
     """
-    def __init__(self, *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment | None = None, assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001, repeats: typing.SupportsIndex = 1, backward: bool = False, seconds_per_reading: typing.SupportsFloat | typing.SupportsIndex | None = None, scales: ScaleTemperatures | None = None) -> None:
+    def __init__(self, *, misalignment: collections.abc.Mapping[str, Misalignment] = {}, noise: Noise = ..., environment: Environment | None = None, assumed_environment: Environment | None = None, verified_share: typing.SupportsFloat | typing.SupportsIndex = 0.001, repeats: typing.SupportsIndex = 1, backward: bool = False, seconds_per_reading: typing.SupportsFloat | typing.SupportsIndex | None = None, scales: ScaleTemperatures | None = None, machine_drift: numpy.typing.ArrayLike = (0.0, 0.0, 0.0)) -> None:
         """
         Raises InvalidArgument for repeats that are no small number; simulate() checks the rest.
         """
@@ -948,6 +973,9 @@ class SimulationOptions:
         ...
     @property
     def environment(self) -> Environment | None:
+        ...
+    @property
+    def machine_drift(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
     @property
     def misalignment(self) -> dict[str, Misalignment]:
@@ -1138,7 +1166,7 @@ class Calibration:
             Of a function these are arrays (n,), of a squareness numbers without a position. Raises KeyError naming the
             parameters that there are.
         """
-    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None, provenance: collections.abc.Mapping[str, str] = {}, unseen_faults: collections.abc.Sequence[str] = [], between_nodes: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_reference: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_as_found: numpy.typing.ArrayLike | None = None) -> None:
+    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None, provenance: collections.abc.Mapping[str, str] = {}, unseen_faults: collections.abc.Sequence[str] = [], between_nodes: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_reference: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_as_found: numpy.typing.ArrayLike | None = None, expansion: numpy.typing.ArrayLike | None = None, fixed_point: numpy.typing.ArrayLike | None = None) -> None:
         """
         A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises InvalidArgument naming the parameter for what is none: nodes that do not ascend, values that are not finite, a covariance that is not one of these values.
         """
@@ -1206,6 +1234,11 @@ class Calibration:
         When it was evaluated: ISO 8601, UTC; empty where it is not known.
         """
     @property
+    def expansion(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        Coefficients of the scales of X, Y, Z (3,) by which positioning errors are referred to temperature_reference, 1/K; of an adjustment as it found them. None: as found, or not known.
+        """
+    @property
     def findings(self) -> list[Undetermined]:
         """
         What the readings do not determine, why, and what would help; files keep it in words only.
@@ -1219,6 +1252,11 @@ class Calibration:
     def fit_reasons(self) -> list[str]:
         """
         Why that verdict, a sentence each.
+        """
+    @property
+    def fixed_point(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Positions from which these scales expand (3,), mm.
         """
     @property
     def functions(self) -> dict[str, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]]:
@@ -1326,11 +1364,29 @@ class Smoothness:
     @property
     def translation(self) -> float:
         ...
+class MachineDrift:
+    """
+    A drift of the functional point along the axes that is no expansion of scales, in proportion to a record since the run's first reading: its rates are unknowns.
+    """
+    def __init__(self, standard_uncertainty: numpy.typing.ArrayLike, *, record: str = 'time') -> None:
+        """
+        standard_uncertainty (3,) of the rates along X, Y, Z about 0, mm/s, or mm/K with a temperature; 0: no drift. record: "time", or the channel of a temperature: "temperature", "temperature_x", ..., "air_temperature". adjust() checks them.
+        """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
+    @property
+    def record(self) -> str:
+        ...
+    @property
+    def standard_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
 class AdjustmentOptions:
     """
-    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of a false alarm among a thousand tests for faults; 0: they are named and not corrected. slips: "report" rejects a run with a slip, "estimate" makes it an unknown and accepts that. scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best. plausible: what a machine can be. expansion: of the scales; coefficients that are uncertain are unknowns. reliability: also which faults the readings control. search_faults: False: it is known already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not reached soon, values are those that were, and rejected.
+    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of a false alarm among a thousand tests for faults; 0: they are named and not corrected. slips: "report" rejects a run with a slip, "estimate" makes it an unknown and accepts that. scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best. plausible: what a machine can be. expansion: of the scales; coefficients that are uncertain are unknowns. machine_drift: of which the rates are unknowns. reliability: also which faults the readings control. search_faults: False: it is known already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not reached soon, values are those that were, and rejected.
     """
-    def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.00012, slips: str = 'report', scale_uncertainty: bool = False, full_covariance: bool = False, plausible: PlausibleLimits = ..., expansion: KnownExpansion | None = None, reliability: bool = False, search_faults: bool = True) -> None:
+    def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.00012, slips: str = 'report', scale_uncertainty: bool = False, full_covariance: bool = False, plausible: PlausibleLimits = ..., expansion: KnownExpansion | None = None, machine_drift: MachineDrift | None = None, reliability: bool = False, search_faults: bool = True) -> None:
         """
         adjust() checks them.
         """
@@ -1339,6 +1395,9 @@ class AdjustmentOptions:
         ...
     @property
     def full_covariance(self) -> bool:
+        ...
+    @property
+    def machine_drift(self) -> MachineDrift | None:
         ...
     @property
     def one_setup_per_line(self) -> bool:
@@ -1440,6 +1499,30 @@ class ExpansionEstimate:
         """
         Value of its prior.
         """
+    @property
+    def value(self) -> float:
+        ...
+class DriftEstimate:
+    """
+    A rate of the machine's drift as it was found, mm/s or mm/K.
+    """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
+    @property
+    def axis(self) -> int:
+        """
+        0, 1, 2 of X, Y, Z.
+        """
+    @property
+    def prior(self) -> float:
+        """
+        Standard uncertainty of its prior.
+        """
+    @property
+    def standard_uncertainty(self) -> float:
+        ...
     @property
     def value(self) -> float:
         ...
@@ -1601,7 +1684,7 @@ class FitReason:
     @property
     def finding(self) -> str:
         """
-        "no_redundancy"; "noise_factor", "misfit", "no_misfit": root of the variance factor, not credible, or larger or smaller than chance explains; "uneven_misfit": noise factor of one group of readings, and as the limit that of the others; "trend": what residuals of one channel run by, from the first reading to the last (mm or rad); "prior": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); "fault": what a fault that was not corrected takes off chi-square; "alternatives": by how much alternative faults differ in `parameter`; "scaled": what the uncertainties were multiplied by.
+        "no_redundancy"; "noise_factor", "misfit", "no_misfit": root of the variance factor, not credible, or larger or smaller than chance explains; "uneven_misfit": noise factor of one group of readings, and as the limit that of the others; "trend": what residuals of one channel run by, from the first reading to the last (mm or rad); "prior": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); "fault": what a fault that was not corrected takes off chi-square; "alternatives": by how much alternative faults differ in `parameter`; "scaled": what the uncertainties were multiplied by; "mistake": `parameter` says which one would explain the readings.
         """
     @property
     def limit(self) -> float:
@@ -1614,7 +1697,7 @@ class FitReason:
     @property
     def parameter(self) -> str:
         """
-        Of alternatives; else empty.
+        Of alternatives, and of a mistake its sentence; else empty.
         """
     @property
     def run(self) -> int:
@@ -1771,6 +1854,10 @@ class Adjustment:
         ...
     def _repr_html_(self) -> str:
         ...
+    def with_mistake(self, mistake: str) -> Adjustment:
+        """
+        The same, rejected because this mistake would explain the readings.
+        """
     @property
     def calibration(self) -> Calibration:
         ...
@@ -1800,6 +1887,11 @@ class Adjustment:
     @property
     def iterations(self) -> int:
         ...
+    @property
+    def machine_drift(self) -> list[DriftEstimate]:
+        """
+        Rates of the machine's drift that were unknowns.
+        """
     @property
     def normalised_residuals(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
         """
@@ -2794,40 +2886,40 @@ class Validation:
         ...
 class Compensator:
     """
-    Volumetric compensation as a controller does it (the C++ library stepdiag::controller): forward(c) = c + error(c) is where the tool is when the axes stand at c, command(t) where they must stand for it to be at t. Positions (n, 3) are axis positions in the controller's coordinates, mm; tool: offset of the functional point (3,), mm, by default that of the calibration. NaN where there is no answer: outside with "refuse", beyond the margin, a position that is not finite, a tool longer than largest_tool.
+    Volumetric compensation as a controller does it (the C++ library stepdiag::controller): forward(c) = c + error(c) is where the tool is when the axes stand at c, command(t) where they must stand for it to be at t. Positions (n, 3) are axis positions in the controller's coordinates, mm; tool: offset of the functional point (3,), mm, by default that of the calibration; temperature: of the scales of X, Y, Z (3,), degrees Celsius, by default none: the error is that of the table. NaN where there is no answer: outside with "refuse", beyond the margin, a position that is not finite, a tool longer than largest_tool, a temperature outside `temperatures`.
     """
-    def __init__(self, table: str | os.PathLike[str] | Calibration | ErrorMap, chain: Chain | str, *, origin: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), outside: str = 'hold', margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, largest_correction: typing.SupportsFloat | typing.SupportsIndex = 1.0, approach: str = 'mean', largest_tool: typing.SupportsFloat | typing.SupportsIndex = 1000.0, accept_rejected: bool = False) -> None:
+    def __init__(self, table: str | os.PathLike[str] | Calibration | ErrorMap, chain: Chain | str, *, origin: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), outside: str = 'hold', margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, largest_correction: typing.SupportsFloat | typing.SupportsIndex = 1.0, approach: str = 'mean', largest_tool: typing.SupportsFloat | typing.SupportsIndex = 1000.0, accept_rejected: bool = False, temperatures: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(2)"] | None = None) -> None:
         """
-        table: a file, a Calibration or an ErrorMap that carries chain, volume and tool. chain: the controller's. origin: home in the controller's coordinates. outside the calibrated volume: "hold" the error of its nearest point, go on "linear" up to `margin`, or "refuse". largest_correction: command and forward shorten a longer error to this length. approach: "mean", "positive" or "negative", of a table with reversal. accept_rejected: take a table whose fit was rejected. Warns (UserWarning) of a fit that is not accepted. Raises InvalidArgument for a table or options that a controller should not use.
+        table: a file, a Calibration or an ErrorMap that carries chain, volume and tool. chain: the controller's. origin: home in the controller's coordinates. outside the calibrated volume: "hold" the error of its nearest point, go on "linear" up to `margin`, or "refuse". largest_correction: command and forward shorten a longer error to this length. approach: "mean", "positive" or "negative", of a table with reversal. accept_rejected: take a table whose fit was rejected. temperatures: lowest and highest of a scale that calls may state, degrees Celsius; needs a table that is referred to a temperature by a known expansion. Warns (UserWarning) of a fit that is not accepted. Raises InvalidArgument for a table or options that a controller should not use.
         """
     def __repr__(self) -> str:
         ...
     def _repr_html_(self) -> str:
         ...
-    def command(self, targets: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
+    def command(self, targets: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None, temperature: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
         Where the axes must stand (n, 3), mm, for the tool to be at the targets (n, 3).
         """
-    def error(self, positions: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
+    def error(self, positions: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None, temperature: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
         Error of the functional point (n, 3), mm: exact, and the whole of it where corrections are capped.
         """
-    def forward(self, commands: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
+    def forward(self, commands: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None, temperature: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
         Where the tool is (n, 3), mm, when the axes stand at the commands (n, 3).
         """
-    def orientation(self, positions: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
+    def orientation(self, positions: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None, temperature: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
         Rotation vectors of the tool (n, 3), rad.
         """
-    def status(self, positions: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.int32]:
+    def status(self, positions: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike | None = None, temperature: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.int32]:
         """
-        Of the error at positions (n, 3): 0, or the sum of 1 outside the volume, 2 longer than largest_correction, 4 refused; shape (n,).
+        Of the error at positions (n, 3): 0, or the sum of 1 outside the volume, 2 longer than largest_correction, 4 refused, 16 (with 4) a temperature that is not taken; shape (n,).
         """
     @property
     def fingerprint(self) -> int:
         """
-        The table in force: a hash of chain, volume, tool, nodes and values, 64 bit.
+        The table in force: a hash of chain, volume, tool, nodes, values and expansion, 64 bit.
         """
     @property
     def fit(self) -> str | None:
@@ -2838,6 +2930,11 @@ class Compensator:
     def inverse_bound(self) -> float:
         """
         |forward(command(t)) - t| never exceeds this, mm.
+        """
+    @property
+    def temperature_reference(self) -> float | None:
+        """
+        Temperature of the scales at which they add nothing, degrees Celsius; None: none may be stated.
         """
     @property
     def tool(self) -> numpy.typing.NDArray[numpy.float64]:

@@ -30,6 +30,7 @@ UNITS: Final[Mapping[str, Unit]] = {
     "urad": Unit("µrad", MICRORADIAN),
     "um_per_h": Unit("µm/h", MICROMETRE / HOUR),
     "um_per_sqrt_h": Unit("µm/√h", MICROMETRE / HOUR**0.5),
+    "um_per_k": Unit("µm/K", MICROMETRE),
     "um_per_m_k": Unit("µm/(m·K)", PPM),
     "ppm": Unit("ppm", PPM),
     "c": Unit("°C", 1.0),

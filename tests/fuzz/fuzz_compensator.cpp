@@ -18,6 +18,7 @@ CompensatorOptions any_options(FuzzedDataProvider& bytes) {
     options.margin = fuzzing::any_number(bytes);
     options.largest_correction = fuzzing::any_number(bytes);
     options.origin = fuzzing::any_vector(bytes);
+    if (bytes.ConsumeBool()) options.temperatures = {fuzzing::any_number(bytes), fuzzing::any_number(bytes)};
     return options;
 }
 
@@ -58,6 +59,17 @@ void check_position(const Compensator& c, const CompensatorOptions& options, con
                "a correction is no longer than the largest");
     }
     expect(fuzzing::same_bits(c.command(position, tool).position, command.position), "a command is reproducible");
+
+    const std::array<double, 3> warm =
+        options.temperatures[0] < options.temperatures[1]
+            ? std::array<double, 3>{options.temperatures[0], options.temperatures[1], options.temperatures[0]}
+            : position;
+    const CompensatedPosition there = c.command(position, tool, warm);
+    const CompensatedPosition from = c.forward(there.position, tool, warm);
+    if (!((there.status | from.status) & (compensation_refused | compensation_capped)))
+        expect(std::hypot(from.position[0] - position[0], from.position[1] - position[1],
+                          from.position[2] - position[2]) <= c.inverse_bound(),
+               "forward of command is within the bound with temperatures");
 }
 
 }  // namespace

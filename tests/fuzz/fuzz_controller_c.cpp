@@ -13,6 +13,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         options.margin = fuzzing::any_number(bytes);
         options.largest_correction = fuzzing::any_number(bytes);
         for (double& origin : options.origin) origin = fuzzing::any_number(bytes);
+        for (double& temperature : options.temperatures) temperature = fuzzing::any_number(bytes);
     }
     const auto position = fuzzing::any_vector(bytes), tool = fuzzing::any_vector(bytes);
     const bool own_tool = bytes.ConsumeBool();
@@ -35,7 +36,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const unsigned status = stepdiag_error(c, position.data(), tool_or_own, error, orientation);
     const unsigned commanded = stepdiag_command(c, position.data(), tool_or_own, command);
     stepdiag_forward(c, position.data(), tool_or_own, actual);
+    double warm[3];
+    const auto temperature = fuzzing::any_vector(bytes);
+    const unsigned warmed = stepdiag_command_at_temperature(c, position.data(), tool_or_own, temperature.data(), warm);
     for (int i = 0; i < 3; ++i) {
+        fuzzing::expect(std::isfinite(warm[i]) || (warmed & STEPDIAG_REFUSED), "a command with temperatures is finite");
         fuzzing::expect(std::isfinite(error[i]) || (status & STEPDIAG_REFUSED), "an error is finite");
         fuzzing::expect(std::isfinite(command[i]) || (commanded & STEPDIAG_REFUSED), "a command is finite");
     }

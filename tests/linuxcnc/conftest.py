@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from linuxcnc_machine import CHAIN, MODULE, TOOL, VOLUME, make_errors
+from linuxcnc_machine import CHAIN, EXPANSION_LINES, MODULE, TOOL, VOLUME, make_errors
 
 from stepdiag import Machine
 
@@ -19,6 +19,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("table") / "calibration.csv"
     make_errors().write(path, chain=CHAIN, volume=VOLUME, tool=TOOL)
+    return path
+
+
+@pytest.fixture(scope="session")
+def warm_table(table: Path) -> Path:
+    """The same table, referred to 20 °C by a known expansion."""
+    path = table.with_name("warm.csv")
+    path.write_text(EXPANSION_LINES + table.read_text())
     return path
 
 

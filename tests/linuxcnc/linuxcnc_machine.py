@@ -5,13 +5,18 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from stepdiag import ErrorMap
+from stepdiag import ErrorMap, Expansion
 
 CHAIN = "[w X' b Y Z t]"
 VOLUME = (400.0, 300.0, 200.0)
 TOOL = (12.0, -7.0, -150.0)
 MODULE = Path("/usr/lib/linuxcnc/modules/stepdiagkins.so")
 KINS = "stepdiagkins."
+# Of its scales, and the leading lines of a table that is referred with it.
+EXPANSION = Expansion((1.15e-5, 2.38e-5, -3e-6), fixed_point=(150.0, -40.5, 200.0), reference=20.0)
+EXPANSION_LINES = (
+    "# temperature_reference_c=20\n# expansion_per_k=1.15e-05 2.38e-05 -3e-06\n# fixed_point_mm=150 -40.5 200\n"
+)
 
 Points = npt.NDArray[np.float64]
 

@@ -24,6 +24,7 @@ BELOW: dict[str, set[str]] = {
     "positions": {"io"},
     "head": {"io"},
     "scenario": {"head"},
+    "importing": {"scenario"},
     "uncertainty": {"scenario"},
     "planning": {"uncertainty"},
     "program": {"planning"},
@@ -36,7 +37,7 @@ BELOW: dict[str, set[str]] = {
     "objects": {"report"},
     "page": {"objects"},
     "demo": {"report", "program", "export", "linuxcnc"},
-    "cli": {"demo", "page", "progress"},
+    "cli": {"demo", "page", "progress", "importing"},
     "__main__": {"cli"},
 }
 MOST_OF_A_ROOM = 20  # modules beside __init__, of more than which nobody keeps count

@@ -25,6 +25,15 @@ void check_options(const AdjustmentOptions& options, const Plan& plan) {
             if (!(value == 0.0 || (value >= 1e-9 && value <= 1e6)))
                 throw InvalidArgument(std::string("smoothness ") + key +
                                       ": expected 0 or a deviation of 1e-9 to 1e6 mm or rad");
+    if (const auto& drift = options.machine_drift) {
+        const auto& known = {"time",          "temperature",   "temperature_x",
+                             "temperature_y", "temperature_z", "air_temperature"};
+        if (std::find(known.begin(), known.end(), drift->record) == known.end())
+            throw InvalidArgument("adjustment machine_drift: expected time or a temperature, got \"" + drift->record +
+                                  "\"");
+        if (!drift->standard_uncertainty.allFinite() || drift->standard_uncertainty.minCoeff() < 0.0)
+            throw InvalidArgument("adjustment machine_drift: expected three finite standard uncertainties, at least 0");
+    }
     for (const auto& entry : options.setup_by_line)
         if (!plan.contains(Line::parse(entry.first)))
             throw InvalidArgument("adjustment: line \"" + entry.first + "\" is not in the plan");
@@ -54,7 +63,8 @@ std::vector<FitReason> coefficients_in_place_of_faults(const AdjustmentProblem& 
         of_readings -= std::pow(without.x()[of.unknown] / of.prior, 2);
     if (of_readings > found.weighted_square_sum + FaultTests::significant * std::max(1.0, found.variance_factor()))
         return {};
-    return far_coefficients(expansion_estimates(without.problem(), without.x(), without.inverse()));
+    return far_coefficients(expansion_estimates(without.problem(), without.x(), without.inverse()),
+                            drift_estimates(without.problem(), without.x(), without.inverse()));
 }
 
 [[noreturn]] void refuse_unsolved(const Measurement& measurement, const Plan& plan) {
@@ -114,6 +124,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     if (options.full_covariance) result.calibration.covariance = full_covariance(problem, forms, solver.factor());
     result.setup = setup_estimates(problem, known, x, inverse);
     result.expansion = expansion_estimates(problem, x, inverse);
+    result.machine_drift = drift_estimates(problem, x, inverse);
     result.residuals = reading_residuals(solver.equations(), inverse);
     std::stable_sort(result.residuals.begin(), result.residuals.end(),
                      [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
@@ -138,6 +149,8 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     if (options.scale_uncertainty) scale_uncertainties(result);
     add_sensor_effects(sensor_effects(solver), problem, forms, observability, result);
     state_temperature(measurement, options.expansion, result.calibration);
+    for (const ExpansionEstimate& found : result.expansion)
+        for (const int axis : found.axes) (*result.calibration.expansion)[axis] = found.value;
     result.calibration.fit = result.verdict.fit;
     if (result.degrees_of_freedom > 0) result.calibration.variance_factor = result.variance_factor();
     return result;

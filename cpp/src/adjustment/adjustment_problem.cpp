@@ -203,6 +203,8 @@ void AdjustmentProblem::collect_points(const Measurement& measurement, const Adj
         temperature = scale_temperatures(measurement, expansion_->temperature);
         sensors_ = sensor_groups(measurement, *expansion_);
     }
+    std::vector<double> drifted;
+    if (options.machine_drift) drifted = since_first_reading(measurement, options.machine_drift->record);
     std::vector<std::string> names;
     for (int c = 0; c < std::max(3, measurement.beam_count()); ++c) names.push_back(stepdiag::channel_name(kind_, c));
     for (std::size_t row = 0; row < measurement.size(); ++row) {
@@ -225,6 +227,7 @@ void AdjustmentProblem::collect_points(const Measurement& measurement, const Adj
         point.place.commanded = target.commanded;
         point.place.travel = plan_.frame(station.line).col(2).dot(target.commanded - line.front().commanded);
         if (setup.first_time) point.place.time = *time->value[row] - *setup.first_time;
+        if (!drifted.empty()) point.place.drifted = drifted[row];
         if (expansion_) {
             point.place.from_fixed = target.commanded - expansion_->expansion.fixed_point;
             point.place.stretch = expansion_->expansion.stretch(target.commanded, temperature[row]);
@@ -267,12 +270,10 @@ MachineErrors AdjustmentProblem::errors(const AdjustedPoint& point, const Eigen:
         for (int c = 0; c < 6; ++c)
             if (node.unknown[c] != no_unknown) errors[a][c] = x[node.unknown[c]];
     }
-    if (expansion_) {
-        Eigen::Vector3d coefficient = expansion_->expansion.coefficient;
-        for (const CoefficientUnknown& of : coefficients_)
-            for (const int a : of.axes) coefficient[a] += x[of.unknown];
-        for (int a = 0; a < 3; ++a) errors[a][a] += coefficient[a] * point.place.stretch[a];
-    }
+    if (expansion_)
+        for (int a = 0; a < 3; ++a) errors[a][a] += expansion_->expansion.coefficient[a] * point.place.stretch[a];
+    for (const CoefficientUnknown& of : coefficients_)
+        for (const int a : of.axes) errors[a][a] += x[of.unknown] * of.effect(point.place, a);
     return errors;
 }
 
@@ -332,7 +333,11 @@ void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options) {
     if (expansion_)
         for (const AxisGroup& axes : coefficient_groups(*expansion_))
             if (const double prior = expansion_->standard_uncertainty[axes.front()]; prior > 0.0)
-                coefficients_.push_back({axes, prior, banded_unknowns + border_++});
+                coefficients_.push_back({axes, prior, false, banded_unknowns + border_++});
+    if (options.machine_drift)
+        for (int a = 0; a < 3; ++a)
+            if (const double prior = options.machine_drift->standard_uncertainty[a]; prior > 0.0)
+                coefficients_.push_back({{a}, prior, true, banded_unknowns + border_++});
 
     if (border_ > largest_border)
         throw InvalidArgument("adjustment: " + std::to_string(setups_.size()) + " set-ups have more than " +
@@ -387,9 +392,11 @@ void AdjustmentProblem::weigh_unknowns() {
             if (of.unit == "rad" || of.unit == "1") change_scale_[j] = 1.0;
         }
     constexpr double usual_kelvins = 10.0;  // that make a coefficient a part of lengths
+    double longest = 0.0;
+    for (const AdjustedPoint& point : points_) longest = std::max(longest, std::abs(point.place.drifted));
     for (const CoefficientUnknown& of : coefficients_) {
         prior_[of.unknown] = usual_[of.unknown] = of.prior;
-        change_scale_[of.unknown] = usual_kelvins;
+        change_scale_[of.unknown] = of.of_drift ? longest / metre : usual_kelvins;
     }
 }
 

@@ -52,11 +52,15 @@ struct AdjustedReading {
     bool used() const { return outlier == 0; }
 };
 
-// An expansion coefficient: its deviation from what is stated.
+// What moves axes along themselves in proportion to something that is known at each point: an expansion coefficient,
+// its deviation from what is stated, or a rate of the machine's drift.
 struct CoefficientUnknown {
     AxisGroup axes;
-    PriorUncertainty prior;  // 1/K
+    PriorUncertainty prior;  // 1/K; mm/s or mm/K
+    bool of_drift;
     int unknown = no_unknown;
+
+    double effect(const ReadingPlace& place, int axis) const { return of_drift ? place.drifted : place.stretch[axis]; }
 };
 
 // What each of some readings reads too much by a fault of size 1.
@@ -110,7 +114,8 @@ public:
     int border() const { return border_; }
     const std::vector<CoefficientUnknown>& coefficients() const { return coefficients_; }
     const std::optional<KnownExpansion>& expansion() const { return expansion_; }
-    const std::vector<AxisGroup>& sensors() const { return sensors_; }  // of the scales' temperatures
+    bool moves_axes() const { return expansion_ || !coefficients_.empty(); }  // by more than their errors
+    const std::vector<AxisGroup>& sensors() const { return sensors_; }        // of the scales' temperatures
     const std::vector<EstimatedFault>& faults() const { return faults_; }
     // Instead of those that there were; their unknowns are the last ones.
     void estimate(std::vector<EstimatedFault> faults);

@@ -151,10 +151,21 @@ std::vector<ExpansionEstimate> expansion_estimates(const AdjustmentProblem& prob
                                                    const BorderedBand& inverse) {
     std::vector<ExpansionEstimate> estimates;
     for (const CoefficientUnknown& of : problem.coefficients()) {
+        if (of.of_drift) continue;
         const double stated = problem.expansion()->expansion.coefficient[of.axes.front()];
         estimates.push_back(
             {of.axes, stated + x[of.unknown], std::sqrt(element(inverse, of.unknown, of.unknown)), stated, of.prior});
     }
+    return estimates;
+}
+
+std::vector<DriftEstimate> drift_estimates(const AdjustmentProblem& problem, const Eigen::VectorXd& x,
+                                           const BorderedBand& inverse) {
+    std::vector<DriftEstimate> estimates;
+    for (const CoefficientUnknown& of : problem.coefficients())
+        if (of.of_drift)
+            estimates.push_back(
+                {of.axes.front(), x[of.unknown], std::sqrt(element(inverse, of.unknown, of.unknown)), of.prior});
     return estimates;
 }
 

@@ -29,6 +29,8 @@ std::vector<SetupEstimate> setup_estimates(const AdjustmentProblem& problem, con
                                            const Eigen::VectorXd& x, const BorderedBand& inverse);
 std::vector<ExpansionEstimate> expansion_estimates(const AdjustmentProblem& problem, const Eigen::VectorXd& x,
                                                    const BorderedBand& inverse);
+std::vector<DriftEstimate> drift_estimates(const AdjustmentProblem& problem, const Eigen::VectorXd& x,
+                                           const BorderedBand& inverse);
 // Of readings, priors and smoothness over unknowns.
 int degrees_of_freedom(const GaussNewton& solver);
 // Of all readings in the problem's order, at the last linearisation.

@@ -24,6 +24,7 @@ struct ReadingPlace {
     Eigen::Vector3d commanded;                             // mm
     double travel = 0.0;                                   // commanded, from the line's first point along it, mm
     double time = 0.0;                                     // since the set-up's first reading, s
+    double drifted = 0.0;                                  // since the run's first, s or K (MachineDrift)
     Eigen::Vector3d stretch = Eigen::Vector3d::Zero();     // of the scales, by axis (Expansion::stretch), mm K
     Eigen::Vector3d from_fixed = Eigen::Vector3d::Zero();  // by axis, of the scales' fixed points, mm
 };

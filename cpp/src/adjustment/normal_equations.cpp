@@ -78,7 +78,7 @@ NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&p
     derivatives_.assign(weights, 0.0);
     for (const auto& [place, derivative] : of_faults) derivatives_[place] = derivative;
     residuals_.setZero(Eigen::Index(problem.readings().size()));
-    if (problem.expansion()) by_shift_.resize(problem.readings().size());
+    if (problem.moves_axes()) by_shift_.resize(problem.readings().size());
     prior_weight_.resize(problem.size());
     for (int j = 0; j < problem.size(); ++j) prior_weight_[j] = std::pow(problem.prior()[j], -2);
     usual_weight_ = centre_ = Eigen::VectorXd::Zero(problem.size());
@@ -149,12 +149,12 @@ void NormalEquations::linearise(const Eigen::VectorXd& x, bool derivatives) {
                 row[c] = unknown[c] == no_unknown ? 0.0 : weight * derivative(reading.channel, c);
             for (std::size_t c = 0; c < setup.active.size(); ++c)
                 row[18 + c] = weight * derivative(reading.channel, 18 + setup.active[c]);
-            if (!problem.expansion()) continue;
+            if (!problem.moves_axes()) continue;
             for (int a = 0; a < 3; ++a) by_shift_[r][a] = weight * derivative(reading.channel, 7 * a);
             for (std::size_t k = 0; k < problem.coefficients().size(); ++k) {
                 double& by_coefficient = row[18 + setup.active.size() + k] = 0.0;
                 for (const int a : problem.coefficients()[k].axes)
-                    by_coefficient += by_shift_[r][a] * point.place.stretch[a];
+                    by_coefficient += by_shift_[r][a] * problem.coefficients()[k].effect(point.place, a);
             }
         }
     }

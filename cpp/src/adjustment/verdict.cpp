@@ -52,7 +52,8 @@ void compare_with_priors(const Adjustment& adjustment, std::vector<FitReason>& r
         if (!(distance <= farthest_prior))
             reasons.push_back({FitFinding::prior, distance, farthest_prior, e.line, name(e.quantity), e.component});
     }
-    for (const FitReason& reason : far_coefficients(adjustment.expansion)) reasons.push_back(reason);
+    for (const FitReason& reason : far_coefficients(adjustment.expansion, adjustment.machine_drift))
+        reasons.push_back(reason);
 }
 
 void judge_faults(const Adjustment& adjustment, std::vector<FitReason>& reasons) {
@@ -86,6 +87,7 @@ std::string name(FitFinding finding) {
         case FitFinding::fault: return "fault";
         case FitFinding::alternatives: return "alternatives";
         case FitFinding::scaled: return "scaled";
+        case FitFinding::mistake: return "mistake";
     }
     return "";
 }
@@ -102,13 +104,18 @@ std::string name(FitAspect aspect) {
     return "";
 }
 
-std::vector<FitReason> far_coefficients(const std::vector<ExpansionEstimate>& expansion) {
+std::vector<FitReason> far_coefficients(const std::vector<ExpansionEstimate>& expansion,
+                                        const std::vector<DriftEstimate>& machine_drift) {
     std::vector<FitReason> reasons;
     for (const ExpansionEstimate& e : expansion)
         if (const double distance = distance_from_prior(e.value - e.stated, e.standard_uncertainty, e.prior);
             !(distance <= farthest_prior))
             reasons.push_back({FitFinding::prior, distance, farthest_prior, "", "expansion",
                                e.axes.size() == 1 ? e.axes.front() : -1});
+    for (const DriftEstimate& e : machine_drift)
+        if (const double distance = distance_from_prior(e.value, e.standard_uncertainty, e.prior);
+            !(distance <= farthest_prior))
+            reasons.push_back({FitFinding::prior, distance, farthest_prior, "", "machine_drift", e.axis});
     return reasons;
 }
 

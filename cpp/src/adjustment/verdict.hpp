@@ -7,8 +7,9 @@ namespace stepdiag {
 
 // From what the adjustment found, its own verdict not counted, the patterns of its residuals, and the set-up quantities
 // that scatter more than their priors.
-// Reasons where a coefficient of expansion stands too far from what is stated of it.
-std::vector<FitReason> far_coefficients(const std::vector<ExpansionEstimate>& expansion);
+// Reasons where a coefficient of expansion, or a rate of drift, stands too far from what is stated of it.
+std::vector<FitReason> far_coefficients(const std::vector<ExpansionEstimate>& expansion,
+                                        const std::vector<DriftEstimate>& machine_drift);
 
 Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& patterns,
               const std::vector<ResidualPattern>& prior_scatter);

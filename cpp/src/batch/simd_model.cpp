@@ -88,18 +88,18 @@ STEPDIAG_INLINE Vector& along(Lanes3& vector, int axis) {
     return axis == 0 ? vector.x : axis == 1 ? vector.y : vector.z;
 }
 
-// What the scale's expansion adds to an axis, and the force on that back to the coefficients.
+// What expansion and drift add to an axis, and the force on that back to the coefficients.
 STEPDIAG_INLINE void expand(const Chunk& chunk, const SimdProblem::Point& point, int axis, Lanes3& shift) {
     Vector& position = along(shift, axis);
     position = position + hn::Set(Tag(), point.expansion[axis]);
     for (const SimdProblem::Coefficient& of : chunk.problem.coefficients)
         if (std::find(of.axes.begin(), of.axes.end(), axis) != of.axes.end())
-            position = mul_add(hn::Set(Tag(), point.stretch[axis]), chunk.unknown(of.unknown), position);
+            position = mul_add(hn::Set(Tag(), of.effect(point, axis)), chunk.unknown(of.unknown), position);
 }
 STEPDIAG_INLINE void pull_expansion(const Chunk& chunk, const SimdProblem::Point& point, int axis, Lanes3 force) {
     for (const SimdProblem::Coefficient& of : chunk.problem.coefficients)
         if (std::find(of.axes.begin(), of.axes.end(), axis) != of.axes.end())
-            chunk.pull(of.unknown, hn::Set(Tag(), point.stretch[axis]) * along(force, axis));
+            chunk.pull(of.unknown, hn::Set(Tag(), of.effect(point, axis)) * along(force, axis));
 }
 
 // Follows the chain from the tool to the workpiece, and carries the forces back to the tool.
@@ -112,7 +112,7 @@ STEPDIAG_INLINE void pull_point(const Chunk& chunk, const SimdProblem::Point& po
     for (int place = 2; place >= 0; --place) {
         const double* node = chunk.node(point.node[place]);
         Lanes3 shift = part3(node, node_shift);
-        if (problem.expands) expand(chunk, point, problem.axis[place], shift);
+        if (problem.moves_axes) expand(chunk, point, problem.axis[place], shift);
         const AxisMotion<Vector> axis{part9(node, node_rotation), shift, problem.carries_workpiece[place]};
         const MovedPoint<Vector> moved = move_point(axis, position);
         position_arm[place] = moved.arm, position = moved.point;
@@ -126,7 +126,7 @@ STEPDIAG_INLINE void pull_point(const Chunk& chunk, const SimdProblem::Point& po
         const MirrorPull inside = {transposed_product(rotation, pull.point), transposed_product(rotation, pull.normal)};
         const Lanes3 on_shift = problem.carries_workpiece[place] ? inside.point : pull.point;
         add3(node, node_shift_pull, on_shift);
-        if (problem.expands) pull_expansion(chunk, point, problem.axis[place], on_shift);
+        if (problem.moves_axes) pull_expansion(chunk, point, problem.axis[place], on_shift);
         pull = inside;
     }
     add3(setup, normal_pull, pull.normal);
@@ -209,7 +209,7 @@ SimdProblem::SimdProblem(const AdjustmentProblem& problem, const std::vector<std
       unknowns(problem.size()),
       channels(0),
       tool(problem.tool()),
-      expands(problem.expansion()),
+      moves_axes(problem.moves_axes()),
       setup_size(0) {
     const auto place = [&](int unknown) { return unknown == no_unknown ? unknowns : unknown; };
     for (const LineSetup& setup : problem.setups()) {
@@ -232,11 +232,13 @@ SimdProblem::SimdProblem(const AdjustmentProblem& problem, const std::vector<std
         carries_workpiece[p] = problem.chain().carries_workpiece(order[p]);
         axis[p] = index(order[p]);
     }
-    for (const CoefficientUnknown& of : problem.coefficients()) coefficients.push_back({of.unknown, of.axes});
+    for (const CoefficientUnknown& of : problem.coefficients())
+        coefficients.push_back({of.unknown, of.axes, of.of_drift});
     for (const AdjustedPoint& point : problem.points()) {
         Point& to = points.emplace_back();
-        to = {point.setup, {}, point.place.travel, point.place.time, int(of_points.size()), {}, {}};
-        for (int a = 0; expands && a < 3; ++a) {
+        to = {point.setup, {}, point.place.travel, point.place.time, point.place.drifted, int(of_points.size()),
+              {},          {}};
+        for (int a = 0; problem.expansion() && a < 3; ++a) {
             to.stretch[a] = point.place.stretch[a];
             to.expansion[a] = problem.expansion()->expansion.coefficient[a] * to.stretch[a];
         }

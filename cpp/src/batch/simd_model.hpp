@@ -26,13 +26,16 @@ struct SimdProblem {
     struct Point {
         int setup;
         std::array<int, 3> node;  // for each place in the chain; home is the last node
-        double travel, time;
+        double travel, time, drifted;
         int first_channel;
         std::array<double, 3> expansion, stretch;  // of each axis along itself, mm; by its coefficient, mm K
     };
     struct Coefficient {
         int unknown;
         std::vector<int> axes;
+        bool of_drift;
+
+        double effect(const Point& point, int axis) const { return of_drift ? point.drifted : point.stretch[axis]; }
     };
     struct Node {
         std::array<int, 6> unknown;
@@ -52,7 +55,7 @@ struct SimdProblem {
     std::array<bool, 3> carries_workpiece;  // for each place in the chain
     std::array<int, 3> axis;                // likewise: 0, 1, 2
     Eigen::Vector3d tool;
-    bool expands;
+    bool moves_axes;  // along themselves, by more than their errors
     std::vector<Coefficient> coefficients;
     std::vector<Point> points;
     std::vector<Channel> of_points;

@@ -246,15 +246,16 @@ SimdReduction::SimdReduction(const Measurement& pattern, const HeadCalibrations&
     auto members = rows.begin();
     for (const Pass& pass : passes) {
         for (const std::size_t row : (members++)->second) {
-            const int number = pattern.stations()[row].point;
-            const PassPoint& point = pass.points[number];
+            const std::optional<int>& number = pass.place[pattern.stations()[row].point];
+            if (!number) continue;
+            const PassPoint& point = pass.points[*number];
             const HeadCalibration& head = heads.of(pass.line.name());
             const TakenRow taken = take_row(pattern, places, row, head, kind);
             if (taken.raws.empty() || (taken.kind == ReducedRow::distance && !point.has_length)) continue;
             ReducedRow reduced{};
             reduced.kind = taken.kind;
             reduced.raws = std::uint32_t(taken.raws.size());
-            reduced.place = std::uint32_t(values_per_reading * (pass.first_reading + number));
+            reduced.place = std::uint32_t(values_per_reading * (pass.first_reading + *number));
             reduced.by_distance_alone = kind == LengthKind::distance;
             reduced.lateral_x = point.lateral.x(), reduced.lateral_y = point.lateral.y();
             reduced.travel = point.travel;

@@ -70,6 +70,9 @@ py::object& reason_wording() {
     static py::object& words = *new py::object(py::none());  // outlives the interpreter
     return words;
 }
+std::vector<std::string> in_words(const std::vector<FitReason>& reasons) {
+    return reason_wording()(reasons).cast<std::vector<std::string>>();
+}
 py::object& unseen_wording() {
     static py::object& words = *new py::object(py::none());
     return words;
@@ -118,6 +121,20 @@ void bind_options(py::module_& m) {
         .def_readonly("rotation", &Smoothness::rotation)
         .def_readonly("cross_validated", &Smoothness::cross_validated);
 
+    py::class_<MachineDrift>(m, "MachineDrift",
+                             "A drift of the functional point along the axes that is no expansion of scales, in "
+                             "proportion to a record since the run's first reading: its rates are unknowns.")
+        .def(py::init([](const ArrayLike& standard_uncertainty, const std::string& record) {
+                 return MachineDrift{to_vector3(standard_uncertainty, "standard_uncertainty"), record};
+             }),
+             py::arg("standard_uncertainty"), py::kw_only(), py::arg("record") = MachineDrift{}.record,
+             "standard_uncertainty (3,) of the rates along X, Y, Z about 0, mm/s, or mm/K with a temperature; 0: no "
+             "drift. record: \"time\", or the channel of a temperature: \"temperature\", \"temperature_x\", ..., "
+             "\"air_temperature\". adjust() checks them.")
+        .def_property_readonly("standard_uncertainty",
+                               [](const MachineDrift& d) { return to_numpy_vector(d.standard_uncertainty); })
+        .def_readonly("record", &MachineDrift::record);
+
     const AdjustmentOptions usual;
     py::class_<AdjustmentOptions>(
         m, "AdjustmentOptions",
@@ -130,7 +147,8 @@ void bind_options(py::module_& m) {
         "scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and "
         "the fit is doubtful at best. plausible: what a machine can be. expansion: of the scales; coefficients that "
         "are "
-        "uncertain are unknowns. reliability: also which faults the readings control. search_faults: False: it is "
+        "uncertain are unknowns. machine_drift: of which the rates are unknowns. reliability: also which faults the "
+        "readings control. search_faults: False: it is "
         "known "
         "already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not "
         "reached "
@@ -140,7 +158,7 @@ void bind_options(py::module_& m) {
                          bool rotations, const std::optional<Smoothness>& smoothness, double outlier_probability,
                          const std::string& slips, bool scale_uncertainty, bool full_covariance,
                          const PlausibleLimits& plausible, const std::optional<KnownExpansion>& expansion,
-                         bool reliability, bool search_faults) {
+                         const std::optional<MachineDrift>& machine_drift, bool reliability, bool search_faults) {
                  AdjustmentOptions options{uncertainty,
                                            setup.value,
                                            {},
@@ -154,6 +172,7 @@ void bind_options(py::module_& m) {
                                            full_covariance,
                                            plausible,
                                            expansion,
+                                           machine_drift,
                                            reliability,
                                            search_faults};
                  for (const auto& [line, priors] : setup_by_line) options.setup_by_line[line] = priors.value;
@@ -166,8 +185,8 @@ void bind_options(py::module_& m) {
              py::arg("outlier_probability") = usual.outlier_probability, py::arg("slips") = name(usual.slips),
              py::arg("scale_uncertainty") = usual.scale_uncertainty, py::arg("full_covariance") = usual.full_covariance,
              py::arg("plausible") = usual.plausible, py::arg("expansion") = std::nullopt,
-             py::arg("reliability") = usual.reliability, py::arg("search_faults") = usual.search_faults,
-             "adjust() checks them.")
+             py::arg("machine_drift") = std::nullopt, py::arg("reliability") = usual.reliability,
+             py::arg("search_faults") = usual.search_faults, "adjust() checks them.")
         .def_readonly("uncertainty", &AdjustmentOptions::uncertainty)
         .def_property_readonly("setup", [](const AdjustmentOptions& o) { return Priors{o.setup}; })
         .def_property_readonly("setup_by_line",
@@ -186,6 +205,7 @@ void bind_options(py::module_& m) {
         .def_readonly("full_covariance", &AdjustmentOptions::full_covariance)
         .def_readonly("plausible", &AdjustmentOptions::plausible)
         .def_readonly("expansion", &AdjustmentOptions::expansion)
+        .def_readonly("machine_drift", &AdjustmentOptions::machine_drift)
         .def_readonly("reliability", &AdjustmentOptions::reliability)
         .def_readonly("search_faults", &AdjustmentOptions::search_faults);
 }
@@ -209,6 +229,12 @@ void bind_result(py::module_& m) {
         .def_readonly("standard_uncertainty", &ExpansionEstimate::standard_uncertainty)
         .def_readonly("stated", &ExpansionEstimate::stated, "Value of its prior.")
         .def_readonly("prior", &ExpansionEstimate::prior, "Standard uncertainty of its prior.");
+
+    py::class_<DriftEstimate>(m, "DriftEstimate", "A rate of the machine's drift as it was found, mm/s or mm/K.")
+        .def_readonly("axis", &DriftEstimate::axis, "0, 1, 2 of X, Y, Z.")
+        .def_readonly("value", &DriftEstimate::value)
+        .def_readonly("standard_uncertainty", &DriftEstimate::standard_uncertainty)
+        .def_readonly("prior", &DriftEstimate::prior, "Standard uncertainty of its prior.");
 
     py::class_<Outlier>(m, "Outlier", "A reading that was left out.")
         .def_readonly("row", &Outlier::row)
@@ -258,7 +284,9 @@ void bind_result(py::module_& m) {
             "first reading to the last (mm or rad); "
             "\"prior\": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); \"fault\": what "
             "a fault that was not corrected takes off chi-square; \"alternatives\": by how much alternative faults "
-            "differ in `parameter`; \"scaled\": what the uncertainties were multiplied by.")
+            "differ in `parameter`; \"scaled\": what the uncertainties were multiplied by; \"mistake\": `parameter` "
+            "says "
+            "which one would explain the readings.")
         .def_readonly("value", &FitReason::value)
         .def_readonly("limit", &FitReason::limit)
         .def_readonly("standard_uncertainty", &FitReason::standard_uncertainty,
@@ -268,7 +296,7 @@ void bind_result(py::module_& m) {
                       "Of an uneven misfit or a trend; empty: all. Of a prior or prior_scatter the set-up quantity.")
         .def_readonly("component", &FitReason::component, "Of a prior: as of SetupEstimate.")
         .def_readonly("fault", &FitReason::fault, "Of a fault or alternatives: its class, from 1; else 0.")
-        .def_readonly("parameter", &FitReason::parameter, "Of alternatives; else empty.")
+        .def_readonly("parameter", &FitReason::parameter, "Of alternatives, and of a mistake its sentence; else empty.")
         .def_readonly("run", &FitReason::run, "Of an uneven misfit: the run; -1: all.")
         .def_property_readonly(
             "aspect", [](const FitReason& r) { return name(r.aspect); },
@@ -363,6 +391,9 @@ void bind_result(py::module_& m) {
             "expansion", [](const AdjustmentOfRun& a) { return a.adjustment.expansion; },
             "Expansion coefficients that were unknowns.")
         .def_property_readonly(
+            "machine_drift", [](const AdjustmentOfRun& a) { return a.adjustment.machine_drift; },
+            "Rates of the machine's drift that were unknowns.")
+        .def_property_readonly(
             "residuals",
             [](const Result& r) -> ChannelArrays {
                 return r.by_channel(NAN, [](const ReadingResidual& x) { return x.residual; });
@@ -421,6 +452,17 @@ void bind_result(py::module_& m) {
         .def_property_readonly(
             "combinations", [](const Result& r) { return r.adjustment.combinations; },
             "What is known of unknowns that are not determined one by one.")
+        .def(
+            "with_mistake",
+            [](Result found, const std::string& mistake) {
+                Verdict& verdict = found.adjustment.verdict;
+                verdict.fit = Fit::rejected;
+                verdict.reasons.insert(verdict.reasons.begin(), {FitFinding::mistake, 0.0, 0.0})->parameter = mistake;
+                found.adjustment.calibration.fit = verdict.fit;
+                found.adjustment.calibration.fit_reasons = in_words(verdict.reasons);
+                return found;
+            },
+            py::arg("mistake"), "The same, rejected because this mistake would explain the readings.")
         .def_property_readonly(
             "smoothness",
             [](const Result& r) {
@@ -463,7 +505,7 @@ std::optional<FitQuality> fit_quality_of_run(const Measurement& measurement, con
 
 Calibration worded(const Adjustment& adjustment) {
     Calibration calibration = worded(adjustment.calibration);
-    calibration.fit_reasons = reason_wording()(adjustment.verdict.reasons).cast<std::vector<std::string>>();
+    calibration.fit_reasons = in_words(adjustment.verdict.reasons);
     calibration.unseen_faults = unseen_wording()(adjustment.unseen, calibration).cast<std::vector<std::string>>();
     return calibration;
 }

@@ -63,7 +63,8 @@ Calibration make_calibration(
     const std::string& date, const std::optional<std::string>& fit, const std::optional<double>& variance_factor,
     const Names& fit_reasons, const std::optional<double>& uncertainty_scaled, const Texts& provenance,
     const Names& unseen_faults, const std::optional<double>& between_nodes,
-    const std::optional<double>& temperature_reference, const std::optional<ArrayLike>& temperature_as_found) {
+    const std::optional<double>& temperature_reference, const std::optional<ArrayLike>& temperature_as_found,
+    const std::optional<ArrayLike>& expansion, const std::optional<ArrayLike>& fixed_point) {
     Calibration calibration{method, to_chain(chain), to_vector3(volume, "volume"), to_vector3(tool, "tool"), {}, {},
                             {},     undetermined};
     for (const auto& [name, table] : functions)
@@ -102,6 +103,8 @@ Calibration make_calibration(
     calibration.temperature_reference = temperature_reference;
     if (temperature_as_found)
         calibration.temperature_as_found = to_vector3(*temperature_as_found, "temperature_as_found");
+    if (expansion) calibration.expansion = to_vector3(*expansion, "expansion");
+    if (fixed_point) calibration.fixed_point = to_vector3(*fixed_point, "fixed_point");
     check(calibration);
     return calibration;
 }
@@ -127,7 +130,8 @@ void bind_calibration(py::module_& m) {
              py::arg("fit_reasons") = Names{}, py::arg("uncertainty_scaled") = std::nullopt,
              py::arg("provenance") = Texts{}, py::arg("unseen_faults") = Names{},
              py::arg("between_nodes") = std::nullopt, py::arg("temperature_reference") = std::nullopt,
-             py::arg("temperature_as_found") = std::nullopt,
+             py::arg("temperature_as_found") = std::nullopt, py::arg("expansion") = std::nullopt,
+             py::arg("fixed_point") = std::nullopt,
              "A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: "
              "name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises "
              "InvalidArgument naming the parameter for what is none: nodes that do not "
@@ -158,6 +162,16 @@ void bind_calibration(py::module_& m) {
             },
             "Temperatures of the scales of X, Y, Z (3,) where errors are as found, means over all readings, degrees "
             "Celsius; None: nothing was recorded, or they are referred to temperature_reference.")
+        .def_property_readonly(
+            "expansion",
+            [](const Calibration& c) {
+                return c.expansion ? std::optional(to_numpy_vector(*c.expansion)) : std::nullopt;
+            },
+            "Coefficients of the scales of X, Y, Z (3,) by which positioning errors are referred to "
+            "temperature_reference, 1/K; of an adjustment as it found them. None: as found, or not known.")
+        .def_property_readonly(
+            "fixed_point", [](const Calibration& c) { return to_numpy_vector(c.fixed_point); },
+            "Positions from which these scales expand (3,), mm.")
         .def_readonly("provenance", &Calibration::provenance,
                       "What it was made from, as far as it is known: program and version, SHA-256 of the run, the "
                       "scenario and the descriptions of heads, options that are not the default ones. Keys: program, "

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "bindings.hpp"
@@ -49,7 +50,8 @@ void warn_of_fit(const Compensator& compensator) {
 
 Compensator make_compensator(const TableLike& table, const ChainLike& chain, const ArrayLike& origin,
                              const std::string& outside, double margin, double largest_correction,
-                             const std::string& approach, double largest_tool, bool accept_rejected) {
+                             const std::string& approach, double largest_tool, bool accept_rejected,
+                             const std::optional<std::array<double, 2>>& temperatures) {
     CompensatorOptions options;
     options.origin = to_position(to_vector3(origin, "origin"));
     options.outside = one_of<Outside>(
@@ -62,6 +64,7 @@ Compensator make_compensator(const TableLike& table, const ChainLike& chain, con
                                                     {"negative", CompensatedApproach::negative}});
     options.largest_tool = largest_tool;
     options.accept_rejected = accept_rejected;
+    if (temperatures) options.temperatures = *temperatures;
     const std::string name = to_chain(chain).name();
     const auto made = [&] {
         if (py::isinstance<Calibration>(table))
@@ -74,6 +77,19 @@ Compensator make_compensator(const TableLike& table, const ChainLike& chain, con
     warn_of_fit(compensator);
     return compensator;
 }
+
+// Temperatures of the scales of a call, or none.
+class Scales {
+public:
+    explicit Scales(const std::optional<ArrayLike>& temperature) : given_(temperature.has_value()) {
+        if (temperature) temperature_ = to_position(to_vector3(*temperature, "temperature"));
+    }
+    operator const double*() const { return given_ ? temperature_.data() : nullptr; }
+
+private:
+    bool given_;
+    Position temperature_ = {};
+};
 
 Position tool_of(const Compensator& compensator, const std::optional<ArrayLike>& tool) {
     return tool ? to_position(to_vector3(*tool, "tool")) : compensator.tool();
@@ -98,14 +114,18 @@ Position unless_refused(const Position& answer, unsigned status) {
 }
 
 py::array_t<int> status(const Compensator& compensator, const ArrayLike& positions,
-                        const std::optional<ArrayLike>& tool) {
+                        const std::optional<ArrayLike>& tool, const std::optional<ArrayLike>& temperature) {
     const Points points = to_points(positions, "positions");
     const Position offset = tool_of(compensator, tool);
+    const Scales scales(temperature);
     py::array_t<int> result(points.rows());
     int* out = result.mutable_data();
     py::gil_scoped_release release;
-    for (Eigen::Index i = 0; i < points.rows(); ++i)
-        out[i] = int(compensator.error({points(i, 0), points(i, 1), points(i, 2)}, offset).status);
+    for (Eigen::Index i = 0; i < points.rows(); ++i) {
+        const Position p = {points(i, 0), points(i, 1), points(i, 2)};
+        Position error;
+        out[i] = int(compensator.error(p.data(), offset.data(), scales, error.data(), nullptr));
+    }
     return result;
 }
 
@@ -117,63 +137,87 @@ void bind_controller(py::module_& m) {
         "Volumetric compensation as a controller does it (the C++ library stepdiag::controller): forward(c) = c + "
         "error(c) is where the tool is when the axes stand at c, command(t) where they must stand for it to be at t. "
         "Positions (n, 3) are axis positions in the controller's coordinates, mm; tool: offset of the functional point "
-        "(3,), mm, by default that of the calibration. NaN where there is no answer: outside with \"refuse\", beyond "
-        "the margin, a position that is not finite, a tool longer than largest_tool.")
+        "(3,), mm, by default that of the calibration; temperature: of the scales of X, Y, Z (3,), degrees Celsius, by "
+        "default none: the error is that of the table. NaN where there is no answer: outside with \"refuse\", beyond "
+        "the margin, a position that is not finite, a tool longer than largest_tool, a temperature outside "
+        "`temperatures`.")
         .def(py::init(&make_compensator), py::arg("table"), py::arg("chain"), py::kw_only(),
              py::arg("origin") = zeros(3), py::arg("outside") = "hold", py::arg("margin") = CompensatorOptions{}.margin,
              py::arg("largest_correction") = CompensatorOptions{}.largest_correction, py::arg("approach") = "mean",
              py::arg("largest_tool") = CompensatorOptions{}.largest_tool, py::arg("accept_rejected") = false,
+             py::arg("temperatures") = std::nullopt,
              "table: a file, a Calibration or an ErrorMap that carries chain, volume and tool. chain: the "
              "controller's. origin: home in the controller's coordinates. outside the calibrated volume: \"hold\" the "
              "error of its nearest point, go on \"linear\" up to `margin`, or \"refuse\". largest_correction: command "
              "and forward shorten a longer error to this length. approach: \"mean\", \"positive\" or \"negative\", of "
-             "a table with reversal. accept_rejected: take a table whose fit was rejected. Warns (UserWarning) of "
+             "a table with reversal. accept_rejected: take a table whose fit was rejected. "
+             "temperatures: lowest and highest of a scale that calls may state, degrees Celsius; needs a table that "
+             "is referred to a temperature by a known expansion. Warns (UserWarning) of "
              "a fit that is not accepted. Raises InvalidArgument for a table or options that a controller should not "
              "use.")
         .def(
             "error",
-            [](const Compensator& c, const ArrayLike& positions, const std::optional<ArrayLike>& tool) {
-                return for_each_position(positions, "positions", [&, offset = tool_of(c, tool)](const Position& p) {
-                    const MachineError e = c.error(p, offset);
-                    return unless_refused(e.position, e.status);
-                });
+            [](const Compensator& c, const ArrayLike& positions, const std::optional<ArrayLike>& tool,
+               const std::optional<ArrayLike>& temperature) {
+                return for_each_position(
+                    positions, "positions",
+                    [&, offset = tool_of(c, tool), scales = Scales(temperature)](const Position& p) {
+                        MachineError e;
+                        e.status = c.error(p.data(), offset.data(), scales, e.position.data(), e.orientation.data());
+                        return unless_refused(e.position, e.status);
+                    });
             },
-            py::arg("positions"), py::arg("tool") = std::nullopt,
+            py::arg("positions"), py::arg("tool") = std::nullopt, py::arg("temperature") = std::nullopt,
             "Error of the functional point (n, 3), mm: exact, and the whole of it where corrections are capped.")
         .def(
             "orientation",
-            [](const Compensator& c, const ArrayLike& positions, const std::optional<ArrayLike>& tool) {
-                return for_each_position(positions, "positions", [&, offset = tool_of(c, tool)](const Position& p) {
-                    const MachineError e = c.error(p, offset);
-                    return unless_refused(e.orientation, e.status);
-                });
+            [](const Compensator& c, const ArrayLike& positions, const std::optional<ArrayLike>& tool,
+               const std::optional<ArrayLike>& temperature) {
+                return for_each_position(
+                    positions, "positions",
+                    [&, offset = tool_of(c, tool), scales = Scales(temperature)](const Position& p) {
+                        MachineError e;
+                        e.status = c.error(p.data(), offset.data(), scales, e.position.data(), e.orientation.data());
+                        return unless_refused(e.orientation, e.status);
+                    });
             },
-            py::arg("positions"), py::arg("tool") = std::nullopt, "Rotation vectors of the tool (n, 3), rad.")
+            py::arg("positions"), py::arg("tool") = std::nullopt, py::arg("temperature") = std::nullopt,
+            "Rotation vectors of the tool (n, 3), rad.")
         .def(
             "command",
-            [](const Compensator& c, const ArrayLike& targets, const std::optional<ArrayLike>& tool) {
-                return for_each_position(targets, "targets", [&, offset = tool_of(c, tool)](const Position& p) {
-                    const CompensatedPosition answer = c.command(p, offset);
-                    return unless_refused(answer.position, answer.status);
-                });
+            [](const Compensator& c, const ArrayLike& targets, const std::optional<ArrayLike>& tool,
+               const std::optional<ArrayLike>& temperature) {
+                return for_each_position(
+                    targets, "targets",
+                    [&, offset = tool_of(c, tool), scales = Scales(temperature)](const Position& p) {
+                        CompensatedPosition answer;
+                        answer.status = c.command(p.data(), offset.data(), scales, answer.position.data());
+                        return unless_refused(answer.position, answer.status);
+                    });
             },
-            py::arg("targets"), py::arg("tool") = std::nullopt,
+            py::arg("targets"), py::arg("tool") = std::nullopt, py::arg("temperature") = std::nullopt,
             "Where the axes must stand (n, 3), mm, for the tool to be at the targets (n, 3).")
         .def(
             "forward",
-            [](const Compensator& c, const ArrayLike& commands, const std::optional<ArrayLike>& tool) {
-                return for_each_position(commands, "commands", [&, offset = tool_of(c, tool)](const Position& p) {
-                    const CompensatedPosition answer = c.forward(p, offset);
-                    return unless_refused(answer.position, answer.status);
-                });
+            [](const Compensator& c, const ArrayLike& commands, const std::optional<ArrayLike>& tool,
+               const std::optional<ArrayLike>& temperature) {
+                return for_each_position(
+                    commands, "commands",
+                    [&, offset = tool_of(c, tool), scales = Scales(temperature)](const Position& p) {
+                        CompensatedPosition answer;
+                        answer.status = c.forward(p.data(), offset.data(), scales, answer.position.data());
+                        return unless_refused(answer.position, answer.status);
+                    });
             },
-            py::arg("commands"), py::arg("tool") = std::nullopt,
+            py::arg("commands"), py::arg("tool") = std::nullopt, py::arg("temperature") = std::nullopt,
             "Where the tool is (n, 3), mm, when the axes stand at the commands (n, 3).")
         .def("status", &status, py::arg("positions"), py::arg("tool") = std::nullopt,
+             py::arg("temperature") = std::nullopt,
              "Of the error at positions (n, 3): 0, or the sum of 1 outside the volume, 2 longer than "
-             "largest_correction, 4 refused; shape (n,).")
-        .def_property_readonly("fingerprint", &Compensator::fingerprint,
-                               "The table in force: a hash of chain, volume, tool, nodes and values, 64 bit.")
+             "largest_correction, 4 refused, 16 (with 4) a temperature that is not taken; shape (n,).")
+        .def_property_readonly(
+            "fingerprint", &Compensator::fingerprint,
+            "The table in force: a hash of chain, volume, tool, nodes, values and expansion, 64 bit.")
         .def_property_readonly("inverse_bound", &Compensator::inverse_bound,
                                "|forward(command(t)) - t| never exceeds this, mm.")
         .def_property_readonly("volume",
@@ -181,6 +225,13 @@ void bind_controller(py::module_& m) {
         .def_property_readonly(
             "tool", [](const Compensator& c) { return to_numpy_vector(Eigen::Vector3d(c.tool().data())); },
             "Of the calibration, mm.")
+        .def_property_readonly(
+            "temperature_reference",
+            [](const Compensator& c) {
+                const double reference = c.temperature_reference();
+                return std::isnan(reference) ? std::nullopt : std::optional(reference);
+            },
+            "Temperature of the scales at which they add nothing, degrees Celsius; None: none may be stated.")
         .def_property_readonly(
             "fit",
             [](const Compensator& c) { return c.fit().empty() ? std::nullopt : std::optional<std::string>(c.fit()); },

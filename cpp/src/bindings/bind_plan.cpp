@@ -70,27 +70,42 @@ void bind_plan(py::module_& m) {
             },
             "How the axes X, Y, Z come to every point, the first included: +1 or -1, (3,).");
 
+    py::class_<CheckPoints>(m, "CheckPoints",
+                            "Returns to one point of each line but scale lines, which tell a drift from the machine's "
+                            "errors.")
+        .def(py::init([](const IntegerLike& every, const IntegerLike& at) {
+                 return CheckPoints{int(to_integer(every, "every", 0, Plan::largest_step_count)),
+                                    int(to_integer(at, "at", 0, Plan::largest_step_count))};
+             }),
+             py::arg("every") = integer(0), py::arg("at") = integer(0),
+             "every: after so many steps, each a move of every axis; 0: there are none. at: the point is that after so "
+             "many steps, 0 the line's first.")
+        .def_readonly("every", &CheckPoints::every)
+        .def_readonly("at", &CheckPoints::at);
+
     py::class_<Plan>(m, "Plan",
                      "The lines measured through a volume, in single-axis steps. Lines are named by the travel signs "
                      "of X, Y, Z: three of p n 0.")
         .def(py::init([](const ArrayLike& volume, const std::vector<std::string>& lines, const IntegerLike& steps,
                          const std::variant<std::string, std::vector<std::string>>& order,
-                         const std::vector<std::string>& scale_lines) {
+                         const std::vector<std::string>& scale_lines, const CheckPoints& check_points) {
                  const int count = int(to_integer(steps, "steps", 1, Plan::largest_step_count));
                  return Plan(to_vector3(volume, "volume"), parse_lines(lines), count, parse_orders(order),
-                             parse_lines(scale_lines));
+                             parse_lines(scale_lines), check_points);
              }),
              py::arg("volume"), py::arg("lines"), py::arg("steps"), py::arg("order") = "XYZ",
-             py::arg("scale_lines") = std::vector<std::string>{},
+             py::arg("scale_lines") = std::vector<std::string>{}, py::kw_only(),
+             py::arg("check_points") = CheckPoints{},
              "volume: edges in mm. steps: per axis. order: in which a step moves the axes, \"XYZ\" ...; of several, "
              "run r goes in the order r modulo their number. Raises InvalidArgument for an unknown or doubled line, a "
              "volume "
-             "without extent, steps outside 1 .. 2000.")
+             "without extent, steps outside 1 .. 2000, check points that are outside 0 .. steps.")
         .def_property_readonly_static("largest_step_count", [](const py::object&) { return Plan::largest_step_count; })
         .def_property_readonly("volume", [](const Plan& plan) { return to_numpy_vector(plan.volume()); })
         .def_property_readonly("lines", [](const Plan& plan) { return line_names(plan.lines()); })
         .def_property_readonly("scale_lines", [](const Plan& plan) { return line_names(plan.scale_lines()); })
         .def_property_readonly("steps", &Plan::steps)
+        .def_property_readonly("check_points", &Plan::check_points)
         .def_property_readonly(
             "order", [](const Plan& plan) { return order_name(plan.order()); }, "The order of run 0.")
         .def_property_readonly("orders",
@@ -104,7 +119,18 @@ void bind_plan(py::module_& m) {
             [](const Plan& plan, const std::string& line, const IntegerLike& run) {
                 return positions_of(plan.points(Line::parse(line), to_int(run, "run")));
             },
-            py::arg("line"), py::arg("run") = integer(0), "Commanded points of a line of this plan, (n, 3), mm.")
+            py::arg("line"), py::arg("run") = integer(0),
+            "Commanded points of a line of this plan in the order of travel, returns to its check point included, "
+            "(n, 3), mm.")
+        .def(
+            "check_numbers",
+            [](const Plan& plan, const std::string& line) {
+                std::vector<int> numbers;
+                for (const PlanPoint& point : plan.points(Line::parse(line)))
+                    if (point.is_check) numbers.push_back(point.number);
+                return numbers;
+            },
+            py::arg("line"), "Numbers of the points of a line that are returns to its check point.")
         .def(
             "passes",
             [](const Plan& plan, const IntegerLike& repeats, bool backward) {

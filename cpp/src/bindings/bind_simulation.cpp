@@ -89,23 +89,24 @@ void bind_simulation(py::module_& m) {
         "1 for the others); assumed_environment: what the readings are reduced with (none: the same). verified_share: "
         "of a traced head's replayed poses, traced again and compared. repeats: how often each line is measured, runs "
         "0, 1, 2, ...; backward: runs 0, 2, ... are each followed by one in reverse order, 1, 3, ...; "
-        "seconds_per_reading: makes the channel time; scales: they expand, and their temperatures are recorded.")
+        "seconds_per_reading: makes the channel time; scales: they expand, and their temperatures are recorded; "
+        "machine_drift (3,): of the functional point along the axes since the first reading, mm/s.")
         .def(py::init([](const std::map<std::string, Misalignment>& misalignment, const Noise& noise,
                          const std::optional<Environment>& environment, const std::optional<Environment>& assumed,
                          double verified_share, const IntegerLike& repeats, bool backward,
                          const std::optional<double>& seconds_per_reading,
-                         const std::optional<ScaleTemperatures>& scales) {
+                         const std::optional<ScaleTemperatures>& scales, const ArrayLike& machine_drift) {
                  return SimulationOptions{misalignment,   noise,
                                           environment,    assumed,
                                           verified_share, to_int(repeats, "repeats"),
                                           backward,       seconds_per_reading,
-                                          scales};
+                                          scales,         to_vector3(machine_drift, "machine_drift")};
              }),
              py::kw_only(), py::arg("misalignment") = std::map<std::string, Misalignment>{}, py::arg("noise") = Noise{},
              py::arg("environment") = std::nullopt, py::arg("assumed_environment") = std::nullopt,
              py::arg("verified_share") = SimulationOptions{}.verified_share, py::arg("repeats") = integer(1),
              py::arg("backward") = false, py::arg("seconds_per_reading") = std::nullopt,
-             py::arg("scales") = std::nullopt,
+             py::arg("scales") = std::nullopt, py::arg("machine_drift") = zeros(3),
              "Raises InvalidArgument for repeats that are no small number; simulate() checks the rest.")
         .def_readonly("misalignment", &SimulationOptions::misalignment)
         .def_readonly("noise", &SimulationOptions::noise)
@@ -115,7 +116,9 @@ void bind_simulation(py::module_& m) {
         .def_readonly("repeats", &SimulationOptions::repeats)
         .def_readonly("backward", &SimulationOptions::backward)
         .def_readonly("seconds_per_reading", &SimulationOptions::seconds_per_reading)
-        .def_readonly("scales", &SimulationOptions::scales);
+        .def_readonly("scales", &SimulationOptions::scales)
+        .def_property_readonly("machine_drift",
+                               [](const SimulationOptions& o) { return to_numpy_vector(o.machine_drift); });
 
     m.def(
         "simulate",

@@ -5,48 +5,69 @@ namespace {
 
 using Tables = CompensatorTables;
 
+// The two ways of `Scales` that the functions below are made for.
+struct Without {
+    STEPDIAG_INLINED static ScalesOfTable scales(const Tables& /*t*/, const double* /*temperature*/) noexcept {
+        return {};
+    }
+};
+struct AtTemperature {
+    STEPDIAG_INLINED static ExpandedScales scales(const Tables& t, const double* temperature) noexcept {
+        return t.scales.at(temperature);
+    }
+};
+
 // Baseline functions for all processors that the library supports.
-template <class Order>
+template <class Order, class Way>
 struct Plain {
-    static unsigned error(const Tables& t, const double* p, const double* tool, double* e, double* turn) noexcept {
-        return answer_error(Order{}, t, p, tool, e, turn);
+    static unsigned error(const Tables& t, const double* p, const double* tool, const double* temperature, double* e,
+                          double* turn) noexcept {
+        return answer_error(Order{}, Way::scales(t, temperature), t, p, tool, e, turn);
     }
-    static unsigned command(const Tables& t, const double* target, const double* tool, double* command) noexcept {
-        return answer_command(Order{}, t, target, tool, command);
+    static unsigned command(const Tables& t, const double* target, const double* tool, const double* temperature,
+                            double* command) noexcept {
+        return answer_command(Order{}, Way::scales(t, temperature), t, target, tool, command);
     }
-    static unsigned forward(const Tables& t, const double* command, const double* tool, double* actual) noexcept {
-        return answer_forward(Order{}, t, command, tool, actual);
+    static unsigned forward(const Tables& t, const double* command, const double* tool, const double* temperature,
+                            double* actual) noexcept {
+        return answer_forward(Order{}, Way::scales(t, temperature), t, command, tool, actual);
     }
 };
 
 #if defined(__x86_64__)
 #define STEPDIAG_FUSED [[gnu::target("avx2,fma")]]
 
-template <class Order>
+template <class Order, class Way>
 struct Fused {
-    STEPDIAG_FUSED static unsigned error(const Tables& t, const double* p, const double* tool, double* e,
-                                         double* turn) noexcept {
-        return answer_error(Order{}, t, p, tool, e, turn);
+    STEPDIAG_FUSED static unsigned error(const Tables& t, const double* p, const double* tool,
+                                         const double* temperature, double* e, double* turn) noexcept {
+        return answer_error(Order{}, Way::scales(t, temperature), t, p, tool, e, turn);
     }
     STEPDIAG_FUSED static unsigned command(const Tables& t, const double* target, const double* tool,
-                                           double* command) noexcept {
-        return answer_command(Order{}, t, target, tool, command);
+                                           const double* temperature, double* command) noexcept {
+        return answer_command(Order{}, Way::scales(t, temperature), t, target, tool, command);
     }
     STEPDIAG_FUSED static unsigned forward(const Tables& t, const double* command, const double* tool,
-                                           double* actual) noexcept {
-        return answer_forward(Order{}, t, command, tool, actual);
+                                           const double* temperature, double* actual) noexcept {
+        return answer_forward(Order{}, Way::scales(t, temperature), t, command, tool, actual);
     }
 };
 #else
-template <class Order>
-using Fused = Plain<Order>;
+template <class Order, class Way>
+using Fused = Plain<Order, Way>;
 #endif
 
-template <int first, int second, int third>
+template <class Order, class Way>
 Answers answers(bool fused) {
+    using P = Plain<Order, Way>;
+    using F = Fused<Order, Way>;
+    return fused ? Answers{F::error, F::command, F::forward} : Answers{P::error, P::command, P::forward};
+}
+
+template <int first, int second, int third>
+Answers answers(bool fused, bool at_temperature) {
     using Order = AxisOrder<first, second, third>;
-    if (fused) return {Fused<Order>::error, Fused<Order>::command, Fused<Order>::forward};
-    return {Plain<Order>::error, Plain<Order>::command, Plain<Order>::forward};
+    return at_temperature ? answers<Order, AtTemperature>(fused) : answers<Order, Without>(fused);
 }
 
 }  // namespace
@@ -59,14 +80,14 @@ bool are_fused_answers_known() {
 #endif
 }
 
-Answers answers_for(const Chain& chain, bool fused) {
+Answers answers_for(const Chain& chain, bool fused, bool at_temperature) {
     switch (3 * index(chain.order()[0]) + index(chain.order()[1])) {
-        case 1: return answers<0, 1, 2>(fused);
-        case 2: return answers<0, 2, 1>(fused);
-        case 3: return answers<1, 0, 2>(fused);
-        case 5: return answers<1, 2, 0>(fused);
-        case 6: return answers<2, 0, 1>(fused);
-        default: return answers<2, 1, 0>(fused);
+        case 1: return answers<0, 1, 2>(fused, at_temperature);
+        case 2: return answers<0, 2, 1>(fused, at_temperature);
+        case 3: return answers<1, 0, 2>(fused, at_temperature);
+        case 5: return answers<1, 2, 0>(fused, at_temperature);
+        case 6: return answers<2, 0, 1>(fused, at_temperature);
+        default: return answers<2, 1, 0>(fused, at_temperature);
     }
 }
 

@@ -14,6 +14,12 @@ namespace {
 constexpr double shortest_edge = 1e-3;  // mm
 constexpr double node_slack = 1e-6;     // mm; accepts rounding of the positions at the ends of a table
 
+constexpr double coldest = -100.0, hottest = 200.0;  // degrees Celsius; detects kelvin
+
+bool states_temperatures(const CompensatorOptions& options) {
+    return !(options.temperatures[0] == 0.0 && options.temperatures[1] == 0.0);
+}
+
 std::string text(double number) { return format_decimal(number, 0); }
 
 void require(bool holds, const std::string& what, const std::string& expected, double got) {
@@ -46,6 +52,12 @@ void check(const CompensatorOptions& options) {
             "a positive length of at most 100 m", options.largest_correction);
     require(options.largest_tool >= 0.0 && options.largest_tool <= farthest_position, "largest_tool",
             "a length from 0 to 100 m", options.largest_tool);
+    if (!states_temperatures(options)) return;
+    const auto [lowest, highest] = options.temperatures;
+    for (const double temperature : options.temperatures)
+        require(temperature >= coldest && temperature <= hottest, "temperatures",
+                "two from " + text(coldest) + " to " + text(hottest) + " degrees Celsius", temperature);
+    require(lowest < highest, "temperatures", "the lowest below the highest, " + text(highest), lowest);
 }
 
 void check_volume(const Eigen::Vector3d& volume, const CompensatorOptions& options, const std::string& name) {
@@ -58,6 +70,25 @@ void check_volume(const Eigen::Vector3d& volume, const CompensatorOptions& optio
 void check_tool(const Eigen::Vector3d& tool, const CompensatorOptions& options, const std::string& name) {
     require(tool.norm() <= options.largest_tool, name + ": tool_mm",
             "a tool no longer than the option largest_tool, " + text(options.largest_tool), tool.norm());
+}
+
+std::optional<Expansion> check_temperatures(const ParameterTable& table, const CompensatorOptions& options,
+                                            const std::string& name) {
+    if (!states_temperatures(options)) return std::nullopt;
+    if (auto expansion = expansion_of(table, name)) return expansion;
+    const auto header = [&](const char* key) {
+        const auto entry = table.header.find(key);
+        return entry == table.header.end() ? std::string() : entry->second;
+    };
+    const std::string found = header("temperature_as_found_c");
+    throw InvalidArgument(
+        name +
+        ": for compensation by temperatures of the scales, expected positioning errors that are referred to a "
+        "temperature (temperature_reference_c) by a known expansion (expansion_per_k), got " +
+        (!header("temperature_reference_c").empty() ? "no expansion"
+         : found.empty()                            ? "neither"
+                                                    : "errors as found at " + found + " degrees Celsius") +
+        "; evaluate the run again with [temperature] in the scenario");
 }
 
 std::string check_fit(const ParameterTable& table, const CompensatorOptions& options, const std::string& name) {

@@ -3,10 +3,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "stepdiag/controller/compensator.hpp"
+#include "stepdiag/machine/expansion.hpp"
 #include "stepdiag/machine/parameter_table.hpp"
 
 namespace stepdiag {
@@ -17,6 +19,9 @@ inline constexpr double farthest_position = 1e5;  // mm
 void check(const CompensatorOptions& options);
 void check_volume(const Eigen::Vector3d& volume, const CompensatorOptions& options, const std::string& name);
 void check_tool(const Eigen::Vector3d& tool, const CompensatorOptions& options, const std::string& name);
+// The table's expansion if the options state temperatures.
+std::optional<Expansion> check_temperatures(const ParameterTable& table, const CompensatorOptions& options,
+                                            const std::string& name);
 // Verdict of the table's fit; empty if the table has none.
 std::string check_fit(const ParameterTable& table, const CompensatorOptions& options, const std::string& name);
 // Checks that the nodes match the volume. This detects tables in metres or micrometres, or of another machine.

@@ -1,6 +1,7 @@
 #include "stepdiag/controller/compensator.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "controller/checks.hpp"
 #include "controller/compensator_tables.hpp"
@@ -27,6 +28,17 @@ int largest_step_count(double error, double contraction) {
     int count = 0;
     for (double left = error; left > iteration_bound; left *= factor) ++count;
     return count;
+}
+
+const Answers& answers(const CompensatorTables& tables, const double* temperature) {
+    return temperature ? tables.answers_at_temperature : tables.answers;
+}
+
+ScaleRange scale_range(const ParameterTable& table, const CompensatorOptions& options, const std::string& name) {
+    const std::optional<Expansion> expansion = check_temperatures(table, options, name);
+    if (!expansion) return {};
+    return {options.temperatures[0], options.temperatures[1], expansion->reference, read(expansion->coefficient.data()),
+            read(expansion->fixed_point.data())};
 }
 
 // Calls `make`. Prefixes the messages of its exceptions with the table's name.
@@ -58,19 +70,33 @@ std::unique_ptr<CompensatorTables> make_tables(const ParameterTable& table, cons
     check_nodes(table, edges, name);
     const ErrorModel model =
         named(name, [&] { return ErrorModel(own, ErrorMap(table), array(edges), options.margin, options.approach); });
-    const ErrorModel::Bounds bounds = named(name, [&] { return model.bounds(options.largest_tool); });
+    const ScaleRange scales = scale_range(table, options, name);
+    const ErrorModel::Bounds bounds = named(name, [&] { return model.bounds(options.largest_tool, scales.largest()); });
     if (!(bounds.contraction < steepest_contraction))
         throw InvalidArgument(name + ": expected errors that change by less than " +
                               std::to_string(steepest_contraction) + " mm/mm, got up to " +
                               std::to_string(bounds.contraction) + "; are the values in um and urad?");
     const Box volume = {{0.0, 0.0, 0.0}, {edges.x(), edges.y(), edges.z()}};
     return std::unique_ptr<CompensatorTables>(new CompensatorTables{
-        model, answers_for(own, are_fused_answers_known()), read(options.origin.data()), volume.grown(options.margin),
-        Box{}.grown(farthest_position), volume.grown(edge_slack), volume.grown(2.0 * edge_slack), options.outside,
-        options.margin, options.largest_correction, options.largest_correction * options.largest_correction,
+        model,
+        answers_for(own, are_fused_answers_known(), false),
+        answers_for(own, are_fused_answers_known(), true),
+        scales,
+        read(options.origin.data()),
+        volume.grown(options.margin),
+        Box{}.grown(farthest_position),
+        volume.grown(edge_slack),
+        volume.grown(2.0 * edge_slack),
+        options.outside,
+        options.margin,
+        options.largest_correction,
+        options.largest_correction * options.largest_correction,
         options.largest_tool * options.largest_tool,
-        largest_step_count(std::min(bounds.error, options.largest_correction), bounds.contraction), array(edges),
-        array(tool), stepdiag::fingerprint(own, edges, tool, table), check_fit(table, options, name),
+        largest_step_count(std::min(bounds.error, options.largest_correction), bounds.contraction),
+        array(edges),
+        array(tool),
+        stepdiag::fingerprint(own, edges, tool, table, expansion_of(table, name)),
+        check_fit(table, options, name),
         not_told(table, edges, name)});
 }
 
@@ -82,17 +108,42 @@ Compensator::~Compensator() = default;
 Compensator::Compensator(Compensator&&) noexcept = default;
 Compensator& Compensator::operator=(Compensator&&) noexcept = default;
 
+unsigned Compensator::error(const double* position, const double* tool, const double* temperature, double* error,
+                            double* orientation) const noexcept {
+    if (temperature && !tables_->scales.holds(temperature)) {
+        write({0.0, 0.0, 0.0}, error);
+        if (orientation) write({0.0, 0.0, 0.0}, orientation);
+        return compensation_refused | compensation_temperature;
+    }
+    return answers(*tables_, temperature)
+        .error(*tables_, position, tool ? tool : tables_->tool.data(), temperature, error, orientation);
+}
+
+unsigned Compensator::command(const double* target, const double* tool, const double* temperature,
+                              double* command) const noexcept {
+    if (temperature && !tables_->scales.holds(temperature))
+        return write(read(target), command), compensation_refused | compensation_temperature;
+    return answers(*tables_, temperature)
+        .command(*tables_, target, tool ? tool : tables_->tool.data(), temperature, command);
+}
+
+unsigned Compensator::forward(const double* command, const double* tool, const double* temperature,
+                              double* actual) const noexcept {
+    if (temperature && !tables_->scales.holds(temperature))
+        return write(read(command), actual), compensation_refused | compensation_temperature;
+    return answers(*tables_, temperature)
+        .forward(*tables_, command, tool ? tool : tables_->tool.data(), temperature, actual);
+}
+
 unsigned Compensator::error(const double* position, const double* tool, double* error,
                             double* orientation) const noexcept {
-    return tables_->answers.error(*tables_, position, tool ? tool : tables_->tool.data(), error, orientation);
+    return this->error(position, tool, nullptr, error, orientation);
 }
-
 unsigned Compensator::command(const double* target, const double* tool, double* command) const noexcept {
-    return tables_->answers.command(*tables_, target, tool ? tool : tables_->tool.data(), command);
+    return this->command(target, tool, nullptr, command);
 }
-
 unsigned Compensator::forward(const double* command, const double* tool, double* actual) const noexcept {
-    return tables_->answers.forward(*tables_, command, tool ? tool : tables_->tool.data(), actual);
+    return this->forward(command, tool, nullptr, actual);
 }
 
 MachineError Compensator::error(const std::array<double, 3>& position,
@@ -113,11 +164,33 @@ CompensatedPosition Compensator::forward(const std::array<double, 3>& command,
     result.status = forward(command.data(), tool.data(), result.position.data());
     return result;
 }
+MachineError Compensator::error(const std::array<double, 3>& position, const std::array<double, 3>& tool,
+                                const std::array<double, 3>& temperature) const noexcept {
+    MachineError result;
+    result.status =
+        error(position.data(), tool.data(), temperature.data(), result.position.data(), result.orientation.data());
+    return result;
+}
+CompensatedPosition Compensator::command(const std::array<double, 3>& target, const std::array<double, 3>& tool,
+                                         const std::array<double, 3>& temperature) const noexcept {
+    CompensatedPosition result;
+    result.status = command(target.data(), tool.data(), temperature.data(), result.position.data());
+    return result;
+}
+CompensatedPosition Compensator::forward(const std::array<double, 3>& command, const std::array<double, 3>& tool,
+                                         const std::array<double, 3>& temperature) const noexcept {
+    CompensatedPosition result;
+    result.status = forward(command.data(), tool.data(), temperature.data(), result.position.data());
+    return result;
+}
 
 std::uint64_t Compensator::fingerprint() const noexcept { return tables_->fingerprint; }
 double Compensator::inverse_bound() const noexcept { return inverse_bound_mm; }
 std::array<double, 3> Compensator::volume() const noexcept { return tables_->volume; }
 std::array<double, 3> Compensator::tool() const noexcept { return tables_->tool; }
+double Compensator::temperature_reference() const noexcept {
+    return tables_->scales.is_empty() ? std::numeric_limits<double>::quiet_NaN() : tables_->scales.reference;
+}
 const std::string& Compensator::fit() const noexcept { return tables_->fit; }
 const std::vector<std::string>& Compensator::uncompensated() const noexcept { return tables_->uncompensated; }
 

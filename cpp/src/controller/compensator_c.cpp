@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <exception>
 
@@ -22,7 +23,8 @@ static_assert(int(stepdiag::CompensatedApproach::mean) == STEPDIAG_MEAN &&
               int(stepdiag::CompensatedApproach::negative) == STEPDIAG_NEGATIVE);
 static_assert(int(stepdiag::compensation_outside) == STEPDIAG_OUTSIDE &&
               int(stepdiag::compensation_capped) == STEPDIAG_CAPPED &&
-              int(stepdiag::compensation_refused) == STEPDIAG_REFUSED);
+              int(stepdiag::compensation_refused) == STEPDIAG_REFUSED &&
+              int(stepdiag::compensation_temperature) == STEPDIAG_TEMPERATURE);
 
 std::array<double, 3> array(const double v[3]) { return {v[0], v[1], v[2]}; }
 
@@ -33,7 +35,8 @@ stepdiag::CompensatorOptions options_of(const stepdiag_options& given) {
             given.largest_correction,
             stepdiag::CompensatedApproach(given.approach),
             given.largest_tool,
-            given.accept_rejected != 0};
+            given.accept_rejected != 0,
+            {given.temperatures[0], given.temperatures[1]}};
 }
 
 stepdiag_compensator* load(const char* path, const char* chain, const stepdiag_options* options) {
@@ -68,7 +71,8 @@ stepdiag_options stepdiag_default_options(void) {
             own.largest_correction,
             int(own.approach),
             own.largest_tool,
-            own.accept_rejected};
+            own.accept_rejected,
+            {own.temperatures[0], own.temperatures[1]}};
 }
 
 stepdiag_compensator* stepdiag_compensator_load(const char* path, const char* chain, const stepdiag_options* options,
@@ -85,25 +89,41 @@ stepdiag_compensator* stepdiag_compensator_load(const char* path, const char* ch
 
 void stepdiag_compensator_free(stepdiag_compensator* compensator) { delete compensator; }
 
-unsigned stepdiag_error(const stepdiag_compensator* compensator, const double position[3], const double tool[3],
-                        double error[3], double orientation[3]) {
+unsigned stepdiag_error_at_temperature(const stepdiag_compensator* compensator, const double position[3],
+                                       const double tool[3], const double temperature[3], double error[3],
+                                       double orientation[3]) {
     if (!compensator || !position) return STEPDIAG_REFUSED;
     Scratch scratch;
-    return compensator->compensator.error(position, tool, scratch.or_else(error), orientation);
+    return compensator->compensator.error(position, tool, temperature, scratch.or_else(error), orientation);
+}
+
+unsigned stepdiag_command_at_temperature(const stepdiag_compensator* compensator, const double target[3],
+                                         const double tool[3], const double temperature[3], double command[3]) {
+    if (!compensator || !target) return STEPDIAG_REFUSED;
+    Scratch scratch;
+    return compensator->compensator.command(target, tool, temperature, scratch.or_else(command));
+}
+
+unsigned stepdiag_forward_at_temperature(const stepdiag_compensator* compensator, const double command[3],
+                                         const double tool[3], const double temperature[3], double actual[3]) {
+    if (!compensator || !command) return STEPDIAG_REFUSED;
+    Scratch scratch;
+    return compensator->compensator.forward(command, tool, temperature, scratch.or_else(actual));
+}
+
+unsigned stepdiag_error(const stepdiag_compensator* compensator, const double position[3], const double tool[3],
+                        double error[3], double orientation[3]) {
+    return stepdiag_error_at_temperature(compensator, position, tool, nullptr, error, orientation);
 }
 
 unsigned stepdiag_command(const stepdiag_compensator* compensator, const double target[3], const double tool[3],
                           double command[3]) {
-    if (!compensator || !target) return STEPDIAG_REFUSED;
-    Scratch scratch;
-    return compensator->compensator.command(target, tool, scratch.or_else(command));
+    return stepdiag_command_at_temperature(compensator, target, tool, nullptr, command);
 }
 
 unsigned stepdiag_forward(const stepdiag_compensator* compensator, const double command[3], const double tool[3],
                           double actual[3]) {
-    if (!compensator || !command) return STEPDIAG_REFUSED;
-    Scratch scratch;
-    return compensator->compensator.forward(command, tool, scratch.or_else(actual));
+    return stepdiag_forward_at_temperature(compensator, command, tool, nullptr, actual);
 }
 
 uint64_t stepdiag_fingerprint(const stepdiag_compensator* compensator) {
@@ -112,6 +132,10 @@ uint64_t stepdiag_fingerprint(const stepdiag_compensator* compensator) {
 
 double stepdiag_inverse_bound(const stepdiag_compensator* compensator) {
     return compensator ? compensator->compensator.inverse_bound() : 0.0;
+}
+
+double stepdiag_temperature_reference(const stepdiag_compensator* compensator) {
+    return compensator ? compensator->compensator.temperature_reference() : NAN;
 }
 
 void stepdiag_calibration_tool(const stepdiag_compensator* compensator, double tool[3]) {

@@ -1,6 +1,7 @@
 // Data of a loaded compensator, and the functions for the requests of a controller.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -19,18 +20,45 @@ inline constexpr double iteration_bound = 4e-11;  // mm
 
 struct CompensatorTables;
 
-// Functions for one order of the axes and one instruction set, selected when loading.
+// Functions for one order of the axes and one instruction set, selected when loading, without or with temperatures.
 struct Answers {
     using Tables = CompensatorTables;
-    unsigned (*error)(const Tables&, const double* position, const double* tool, double* error,
-                      double* orientation) noexcept;
-    unsigned (*command)(const Tables&, const double* target, const double* tool, double* command) noexcept;
-    unsigned (*forward)(const Tables&, const double* command, const double* tool, double* actual) noexcept;
+    unsigned (*error)(const Tables&, const double* position, const double* tool, const double* temperature,
+                      double* error, double* orientation) noexcept;
+    unsigned (*command)(const Tables&, const double* target, const double* tool, const double* temperature,
+                        double* command) noexcept;
+    unsigned (*forward)(const Tables&, const double* command, const double* tool, const double* temperature,
+                        double* actual) noexcept;
+};
+
+// Temperatures that calls may state. Without any, `lowest` exceeds `highest`.
+struct ScaleRange {
+    double lowest = 1.0, highest = 0.0, reference = 0.0;  // degrees Celsius
+    Vector3 coefficient = {0.0, 0.0, 0.0};                // 1/K
+    Vector3 fixed_point = {0.0, 0.0, 0.0};                // mm, in the volume's coordinates
+
+    bool is_empty() const noexcept { return lowest > highest; }
+    STEPDIAG_INLINED bool holds(const double* temperature) const noexcept {  // never NaN
+        const auto inside = [this](double t) { return lowest <= t && t <= highest; };
+        return inside(temperature[0]) && inside(temperature[1]) && inside(temperature[2]);
+    }
+    STEPDIAG_INLINED ExpandedScales at(const double* temperature) const noexcept {
+        return {{coefficient.x * (temperature[0] - reference), coefficient.y * (temperature[1] - reference),
+                 coefficient.z * (temperature[2] - reference)},
+                fixed_point};
+    }
+    // Largest rates over the range; 0 without one.
+    ExpandedScales largest() const noexcept {
+        const double warmth = is_empty() ? 0.0 : std::max(std::abs(lowest - reference), std::abs(highest - reference));
+        const auto rate = [&](double c) { return std::abs(c) * warmth; };
+        return {{rate(coefficient.x), rate(coefficient.y), rate(coefficient.z)}, fixed_point};
+    }
 };
 
 struct CompensatorTables {
     ErrorModel model;
-    Answers answers;
+    Answers answers, answers_at_temperature;
+    ScaleRange scales;
     Vector3 origin;
     Box known;                      // the model is evaluated here; positions outside use the nearest point
     Box everywhere;                 // range of valid positions
@@ -68,9 +96,10 @@ struct CompensatorTables {
     }
 };
 
-template <class Order>
-STEPDIAG_INLINED unsigned answer_error(Order order, const CompensatorTables& t, const double* position,
-                                       const double* tool, double* error, double* orientation) noexcept {
+template <class Order, class Scales>
+STEPDIAG_INLINED unsigned answer_error(Order order, const Scales& scales, const CompensatorTables& t,
+                                       const double* position, const double* tool, double* error,
+                                       double* orientation) noexcept {
     const Vector3 asked = read(position), offset = read(tool), p = asked - t.origin;
     const unsigned status = t.status(p, offset);
     if (status & compensation_refused) {
@@ -80,7 +109,7 @@ STEPDIAG_INLINED unsigned answer_error(Order order, const CompensatorTables& t, 
     }
     const Vector3 nearest = t.known.nearest(p);
     const ErrorModel::Cell cell = t.model.cell(nearest);
-    const Vector3 e = t.model.error(order, nearest, offset, cell);
+    const Vector3 e = t.model.error(order, scales, nearest, offset, cell);
     write(e, error);
     if (orientation) write(t.model.orientation(order, nearest, cell), orientation);
     return dot(e, e) > t.largest_correction2 ? status | compensation_capped : status;
@@ -91,37 +120,38 @@ STEPDIAG_INLINED unsigned answer_error(Order order, const CompensatorTables& t, 
 // The errors at two positions differ by at most q times their distance, and |S| <= q. Each step therefore reduces the
 // residual to at most (2 q + q^2) |r|, for any number of nodes between the positions. Within one cell of the table it
 // is at most q^2 |r|, so two steps suffice. The residual r is the error of the subsequent forward.
-template <class Order>
-STEPDIAG_INLINED unsigned answer_command(Order order, const CompensatorTables& t, const double* target,
-                                         const double* tool, double* command) noexcept {
+template <class Order, class Scales>
+STEPDIAG_INLINED unsigned answer_command(Order order, const Scales& scales, const CompensatorTables& t,
+                                         const double* target, const double* tool, double* command) noexcept {
     const Vector3 asked = read(target), offset = read(tool), p = asked - t.origin;
     const unsigned status = t.status(p, offset);
     if (status & compensation_refused) return write(asked, command), status;
     Vector3 nearest = t.known.nearest(p);
     ErrorModel::Cell cell = t.model.cell(nearest);
-    const Matrix3 slope = t.model.slope(order, nearest, offset, cell);
+    const Matrix3 slope = t.model.slope(order, scales, nearest, offset, cell);
     unsigned capped = 0;
-    Vector3 k = {0.0, 0.0, 0.0}, r = t.capped(t.model.error(order, nearest, offset, cell), capped);
+    Vector3 k = {0.0, 0.0, 0.0}, r = t.capped(t.model.error(order, scales, nearest, offset, cell), capped);
     for (int step = 0; step < t.step_count && dot(r, r) > iteration_bound * iteration_bound; ++step) {
         k = k - (r - slope * r);
         nearest = t.known.nearest(p + k);
         if (!cell.holds(nearest)) cell = t.model.cell(nearest);
         capped = 0;
-        r = k + t.capped(t.model.error(order, nearest, offset, cell), capped);
+        r = k + t.capped(t.model.error(order, scales, nearest, offset, cell), capped);
     }
     write(asked + k, command);
     return status | capped;
 }
 
-template <class Order>
-STEPDIAG_INLINED unsigned answer_forward(Order order, const CompensatorTables& t, const double* command,
-                                         const double* tool, double* actual) noexcept {
+template <class Order, class Scales>
+STEPDIAG_INLINED unsigned answer_forward(Order order, const Scales& scales, const CompensatorTables& t,
+                                         const double* command, const double* tool, double* actual) noexcept {
     const Vector3 asked = read(command), offset = read(tool);
     const Vector3 p = asked - t.origin;
     if (!t.is_usable(p, offset)) return write(asked, actual), compensation_refused;
     const Vector3 nearest = t.known.nearest(p);
     unsigned capped = 0;
-    const Vector3 result = asked + t.capped(t.model.error(order, nearest, offset, t.model.cell(nearest)), capped);
+    const Vector3 result =
+        asked + t.capped(t.model.error(order, scales, nearest, offset, t.model.cell(nearest)), capped);
     const Vector3 at = result - t.origin;
     const unsigned status = t.inside_of_results.holds(at) ? 0 : t.status_outside(at, t.inside_of_results);
     if (status & compensation_refused) return write(asked, actual), status;
@@ -129,7 +159,7 @@ STEPDIAG_INLINED unsigned answer_forward(Order order, const CompensatorTables& t
 }
 
 // `fused`: with AVX2 and FMA. This is a quarter faster and changes the last digits of an error (1e-16 relative).
-Answers answers_for(const Chain& chain, bool fused);
+Answers answers_for(const Chain& chain, bool fused, bool at_temperature);
 bool are_fused_answers_known();  // whether this processor has AVX2 and FMA
 
 std::unique_ptr<CompensatorTables> make_tables(const ParameterTable& table, const std::string& name,

@@ -50,9 +50,17 @@ ErrorModel::ErrorModel(const Chain& chain, const ErrorMap& errors, const std::ar
 //   |de/dp_a| <= |delta_a'| + |theta_a'| reach_a + sum of |theta| over the rotations that turn the direction of a
 // (|d Exp(theta)/dp| <= |theta'|). The root of the sum of squares of these three columns is a bound of the matrix
 // de/dp. Because e is continuous, it also bounds the difference of the errors at two positions.
-ErrorModel::Bounds ErrorModel::bounds(double largest_tool) const {
+// The expansion of a scale adds rate (p - f) to delta_a and rate to delta_a'.
+ErrorModel::Bounds ErrorModel::bounds(double largest_tool, const ExpandedScales& scales) const {
+    const std::array<double, 3> rate = {scales.rate.x, scales.rate.y, scales.rate.z},
+                                fixed = {scales.fixed_point.x, scales.fixed_point.y, scales.fixed_point.z};
     std::array<Extremes, 3> most;
-    for (int axis = 0; axis < 3; ++axis) most[axis] = extremes(tables_[axis], -margin_, volume_[axis] + margin_);
+    for (int axis = 0; axis < 3; ++axis) {
+        const double lowest = -margin_, highest = volume_[axis] + margin_;
+        most[axis] = extremes(tables_[axis], lowest, highest);
+        most[axis].delta += rate[axis] * std::max(std::abs(lowest - fixed[axis]), std::abs(highest - fixed[axis]));
+        most[axis].delta_slope += rate[axis];
+    }
     double reach = largest_tool, error = 0.0, squares = 0.0;
     for (int rank = 2; rank >= 0; --rank) {
         const int axis = order_[rank];

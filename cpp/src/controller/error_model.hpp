@@ -43,6 +43,33 @@ STEPDIAG_INLINED Vector3 rotation_vector(const Quaternion& q) noexcept {
     return (2.0 + dot(q.v, q.v) * (1.0 / 3.0)) * q.v;
 }
 
+// What the scales add to delta(p) along each axis: nothing without their temperatures,
+struct ScalesOfTable {
+    template <int axis>
+    STEPDIAG_INLINED Vector3 expanded(const Vector3& delta, double /*position*/) const noexcept {
+        return delta;
+    }
+    template <int axis>
+    STEPDIAG_INLINED Vector3 expanded_slope(const Vector3& delta_slope) const noexcept {
+        return delta_slope;
+    }
+};
+// and rate (p - fixed_point) with them (machine/expansion.hpp).
+struct ExpandedScales {
+    Vector3 rate, fixed_point;  // coefficient times temperature minus reference; mm
+
+    template <int axis>
+    STEPDIAG_INLINED Vector3 expanded(Vector3 delta, double position) const noexcept {
+        delta.at<axis>() += rate.at<axis>() * (position - fixed_point.at<axis>());
+        return delta;
+    }
+    template <int axis>
+    STEPDIAG_INLINED Vector3 expanded_slope(Vector3 delta_slope) const noexcept {
+        delta_slope.at<axis>() += rate.at<axis>();
+        return delta_slope;
+    }
+};
+
 // Axes from workpiece to tool, X, Y, Z = 0, 1, 2. As a compile-time constant it avoids looking up components.
 template <int first, int second, int third>
 struct AxisOrder {};
@@ -67,20 +94,20 @@ public:
         return {&tables_[0].find(p.x), &tables_[1].find(p.y), &tables_[2].find(p.z)};
     }
 
-    template <int first, int second, int third>
-    STEPDIAG_INLINED Vector3 error(AxisOrder<first, second, third>, const Vector3& p, const Vector3& tool,
-                                   const Cell& cell) const noexcept {
-        Vector3 lever = tool, d = start<third>(p, cell, lever);
-        move<second>(1, p, cell, lever, d);
-        move<first>(0, p, cell, lever, d);
+    template <int first, int second, int third, class Scales>
+    STEPDIAG_INLINED Vector3 error(AxisOrder<first, second, third>, const Scales& scales, const Vector3& p,
+                                   const Vector3& tool, const Cell& cell) const noexcept {
+        Vector3 lever = tool, d = start<third>(scales, p, cell, lever);
+        move<second>(1, scales, p, cell, lever, d);
+        move<first>(0, scales, p, cell, lever, d);
         return d;
     }
 
     // Derivative of the error with respect to the position, to first order in the errors. Column a is
     //   delta_a' + theta_a' x lever_a + (sum of the thetas that rotate the direction of a) x e_a
-    template <int first, int second, int third>
-    STEPDIAG_INLINED Matrix3 slope(AxisOrder<first, second, third>, const Vector3& p, const Vector3& tool,
-                                   const Cell& cell) const noexcept {
+    template <int first, int second, int third, class Scales>
+    STEPDIAG_INLINED Matrix3 slope(AxisOrder<first, second, third>, const Scales& scales, const Vector3& p,
+                                   const Vector3& tool, const Cell& cell) const noexcept {
         Matrix3 slope;
         const Vector3 theta1 = cell.at<first>().at(p.at<first>()).theta;
         const Vector3 theta2 = theta1 + cell.at<second>().at(p.at<second>()).theta;
@@ -89,9 +116,9 @@ public:
         slope.column<second>() = cross_unit<second>(carries_workpiece(1) ? theta2 : theta1);
         slope.column<third>() =
             cross_unit<third>(carries_workpiece(2) ? theta2 + cell.at<third>().at(p.at<third>()).theta : theta2);
-        add_slope<third>(2, p, cell, lever, slope);
-        add_slope<second>(1, p, cell, lever, slope);
-        add_slope<first>(0, p, cell, lever, slope);
+        add_slope<third>(2, scales, p, cell, lever, slope);
+        add_slope<second>(1, scales, p, cell, lever, slope);
+        add_slope<first>(0, scales, p, cell, lever, slope);
         return slope;
     }
 
@@ -106,22 +133,25 @@ public:
                                turn(cell.at<third>(), p.at<third>()));
     }
 
-    // Bounds for all valid positions and all tools up to the length `largest_tool`, mm; see error_model.cpp.
+    // Bounds for all valid positions and all tools up to the length `largest_tool`, mm, with scales as in the table and
+    // with rates of their expansion up to those of `scales`; see error_model.cpp.
     struct Bounds {
         double error;        // |e| <= error, mm
         double contraction;  // |e(p) - e(q)| <= contraction |p - q|, and |slope| <= contraction
     };
-    Bounds bounds(double largest_tool) const;
+    Bounds bounds(double largest_tool, const ExpandedScales& scales) const;
 
 private:
     bool carries_workpiece(int rank) const noexcept { return rank < axes_before_bed_; }
 
     // Effect of the axis next to the tool, where d is initially 0.
-    template <int axis>
-    STEPDIAG_INLINED Vector3 start(const Vector3& p, const Cell& cell, Vector3& lever) const noexcept {
+    template <int axis, class Scales>
+    STEPDIAG_INLINED Vector3 start(const Scales& scales, const Vector3& p, const Cell& cell,
+                                   Vector3& lever) const noexcept {
         const AxisInterval& interval = cell.at<axis>();
         const double position = p.at<axis>();
-        const auto [delta, theta] = interval.at(position);
+        const auto [of_table, theta] = interval.at(position);
+        const Vector3 delta = scales.template expanded<axis>(of_table, position);
         if (carries_workpiece(2)) {
             lever.at<axis>() += position;
             return add_turn(delta, theta, lever + delta);
@@ -130,12 +160,13 @@ private:
         lever.at<axis>() += position;
         return d;
     }
-    template <int axis>
-    STEPDIAG_INLINED void move(int rank, const Vector3& p, const Cell& cell, Vector3& lever,
+    template <int axis, class Scales>
+    STEPDIAG_INLINED void move(int rank, const Scales& scales, const Vector3& p, const Cell& cell, Vector3& lever,
                                Vector3& d) const noexcept {
         const AxisInterval& interval = cell.at<axis>();
         const double position = p.at<axis>();
-        const auto [delta, theta] = interval.at(position);
+        const auto [of_table, theta] = interval.at(position);
+        const Vector3 delta = scales.template expanded<axis>(of_table, position);
         if (carries_workpiece(rank)) {
             lever.at<axis>() += position;
             d = d + delta;
@@ -146,12 +177,13 @@ private:
         }
     }
 
-    template <int axis>
-    STEPDIAG_INLINED void add_slope(int rank, const Vector3& p, const Cell& cell, Vector3& lever,
+    template <int axis, class Scales>
+    STEPDIAG_INLINED void add_slope(int rank, const Scales& scales, const Vector3& p, const Cell& cell, Vector3& lever,
                                     Matrix3& slope) const noexcept {
         const AxisInterval& interval = cell.at<axis>();
         if (carries_workpiece(rank)) lever.at<axis>() += p.at<axis>();
-        slope.column<axis>() = add_cross(slope.column<axis>() + interval.delta_slope(), interval.theta_slope(), lever);
+        const Vector3 delta_slope = scales.template expanded_slope<axis>(interval.delta_slope());
+        slope.column<axis>() = add_cross(slope.column<axis>() + delta_slope, interval.theta_slope(), lever);
         if (!carries_workpiece(rank)) lever.at<axis>() += p.at<axis>();
     }
 

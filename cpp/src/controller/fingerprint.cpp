@@ -41,7 +41,7 @@ private:
 }  // namespace
 
 std::uint64_t fingerprint(const Chain& chain, const Eigen::Vector3d& volume, const Eigen::Vector3d& tool,
-                          const ParameterTable& table) {
+                          const ParameterTable& table, const std::optional<Expansion>& expansion) {
     Hash hash;
     hash.add(chain.name());
     for (const double length : volume) hash.add(length);
@@ -53,6 +53,11 @@ std::uint64_t fingerprint(const Chain& chain, const Eigen::Vector3d& volume, con
     for (const auto& squareness : table.squarenesses) {
         hash.add(std::uint64_t(squareness.has_value()));
         if (squareness) hash.add(squareness->value);
+    }
+    if (expansion) {
+        for (const double coefficient : expansion->coefficient) hash.add(coefficient);
+        for (const double position : expansion->fixed_point) hash.add(position);
+        hash.add(expansion->reference);
     }
     return hash.value();
 }

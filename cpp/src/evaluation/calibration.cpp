@@ -124,6 +124,11 @@ void check(const Calibration& calibration) {
     for (const auto& [key, number] : numbers(calibration))
         if (number && !(std::isfinite(*number) && *number >= 0.0))
             throw InvalidArgument(std::string(key) + ": expected a finite number of at least 0");
+    if (calibration.expansion) {
+        if (!calibration.temperature_reference)
+            throw InvalidArgument("expansion: expected a temperature_reference with it, got none");
+        check(Expansion{*calibration.expansion, calibration.fixed_point, *calibration.temperature_reference});
+    }
     check_provenance(calibration.provenance);
     for (const std::string& sentence : calibration.undetermined) check_one_line(sentence, "undetermined");
     for (const std::string& sentence : calibration.fit_reasons) check_one_line(sentence, "fit_reasons");
@@ -254,6 +259,10 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
         table.header["temperature_reference_c"] = format_decimal(*reference, 0);
     else if (const auto& found = calibration.temperature_as_found)
         table.header["temperature_as_found_c"] = format_lengths(*found);
+    if (calibration.expansion) {
+        table.header["expansion_per_k"] = format_lengths(*calibration.expansion);
+        table.header["fixed_point_mm"] = format_lengths(calibration.fixed_point);
+    }
     if (!calibration.fit_reasons.empty()) table.header["fit_reasons"] = join(calibration.fit_reasons, sentence_break);
     if (!calibration.unseen_faults.empty())
         table.header["unseen_faults"] = join(calibration.unseen_faults, sentence_break);
@@ -305,6 +314,11 @@ Calibration read_calibration(const std::string& path) {
     }
     if (!optional_value("temperature_as_found_c").empty())
         calibration.temperature_as_found = lengths_of(table, "temperature_as_found_c", path);
+    if (const auto expansion = expansion_of(table, path)) {
+        calibration.temperature_reference = expansion->reference;
+        calibration.expansion = expansion->coefficient;
+        calibration.fixed_point = expansion->fixed_point;
+    }
     const auto slopes = functions_listed(table, "undetermined_slopes", path);
     const auto constants = functions_listed(table, "undetermined_reversal_constants", path);
     for (int i = 0; i < function_count; ++i) {

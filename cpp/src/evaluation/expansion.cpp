@@ -34,8 +34,11 @@ std::vector<AxisGroup> sensor_groups(const Measurement& measurement, const Known
 
 void state_temperature(const Measurement& measurement, const std::optional<KnownExpansion>& known,
                        Calibration& calibration) {
-    if (known) calibration.temperature_reference = known->expansion.reference;
-    else calibration.temperature_as_found = mean_scale_temperatures(measurement);
+    if (known) {
+        calibration.temperature_reference = known->expansion.reference;
+        calibration.expansion = known->expansion.coefficient;
+        calibration.fixed_point = known->expansion.fixed_point;
+    } else calibration.temperature_as_found = mean_scale_temperatures(measurement);
 }
 
 }  // namespace stepdiag

@@ -173,12 +173,16 @@ std::vector<Pass> collect_passes(const Measurement& measurement, const Plan& pla
         const Line line = measurement.stations()[members.front()].line;
         const auto planned = planned_points(measurement, members.front(), plan);
         Pass pass{line, plan.is_scale_line(line), plan.frame(line), {}, readings};
-        for (const PlanPoint& point : planned) pass.points.emplace_back().plan = point;
+        for (const PlanPoint& point : planned) {
+            pass.place.push_back(point.is_check ? std::nullopt : std::optional(int(pass.points.size())));
+            if (!point.is_check) pass.points.emplace_back().plan = point;
+        }
         const Eigen::Vector3d start = planned.front().commanded;
         for (const std::size_t row : members) {
             const Station& station = measurement.stations()[row];
             check_station(measurement, row, planned);
-            PassPoint& point = pass.points[station.point];
+            if (!pass.place[station.point]) continue;
+            PassPoint& point = pass.points[*pass.place[station.point]];
             // The position in the file only identifies the point, because it may have been rounded when it was written.
             const Eigen::Vector3d travel = pass.frame.transpose() * (planned[station.point].commanded - start);
             point.lateral = travel.head<2>();

@@ -34,6 +34,9 @@ struct Pass {
     Eigen::Matrix3d frame;  // machine_R_line
     std::vector<PassPoint> points;
     int first_reading;  // index of the reading of points[0] among those of all passes
+    // By number of a point on its line: its place in `points`, none for a return to a check point, which these
+    // evaluations do not use.
+    std::vector<std::optional<int>> place = {};
 
     Eigen::Vector3d direction() const { return frame.col(2); }
 };

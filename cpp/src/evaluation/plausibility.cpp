@@ -30,13 +30,14 @@ struct LineDistances {
     std::vector<std::size_t> row;
     std::vector<double> travel, distance;  // mm
 
-    // Ratio of distance to travel: the median over pairs of readings half a line apart.
+    // Ratio of distance to travel: the median over pairs of readings half a line apart; 1 where all stand together.
     double growth() const {
         const std::size_t half = (row.size() + 1) / 2;
         std::vector<double> ratios;
         for (std::size_t i = 0; i + half < row.size(); ++i)
-            ratios.push_back((distance[i + half] - distance[i]) / (travel[i + half] - travel[i]));
-        return median(std::move(ratios));
+            if (travel[i + half] != travel[i])  // not both at a check point
+                ratios.push_back((distance[i + half] - distance[i]) / (travel[i + half] - travel[i]));
+        return ratios.empty() ? 1.0 : median(std::move(ratios));
     }
 
     // Deviations of the readings from the line that most of them lie on, mm.

@@ -49,6 +49,23 @@ Eigen::Vector3d lengths_of(const ParameterTable& table, const std::string& key, 
     return lengths;
 }
 
+std::optional<Expansion> expansion_of(const ParameterTable& table, const std::string& name) {
+    if (table.header.count("expansion_per_k") == 0) return std::nullopt;
+    const auto given = table.header.find("temperature_reference_c");
+    const auto reference = given == table.header.end() ? std::nullopt : parse_decimal(given->second, 0);
+    if (!reference)
+        throw InvalidArgument(name + ": temperature_reference_c: expected a temperature with expansion_per_k, got " +
+                              (given == table.header.end() ? "none" : "\"" + given->second + "\""));
+    Expansion expansion{lengths_of(table, "expansion_per_k", name), Eigen::Vector3d::Zero(), *reference};
+    if (table.header.count("fixed_point_mm") > 0) expansion.fixed_point = lengths_of(table, "fixed_point_mm", name);
+    try {
+        check(expansion);
+    } catch (const InvalidArgument& error) {
+        throw InvalidArgument(name + ": " + error.what());
+    }
+    return expansion;
+}
+
 std::set<std::string> functions_listed(const ParameterTable& table, const std::string& key, const std::string& name) {
     std::set<std::string> names;
     const auto entry = table.header.find(key);

@@ -1,5 +1,6 @@
 #include "stepdiag/measurement/records.hpp"
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <string>
@@ -59,6 +60,12 @@ std::vector<std::vector<std::size_t>> recorded_passes(const Measurement& measure
     return list;
 }
 
+bool was_read(const Measurement& measurement, std::size_t row) {
+    for (const Channel& channel : measurement.channels())
+        if (is_signal(channel.name) && channel.value[row]) return true;
+    return false;
+}
+
 }  // namespace
 
 std::vector<double> recorded(const Measurement& measurement, const Channel* channel,
@@ -70,6 +77,35 @@ std::vector<double> recorded(const Measurement& measurement, const Channel* chan
     std::vector<double> all;
     for (const auto& value : values) all.push_back(*value);
     return all;
+}
+
+std::vector<double> since_first_reading(const Measurement& measurement, const std::string& record) {
+    const Channel* channel = measurement.find(record);
+    const bool is_time = record == "time";
+    std::vector<std::optional<double>> found(measurement.size());
+    std::optional<double> start;
+    for (const auto& rows : recorded_passes(measurement)) {
+        const std::vector<double> of_pass = recorded(measurement, channel, rows);
+        for (std::size_t k = 0; k < rows.size(); ++k) {
+            const std::size_t row = rows[k];
+            if (!of_pass.empty() && (!is_time || channel->value[row])) {
+                found[row] = of_pass[k];
+                if (is_time) start = std::min(start.value_or(of_pass[k]), of_pass[k]);
+            } else if (was_read(measurement, row)) {
+                const Station& station = measurement.stations()[row];
+                throw InvalidArgument("run " + std::to_string(station.run) + ", line " + station.line.name() +
+                                      ", point " + std::to_string(station.point) + ": a machine drift with \"" +
+                                      record + "\" needs that column");
+            }
+        }
+    }
+    std::vector<double> since(found.size(), 0.0);
+    for (std::size_t row = 0; row < found.size(); ++row)
+        if (found[row]) {
+            if (!start) start = found[row];
+            since[row] = *found[row] - *start;
+        }
+    return since;
 }
 
 std::vector<Eigen::Vector3d> scale_temperatures(const Measurement& measurement,

@@ -17,16 +17,17 @@ StepOrder parse_order(std::string_view text) {
 }
 
 Plan::Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, StepOrder order,
-           std::vector<Line> scale_lines)
-    : Plan(volume, std::move(lines), steps, std::vector{order}, std::move(scale_lines)) {}
+           std::vector<Line> scale_lines, const CheckPoints& check_points)
+    : Plan(volume, std::move(lines), steps, std::vector{order}, std::move(scale_lines), check_points) {}
 
 Plan::Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::vector<StepOrder> orders,
-           std::vector<Line> scale_lines)
+           std::vector<Line> scale_lines, const CheckPoints& check_points)
     : volume_(volume),
       lines_(std::move(lines)),
       steps_(steps),
       orders_(std::move(orders)),
-      scale_lines_(std::move(scale_lines)) {
+      scale_lines_(std::move(scale_lines)),
+      check_points_(check_points) {
     if (!volume_.allFinite() || volume_.minCoeff() < 1e-3 || volume_.maxCoeff() > 1e6)
         throw InvalidArgument("volume: expected three edges in mm, each from 0.001 to 1e6");
     if (steps_ < 1 || steps_ > largest_step_count)
@@ -34,6 +35,10 @@ Plan::Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, st
                               std::to_string(steps_));
     if (lines_.empty() && scale_lines_.empty()) throw InvalidArgument("lines: expected at least one line");
     if (orders_.empty()) throw InvalidArgument("order: expected at least one permutation of XYZ");
+    for (const auto& [key, value] : {std::pair("every", check_points_.every), std::pair("at", check_points_.at)})
+        if (value < 0 || value > steps_)
+            throw InvalidArgument(std::string("check_points ") + key + ": expected 0 to " + std::to_string(steps_) +
+                                  " (steps), got " + std::to_string(value));
     std::vector<std::string> seen;
     for (const auto* group : {&lines_, &scale_lines_})
         for (const Line& line : *group) {
@@ -78,7 +83,14 @@ std::vector<PlanPoint> Plan::points(const Line& line, int run) const {
 
     std::vector<PlanPoint> points{point};
     const int stride = scale ? steps_ : 1;
-    for (int step = 0; step < steps_; step += stride)
+    PlanPoint check = point;
+    for (const Axis axis : all_axes)
+        if (line.moves(axis)) {
+            check.node[index(axis)] += line.sign(axis) * check_points_.at;
+            check.commanded[index(axis)] = node_position(axis, check.node[index(axis)]);
+        }
+    check.is_check = true;
+    for (int step = 0; step < steps_; step += stride) {
         for (const Axis axis : order(run)) {
             if (!line.moves(axis)) continue;
             place(axis, point.node[index(axis)] + line.sign(axis) * stride);
@@ -86,6 +98,11 @@ std::vector<PlanPoint> Plan::points(const Line& line, int run) const {
             ++point.number;
             points.push_back(point);
         }
+        const int made = step + 1;
+        if (scale || check_points_.every == 0 || made % check_points_.every != 0 || made <= check_points_.at) continue;
+        check.number = ++point.number;
+        points.push_back(check);
+    }
     return points;
 }
 

@@ -42,14 +42,9 @@ LinePlace place_on_line(const Machine& machine, const Plan& plan, const Heads& h
 std::vector<Pose> tool_poses(const Machine& machine, const PlannedPass& pass, const SimulationOptions& options) {
     const Approaches approach = approaches(pass.line, pass.direction);
     std::vector<Pose> poses;
-    for (const PlanPoint& point : pass.points) {
-        Eigen::Vector3d expansion = Eigen::Vector3d::Zero();
-        if (const auto& scales = options.scales) {
-            const double time = double(pass.first_row + poses.size()) * options.seconds_per_reading.value_or(0.0);
-            expansion = scales->expansion.shift(point.commanded, scales->at(time));
-        }
-        poses.push_back(machine.pose(point.commanded, approach, expansion));
-    }
+    for (const PlanPoint& point : pass.points)
+        poses.push_back(
+            machine.pose(point.commanded, approach, options.shift(point.commanded, pass.first_row + poses.size())));
     return poses;
 }
 

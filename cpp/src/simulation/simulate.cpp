@@ -51,6 +51,9 @@ void check_options(const Plan& plan, const Heads& heads, const SimulationOptions
     }
     check_noise(options.noise);
     if (options.scales) check_scales(*options.scales, options.seconds_per_reading.has_value());
+    if (!options.machine_drift.allFinite()) throw InvalidArgument("machine_drift: expected three finite rates in mm/s");
+    if (!options.machine_drift.isZero(0.0) && !options.seconds_per_reading)
+        throw InvalidArgument("machine_drift: expected seconds_per_reading as well");
     if (options.repeats < 1 || options.repeats > SimulationOptions::largest_repeat_count)
         throw InvalidArgument("repeats: expected 1 to " + std::to_string(SimulationOptions::largest_repeat_count) +
                               ", got " + std::to_string(options.repeats));
@@ -112,6 +115,13 @@ HeadCalibrations Heads::calibration() const {
 Misalignment SimulationOptions::misalignment_of(const Line& line) const {
     const auto entry = misalignment.find(line.name());
     return entry == misalignment.end() ? Misalignment{} : entry->second;
+}
+
+Eigen::Vector3d SimulationOptions::shift(const Eigen::Vector3d& commanded, std::uint64_t row) const {
+    const double time = double(row) * seconds_per_reading.value_or(0.0);
+    Eigen::Vector3d shift = time * machine_drift;
+    if (scales) shift += scales->expansion.shift(commanded, scales->at(time));
+    return shift;
 }
 
 Environment SimulationOptions::environment_of(const Head& head) const {

@@ -19,17 +19,14 @@ PassReader reader_on(const Machine& machine, const Plan& plan, const Heads& head
 VirtualReadout::VirtualReadout(Machine machine, const Plan& plan, const Heads& heads, const Line& line,
                                SimulationOptions options)
     : machine_(std::move(machine)),
-      noise_(options.noise),
-      scales_(options.scales),
-      seconds_(options.seconds_per_reading.value_or(0.0)),
-      reader_(reader_on(machine_, plan, heads, line, std::move(options))) {}
+      options_(std::move(options)),
+      reader_(reader_on(machine_, plan, heads, line, options_)) {}
 
 SignalRow VirtualReadout::read(const Eigen::Vector3d& position, const Approaches& approach, std::uint64_t row,
                                double elapsed) const {
-    const Eigen::Vector3d expansion =
-        scales_ ? scales_->expansion.shift(position, scales_->at(double(row) * seconds_)) : Eigen::Vector3d::Zero();
-    SignalRow signals = reader_.read({machine_.pose(position, approach, expansion)}, {elapsed}, row).front();
-    noise_.add(signals, reader_.signals(), row);
+    const Pose pose = machine_.pose(position, approach, options_.shift(position, row));
+    SignalRow signals = reader_.read({pose}, {elapsed}, row).front();
+    options_.noise.add(signals, reader_.signals(), row);
     return signals;
 }
 

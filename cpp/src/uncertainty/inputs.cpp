@@ -13,7 +13,7 @@ namespace {
 using Of = UncertainQuantity::Of;
 
 // Order of SharedQuantity.
-constexpr std::array<UncertainQuantity, 15> shared_quantities = {{
+constexpr std::array<UncertainQuantity, 17> shared_quantities = {{
     {"part_shift", "shift_um", "shift", Of::part, "xyz"},
     {"part_rotation", "rotation_urad", "rotation", Of::part, "xyz"},
     {"psd_distance", "psd_distance_mm", "PSD distance", Of::head, "", HeadLayout::psd},
@@ -29,8 +29,10 @@ constexpr std::array<UncertainQuantity, 15> shared_quantities = {{
     {"common_expansion", "", "expansion coefficient", Of::scale},
     {"scale_temperature", "scale_temperature_c", "temperature of the scale", Of::scale, "xyz"},
     {"common_scale_temperature", "", "temperature of the scales", Of::scale},
+    {"scale_ramp", "scale_temperature_c_per_h", "ramp of the scale's temperature", Of::scale, "xyz"},
+    {"common_scale_ramp", "", "ramp of the scales' temperature", Of::scale},
 }};
-static_assert(shared_quantities.size() == std::size_t(SharedQuantity::common_scale_temperature) + 1);
+static_assert(shared_quantities.size() == std::size_t(SharedQuantity::common_scale_ramp) + 1);
 
 // Order of NoiseQuantity.
 constexpr std::array<UncertainQuantity, 6> noise_quantities = {{

@@ -191,6 +191,8 @@ std::string budget_group(const UncertainInput& input) {
         case SharedQuantity::common_expansion: return "expansion of the scales";
         case SharedQuantity::scale_temperature:
         case SharedQuantity::common_scale_temperature: return "temperature of the scales";
+        case SharedQuantity::scale_ramp:
+        case SharedQuantity::common_scale_ramp: return "ramp of the scales' temperature";
         default: return name(input.quantity);
     }
 }

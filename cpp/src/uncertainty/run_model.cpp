@@ -25,6 +25,8 @@ std::optional<int> shared_column(SharedQuantity quantity) {
         case SharedQuantity::common_expansion: return shared_field::expansion;
         case SharedQuantity::scale_temperature:
         case SharedQuantity::common_scale_temperature: return shared_field::scale_temperature;
+        case SharedQuantity::scale_ramp:
+        case SharedQuantity::common_scale_ramp: return shared_field::scale_ramp;
         default: return std::nullopt;
     }
 }
@@ -127,11 +129,12 @@ void RunModel::add_input(const UncertainInput& input, int index) {
             if (of_air && !std::holds_alternative<Air>(run.simulation.environment_of(*pass.place.head).air))
                 throw InvalidArgument(what + ": expected a state of the air as environment, got a constant index");
         }
-        const bool of_scales = *column == shared_field::expansion || *column == shared_field::scale_temperature;
+        const bool of_scales = *column >= shared_field::expansion && *column <= shared_field::scale_ramp;
         if (of_scales && !run.simulation.scales)
             throw InvalidArgument(what + ": expected scales that expand, the run has none");
-        const bool of_all_axes =
-            quantity == SharedQuantity::common_expansion || quantity == SharedQuantity::common_scale_temperature;
+        const bool of_all_axes = quantity == SharedQuantity::common_expansion ||
+                                 quantity == SharedQuantity::common_scale_temperature ||
+                                 quantity == SharedQuantity::common_scale_ramp;
         for (int axis = 0; axis < (of_all_axes ? 3 : 1); ++axis)
             shared.uncertain.push_back({*column + input.component + axis, index});
         return;
@@ -172,7 +175,7 @@ bool RunModel::moves_poses() const {
            shared.is_uncertain(shared_field::machine_drift, 3) || has_uncertain_scales();
 }
 
-bool RunModel::has_uncertain_scales() const { return shared.is_uncertain(shared_field::expansion, 6); }
+bool RunModel::has_uncertain_scales() const { return shared.is_uncertain(shared_field::expansion, 9); }
 
 bool RunModel::has_uncertain_air() const { return shared.is_uncertain(shared_field::temperature, 4); }
 

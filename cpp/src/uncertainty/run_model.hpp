@@ -23,8 +23,9 @@ enum : int {
     machine_drift = 6,  // x, y, z, as the next two
     expansion = 9,
     scale_temperature = 12,
-    psd_distance = 15,
-    beam_offset = 16,  // u, v of d1 ... dn
+    scale_ramp = 15,
+    psd_distance = 18,
+    beam_offset = 19,  // u, v of d1 ... dn
 };
 }
 

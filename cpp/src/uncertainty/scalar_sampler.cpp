@@ -46,10 +46,12 @@ std::vector<Displacement> ScalarSampler::displacements(const Eigen::VectorXd& de
                                 shared[shared_field::machine_drift + 2]);
     const bool of_scales = model_.has_uncertain_scales();
     for (std::size_t r = 0; r < rows; ++r) {
-        displaced[r].shift = drift * (double(r) * model_.seconds);
+        const double time = double(r) * model_.seconds;
+        displaced[r].shift = drift * time;
         for (int k = 0; of_scales && k < 3; ++k)
-            displaced[r].shift[k] += model_.moved_by_scale(model_.rows[r], k, shared[shared_field::expansion + k],
-                                                           shared[shared_field::scale_temperature + k]);
+            displaced[r].shift[k] += model_.moved_by_scale(
+                model_.rows[r], k, shared[shared_field::expansion + k],
+                shared[shared_field::scale_temperature + k] + time * shared[shared_field::scale_ramp + k]);
     }
     if (!sample) return displaced;
     const auto& noise = model_.run.inputs.noise;

@@ -105,10 +105,12 @@ void SimdSampler::displace(std::optional<std::uint64_t> first_sample, Scratch& s
                 double& to = scratch.displaced[6 * r + k].value[lane] = 0.0;
                 if (k >= 3) continue;
                 const auto shared = [&](int field) { return scratch.shared[field + k].value[lane]; };
-                to = shared(shared_field::machine_drift) * (double(r) * model_.seconds);
+                const double time = double(r) * model_.seconds;
+                to = shared(shared_field::machine_drift) * time;
                 if (of_scales)
-                    to += model_.moved_by_scale(model_.rows[r], int(k), shared(shared_field::expansion),
-                                                shared(shared_field::scale_temperature));
+                    to += model_.moved_by_scale(
+                        model_.rows[r], int(k), shared(shared_field::expansion),
+                        shared(shared_field::scale_temperature) + time * shared(shared_field::scale_ramp));
             }
     if (!first_sample) return;
     const auto& noise = model_.run.inputs.noise;

@@ -10,9 +10,10 @@ from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.ids3010 import Ids3010, InstrumentError, parse_source
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.raw_file import RawContent, RawFile, check_new
-from stepdiag.acquisition.raw_records import Header
+from stepdiag.acquisition.raw_records import Header, Record
 from stepdiag.acquisition.reading_plan import channels_of, check_axes, described_plan, digest_of
 from stepdiag.acquisition.run_from_raw import measurement_of
+from stepdiag.acquisition.temperature_file import TemperatureFile
 from stepdiag.acquisition.triggers import Operator, Silent, Trigger
 from stepdiag.acquisition.visit_loop import Acquisition, Resume
 from stepdiag.io.data_files import write_measurement
@@ -51,6 +52,7 @@ def acquire(
     resume: Resume | None = None,
     raw: Path | None = None,
     operator: Operator | None = None,
+    temperatures: Path | None = None,
 ) -> Acquired:
     """Acquire the readings of a scenario's plan from an instrument and write the measurement.
 
@@ -68,13 +70,14 @@ def acquire(
             line or set-up again. None: begin a new one.
         raw: the raw file; None: `raw_path(output)`.
         operator: receives messages and confirms; None: messages are dropped.
+        temperatures: CSV file that another program appends temperatures to (docs/acquisition.md).
 
     Raises:
         InvalidArgument: an option, the head or a file does not suit, or a file exists that would be
             lost.
         InstrumentError: the instrument cannot be reached or fails.
     """
-    known, options = scenario.known, options or AcquireOptions()
+    known, options, operator = scenario.known, options or AcquireOptions(), operator or Silent()
     try:
         channels = channels_of(known)
         axes = options.axes or tuple(range(1, len(channels) + 1))
@@ -86,6 +89,9 @@ def acquire(
             raise InvalidArgument(f"{path}: expected different names for the raw file and the output")
         if output.exists() and not path.exists():
             raise InvalidArgument(f"{output}: exists, and was not made from {path}: move it away, or name another -o")
+        followed = None
+        if temperatures is not None:
+            followed = TemperatureFile(temperatures, age=options.temperature_age, tell=operator.tell)
         plan = described_plan(known)
         header = Header(
             created=datetime.now(UTC),
@@ -98,14 +104,19 @@ def acquire(
         )
         instrument = Ids3010(host, port, timeout=options.timeout, attempts=options.attempts)
         with instrument, _opened(path, header, resume, instrument) as (file, content):
-            work = Acquisition(known, header, file, instrument, trigger, operator or Silent(), options)
+            work = Acquisition(known, header, file, instrument, trigger, operator, options, followed)
             if content is not None:
                 work.go_on(content, resume or "point")
 
             def write() -> None:
                 # Same content as the raw file, without reading it again after every visit.
-                known = RawContent(path, header, tuple(work.done.values()), sound_bytes=0, torn_bytes=0)
-                run = measurement_of(known, zero=options.zero, uncertainties=options.uncertainties)
+                records: tuple[Record, ...] = (*work.recorded, *work.done.values())
+                run = measurement_of(
+                    RawContent(path, header, records, sound_bytes=0, torn_bytes=0),
+                    zero=options.zero,
+                    uncertainties=options.uncertainties,
+                    temperature_age=options.temperature_age,
+                )
                 write_measurement(run, output)
 
             try:

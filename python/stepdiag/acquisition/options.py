@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.run_from_raw import Zero
+from stepdiag.acquisition.run_from_raw import TEMPERATURE_AGE, Zero
 from stepdiag.acquisition.settling import Settling
 
 
@@ -22,13 +22,14 @@ class AcquireOptions:
     timeout: float = 2.0  # answer to one request
     attempts: int = 3  # tries of a request that changes nothing
     wait_timeout: float = 3600.0  # until the trigger wants the next reading
+    temperature_age: float = TEMPERATURE_AGE  # how far from a reading a row of temperatures may be
 
     def __post_init__(self) -> None:
         if self.sign not in (1, -1):
             raise InvalidArgument(f"sign: expected 1 or -1, got {self.sign!r}")
         if self.attempts < 1:
             raise InvalidArgument(f"attempts: expected at least 1, got {self.attempts}")
-        for name in ("start_timeout", "timeout", "wait_timeout"):
+        for name in ("start_timeout", "timeout", "wait_timeout", "temperature_age"):
             seconds = getattr(self, name)
             if not 0.0 < seconds < 1e7:
                 raise InvalidArgument(f"{name}: expected seconds above 0, got {seconds!r}")

@@ -11,6 +11,15 @@ from stepdiag.config.key_types import Section, Triple
 Picometres = Annotated[int, Field(gt=-(2**63), lt=2**63)]
 Count = Annotated[int, Field(ge=0, le=10**9)]
 Direction = Literal["forward", "backward"]
+RecordedColumn = Literal[
+    "temperature_c",
+    "temperature_x_c",
+    "temperature_y_c",
+    "temperature_z_c",
+    "air_temperature_c",
+    "air_pressure_hpa",
+    "air_humidity_percent",
+]
 
 
 class Visited(Section):
@@ -59,6 +68,7 @@ class Session(Section):
     options: str
     visit: Count
     point: Count
+    temperatures: str | None = None  # the file that was followed
 
 
 class Again(Section):
@@ -67,6 +77,15 @@ class Again(Section):
     record: Literal["again"] = "again"
     time: AwareDatetime
     visit: Count
+
+
+class TemperatureRow(Section):
+    """A row of the file of temperatures, as it was read; null: an empty field."""
+
+    record: Literal["temperatures"] = "temperatures"
+    time: AwareDatetime
+    line: Count  # in the file
+    values: dict[RecordedColumn, float | None]
 
 
 class Point(Section):
@@ -108,7 +127,7 @@ class RawReading(Point):
         return any(pm is None for pm in self.pm)
 
 
-Record = Annotated[Header | Session | Again | Value | RawReading, Field(discriminator="record")]
+Record = Annotated[Header | Session | Again | TemperatureRow | Value | RawReading, Field(discriminator="record")]
 _RECORD: TypeAdapter[Record] = TypeAdapter(Record)
 
 

@@ -1,35 +1,55 @@
 """From a raw file to a measurement. The raw file contains all that is needed."""
 
 import math
+from collections.abc import Sequence
+from datetime import datetime
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from stepdiag._core import InvalidArgument, Measurement
 from stepdiag.acquisition.raw_file import RawContent, read_raw
-from stepdiag.acquisition.raw_records import RawReading, Visited
+from stepdiag.acquisition.raw_records import RawReading, TemperatureRow, Visited
 from stepdiag.config.toml_text import located
 from stepdiag.io.data_files import write_measurement
+from stepdiag.units import native
 
 PICOMETRES = 10**9  # per mm
+TEMPERATURE_AGE: Final = 600.0  # s for which a temperature holds, unless told otherwise
 
 Zero = Literal["none", "first"]
 Row = tuple[Visited, int, RawReading]  # visit, index of the point in it, reading
 
 
-def write_run(raw: Path, output: Path, *, zero: Zero = "none", uncertainties: bool = False) -> None:
+def write_run(
+    raw: Path,
+    output: Path,
+    *,
+    zero: Zero = "none",
+    uncertainties: bool = False,
+    temperature_age: float = TEMPERATURE_AGE,
+) -> None:
     """Write the measurement of a raw file, complete or not at all."""
-    write_measurement(measurement_of(read_raw(raw), zero=zero, uncertainties=uncertainties), output)
+    run = measurement_of(read_raw(raw), zero=zero, uncertainties=uncertainties, temperature_age=temperature_age)
+    write_measurement(run, output)
 
 
-def measurement_of(content: RawContent, *, zero: Zero = "none", uncertainties: bool = False) -> Measurement:
+def measurement_of(
+    content: RawContent,
+    *,
+    zero: Zero = "none",
+    uncertainties: bool = False,
+    temperature_age: float = TEMPERATURE_AGE,
+) -> Measurement:
     """The readings in the plan's order. A lost reading is NaN; a point not yet read has no row.
 
     Args:
         zero: "first": subtract a constant for each set-up and beam, such that its first reading is
             the nominal distance there.
         uncertainties: add the standard deviations of the means.
+        temperature_age: how far in time a row of temperatures may be from a reading, s.
 
     Raises:
         InvalidArgument: there is no reading, or a reading does not belong to the plan of the
@@ -48,13 +68,19 @@ def measurement_of(content: RawContent, *, zero: Zero = "none", uncertainties: b
                 values[name][row] = (header.sign * pm - constants.get((visit.set_up, i), 0)) / PICOMETRES
             if deviation is not None and deviation > 0.0 and reading.values > 0:
                 deviations[name][row] = deviation / math.sqrt(reading.values) / PICOMETRES
-    start = min(reading.time for _, _, reading in rows)
+    times = [reading.time for _, _, reading in rows]
+    start = min(times)
+    recorded = [record for record in content.records if isinstance(record, TemperatureRow)]
     with located(str(content.path)):
         return Measurement(
             [visit.line for visit, _, _ in rows],
             [reading.point for _, _, reading in rows],
             np.array([visit.position_mm[index] for visit, index, _ in rows]),
-            {**values, "time": np.array([(reading.time - start).total_seconds() for _, _, reading in rows])},
+            {
+                **values,
+                "time": np.array([(time - start).total_seconds() for time in times]),
+                **_recorded(recorded, times, temperature_age),
+            },
             run=[visit.run for visit, _, _ in rows],
             direction=[visit.direction for visit, _, _ in rows],
             standard_uncertainty=deviations if uncertainties else {},
@@ -77,6 +103,27 @@ def _rows(content: RawContent, readings: dict[tuple[int, int], RawReading]) -> l
         if not len(reading.pm) == len(reading.sd_pm) == count:
             raise InvalidArgument(f"{where}: expected {count} values ({', '.join(content.header.channels)})")
     return [(*place, readings[key]) for key, place in places.items() if key in readings]
+
+
+def _recorded(
+    rows: Sequence[TemperatureRow], times: Sequence[datetime], age: float
+) -> dict[str, npt.NDArray[np.float64]]:
+    """By channel: values at these times, interpolated between the rows before and after.
+
+    Where only one of these is within `age`, its value; NaN where none is. Rows need not be in order."""
+    channels = {}
+    at = np.array([time.timestamp() for time in times])
+    for column in dict.fromkeys(column for row in rows for column in row.values):
+        known = {row.time.timestamp(): value for row in rows if (value := row.values.get(column)) is not None}
+        moment = np.array([-np.inf, *sorted(known), np.inf])
+        level = np.array([np.nan, *(native(column, known[time]) for time in sorted(known)), np.nan])
+        after = np.searchsorted(moment, at, side="right")
+        since, until = at - moment[after - 1], moment[after] - at
+        with np.errstate(invalid="ignore"):  # infinite ones are not used
+            between = level[after - 1] + since / (since + until) * (level[after] - level[after - 1])
+        alone = np.where(since <= age, level[after - 1], np.where(until <= age, level[after], np.nan))
+        channels[column.rsplit("_", 1)[0]] = np.where((since <= age) & (until <= age), between, alone)
+    return channels
 
 
 def _constants(rows: list[Row], sign: int, channels: int) -> dict[tuple[int, int], int]:

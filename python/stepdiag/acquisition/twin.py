@@ -8,6 +8,7 @@ import socketserver
 import threading
 from collections.abc import Callable, Sequence
 from os import PathLike
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -15,11 +16,13 @@ from stepdiag._core import InvalidArgument, __version__
 from stepdiag.acquisition.ids3010 import AXES, INTERFACES, RUNNING, TWIN
 from stepdiag.acquisition.ids3010_messages import JsonStream, encoded
 from stepdiag.acquisition.twin_instrument import NOT_MEASURING, TEXTS, WRONG_AXIS, TwinBehaviour, TwinInstrument
+from stepdiag.acquisition.twin_temperatures import TwinTemperatures
 from stepdiag.io.whole_files import reason
 from stepdiag.scenario.description import Scenario, read_scenario
 from stepdiag.scenario.order_of_run import visits_of
 
 Params = Sequence[Any]
+BETWEEN_TEMPERATURES = 1.0  # s
 PARSE_ERROR, NO_METHOD, BAD_PARAMS = -32700, -32601, -32602  # JSON-RPC 2.0
 
 
@@ -34,10 +37,14 @@ class Twin:
         port: int = 0,
         behaviour: TwinBehaviour | None = None,
         play: float | None = None,
+        temperatures: Path | None = None,
     ) -> None:
         """port: 0 takes any free one. play: the twin moves through visits by itself, with this time at every point, s.
 
-        Raises InvalidArgument if the instrument cannot have the head's beams, or the port cannot be opened."""
+        temperatures: the CSV file to which it appends every second what the sensors of the scales show.
+
+        Raises InvalidArgument if the instrument cannot have the head's beams, the port cannot be opened, or the file
+        cannot be written."""
         described = scenario if isinstance(scenario, Scenario) else read_scenario(scenario)
         if play is not None and not 0.0 < play < 1e6:
             raise InvalidArgument(f"play: expected seconds above 0, got {play!r}")
@@ -45,6 +52,7 @@ class Twin:
         self.instrument.moves_itself = play is not None
         self._visits = list(visits_of(described.known))
         self._play = play
+        self._temperatures = None if temperatures is None else TwinTemperatures(described, temperatures)
         self._ended = threading.Event()
         try:
             self._server = _Server((host, port), _Client)
@@ -68,6 +76,9 @@ class Twin:
         targets: list[Callable[[], None]] = [lambda: self._server.serve_forever(poll_interval=0.05)]
         if self._play is not None:
             targets.append(self._move_on)
+        if self._temperatures is not None:
+            self._temperatures.append(self.instrument.row())  # before a client looks
+            targets.append(self._record)
         self._threads = [threading.Thread(target=target, daemon=True) for target in targets]
         for thread in self._threads:
             thread.start()
@@ -82,6 +93,11 @@ class Twin:
         self._server.server_close()
         for thread in self._threads:
             thread.join()
+
+    def _record(self) -> None:
+        assert self._temperatures is not None
+        while not self._ended.wait(BETWEEN_TEMPERATURES):
+            self._temperatures.append(self.instrument.row())
 
     def _move_on(self) -> None:
         """Move through the points of every visit that a client begins, then to the next visit of the same set-up."""

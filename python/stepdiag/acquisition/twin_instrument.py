@@ -153,6 +153,11 @@ class TwinInstrument:
         with self._lock:
             return self._visit, self._index
 
+    def row(self) -> int:
+        """The row of the simulated run that it reads now."""
+        with self._lock:
+            return self._row
+
     def _place(self, set_up: int) -> None:
         if set_up != self._set_up:  # without `interrupt`, the measurement counts as started again
             self._interrupted = [self._behaviour.interrupt] * AXES

@@ -10,10 +10,11 @@ from stepdiag._core import __version__
 from stepdiag.acquisition.ids3010 import RUNNING, STARTING, TWIN, Ids3010, InstrumentError, Sample
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.raw_file import RawContent, RawFile
-from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, Session, Value
+from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, Session, TemperatureRow, Value
 from stepdiag.acquisition.reading_plan import placement
 from stepdiag.acquisition.run_from_raw import PICOMETRES
 from stepdiag.acquisition.settling import Reading, take_reading
+from stepdiag.acquisition.temperature_file import TemperatureFile
 from stepdiag.acquisition.triggers import Context, Operator, Trigger, point_text
 from stepdiag.mistakes.nominal_way import Way, line_remark
 from stepdiag.scenario.known import Known
@@ -23,7 +24,9 @@ Resume = Literal["point", "line", "set-up"]
 
 
 class Acquisition:
-    """State of an acquisition. `done`: readings by (visit, point), in order of acquisition."""
+    """State of an acquisition.
+
+    `done`: readings by (visit, point), in order of acquisition. `recorded`: rows of temperatures."""
 
     def __init__(
         self,
@@ -34,22 +37,32 @@ class Acquisition:
         trigger: Trigger,
         operator: Operator,
         options: "AcquireOptions",
+        temperatures: TemperatureFile | None = None,
     ) -> None:
         self._known, self._header, self._options = known, header, options
         self._file, self._instrument = file, instrument
         self._trigger, self._operator = trigger, operator
+        self._temperatures = temperatures
         self._visits = list(visits_of(known))
         self._axes = [axis - 1 for axis in header.axes]
         self._is_twin = False
         self._set_up = 0  # the last set-up for which the instrument was ready
         self._visit = 0  # visit of the last reading
         self.done: dict[tuple[int, int], RawReading] = {}
+        self.recorded: list[TemperatureRow] = []
 
     def go_on(self, content: RawContent, resume: Resume) -> None:
         """Continue a raw file, except its last line or set-up if that is read again."""
         if content.torn is not None:
             self._operator.tell(content.torn)
         self.done = content.readings()
+        self.recorded = [record for record in content.records if isinstance(record, TemperatureRow)]
+        if self._temperatures is not None:
+            self._temperatures.leave_out(self.recorded)
+        elif self.recorded:
+            self._operator.tell(
+                "warning: the readings so far have temperatures; without `temperatures` others have none"
+            )
         if resume == "point" or not self.done:
             return
         last, _ = next(reversed(self.done))
@@ -84,6 +97,8 @@ class Acquisition:
                 self._take(*self._last_taken(), once_more=True)
             self._take(visit, index)
             if index + 1 == len(visit.points):
+                if rows := self._new_temperatures():
+                    self._file.append(rows)
                 write()
                 self._operator.tell(self._summary(visit))
                 remark = self._remark(visit)
@@ -118,7 +133,10 @@ class Acquisition:
         if doubt is not None:
             reading.lost = dict.fromkeys(range(len(self._axes)), doubt)
         *values, stored = _records(visit, index, reading, self._header.channels)
+        values = [*self._new_temperatures(), *values]
         assert isinstance(stored, RawReading)
+        if self._temperatures is not None:
+            self._temperatures.warn_of_age(stored.time)
         self._tell_lost(visit, index, stored)
         key = (stored.visit, stored.point)
         if once_more and stored.is_lost and not self.done[key].is_lost:
@@ -128,6 +146,11 @@ class Acquisition:
             self.done.pop(key, None)
             self.done[key] = stored
         self._trigger.stored(visit, index, self.done[key].pm)
+
+    def _new_temperatures(self) -> list[TemperatureRow]:
+        rows = [] if self._temperatures is None else self._temperatures.new_rows()
+        self.recorded += rows
+        return rows
 
     def _tell_lost(self, visit: Visit, index: int, reading: RawReading) -> None:
         for channel, why in reading.lost.items():
@@ -171,6 +194,7 @@ class Acquisition:
             options=repr(self._options),
             visit=visit.number,
             point=int(visit.points[index]),
+            temperatures=None if self._temperatures is None else str(self._temperatures.path),
         )
 
     def _summary(self, visit: Visit) -> str:

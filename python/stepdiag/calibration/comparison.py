@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from stepdiag._core import Calibration, ErrorMap, InvalidArgument
 from stepdiag.calibration.table_sums import FloatArray, TableValues, Term
-from stepdiag.calibration.truth import TruthAgreement, agreement_with_truth, truth_as_calibration
+from stepdiag.calibration.temperature_text import temperature_mark
+from stepdiag.calibration.truth import TRUTH, TruthAgreement, agreement_with_truth, truth_as_calibration
 from stepdiag.display import Displayed, Facts, lengths_text
 from stepdiag.parameters import units_of
 from stepdiag.style import drawn
@@ -147,6 +148,12 @@ def significance_threshold(limit: float, count: int) -> float:
     return -NormalDist().inv_cdf(max(0.5 * limit / max(count, 1), sys.float_info.min))
 
 
+def made_of(calibration: Calibration) -> dict[str, str]:
+    """How and when a calibration was made, and for which temperature; empty: not known, or the truth."""
+    temperature = "" if calibration.method == TRUTH else temperature_mark(calibration)
+    return {"method": calibration.method, "date": calibration.date, "temperature": temperature}
+
+
 def compare_calibrations(a: Calibration | ErrorMap, b: Calibration | ErrorMap, *, limit: float = 0.05) -> Comparison:
     """Differences B - A of all parameters that both determine, with their significance.
 
@@ -169,6 +176,11 @@ def compare_calibrations(a: Calibration | ErrorMap, b: Calibration | ErrorMap, *
         b, truths = truth_as_calibration(b, calibration)
         with_truth = True
     notes = [*_check_machines(a, b), *truths]
+    marks = temperature_mark(a), temperature_mark(b)
+    if marks[0] != marks[1] and not with_truth:
+        notes.append(
+            f"temperatures differ: A {marks[0]}, B {marks[1]}; so positioning differs by the scales' expansion"
+        )
     run = a.provenance.get("run_sha256")
     if run is not None and run == b.provenance.get("run_sha256"):
         notes.append("A and B are evaluations of the same run: they are not independent")

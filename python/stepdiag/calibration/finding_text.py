@@ -1,6 +1,6 @@
 """The core's findings in words: what the readings leave open (`Undetermined`, `KnownCombination`) and the verdict of a
 fit (`FitReason`; docs/conventions.md, "Verdict of a fit"), faults of readings (`FaultClass`), and where an error map
-breaks the frame choice. All sentences about them are here."""
+breaks the frame choice or is implausible. All sentences about them are here."""
 
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
@@ -12,15 +12,20 @@ from stepdiag._core import (
     Fault,
     FaultClass,
     FitReason,
+    InvalidArgument,
     KnownCombination,
+    PlausibleLimits,
     Undetermined,
 )
-from stepdiag.parameters import kind_of, units_of
+from stepdiag.parameters import AXES, kind_of, units_of
 from stepdiag.setup_quantities import SETUP_QUANTITIES, component_name, report_unit
-from stepdiag.units import MICRO, report_value
+from stepdiag.units import MICRO, MICRORADIAN, report_value
 
 if TYPE_CHECKING:
+    import numpy as np
     import numpy.typing as npt
+
+LARGEST_ANGLE: Final = 0.1  # rad: twenty times what is plausible
 
 # By Undetermined.reasons(); empty where "undetermined" says it all.
 REASONS: Final = {
@@ -168,6 +173,40 @@ def frame_deviation_texts(errors: ErrorMap, volume: "npt.ArrayLike") -> Iterator
         yield f"{name} is {shown:g} {unit} {place}, where the frame choice has 0; used as given"
 
 
+def implausible_texts(
+    errors: ErrorMap, volume: "Sequence[float] | npt.NDArray[np.float64]", limits: PlausibleLimits
+) -> Iterator[str]:
+    """What no machine has, by the limits for results: a sentence for each parameter that is beyond them."""
+    edges = dict(zip(AXES, volume, strict=True))
+    for name, (value, place) in _largest_values(errors):
+        limit = limits.rotation if units_of(name) == "rad" else limits.translation
+        if name[0] == "E" and name[1] == name[2]:
+            limit = min(limit, limits.positioning * edges[name[2]])
+        if abs(value) > limit:
+            shown, unit = report_value(units_of(name), value)
+            most, _ = report_value(units_of(name), limit)
+            yield f"{name} is {shown:g} {unit}{place}, beyond what a machine can be ({most:g} {unit}); used as given"
+
+
+def check_angles(errors: ErrorMap, where: str) -> None:
+    """Raise InvalidArgument for angles that are none of a machine's: a wrong unit or a damaged number."""
+    for name, (value, place) in _largest_values(errors):
+        if units_of(name) == "rad" and abs(value) >= LARGEST_ANGLE:
+            raise InvalidArgument(
+                f"{where}: {name} is {value / MICRORADIAN:g} µrad{place}, expected less than {LARGEST_ANGLE:g} rad"
+            )
+
+
+def _largest_values(errors: ErrorMap) -> Iterator[tuple[str, tuple[float, str]]]:
+    """Of each parameter the value that is furthest from 0, and where."""
+    for name, angle in errors.squareness.items():
+        yield name, (angle, "")
+    for tables in (errors.functions, errors.negative_functions):
+        for name, (position, value) in tables.items():
+            k = int(abs(value).argmax())
+            yield name, (float(value[k]), f" at {position[k]:g} mm")
+
+
 def fit_row(calibration: Calibration) -> str:
     """What the file of a calibration says of its fit."""
     if calibration.fit is None:
@@ -242,6 +281,11 @@ def reason_text(reason: FitReason) -> str:
                 f"the expansion coefficient of {scales} is {reason.value:.3g} standard uncertainties from what "
                 f"[temperature] states (at most {reason.limit:g} is credible)"
             )
+        case "prior" if reason.channel == "machine_drift":
+            return (
+                f"the drift of the functional point along {'XYZ'[reason.component]} is {reason.value:.3g} standard "
+                f"uncertainties from what [adjustment] takes it for (at most {reason.limit:g} is credible)"
+            )
         case "prior":
             name = f"{reason.channel.replace('_', ' ')}{_component(reason)}"
             return (
@@ -268,8 +312,15 @@ def reason_text(reason: FitReason) -> str:
                 f"what fault {reason.fault} may be, and no reading tells, makes a difference of {value:.3g} {unit} in "
                 f"{reason.parameter} ({limit:g} {unit} is plausible)"
             )
+        case "mistake":
+            return mistake_reason(reason.parameter)
         case _:
             return "nothing controls the readings"
+
+
+def mistake_reason(mistake: str) -> str:
+    """Why a fit is rejected where a mistake was found; both without a full stop."""
+    return f"a mistake explains the readings: {mistake}"
 
 
 def fault_rows(faults: Sequence[FaultClass]) -> Iterator[str]:

@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, Measurement
+from stepdiag.units import PPM
 
 REFERENCE: Final = 20.0  # °C, ISO 1
 STEEL: Final = 11.5  # µm/(m K)
@@ -20,7 +21,12 @@ def temperature_rows(calibration: Calibration) -> Iterator[str]:
 def temperature_text(calibration: Calibration) -> str:
     """To which temperature positioning errors belong; without a full stop."""
     if calibration.temperature_reference is not None:
-        return f"positioning errors are referred to {calibration.temperature_reference:g} °C"
+        said = f"positioning errors are referred to {calibration.temperature_reference:g} °C"
+        if calibration.expansion is None:
+            return said
+        numbers = [f"{coefficient / PPM:.4g}" for coefficient in calibration.expansion]
+        numbers = numbers[:1] if len(set(numbers)) == 1 else numbers
+        return f"{said}, with scales that expand by {', '.join(numbers)} µm/(m·K)"
     found = calibration.temperature_as_found
     if found is not None:
         return (
@@ -29,6 +35,23 @@ def temperature_text(calibration: Calibration) -> str:
     edge = max(calibration.volume)
     grows = f"{STEEL * edge * 1e-3:.2g} µm a kelvin on {edge:g} mm"
     return f"no temperature was recorded; errors are as found (steel: {grows})"
+
+
+def reference_mark(reference: float | None) -> str:
+    """Whether positioning errors are as found or referred to a temperature, °C."""
+    return "as found" if reference is None else f"referred to {reference:g} °C"
+
+
+def temperature_mark(calibration: Calibration) -> str:
+    """The same in few words, for figures and comparisons."""
+    if calibration.temperature_reference is not None:
+        return reference_mark(calibration.temperature_reference)
+    found = calibration.temperature_as_found
+    if found is None:
+        return "temperature not recorded"
+    if np.ptp(found) < MATTERS:
+        return f"as found at {np.mean(found):.1f} °C"
+    return f"as found at X {found[0]:.1f}, Y {found[1]:.1f}, Z {found[2]:.1f} °C"
 
 
 def temperature_warnings(calibration: Calibration, measurement: Measurement) -> list[str]:

@@ -9,6 +9,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import PATH, Grouped, Writes, in_flags, out_file, tell
+from stepdiag.cli.terminal import plain
 from stepdiag.io.outputs import MEASUREMENT, RAW, OutputFile
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ class _Terminal:
     """The operator at the terminal."""
 
     def tell(self, text: str) -> None:
-        click.echo(in_flags(text))
+        click.echo(plain(in_flags(text)))
 
     def confirm(self, text: str) -> None:
         click.echo(f"{text}: Enter", nl=False)
@@ -38,6 +39,7 @@ class _Terminal:
         "Instrument": ["source", "axes", "sign", "zero", "timeout"],
         "When to read": ["trigger", "start", "wait_timeout", "retries"],
         "Settling": ["settle_count", "settle_limit_um", "settle_timeout", "average", "interval_ms"],
+        "Temperatures": ["temperatures", "temperature_age"],
         "Output": ["output", "uncertainties", "raw"],
         "Continue": ["resume", "restart_line", "restart_set_up", "from_raw"],
     },
@@ -112,6 +114,19 @@ class _Terminal:
     show_default=True,
     help="auto: restart the instrument's measurement at a set-up if it is stopped or reports a warning.",
 )
+@click.option(
+    "--temperatures",
+    type=PATH,
+    metavar="FILE",
+    help="CSV file that another program appends to: time, temperature_c or temperature_x_c ..., air_temperature_c ...",
+)
+@click.option(
+    "--temperature-age",
+    type=SECONDS,
+    default=600.0,
+    show_default=True,
+    help="Seconds that a row of this file may be away from a reading.",
+)
 @click.option("--uncertainties", is_flag=True, help="Also write the standard deviation of each mean (u_d1_um ...).")
 @click.option(
     "--raw", type=Writes(RAW), metavar="FILE", help="Raw file (.jsonl).  [default: beside the output, run.raw.jsonl]"
@@ -132,6 +147,8 @@ def acquire(scenario: Path | None, output: OutputFile, from_raw: Path | None, **
     if from_raw is not None:
         if scenario is not None or given["source"] is not None:
             raise InvalidArgument("--from-raw: reads no scenario and no --source")
+        if given["temperatures"] is not None:
+            raise InvalidArgument("--from-raw: has the temperatures that were read, and reads no --temperatures")
         _convert(from_raw, output, _options(given))
         return
     if scenario is None or given["source"] is None:
@@ -146,8 +163,9 @@ def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
     described = read_scenario(scenario)
     raw: OutputFile = given["raw"] or OutputFile(raw_path(output.path), (RAW,))
     # acquire() refuses outputs made from other raw files, and raw files that are not resumed.
-    path = output.claim(scenario, raw.path, error_map=described.truth.error_map, overwrite=True)
-    raw.claim(scenario, error_map=described.truth.error_map, overwrite=True)
+    inputs = [scenario] if given["temperatures"] is None else [scenario, given["temperatures"]]
+    path = output.claim(*inputs, raw.path, error_map=described.truth.error_map, overwrite=True)
+    raw.claim(*inputs, error_map=described.truth.error_map, overwrite=True)
     options, resume = _options(given), _resume(given)
     trigger = _trigger(given["trigger"])
     result = acquire(
@@ -159,6 +177,7 @@ def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
         resume=resume,
         raw=raw.path,
         operator=_Terminal(),
+        temperatures=given["temperatures"],
     )
     click.echo(f"wrote {result.output}: {result.readings} of {result.planned} readings, {result.lost} lost")
 
@@ -174,7 +193,13 @@ def _convert(raw: Path, output: OutputFile, options: "AcquireOptions") -> None:
     content = read_raw(raw)
     if content.torn is not None:
         tell("warning", content.torn)
-    write_run(raw, path, zero=options.zero, uncertainties=options.uncertainties)
+    write_run(
+        raw,
+        path,
+        zero=options.zero,
+        uncertainties=options.uncertainties,
+        temperature_age=options.temperature_age,
+    )
     click.echo(f"wrote {path}: {len(content.readings())} of {content.planned} readings")
 
 
@@ -198,6 +223,7 @@ def _options(given: dict[str, Any]) -> "AcquireOptions":
         start=given["start"],
         timeout=given["timeout"],
         wait_timeout=given["wait_timeout"],
+        temperature_age=given["temperature_age"],
     )
 
 
@@ -286,6 +312,12 @@ def _point(context: click.Context, option: click.Parameter, texts: tuple[str, ..
 @click.option(
     "--latch/--no-latch", default=True, show_default=True, help="Beams stay lost until the measurement is restarted."
 )
+@click.option(
+    "--temperatures",
+    type=PATH,
+    metavar="FILE",
+    help="CSV file to which to append the temperatures of the scales every second.",
+)
 @click.option("--interrupt", is_flag=True, help="Interrupt the beams whenever the head moves to another line.")
 def twin(
     scenario: Path,
@@ -297,6 +329,7 @@ def twin(
     lose: frozenset[tuple[int, int]],
     latch: bool,
     interrupt: bool,
+    temperatures: Path | None,
 ) -> None:
     """Simulate the instrument: an IDS3010 that reads SCENARIO's virtual machine.
 
@@ -311,7 +344,7 @@ def twin(
     behaviour = TwinBehaviour(
         settling=settling_ms * 1e-3, sampling_noise_um=sampling_noise_um, latch=latch, lost=lose, interrupt=interrupt
     )
-    with Twin(scenario, host=host, port=port, behaviour=behaviour, play=play) as running:
+    with Twin(scenario, host=host, port=port, behaviour=behaviour, play=play, temperatures=temperatures) as running:
         click.echo(f"listening on {running.address[0]}:{running.address[1]} (Ctrl-C ends)")
         sys.stdout.flush()
         try:

@@ -4,7 +4,12 @@ Imports inside the commands keep the other commands fast.
 """
 
 import io
+import signal
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Final
 
 import click
 
@@ -15,6 +20,7 @@ from stepdiag.cli.evaluate import evaluate, observe
 from stepdiag.cli.export import export
 from stepdiag.cli.files import check, init
 from stepdiag.cli.head import head
+from stepdiag.cli.importing import import_
 from stepdiag.cli.nc import nc
 from stepdiag.cli.options import InOrder, tell
 from stepdiag.cli.plan import plan
@@ -47,6 +53,7 @@ COMMANDS = {
     nc: "Write the measuring program for a controller.",
     acquire: "Record readings from an instrument (IDS3010).",
     twin: "Simulate the instrument on a socket.",
+    import_: "Read a measurement from a spreadsheet.",
     simulate: "Simulate the run of a scenario.",
     evaluate: "Calibrate the machine from a run.",
     plot: "Draw a calibration, a measurement and other files.",
@@ -73,6 +80,33 @@ for command, short_help in COMMANDS.items():
     cli.add_command(command)
 
 
+TERMINATED: Final = 128 + signal.SIGTERM
+
+
+class _Terminated(SystemExit):
+    """SIGTERM."""
+
+
+@contextmanager
+def _ended_by_sigterm() -> Iterator[None]:
+    """Let SIGTERM unwind a command, so that nothing temporary stays. A second one ends the process at once.
+
+    A disposition that someone else has chosen stays."""
+
+    def end(*_: Any) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        raise _Terminated(TERMINATED)
+
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:
+        yield
+        return
+    signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
 def _complain(message: str) -> None:
     tell("error", message)
 
@@ -81,15 +115,18 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return the exit code.
 
     0: done. 1: internal error. 2: error of the user or in a file. 3: done, but the result must not
-    be used. 130: interrupted."""
+    be used. 130: interrupted. 143: ended by SIGTERM."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without µ shows the rest of the line
     try:
-        result = cli.main(arguments, prog_name="stepdiag", standalone_mode=False)
+        with _ended_by_sigterm():
+            result = cli.main(arguments, prog_name="stepdiag", standalone_mode=False)
         return result if isinstance(result, int) else 0
     except click.Abort:
         return 130
+    except _Terminated:
+        return TERMINATED
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         return 0

@@ -59,8 +59,8 @@ def evaluate(
     The first line of the report is the verdict of the fit, which is also stored in the calibration.
     If the fit is rejected, the command ends with a warning and exit code 3; the calibration is
     written, but must not be used. A mistake that would explain a fit that is not accepted is named,
-    with what to change. For the linear methods it is the worse of two verdicts: that of
-    their own test, and that of the adjustment of the same readings. A result that no machine can
+    with what to change, and rejects it. For the linear methods the verdict is the worse of two: that
+    of their own test, and that of the adjustment of the same readings. A result that no machine can
     have ([plausible] in the scenario) is an error, and nothing is written.
 
     netCDF files (.nc) have the covariance of all values, which volume needs for its intervals.
@@ -75,7 +75,7 @@ def evaluate(
     from stepdiag.io.data_files import is_netcdf, read_measurement, write_calibration
     from stepdiag.io.whole_files import check_input
     from stepdiag.report.evaluation import evaluation_report
-    from stepdiag.report.mistakes import searchable, with_mistake
+    from stepdiag.report.mistakes import mistake_text, searchable, with_mistake
     from stepdiag.scenario.description import (
         JudgedEvaluation,
         adjust_scenario,
@@ -117,6 +117,13 @@ def evaluate(
             )
         except InvalidArgument as error:
             raise with_mistake(error, search, mistakes) from None
+    adjusted = result.adjustment if isinstance(result, JudgedEvaluation) else result
+    is_odd = adjusted is None or adjusted.verdict.fit in ("doubtful", "rejected")
+    with Progress("mistakes"):
+        if search and is_odd and not mistakes:
+            mistakes = search.after(adjusted)
+    if mistakes:
+        result = result.with_mistake(mistake_text(mistakes))
     written = write_calibration(
         result.calibration if isinstance(result, JudgedEvaluation) else result,
         path,
@@ -125,11 +132,6 @@ def evaluate(
         between_nodes=known.between_nodes,
     )
     of_temperature = temperature_warnings(written, measurement)
-    adjusted = result.adjustment if isinstance(result, JudgedEvaluation) else result
-    is_odd = adjusted is None or adjusted.verdict.fit in ("doubtful", "rejected")
-    with Progress("mistakes"):  # which may take longer than the evaluation: that is written
-        if search and is_odd and not mistakes:
-            mistakes = search.after(adjusted)
     if as_json:
         from stepdiag.objects.evaluation import evaluated_files, evaluation_object
         from stepdiag.objects.writer import json_text

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from stepdiag.cli.options import PATH, Writes, tell_fit
+from stepdiag.cli.options import PATH, Writes, tell, tell_fit
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import COMP_FILE, COMP_LINES, GRID, ISG_TABLE, KINEMATICS_TABLE, OutputFile, claim_folder
 from stepdiag.progress import Progress
@@ -95,5 +95,8 @@ def export(context: click.Context, /, calibration: Path, to: str, output: Output
     with Progress("export"):
         lines = export_calibration(read, to, path, ExportOptions(**options))
     for line in lines:
-        say(line)
+        if line.startswith("warning: "):
+            tell("warning", line.removeprefix("warning: "))
+        else:
+            say(line)
     tell_fit(context, calibration, read.fit)

@@ -8,7 +8,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, json_option, tell
-from stepdiag.cli.terminal import say
+from stepdiag.cli.terminal import plain, say
 from stepdiag.io.outputs import OutputFile
 from stepdiag.progress import Progress
 
@@ -23,7 +23,8 @@ def check(context: click.Context, files: tuple[Path, ...], as_json: bool) -> Non
     """Check each FILE: report its kind and whether it is valid.
 
     Accepts scenarios, heads and studies (TOML), measurements and calibrations (CSV or netCDF),
-    error maps (CSV) and raw readings (JSON lines). A scenario is checked together with its error
+    error maps (CSV), raw readings (JSON lines) and the compensation.ini of an export to
+    linuxcnc-comp, with the tables beside it. A scenario is checked together with its error
     map. If there is one scenario among the files, each measurement is adjusted with it. The command
     reports whether lines, points and distances belong to that plan, and the verdict of the fit.
 
@@ -83,7 +84,7 @@ def _found_or_refused(function: Callable[..., Result], *files: Path) -> Result |
         return function(*files)
     except InvalidArgument as error:
         tell("error", str(error))
-        return error
+        return InvalidArgument(plain(str(error)))
 
 
 @click.command(epilog="\b\nExample: stepdiag init -o machine")
@@ -106,6 +107,7 @@ def init(output: OutputFile, scenario: Path | None, head_name: str | None) -> No
     """
     from stepdiag.config.scenario_template import template
     from stepdiag.head.description import find_shipped_head
+    from stepdiag.io.data_files import write_measurement
     from stepdiag.io.whole_files import make_folder, read_text, write_whole
     from stepdiag.scenario.description import parse_scenario, read_scenario
     from stepdiag.scenario.known import runs_of
@@ -132,8 +134,7 @@ def init(output: OutputFile, scenario: Path | None, head_name: str | None) -> No
     for name, text in texts.items():
         write_whole(folder / name, text)
     keys = known.keys.plan
-    empty_sheet(known.plan, known.signals, repeats=runs_of(keys), backward=keys.backward).write(
-        folder / "measurement.csv"
-    )
+    sheet = empty_sheet(known.plan, known.signals, repeats=runs_of(keys), backward=keys.backward)
+    write_measurement(sheet, folder / "measurement.csv")
     for path in written:
         click.echo(f"wrote {path}")

@@ -78,7 +78,8 @@ def nc(scenario: Path, output: OutputFile, **given: Any) -> None:
 
     Positions are those of the axes, counted from home, without tool length. Every visit of a line
     begins with an overrun, so that all axes approach all points from the side that the plan
-    specifies.
+    specifies. With --overrun 0, or where --limits cut the overrun, the program and a warning name
+    the points that an axis approaches from another side, or by less.
     """
     from stepdiag.io.whole_files import write_whole
     from stepdiag.program.measuring_program import measuring_program

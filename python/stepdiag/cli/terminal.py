@@ -8,6 +8,10 @@ from typing import Any, Final
 import click
 
 WIDEST: Final = 100  # columns
+LONGEST: Final = 2000  # characters; no line of ours is longer, but a file may have a line of 50 MB
+_SAID_AT_THE_END: Final = 500  # of these: what was expected, as a rule
+# Control characters, which a terminal obeys, and those that turn the direction of writing. They come from files.
+_CONTROLS: Final = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 _GOOD: Final = {"fg": "green"}
 _UNSURE: Final = {"fg": "yellow"}
 _BAD: Final = {"fg": "red", "bold": True}
@@ -35,11 +39,20 @@ _COLOURED: Final = (
 
 
 def say(line: str, *, err: bool = False) -> None:
-    """Write a line. Files and pipes get it as it is."""
+    """Write a line, or several with line feeds between them: plain and not too long. Only a terminal has it wrapped."""
     stream = sys.stderr if err else sys.stdout
-    lines = _wrapped(line) if stream.isatty() else [line]
+    lines = [plain(one) for one in line.split("\n")]
+    if stream.isatty():
+        lines = [part for one in lines for part in _wrapped(one)]
     colour = wants_colour(stream)
     click.echo("\n".join(map(_painted, lines) if colour else lines), err=err, color=colour)
+
+
+def plain(text: str) -> str:
+    """The text with its control characters escaped, such as \\x1b, and at most LONGEST characters of it."""
+    if len(text) > LONGEST:
+        text = f"{text[: LONGEST - _SAID_AT_THE_END - 3]} … {text[-_SAID_AT_THE_END:]}"
+    return _CONTROLS.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
 def wants_colour(stream: Any) -> bool:

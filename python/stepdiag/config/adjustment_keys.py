@@ -18,6 +18,8 @@ def _weighs(choice: str | float) -> str | float:
 
 Choice = Annotated[Literal["free", "fixed"] | float, AfterValidator(_weighs)]
 
+Drift = Annotated[float, Field(ge=0.0, le=1e6)]
+
 _choice = '"free", "fixed" or a positive standard uncertainty'
 
 
@@ -63,6 +65,25 @@ class AdjustmentSection(AdjustmentKeys):
 
     angles: Literal["free", "fixed"] = key(
         '"free" or "fixed"', "Rotations of the machine's axes; fixed: it has none.", "free"
+    )
+    machine_drift_um_per_h: Drift | tuple[Drift, Drift, Drift] = key(
+        "a drift in µm/h of at least 0, or three for X, Y, Z",
+        "Standard uncertainty of a drift of the functional point along X, Y, Z, linear in time since the run's first "
+        "reading: of spindle, structure or mounts of the heads. Its rates are unknowns with this prior; 0: none. "
+        "Needs the time of every reading; `plan.check_points` tell it.",
+        0.0,
+    )
+    machine_drift_um_per_k: Drift | tuple[Drift, Drift, Drift] = key(
+        "a drift in µm/K of at least 0, or three for X, Y, Z",
+        "The same, linear in the temperature of `machine_drift_with`; one of the two.",
+        0.0,
+    )
+    machine_drift_with: Literal["temperature", "temperature_x", "temperature_y", "temperature_z", "air_temperature"] = (
+        key(
+            "the column of a temperature without its unit",
+            "What `machine_drift_um_per_k` goes with, a column of the run such as `air_temperature_c`.",
+            "air_temperature",
+        )
     )
     one_setup_per_line: bool = key(
         "true or false",

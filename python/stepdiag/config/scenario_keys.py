@@ -103,6 +103,12 @@ class MachineErrorsKeys(Section):
         None,
         "truth.csv",
     )
+    drift_um_per_h: Triple = key(
+        "three drifts in µm/h",
+        "Of the functional point along X, Y, Z since the run's first reading, which no temperature of a scale tells; "
+        "needs `plan.seconds_per_reading`.",
+        (0.0, 0.0, 0.0),
+    )
     random: RandomSection | None = Field(
         default=None, description="See `[machine.random]`; not together with `errors`."
     )
@@ -136,6 +142,18 @@ class PlanSection(Section):
         "Lines measured at their two ends only; they fix the slopes of the positioning errors.",
         (),
         ["p00", "0p0", "00p"],
+    )
+    check_points: Annotated[int, Field(ge=0, le=LARGEST_STEPS)] = key(
+        f"an integer from 0 to {LARGEST_STEPS}",
+        "After every so many steps the program returns to the check point of the line and reads it again, which tells "
+        "drift from the machine's errors (docs/temperature.md); 0: never. Scale lines have none.",
+        0,
+        5,
+    )
+    check_point: Annotated[int, Field(ge=0, le=LARGEST_STEPS)] = key(
+        f"an integer from 0 to {LARGEST_STEPS}",
+        "The check point is where the line is after so many steps; 0: its first point.",
+        0,
     )
     repeats: Annotated[int, Field(ge=1, le=LARGEST_REPEATS)] = key(
         f"an integer from 1 to {LARGEST_REPEATS}",

@@ -168,6 +168,9 @@ class UncertaintySection(SetupUncertaintyKeys):
         "`temperature.u_temperature_c`.",
         0.1,
     )
+    scale_temperature_c_per_h: Spread | None = _uncertain(
+        "A ramp of that, linear in time since the run's first reading, likewise; needs `plan.seconds_per_reading`.", 0.2
+    )
     repeatability_um: Spread | None = _uncertain("Positioning at every point, along X, Y, Z, each.", 0.2)
     repeatability_urad: Spread | None = _uncertain("Orientation of the tool at every point, about X, Y, Z, each.", 0.5)
     between_nodes_um: Amplitude | None = key(

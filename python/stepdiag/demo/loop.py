@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from stepdiag.demo.loop_cases import CASES, STEPS, LoopCase, scenario_text
+from stepdiag.demo.loop_cases import CASES, STEPS, LoopCase, runs_of, scenario_text
 from stepdiag.demo.loop_figure import draw_loop
 from stepdiag.demo.loop_job import Calculated, Controller
 from stepdiag.demo.loop_linuxcnc import Linuxcnc
@@ -34,8 +34,8 @@ def claim_loop(folder: Path, steps: int = STEPS) -> Path:
         files[case.truth] = outputs.ERROR_MAP
         files[f"{case.name}/program.ngc"] = outputs.PROGRAM
         files[f"{case.name}/calibration.csv"] = outputs.CALIBRATION
-        for run, seed in ((case.name, 1), (f"{case.name}-again", 2)):
-            scenarios[f"{run}/scenario.toml"] = scenario_text(case, steps, seed)
+        for run, in_use in runs_of(case):
+            scenarios[f"{run}/scenario.toml"] = scenario_text(case, steps, in_use=in_use)
             files[f"{run}/run.csv"] = outputs.MEASUREMENT
             files[f"{run}/run.raw.jsonl"] = outputs.RAW
             files[f"{run}/points.ngc"] = outputs.PROGRAM
@@ -74,7 +74,7 @@ def run_loop(
         *report,
         "",
         f"All files are in {folder}: loop.png, loop.svg, report.txt, points.csv, the truths, and for every case",
-        "scenario.toml, program.ngc, run.csv, calibration.csv, and in a folder of its own (-again) the second run.",
+        "scenario.toml, program.ngc, run.csv, calibration.csv, and in other folders (-again, -cold) the later runs.",
     ]
 
 

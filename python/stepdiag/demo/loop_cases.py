@@ -24,6 +24,14 @@ SCREW_AMPLITUDE: Final = 0.003  # mm
 
 DISTANCE_NOISE: Final = 1e-4  # mm, of each beam
 TILT_NOISE: Final = 1e-6  # rad
+# Scales of steel. They warm up during the measurement, and have other temperatures when the machine is used.
+EXPANSION: Final = 11.5  # µm/(m K)
+START: Final = 22.0  # °C
+WARMING: Final = 3.0  # K/h
+SECONDS: Final = 10.0  # from reading to reading
+IN_USE: Final = (26.0, 25.0, 18.5)  # °C, of X, Y, Z
+RANGE: Final = (10.0, 35.0)  # °C, that the controller is told
+
 RADIUS: Final = DISTANCE_NOISE / TILT_NOISE / math.sqrt(1.5)
 
 
@@ -35,6 +43,7 @@ class LoopCase:
     title: str
     screw: bool = False
     noise: bool = False
+    warm: bool = False
 
     @property
     def truth(self) -> str:
@@ -45,7 +54,10 @@ class LoopCase:
 CLEAN: Final = LoopCase("clean", "no noise, mirror and laser out of true")
 SCREW: Final = LoopCase("screw", "the same with a screw error of 10 mm pitch and 3 µm", screw=True)
 NOISE: Final = LoopCase("noise", "as clean, with noise of 0.1 µm and 1 µrad", noise=True)
-CASES: Final = (CLEAN, SCREW, NOISE)
+WARM: Final = LoopCase(
+    "warm", "as clean, with scales that warm up by 3 K/h and are at 26, 25, 18.5 °C in use", warm=True
+)
+CASES: Final = (CLEAN, SCREW, NOISE, WARM)
 
 
 def finer(steps: int) -> int:
@@ -60,18 +72,25 @@ def write_truth(case: LoopCase, folder: Path, steps: int = STEPS) -> None:
     truth.write(folder / case.truth, chain=_core.Chain(CHAIN), volume=VOLUME, tool=TOOL)
 
 
-def write_scenario(case: LoopCase, folder: Path, steps: int = STEPS, seed: int = 1) -> Path:
-    """Write the scenario of a case; `seed` is that of its noise.
+def runs_of(case: LoopCase) -> tuple[tuple[str, bool], ...]:
+    """Folders of the runs, and whether the machine is in use: before, compensated, and without the temperatures."""
+    cold = ((f"{case.name}-cold", True),) if case.warm else ()
+    return ((case.name, False), (f"{case.name}-again", True), *cold)
+
+
+def write_scenario(case: LoopCase, folder: Path, steps: int = STEPS, *, in_use: bool = False) -> Path:
+    """Write the scenario of a case; `in_use`: of the compensated machine, with other noise and temperatures.
 
     The truth is in the parent folder."""
     make_folder(folder)
     path = folder / "scenario.toml"
-    write_whole(path, scenario_text(case, steps, seed))
+    write_whole(path, scenario_text(case, steps, in_use=in_use))
     return path
 
 
-def scenario_text(case: LoopCase, steps: int = STEPS, seed: int = 1) -> str:
-    """The scenario of a case as text."""
+def scenario_text(case: LoopCase, steps: int = STEPS, seed: int | None = None, *, in_use: bool = False) -> str:
+    """The scenario of a case as text; `seed` is that of its noise."""
+    seed = (2 if in_use else 1) if seed is None else seed
     beams = [
         [round(RADIUS * math.cos(angle), 4), round(RADIUS * math.sin(angle), 4)]
         for angle in (math.radians(90), math.radians(210), math.radians(330))
@@ -92,6 +111,7 @@ def scenario_text(case: LoopCase, steps: int = STEPS, seed: int = 1) -> str:
             'lines = ["ppp", "npp", "pnp", "nnp"]',
             f"steps = {steps}",
             'scale_lines = ["p00", "0p0", "00p"]',
+            *([f"seconds_per_reading = {SECONDS}"] if case.warm else []),
             "",
             "# Three beams, one for each axis of an IDS3010",
             "[head]",
@@ -119,6 +139,19 @@ def scenario_text(case: LoopCase, steps: int = STEPS, seed: int = 1) -> str:
             "measure_s = 0.02",
             "line_change_min = 0.0",
             *noise,
+            *(_temperature(in_use=in_use) if case.warm else []),
             "",
         ]
     )
+
+
+def _temperature(*, in_use: bool) -> list[str]:
+    return [
+        "",
+        "[temperature]",
+        f"expansion_um_per_m_k = {EXPANSION}",
+        "u_expansion_um_per_m_k = 1.0",
+        "u_temperature_c = 0.1",
+        f"axes_c = {list(IN_USE) if in_use else START}",
+        f"axes_c_per_h = {0.0 if in_use else WARMING}",
+    ]

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from stepdiag.demo.loop_outcome import LoopOutcome
 from stepdiag.demo.loop_points import Agreement, FloatArray
 from stepdiag.demo.loop_report import UM, WORDS, left_along
-from stepdiag.style import COLOUR, axis_label, own_style, save
+from stepdiag.style import COLOUR, SERIES, axis_label, own_style, save
 
 SHOWN: Final = 100.0  # mm of X in the screw's panel
 SMALLEST: Final = 1e-4  # µm; smaller errors, such as at home, are left of the figure
-CASES: Final = (COLOUR["X"], COLOUR["Y"], COLOUR["Z"])  # clean, screw, noise
+CASES: Final = (COLOUR["X"], COLOUR["Y"], COLOUR["Z"], SERIES[-1])  # clean, screw, noise, warm
 DASHES: Final = {"nodes": "-", "random": "--"}
 
 

@@ -12,13 +12,14 @@ import numpy.typing as npt
 from stepdiag import _core
 from stepdiag.acquisition.run_from_raw import PICOMETRES
 from stepdiag.acquisition.twin_instrument import TwinInstrument
-from stepdiag.demo.loop_cases import CHAIN
+from stepdiag.demo.loop_cases import CHAIN, RANGE
 from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.order_of_run import visits_of
 
 FloatArray = npt.NDArray[np.float64]
 PATIENCE: Final = 20.0  # s for one reading
 Say = Callable[[str], None]
+Temperature = tuple[float, float, float]  # of X, Y, Z, °C
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class Job:
     run: Path  # the measurement file to write
     points: FloatArray  # (n, 3) machine positions, mm
     table: Path | None = None  # the calibration that it compensates with
+    temperature: Temperature | None = None  # of the scales, that it is told
 
 
 class Controller(Protocol):
@@ -70,7 +72,7 @@ class Calculated:
     def _joints(self, job: Job, targets: FloatArray) -> FloatArray:
         if job.table is None:
             return targets
-        return compensator_of(job.table, job.scenario).command(targets)
+        return compensator_of(job.table, job.scenario).command(targets, temperature=job.temperature)
 
 
 def compensator_of(table: Path, scenario: Scenario) -> _core.Compensator:
@@ -79,4 +81,25 @@ def compensator_of(table: Path, scenario: Scenario) -> _core.Compensator:
         if scenario.truth.noise.distance == 0.0:
             # Readings without noise scatter less than their stated uncertainties, which makes the fit doubtful.
             warnings.filterwarnings("ignore", message=".*fit that is doubtful")
-        return _core.Compensator(table, CHAIN)
+        return _core.Compensator(table, CHAIN, temperatures=None if scenario.known.expansion is None else RANGE)
+
+
+def add_temperatures(run: Path, scenario: Scenario) -> None:
+    """Add what the sensors of the scales read to a complete run, if they expand.
+
+    A file for `acquire` would have one row a second, for some fifty readings of this loop."""
+    scales, seconds = scenario.truth.scales, scenario.known.keys.plan.seconds_per_reading
+    if scales is None or seconds is None:
+        return
+    measured = _core.read_measurement(run)
+    time = seconds * np.arange(len(measured.point))
+    names = ["temperature"] if scales.one_sensor else ["temperature_x", "temperature_y", "temperature_z"]
+    sensors = {name: scales.start[axis] + scales.rate[axis] * time for axis, name in enumerate(names)}
+    _core.Measurement(
+        measured.line,
+        [int(point) for point in measured.point],
+        measured.position,
+        {**measured.channels, **sensors},
+        run=[int(number) for number in measured.run],
+        direction=measured.direction,
+    ).write(run)

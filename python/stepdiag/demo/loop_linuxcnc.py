@@ -24,7 +24,7 @@ from stepdiag.acquisition.settling import Settling
 from stepdiag.acquisition.tcp_trigger import TcpTrigger
 from stepdiag.acquisition.triggers import Context, Silent
 from stepdiag.acquisition.twin import Twin
-from stepdiag.demo.loop_cases import CHAIN
+from stepdiag.demo.loop_cases import CHAIN, RANGE
 from stepdiag.demo.loop_job import PATIENCE, FloatArray, Job, Say
 from stepdiag.linuxcnc.processes import LinuxcncError
 from stepdiag.linuxcnc.session import LinuxcncSession
@@ -81,13 +81,23 @@ class Linuxcnc:
 
     def _configuration(self, job: Job, bridge: str, twin: Twin, listening: "_Listening") -> dict[str, Any]:
         acquisition = ":".join(map(str, listening.address))
-        compensation = {} if job.table is None else {"table": job.table, "chain": CHAIN, "options": {"ramp": 0}}
+        options: dict[str, str | float] = {"ramp": 0}
+        sensors = []
+        if job.temperature is not None:
+            options["temperatures"] = ",".join(f"{limit:g}" for limit in RANGE)
+            sensors = [
+                f"setp stepdiagkins.temperature-{axis} {one!r}"
+                for axis, one in zip("xyz", job.temperature, strict=True)
+            ]
+            sensors.append("setp stepdiagkins.temperature-enable 1")
+        compensation = {} if job.table is None else {"table": job.table, "chain": CHAIN, "options": options}
         return {
             **compensation,
             "ini": {"TASK": {"CYCLE_TIME": TASK_CYCLE}},
             "speed": SPEED,
             "acceleration": ACCELERATION,
             "hal": [
+                *sensors,
                 f"loadusr -Wn stepdiag-bridge /usr/bin/python3 -P {bridge} --acquire {acquisition} "
                 f"--twin {twin.address[0]}:{twin.address[1]} --timeout {PATIENCE:g}",
                 *(f"net joint-{joint} => stepdiag-bridge.joint-{axis}" for joint, axis in enumerate("xyz")),

@@ -8,9 +8,18 @@ from typing import Final
 import numpy as np
 
 from stepdiag import _core
-from stepdiag.demo.loop_cases import CHAIN, NOISE, LoopCase, scenario_text, write_scenario, write_truth
-from stepdiag.demo.loop_job import PATIENCE, Controller, FloatArray, Job, compensator_of
-from stepdiag.demo.loop_points import Agreement, Sizes, agreement, covariances, errors_at, grid_nodes, random_points
+from stepdiag.demo.loop_cases import CHAIN, IN_USE, NOISE, LoopCase, runs_of, scenario_text, write_scenario, write_truth
+from stepdiag.demo.loop_job import PATIENCE, Controller, FloatArray, Job, add_temperatures, compensator_of
+from stepdiag.demo.loop_points import (
+    Agreement,
+    Sizes,
+    Warmth,
+    agreement,
+    covariances,
+    errors_at,
+    grid_nodes,
+    random_points,
+)
 from stepdiag.demo.loop_recheck import Translations, translations
 from stepdiag.io.whole_files import write_whole
 from stepdiag.program.measuring_program import measuring_program
@@ -29,6 +38,7 @@ class PointSet:
     targets: FloatArray
     before: FloatArray
     after: FloatArray
+    cold: FloatArray | None = None  # compensated without the temperatures of the scales
 
 
 @dataclass(frozen=True)
@@ -41,6 +51,7 @@ class LoopOutcome:
     calibration: _core.Calibration
     table: Path
     points: dict[str, PointSet]  # "nodes" and "random"
+    warmth: Warmth | None  # of the machine in use
     first: Translations  # of the runs before and after compensation
     second: Translations
     agreement: dict[str, Agreement]  # with noise: by kind of points
@@ -58,10 +69,15 @@ def run_case(
     """Measure, calibrate, compensate and measure again.
 
     Also returns the axis positions at the points without compensation."""
-    here, later = folder / case.name, folder / f"{case.name}-again"
+    here, *others = (folder / name for name, _ in runs_of(case))
+    later = others[0]
     write_truth(case, folder, steps)
     scenario = read_scenario(write_scenario(case, here, steps))
-    compensated = read_scenario(write_scenario(case, later, steps, seed=2))  # other noise
+    in_use = [read_scenario(write_scenario(case, other, steps, in_use=True)) for other in others]
+    compensated = in_use[0]
+    known = scenario.known.expansion
+    warmth = None if known is None else Warmth(known.expansion, IN_USE)
+    temperature = None if warmth is None else warmth.temperature
     program, table = here / "program.ngc", here / "calibration.csv"
     made = measuring_program(scenario.known, Options(timeout=PATIENCE))
     write_whole(program, made.text)
@@ -77,19 +93,26 @@ def run_case(
     say(f"measure the machine, {made.readings} readings: {case.title}")
     went = controller.do(Job(scenario, program, here / "run.csv", points if standing is None else points[:0]), say)
     standing = went if standing is None else standing
+    add_temperatures(here / "run.csv", scenario)
     run = _core.read_measurement(here / "run.csv")
     say("evaluate")
     calibration = adjust_scenario(scenario.known, run, full_covariance=True).calibration
     calibration.write(table)
     say("measure the compensated machine")
-    after = controller.do(Job(compensated, program, later / "run.csv", points, table), say)
+    after = controller.do(Job(compensated, program, later / "run.csv", points, table, temperature), say)
+    cold = None
+    if warmth is not None:
+        say("measure it compensated without the temperatures")
+        cold = controller.do(Job(in_use[1], program, others[1] / "run.csv", points, table), say)
+    for scenario_of_run, other in zip(in_use, others, strict=True):
+        add_temperatures(other / "run.csv", scenario_of_run)
     machine = scenario.machine()
     found, row = {}, 0
     for name, targets in sets.items():
         rows = slice(row, row + len(targets))
         row += len(targets)
-        errors = (errors_at(machine, joints[rows], targets) for joints in (standing, after))
-        found[name] = PointSet(targets, *errors)
+        axes = (standing, after) if cold is None else (standing, after, cold)
+        found[name] = PointSet(targets, *(errors_at(machine, joints[rows], targets, warmth) for joints in axes))
     outcome = LoopOutcome(
         case,
         scenario,
@@ -97,7 +120,8 @@ def run_case(
         calibration,
         table,
         found,
-        translations(scenario.known, run),
+        warmth,
+        translations(scenario.known, run, known),
         translations(compensated.known, _core.read_measurement(later / "run.csv")),
         {name: agreement(s.after, covariances(calibration, s.targets)) for name, s in found.items()}
         if case.noise
@@ -127,11 +151,12 @@ def repetitions(outcome: LoopOutcome, seeds: int) -> dict[str, Agreement]:
 def whole_grid(outcome: LoopOutcome) -> tuple[float, float]:
     """Largest errors at all nodes of the grid before and after compensation, calculated, mm."""
     nodes = [outcome.scenario.known.plan.nodes(axis) for axis in "XYZ"]
-    compensator = compensator_of(outcome.table, outcome.scenario)
+    compensator, warmth = compensator_of(outcome.table, outcome.scenario), outcome.warmth
+    temperature = None if warmth is None else warmth.temperature
     before = after = 0.0
     for x in nodes[0]:
         targets = np.stack(np.meshgrid([x], nodes[1], nodes[2], indexing="ij"), axis=-1).reshape(-1, 3)
-        before = max(before, Sizes.of(outcome.machine.error(targets)).largest)
-        left = errors_at(outcome.machine, compensator.command(targets), targets)
+        before = max(before, Sizes.of(errors_at(outcome.machine, targets, targets, warmth)).largest)
+        left = errors_at(outcome.machine, compensator.command(targets, temperature=temperature), targets, warmth)
         after = max(after, Sizes.of(left).largest)
     return before, after

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from stepdiag._core import Calibration, Machine, Plan, error_at_point
+from stepdiag._core import Calibration, Expansion, Machine, Plan, error_at_point
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -30,9 +30,20 @@ def random_points(plan: Plan, count: int, seed: int) -> FloatArray:
     return np.random.default_rng(seed).uniform(0.0, plan.volume, (count, 3))
 
 
-def errors_at(machine: Machine, joints: FloatArray, targets: FloatArray) -> FloatArray:
+@dataclass(frozen=True)
+class Warmth:
+    """Scales that expand, at these temperatures of X, Y, Z, °C."""
+
+    expansion: Expansion
+    temperature: tuple[float, float, float]
+
+
+def errors_at(machine: Machine, joints: FloatArray, targets: FloatArray, warmth: Warmth | None = None) -> FloatArray:
     """Deviation of the functional point from its target for axes at `joints`, (n, 3), mm."""
-    return joints + machine.error(joints) - targets
+    if warmth is None:
+        return joints + machine.error(joints) - targets
+    actual = [machine.pose([p], expansion=warmth.expansion.shift(p, warmth.temperature))[1][0] for p in joints]
+    return np.array(actual) - machine.tool - targets
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,12 @@ translations are evaluated: the distance of the functional point from its comman
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from stepdiag._core import Calibration, Head, Measurement, adjust
+from stepdiag._core import Calibration, Head, KnownExpansion, Measurement, adjust
 from stepdiag.parameters import kind_of
 from stepdiag.scenario.known import Known
 
@@ -27,18 +28,23 @@ class Translations:
     squareness: float  # rad
 
 
-def translations(known: Known, run: Measurement) -> Translations:
-    """Evaluate the translations of a run with three or more beams."""
+def translations(known: Known, run: Measurement, expansion: KnownExpansion | None = None) -> Translations:
+    """Evaluate the translations of a run with three or more beams.
+
+    They are referred to the reference temperature by the expansion, or as found."""
     place = along_beam(known, run)
     sound = np.isfinite(place)
+    channels: dict[str, Any] = {
+        name: run.channels[name][sound] for name in run.channels if name.startswith("temperature")
+    }
     reduced = Measurement(
         [line for line, good in zip(run.line, sound, strict=True) if good],
         [int(point) for point in run.point[sound]],
         run.position[sound],
-        {"distance": place[sound]},
+        channels | {"distance": place[sound]},
     )
     head = Head("ideal", standoff=known.head.standoff)
-    found = adjust(reduced, known.plan, head, known.chain, known.tool, rotations=False).calibration
+    found = adjust(reduced, known.plan, head, known.chain, known.tool, rotations=False, expansion=expansion).calibration
     lengths = [
         float(np.max(np.abs(values)))
         for name, (_, values, _) in found.functions.items()

@@ -5,10 +5,20 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stepdiag.demo.loop_cases import DISTANCE_NOISE, RADIUS, SCREW_AMPLITUDE, SCREW_PITCH, TILT_NOISE, finer
+from stepdiag._core import read_measurement
+from stepdiag.demo.loop_cases import (
+    DISTANCE_NOISE,
+    EXPANSION,
+    RADIUS,
+    SCREW_AMPLITUDE,
+    SCREW_PITCH,
+    TILT_NOISE,
+    WARMING,
+    finer,
+)
 from stepdiag.demo.loop_job import compensator_of
 from stepdiag.demo.loop_outcome import LoopOutcome, whole_grid
-from stepdiag.demo.loop_points import Agreement, FloatArray, Sizes, errors_at
+from stepdiag.demo.loop_points import Agreement, FloatArray, Sizes, Warmth, errors_at
 from stepdiag.demo.paper_report import alias_of
 from stepdiag.io.csv_text import csv_text
 from stepdiag.units import MICRO
@@ -32,6 +42,9 @@ def report_lines(outcomes: list[LoopOutcome], repeated: dict[str, Agreement] | N
         if outcome.case.noise:
             yield ""
             yield from noise_note(outcome, repeated)
+        if outcome.warmth is not None:
+            yield ""
+            yield from warm_note(outcome, outcome.warmth)
     yield ""
     yield from recheck_table(outcomes)
 
@@ -103,6 +116,26 @@ def noise_note(outcome: LoopOutcome, repeated: dict[str, Agreement] | None) -> I
     yield "calibration and go wrong together, so its share may be far from 95 %; that of many runs may not."
 
 
+def warm_note(outcome: LoopOutcome, warmth: Warmth) -> Iterator[str]:
+    """What the temperatures of the scales do, if the controller is told them or not."""
+    run = read_measurement(outcome.table.with_name("run.csv")).channels["temperature"]
+    in_use = ", ".join(f"{one:g}" for one in warmth.temperature)
+    yield f"Scales of {EXPANSION:g} µm/(m·K), measured while they warmed up from {run[0]:.4g} to {run[-1]:.4g} °C"
+    found = "not known" if outcome.calibration.expansion is None else f"{outcome.calibration.expansion[0] * 1e6:.5g}"
+    yield f"({WARMING:g} K/h; the calibration found {found} µm/(m·K)), in use at {in_use} °C:"
+    yield f"{'':<44}{'largest, µm':>13}{'rms, µm':>10}"
+    for kind, points in outcome.points.items():
+        rows = {
+            "before": points.before,
+            "after, without temperatures": points.cold,
+            "after, with temperatures": points.after,
+        }
+        for text, errors in rows.items():
+            if errors is not None:
+                sizes = Sizes.of(errors)
+                yield f"{f'{WORDS[kind]}, {text}':<48}{sizes.largest * UM:>9.3g}{sizes.rms * UM:>10.3g}"
+
+
 def recheck_table(outcomes: list[LoopOutcome]) -> Iterator[str]:
     yield "The second calibration, of the compensated machine by the same program. It tilts as before: tilts are taken"
     yield f"{'from the readings, translations asked for':<41}{'before':>21}{'after':>22}"
@@ -112,6 +145,8 @@ def recheck_table(outcomes: list[LoopOutcome]) -> Iterator[str]:
             f"{found.length * UM:>12.3g}{found.squareness * MICRO:>10.2g}" for found in (outcome.first, outcome.second)
         )
         yield f"{outcome.case.name:<9}{'largest length, squareness':<31}{cells}"
+    if any(outcome.warmth is not None for outcome in outcomes):
+        yield "warm: before is referred to 20 °C, after is as found at the temperatures in use"
 
 
 def point_table(outcomes: list[LoopOutcome]) -> str:

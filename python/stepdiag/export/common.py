@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag._core import Calibration, ErrorMap, InvalidArgument
+from stepdiag.calibration.temperature_text import temperature_rows
 from stepdiag.parameters import AXES
 
 FloatArray = npt.NDArray[np.float64]
@@ -81,6 +82,17 @@ def undetermined_of(calibration: Calibration, names: Sequence[str]) -> Iterator[
             yield f"{name} (slope)"
         elif name in calibration.undetermined_reversal_constants:
             yield f"{name} (constant of its reversal error)"
+
+
+def temperature_row(calibration: Calibration) -> str:
+    """For which temperature a table is."""
+    (row,) = temperature_rows(calibration)
+    return row
+
+
+def in_ascii(text: str) -> str:
+    """For controllers, which may take no other characters, not even in comments."""
+    return text.replace("µ", "u").replace("°C", "degC")
 
 
 def tool_of(calibration: Calibration, options: ExportOptions) -> FloatArray:

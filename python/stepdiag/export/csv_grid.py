@@ -14,16 +14,19 @@ import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
 from stepdiag.calibration.finding_text import fit_row
+from stepdiag.calibration.temperature_text import temperature_text
 from stepdiag.export.common import (
     Export,
     ExportOptions,
     FloatArray,
     common_nodes,
     compensated_map,
+    in_ascii,
     inside,
     origin_of,
     require,
     spread,
+    temperature_row,
     tool_of,
     words,
 )
@@ -62,13 +65,15 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
         "sign": "error = actual - commanded position of the tool relative to the workpiece; to compensate, subtract it",
         "reference": "functional point: the tool's origin plus the tool offset; 0 0 0 is home",
         "approach": approach,
+        "temperature": in_ascii(temperature_text(calibration)),
         "interpolation_loss_um": f"{loss * 1e3:.4g}",
         "not_compensated": "; ".join(missing),
         "calibrated": calibration.date,
         **calibration.provenance,
     }
     text = csv_text(_header(bool(options.orientation)), [], leading) + "".join(_rows(axes, origin, values))
-    return Export({output: text}, [fit_row(calibration), *_report(leading, axes, error, loss, place, missing)])
+    report = _report(leading, axes, error, loss, place, missing)
+    return Export({output: text}, [fit_row(calibration), temperature_row(calibration), *report])
 
 
 def _axes(volume: FloatArray, options: ExportOptions) -> list[FloatArray]:

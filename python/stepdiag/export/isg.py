@@ -28,10 +28,12 @@ from stepdiag.export.common import (
     FloatArray,
     common_nodes,
     compensated_map,
+    in_ascii,
     inside,
     origin_of,
     require,
     spread,
+    temperature_row,
     tool_of,
     words,
 )
@@ -71,6 +73,7 @@ def isg(calibration: Calibration, output: Path, options: ExportOptions) -> Expor
     where = "as parameters" if apart else "in the straightnesses: EXY - C0Y y, EXZ + B0Z z, EYZ - A0Z z"
     lines = [
         fit_row(calibration),
+        temperature_row(calibration),
         *provenance_rows(calibration),
         UNTRIED,
         f"chain {calibration.chain}, volume {words(calibration.volume)} mm, home at {words(origin)} mm in the "
@@ -174,5 +177,5 @@ def _text(lines: list[str], tables: dict[str, Table], squareness: dict[str, floa
         blocks.append(f"{' '.join(squareness)}\n{' '.join(f'{angle:.12f}' for angle in squareness.values())}")
     blocks.append(f"P0X P0Y P0Z\n{' '.join(f'{t:.9f}' for t in tool)}")
     # A # begins a new header anywhere. The manuals do not say what comments may contain.
-    head = "".join(f"// {line}\n" for line in ["stepdiag export --to isg", *lines]).replace("#", "").replace("µ", "u")
-    return head + "\n#\n".join(blocks) + "\n"
+    head = "".join(f"// {line}\n" for line in ["stepdiag export --to isg", *lines]).replace("#", "")
+    return in_ascii(head) + "\n#\n".join(blocks) + "\n"

@@ -13,6 +13,7 @@ nominal, and therefore exact at every row. `actual` differs from nominal + E by 
 which is nanometres.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
@@ -25,14 +26,17 @@ from stepdiag.export.common import (
     ExportOptions,
     FloatArray,
     common_nodes,
+    in_ascii,
     inside,
     origin_of,
     require,
     spread,
+    temperature_row,
     tool_of,
     words,
 )
 from stepdiag.export.fewest_nodes import best_subset
+from stepdiag.io.comp_set import fingerprint_rows
 from stepdiag.parameters import AXES
 
 # EMCMOT_COMP_SIZE; LinuxCNC 2.9 reports an error for more rows, and starts without the rest.
@@ -58,7 +62,7 @@ def linuxcnc_comp(calibration: Calibration, output: Path, options: ExportOptions
     losses = [joint.sentence() for joint in joints]
     left = list(_what_is_left(machine, calibration.volume, joints))
     files = {output / f"joint{n}.comp": joint.text(float(origin_of(options)[n])) for n, joint in enumerate(joints)}
-    files[output / COMPANION] = _companion([*head, *losses, *left])
+    files[output / COMPANION] = _companion([*head, *losses, *left], {path.name: text for path, text in files.items()})
     return Export(files, [*head, *losses, *left, f"note: paste the lines of {output / COMPANION} into the INI file"])
 
 
@@ -130,6 +134,7 @@ def _what_the_files_are(
 ) -> list[str]:
     return [
         fit_row(calibration),
+        temperature_row(calibration),
         *provenance_rows(calibration),
         f"chain {calibration.chain}, volume {words(calibration.volume)} mm, home at {words(origin)} mm in the "
         "controller's coordinates",
@@ -150,7 +155,13 @@ def _what_is_left(machine: Machine, volume: FloatArray, joints: list[JointTable]
         before.append(machine.error(grid, 3 * sign))
         after.append(motor + machine.error(motor, 3 * sign) - grid)
     b, a = (np.concatenate(errors) * 1e3 for errors in (before, after))
+    without, with_them = (f"{np.max(np.linalg.norm(errors, axis=1)):.4g}" for errors in (b, a))
+    worse = (
+        f"warning: these files make the machine worse: the largest error in the volume is {without} µm "
+        f"without them and {with_them} µm with them"
+    )
     return [
+        *([worse] if float(with_them) > float(without) else []),
         f"largest error in the volume without compensation {_largest(b)}, with it {_largest(a)}",
         "what is left: straightness, squareness, and what the angles do away from the lines; a COMP_FILE cannot "
         "correct these, stepdiagkins (--to linuxcnc-kins) does",
@@ -164,10 +175,11 @@ def _largest(errors: FloatArray) -> str:
     return f"{np.max(np.linalg.norm(errors, axis=1)):.4g} µm ({components})"
 
 
-def _companion(sentences: list[str]) -> str:
+def _companion(sentences: list[str], tables: Mapping[str, str]) -> str:
     ini = [f"# {sentence}" for sentence in ["stepdiag export --to linuxcnc-comp", *sentences]]
     ini.append("# LinuxCNC ignores BACKLASH of a joint with a COMP_FILE: what is known of reversal is in the files")
     ini.append("# for LINEAR_UNITS = mm, and joints 0 1 2 = X Y Z; paths are relative to the INI file")
+    ini += fingerprint_rows(tables)
     for n in range(3):
         ini += ["", f"[JOINT_{n}]", f"COMP_FILE = joint{n}.comp", "COMP_FILE_TYPE = 0"]
-    return "\n".join(ini).replace("µ", "u") + "\n"
+    return in_ascii("\n".join(ini)) + "\n"

@@ -11,7 +11,16 @@ import numpy as np
 
 from stepdiag._core import Calibration, Compensator
 from stepdiag.calibration.finding_text import fit_row
-from stepdiag.export.common import Export, ExportOptions, FloatArray, origin_of, require, tool_of, words
+from stepdiag.export.common import (
+    Export,
+    ExportOptions,
+    FloatArray,
+    origin_of,
+    require,
+    temperature_row,
+    tool_of,
+    words,
+)
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 
 
@@ -40,6 +49,7 @@ def linuxcnc_kins(calibration: Calibration, output: Path, options: ExportOptions
         arguments += " accept_rejected=1"
     lines = [
         fit_row(calibration),
+        temperature_row(calibration),
         f"chain {calibration.chain}, volume {words(calibration.volume)} mm, tool offset {words(tool)} mm, home at "
         f"{words(origin)} mm in the controller's coordinates",
         "sign: errors, actual - commanded of the tool relative to the workpiece; the module moves the joints by the "
@@ -49,6 +59,10 @@ def linuxcnc_kins(calibration: Calibration, output: Path, options: ExportOptions
         *missing,
         f"INI file: [KINS] KINEMATICS = stepdiagkins {arguments}",
     ]
+    if calibration.expansion is not None:
+        lines.append(
+            "scales: with temperatures=LOWEST,HIGHEST (°C) in that line the module takes their temperatures from pins"
+        )
     if " " in str(output.absolute()):
         lines.append("note: KINEMATICS takes no space in a path: move the table to where there is none")
     return Export({output: _csv_text(table)}, lines)
@@ -85,5 +99,7 @@ def _with_tool(calibration: Calibration, tool: FloatArray) -> Calibration:
         between_nodes=calibration.between_nodes,
         temperature_reference=calibration.temperature_reference,
         temperature_as_found=calibration.temperature_as_found,
+        expansion=calibration.expansion,
+        fixed_point=calibration.fixed_point,
         provenance=calibration.provenance,
     )

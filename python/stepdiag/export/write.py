@@ -13,14 +13,14 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, read_error_map
-from stepdiag.calibration.finding_text import MEANING
+from stepdiag.calibration.finding_text import MEANING, check_angles
 from stepdiag.export.common import Export, ExportOptions, tool_of
 from stepdiag.export.csv_grid import csv_grid
 from stepdiag.export.isg import isg
 from stepdiag.export.linuxcnc_comp import linuxcnc_comp
 from stepdiag.export.linuxcnc_kins import linuxcnc_kins
 from stepdiag.io.data_files import is_netcdf, read_calibration
-from stepdiag.io.whole_files import check_output, make_folder, write_whole
+from stepdiag.io.whole_files import check_output, make_folder, write_set
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 
 # Format -> its options besides `tool`, `origin`, `incomplete` and `accept_rejected`.
@@ -38,6 +38,7 @@ def read_what_is_exported(path: Path) -> Calibration:
     Parameters that an error map lacks are 0. Raises InvalidArgument naming the file, and the line
     or variable."""
     calibration = read_calibration(path)
+    check_angles(calibration.to_error_map(), str(path))
     if is_netcdf(path) or not read_error_map(path).header.get("format", "").startswith("stepdiag error map"):
         return calibration
     edges = dict(zip(AXES, calibration.volume, strict=True))
@@ -60,6 +61,8 @@ def read_what_is_exported(path: Path) -> Calibration:
         between_nodes=calibration.between_nodes,
         temperature_reference=calibration.temperature_reference,
         temperature_as_found=calibration.temperature_as_found,
+        expansion=calibration.expansion,
+        fixed_point=calibration.fixed_point,
     )
 
 
@@ -79,7 +82,7 @@ def export_calibration(
 ) -> list[str]:
     """Write a calibration for a controller. Returns notes: settings, losses, what is not corrected.
 
-    Files are written completely or not at all.
+    Files are written completely or not at all; notes that begin with "warning:" say what makes the machine worse.
 
     Args:
         calibration: the calibration to export.
@@ -97,8 +100,7 @@ def export_calibration(
         make_folder(output)
     for path in export.files:
         check_output(path)
-    for path, text in export.files.items():
-        write_whole(path, text)
+    write_set(export.files)
     return [*export.report, *(f"wrote {path}" for path in export.files)]
 
 

@@ -11,6 +11,7 @@ from matplotlib.patches import Patch
 
 from stepdiag._core import Calibration, ErrorMap
 from stepdiag.calibration.finding_text import FITS, MEANING
+from stepdiag.calibration.temperature_text import temperature_mark
 from stepdiag.figures.page import Heading, Page
 from stepdiag.figures.parameter_panels import (
     COVERAGE_FACTOR,
@@ -60,7 +61,11 @@ def draw_calibration(calibration: Calibration, truth: ErrorMap | None = None, na
 def _heading(calibration: Calibration, name: str) -> Heading:
     volume = " x ".join(f"{edge:g}" for edge in calibration.volume)
     tool = " ".join(f"{offset:g}" for offset in calibration.tool)
-    made = [calibration.method or "method not known", calibration.date or "date not known"]
+    made = [
+        calibration.method or "method not known",
+        calibration.date or "date not known",
+        temperature_mark(calibration),
+    ]
     machine = [f"chain {calibration.chain}", f"volume {volume} mm", f"tool offset {tool} mm"]
     factor = calibration.variance_factor
     fit = [] if factor is None else [f"variance factor {factor:.3g}"]

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from stepdiag.calibration.comparison import Comparison, Difference
+from stepdiag.calibration.comparison import Comparison, Difference, made_of
 from stepdiag.figures.page import Heading, Page
 from stepdiag.figures.parameter_panels import (
     COVERAGE_FACTOR,
@@ -37,7 +37,7 @@ def draw_comparison(comparison: Comparison | StoredComparison, name: str = "comp
     fit = None if isinstance(comparison, StoredComparison) else _worse_fit(comparison)
     by_name = {difference.parameter: difference for difference in comparison.differences}
     with own_style():
-        facts = ", ".join(_facts(comparison))
+        facts = "; ".join(_facts(comparison))
         page = Page(Heading(f"{name}: differences B - A", facts, fit), WIDTH, HEIGHT, _notes(comparison))
         panels = ParameterPanels(page, volume, "")
         for parameter in (*FUNCTIONS, *SQUARENESSES):
@@ -108,9 +108,10 @@ def _facts(comparison: Comparison | StoredComparison) -> Iterator[str]:
         made = comparison.made
     else:
         both = (("a", comparison.a), ("b", comparison.b))
-        made = {f"{key}_{which}": text for which, c in both for key, text in (("method", c.method), ("date", c.date))}
+        made = {f"{key}_{which}": text for which, c in both for key, text in made_of(c).items()}
     for which in "ab":
-        yield f"{which.upper()}: {made[f'method_{which}'] or 'method not known'} {made[f'date_{which}']}".rstrip()
+        method, date, temperature = (made[f"{key}_{which}"] for key in ("method", "date", "temperature"))
+        yield " ".join(filter(None, (f"{which.upper()}: {method or 'method not known'}", date, temperature)))
     marked = sum(_significant(d, comparison.threshold).any() for d in comparison.differences)
     yield f"significant: {marked} of {len(comparison.differences)} parameters"
 

@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 
 from stepdiag._core import Adjustment, InvalidArgument, Measurement
 from stepdiag.calibration.finding_text import combination_text
+from stepdiag.calibration.temperature_text import reference_mark
 from stepdiag.figures.calibration import undetermined_notes, with_gaps
 from stepdiag.figures.growth import OWN, draw_growth_panels
 from stepdiag.figures.page import SMALL, Heading, Page
@@ -88,6 +89,7 @@ def draw_observation(
         f"{len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines, {len(run)} points, "
         f"{', '.join(known.signals)}; {found.degrees_of_freedom} readings more than unknowns"
     )
+    facts += f", positioning {reference_mark(calibration.temperature_reference)}"
     tables = {p: with_gaps(calibration, p, *table) for p, table in calibration.functions.items()}
     curves = {parameter: (position, u) for parameter, (position, _, u) in tables.items()}
     curves |= {p: (np.array([np.nan]), np.array([u])) for p, (_, u) in calibration.squareness.items()}
@@ -135,7 +137,8 @@ def _of_netcdf(file: "NetcdfFile") -> DrawnUncertainty:
     if not sampled and not propagated:
         raise InvalidArgument(f"{file.path}: expected standard uncertainties EXX_u ... or EXX_propagated_u, got none")
     groups, budget = _budget(file, propagated)
-    facts = _facts(file.text("scenario", ""), file.text("method", ""), file.number("samples"))
+    reference = file.number("temperature_reference_c")
+    facts = _facts(file.text("scenario", ""), file.text("method", ""), file.number("samples"), reference)
     return DrawnUncertainty(
         file.lengths("volume_mm"), facts, sampled, propagated, groups, budget, _notes(file.text("warning", ""))
     )
@@ -152,13 +155,16 @@ def _of_csv(table: CsvTable) -> DrawnUncertainty:
     notes = _notes(get("warning", ""))
     if propagated:
         notes.append("the sources of these uncertainties (budget) are in netCDF files (.nc), not in CSV files")
-    facts = _facts(get("scenario", ""), get("method", ""), samples)
+    warmth = get("temperature_reference_c")
+    reference = None if warmth is None else finite_number(warmth, f"{table.path}: temperature_reference_c")
+    facts = _facts(get("scenario", ""), get("method", ""), samples, reference)
     return DrawnUncertainty(table.lengths("volume_mm"), facts, sampled, propagated, [], {}, notes)
 
 
-def _facts(scenario: str, method: str, samples: float | None) -> str:
+def _facts(scenario: str, method: str, samples: float | None, reference: float | None) -> str:
     drawn = f"{samples:,.0f} virtual calibrations" if samples else ""
-    return ", ".join(filter(None, (scenario, f"method {method or 'not known'}", drawn)))
+    temperature = f"positioning {reference_mark(reference)}"
+    return ", ".join(filter(None, (scenario, f"method {method or 'not known'}", drawn, temperature)))
 
 
 def _notes(warning: str) -> list[str]:

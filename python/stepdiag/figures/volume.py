@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from stepdiag._core import InvalidArgument, Machine, errors_at
+from stepdiag._core import Calibration, InvalidArgument, Machine, errors_at
+from stepdiag.calibration.temperature_text import temperature_mark
 from stepdiag.calibration.volume import VolumeErrors
 from stepdiag.figures.page import Heading, Page
 from stepdiag.parameters import AXES
@@ -38,6 +39,8 @@ def draw_volume(found: VolumeErrors, name: str = "calibration") -> Figure:
     with own_style():
         heading = Heading(f"{name}: error in the volume", _facts(found), found.fit)
         note = "planes through the point with the largest error (cross); arrows: error in the plane, enlarged"
+        if isinstance(found.source, Calibration):
+            note += f"; positioning errors {temperature_mark(found.source)}"
         page = Page(heading, WIDTH, scale * float(max(edges[1], edges[2])) + 0.75, [note])
         bar_width = 0.18 / scale
         spaces = 3.2 * bar_width

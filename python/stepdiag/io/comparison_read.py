@@ -32,7 +32,7 @@ class StoredComparison:
     volume: FloatArray  # mm
     limit: float
     count: int  # how many values were tested
-    made: dict[str, str]  # method_a, date_a, method_b, date_b
+    made: dict[str, str]  # method_a, date_a, temperature_a and the same of b; empty: not known
 
     @property
     def threshold(self) -> float:
@@ -71,7 +71,7 @@ def _difference(file: "NetcdfFile", name: str) -> Difference:
     return Difference(name, position, value, u, file.text("shape_only", "false", of=whole) == "true")
 
 
-_MADE: Final = ("method_a", "date_a", "method_b", "date_b")
+_MADE: Final = tuple(f"{key}_{which}" for which in "ab" for key in ("method", "date", "temperature"))
 
 
 def _read_csv(path: Path) -> StoredComparison:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from stepdiag import _core
 from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement
+from stepdiag.io.whole_files import write_by_core
 
 # Imports inside functions keep programs fast that use CSV only.
 
@@ -21,11 +22,14 @@ def read_measurement(path: str | PathLike[str]) -> Measurement:
     """Read a measurement, CSV or netCDF (.nc).
 
     Raises InvalidArgument naming the file, and the line or variable."""
-    if not is_netcdf(path):
-        return _core.read_measurement(path)
-    from stepdiag.io.netcdf_read import read_measurement_netcdf
+    from stepdiag.io.refused_files import explained
 
-    return read_measurement_netcdf(Path(path))
+    with explained(Path(path), "measurement"):
+        if not is_netcdf(path):
+            return _core.read_measurement(path)
+        from stepdiag.io.netcdf_read import read_measurement_netcdf
+
+        return read_measurement_netcdf(Path(path))
 
 
 def read_calibration(path: str | PathLike[str]) -> Calibration:
@@ -44,7 +48,7 @@ def write_measurement(measurement: Measurement, path: str | PathLike[str]) -> No
 
     Raises InvalidArgument naming the file if it cannot be written."""
     if not is_netcdf(path):
-        measurement.write(path)
+        write_by_core(path, measurement.write)
         return
     from stepdiag.io.netcdf_write import write_measurement_netcdf
 
@@ -82,7 +86,7 @@ def write_calibration(
         calibration = calibration.with_between_nodes(between_nodes)
     dated = calibration.dated(calibration.date or date_of_today())
     if not is_netcdf(path):
-        dated.write(path)
+        write_by_core(path, dated.write)
         return dated
     from stepdiag.io.netcdf_write import write_calibration_netcdf
 

@@ -131,9 +131,10 @@ _FACTS: Final[Mapping[type, Callable[[Any], Facts]]] = {
 }
 # They show their properties, in native units.
 _PLAIN: Final = """
-BeamSegment BeamSpot CalibrationEntry Camera Compensator DiagonalErrors Distribution ErrorAtPoint Expansion
+BeamSegment BeamSpot CalibrationEntry Camera CheckPoints Compensator DiagonalErrors Distribution DriftEstimate
+ErrorAtPoint Expansion
 ExpansionEstimate Fault FaultClass FaultControl FitReason GaussianMode HeadBeam HeadBody HeadCalibration HeadDesign
-Interferometer KnownCombination KnownExpansion LateralEffect Misalignment MonteCarloResult Noise Outlier
+Interferometer KnownCombination KnownExpansion LateralEffect MachineDrift Misalignment MonteCarloResult Noise Outlier
 PlausibleLimits Propagation ReadingNoise ReadingUncertainty ReturnedBeam ScaleTemperatures Sensitivity SetupEstimate
 Smoothness SpotSensor UncertainInput UncertainInputs Undetermined Validation VirtualCalibrations VolumetricAccuracy
 """

@@ -127,6 +127,9 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
         verdict["temperature_reference_c"] = calibration.temperature_reference
     elif calibration.temperature_as_found is not None:
         verdict["temperature_as_found_c"] = calibration.temperature_as_found
+    if calibration.expansion is not None:
+        verdict["expansion_per_k"] = calibration.expansion
+        verdict["fixed_point_mm"] = calibration.fixed_point
     verdict["fit_reasons"] = "\n".join(calibration.fit_reasons)
     verdict["unseen_faults"] = "\n".join(calibration.unseen_faults)
     return xr.Dataset(

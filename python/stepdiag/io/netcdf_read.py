@@ -92,6 +92,8 @@ def read_calibration_netcdf(path: Path) -> Calibration:
             "between_nodes": file.number("between_nodes_mm"),
             "temperature_reference": file.number("temperature_reference_c"),
             "temperature_as_found": file.lengths_if_there("temperature_as_found_c"),
+            "expansion": file.lengths_if_there("expansion_per_k"),
+            "fixed_point": file.lengths_if_there("fixed_point_mm"),
         }
         with located(str(path)):
             calibration = Calibration(**parts)

@@ -1,10 +1,10 @@
 """Reads and writes small files, completely or not at all."""
 
 import os
+import secrets
 import stat
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from stepdiag._core import InvalidArgument
@@ -76,28 +76,53 @@ def write_whole(path: Path, content: str | bytes) -> None:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
+def write_set(files: Mapping[Path, str]) -> None:
+    """Write files that belong together: all are on the disk under temporary names before the first is renamed.
+
+    Only what ends the process between two renames leaves old ones beside new ones."""
+    with ExitStack() as stack:
+        for path, text in files.items():
+            temporary = stack.enter_context(whole_file(path))
+            with open(temporary, "wb") as file:
+                file.write(text.encode())
+                file.flush()
+                os.fsync(file.fileno())
+
+
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """A temporary file beside `path`, which replaces it when the block ends without an error."""
     check_output(path)
     target = Path(os.path.realpath(path))  # keeps a symbolic link
+    # A name of its own, not mkstemp's: SIGTERM may come between the making of the file and its return.
+    temporary = target.with_name(f"{target.name}.{secrets.token_hex(8)}")
+    handle = -1
     try:
-        handle, temporary = tempfile.mkstemp(prefix=f"{target.name}.", dir=target.parent)
-    except OSError as error:
-        raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
-    try:
-        yield Path(temporary)
+        handle = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        yield temporary
         os.fchmod(handle, target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~_umask())
         os.fsync(handle)
         os.replace(temporary, target)
         sync_folder(target.parent)
     except BaseException as error:
-        Path(temporary).unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         if isinstance(error, OSError):
             raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
         raise
     finally:
-        os.close(handle)
+        if handle >= 0:
+            os.close(handle)
+
+
+def write_by_core(path: str | os.PathLike[str], write: Callable[[str | os.PathLike[str]], None]) -> None:
+    """Let the core write a file, by the rules of this module. It takes pipes and devices, too.
+
+    Raises InvalidArgument."""
+    check_not_read_only(Path(path))
+    write(path)
+    target = Path(os.path.realpath(path))
+    if target.is_file():
+        sync_folder(target.parent)
 
 
 def sync_folder(folder: Path) -> None:
@@ -126,8 +151,19 @@ def check_output(path: Path) -> None:
     if mode is not None and not stat.S_ISREG(mode):
         what = "a folder" if stat.S_ISDIR(mode) else "not a regular file"
         raise InvalidArgument(f"{path}: cannot be written: it is {what}")
+    check_not_read_only(path)
     if not os.access(folder, os.W_OK):
         raise InvalidArgument(f"{path}: cannot be written: no permission to write in {folder}")
+
+
+def check_not_read_only(path: Path) -> None:
+    """Raise InvalidArgument for a file that was made read-only: renaming would replace it all the same.
+
+    So would root, who may write everything: it is the mode that counts."""
+    if path.is_file() and not (path.stat().st_mode & 0o222 and os.access(path, os.W_OK)):
+        raise InvalidArgument(
+            f"{path}: cannot be written: the file is read-only; make it writable, or name another file"
+        )
 
 
 def _is_device_name(path: Path) -> bool:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from stepdiag import _core
 from stepdiag.scenario.known import Known
-from stepdiag.scenario.planned_readings import RECORDS
+from stepdiag.scenario.planned_readings import RECORDS, with_channels
 
 Rows = npt.NDArray[np.int_]
 Values = npt.NDArray[np.float64]
@@ -86,20 +86,6 @@ def tilts_of(known: Known) -> tuple[str, str] | None:
 def distances_of(known: Known) -> list[str]:
     """The channels that are lengths of beams."""
     return [name for name in known.signals if name.startswith("d")]
-
-
-def with_channels(run: _core.Measurement, fields: Fields, uncertainty: Fields | None = None) -> _core.Measurement:
-    """The run with other readings, and other standard uncertainties where it has any."""
-    channels: dict[str, npt.ArrayLike] = {**run.channels, **fields}
-    return _core.Measurement(
-        run.line,
-        run.point.tolist(),
-        run.position,
-        channels,
-        run=run.run.tolist(),
-        direction=run.direction,
-        standard_uncertainty={**run.standard_uncertainty, **(uncertainty or {})},
-    )
 
 
 def scaled(channels: Sequence[str], factor: float, lines: Sequence[str] | None = None) -> Change:
@@ -195,6 +181,7 @@ def with_plan(
             old.steps,
             order=old.orders if order is None else list(order),
             scale_lines=[renamed.get(line, line) for line in old.scale_lines],
+            check_points=old.check_points,
         )
         lines = [renamed.get(line, line) for line in run.line]
         position = np.array(run.position)

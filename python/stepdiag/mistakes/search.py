@@ -29,6 +29,7 @@ from stepdiag.scenario.planned_readings import check_points
 
 CLEAR: Final = 60.0  # least gain in chi-square
 ALTERNATIVE: Final = 25.0  # what is less behind the best may be it, as of faults
+CHANCE: Final = 9.0  # difference that does not make one better than the other
 FAULT: Final = 28.0  # what one fault of single readings must explain to be one
 CREDIBLE: Final = 9.0  # variance factor above which a fit is rejected: not worth an exact adjustment
 PROMISING: Final = 36.0  # after the screening: what is above is not below `CREDIBLE` at its minimum
@@ -135,7 +136,11 @@ class MistakeSearch:
         if self._as_read.factor <= CREDIBLE:
             return []
         with np.errstate(all="ignore"), _pool() as self._pool:
-            found = self._named(self._single) or self._named(self._pairs())
+            found = (
+                self._named(self._single)
+                or self._named(self._of_families(of_faults=False))
+                or self._named(self._pairs())
+            )
         return found if found and found[0].fit == "accepted" else []
 
     def after(self, adjustment: _core.Adjustment | None, *, refused: bool = False) -> list[FoundMistake]:
@@ -185,8 +190,8 @@ class MistakeSearch:
 
         return list(self._pool.map(refined, [one for one in tried if one.fit.square_sum <= limit]))
 
-    def _of_families(self) -> list[_Tried]:
-        """The best of each family."""
+    def _of_families(self, *, of_faults: bool = True) -> list[_Tried]:
+        """The best of each family; without `of_faults` not of those that the adjustment looks for itself."""
         if self._is_impossible:
             return []  # what is no round number does not repair that
         # Where the adjustment found a factor, or what may be one, its sentence is the one.
@@ -196,7 +201,7 @@ class MistakeSearch:
             family
             for mistake in CATALOGUE
             for family in mistake.families_of(self._copy)
-            if family.fault is None or family.fault not in told
+            if family.fault is None or (of_faults and family.fault not in told)
         ]
         best = self._pool.map(lambda family: _best_of(family, self._copy, self._as_read), families)
         return [one for one in best if one is not None]
@@ -249,7 +254,7 @@ class MistakeSearch:
         # What fits equally well stays in the order of the catalogue.
         alike = sorted(
             (one for one in tried if one.excess(factor) - best < ALTERNATIVE),
-            key=lambda one: round(one.excess(factor) - best),
+            key=lambda one: (one.excess(factor) - best) // CHANCE,
         )
         adjusted = self._pool.map(self._adjusted, [one.hypothesis for one in alike[:MOST_ADJUSTED]])
         found = [one for one in adjusted if one is not None]

@@ -10,7 +10,7 @@ from typing_extensions import TypedDict
 from stepdiag._core import Calibration, Undetermined
 from stepdiag.calibration.finding_text import NOISE_ALONE
 from stepdiag.calibration.largest_by_kind import largest_entries
-from stepdiag.objects.writer import measured, number
+from stepdiag.objects.writer import in_unit, measured, number
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES, Kind, units_of
 
 Array = npt.NDArray[np.float64]
@@ -32,6 +32,15 @@ class Fit(TypedDict):
     """How large faults of readings may be in it unseen, and what they then do, a sentence each."""
     noise_alone: bool
     """Whether the standard uncertainties are of noise alone, as those of linear methods are."""
+
+
+class Temperature(TypedDict):
+    """To which temperature positioning errors belong."""
+
+    temperature_reference_c: float | None
+    """Positioning errors are referred to it; null: they are as found."""
+    temperature_as_found_c: list[float] | None
+    """Of the scales of X, Y, Z; null: not recorded, or referred to a temperature."""
 
 
 class _Function(TypedDict):
@@ -95,7 +104,7 @@ class OpenFinding(TypedDict):
     """The best first; any of them helps."""
 
 
-class CalibrationTables(TypedDict):
+class CalibrationTables(Temperature):
     """The 21 parameters as far as they are determined."""
 
     method: str
@@ -107,10 +116,10 @@ class CalibrationTables(TypedDict):
     volume_mm: list[float]
     tool_mm: list[float]
     straightness_reference: str
-    temperature_reference_c: float | None
-    """Positioning errors are referred to it; null: they are as found."""
-    temperature_as_found_c: list[float] | None
-    """Of the scales of X, Y, Z; null: not recorded, or referred to a temperature."""
+    expansion_um_per_m_k: list[float] | None
+    """Of the scales of X, Y, Z, by which they are referred; null: as found, or not known."""
+    fixed_point_mm: list[float] | None
+    """Positions from which these scales expand."""
     functions: list[LengthFunction | AngleFunction]
     """Values by node; approached in + direction if there are reversal errors."""
     reversal_errors: list[LengthReversal | AngleReversal]
@@ -163,9 +172,20 @@ def fit_of(calibration: Calibration) -> Fit:
     }
 
 
+def temperature_of(calibration: Calibration) -> Temperature:
+    """The temperature that a calibration carries."""
+    found = calibration.temperature_as_found
+    return {
+        "temperature_reference_c": calibration.temperature_reference,
+        "temperature_as_found_c": None if found is None else found.tolist(),
+    }
+
+
 def tables_of(calibration: Calibration) -> CalibrationTables:
     """All values of a calibration, but for its covariance."""
     slopes, constants = calibration.undetermined_slopes, calibration.undetermined_reversal_constants
+    found = calibration.expansion
+    expansion: Any = None if found is None else [in_unit("um_per_m_k", coefficient) for coefficient in found]
     return {
         "method": calibration.method,
         "date": calibration.date,
@@ -174,10 +194,9 @@ def tables_of(calibration: Calibration) -> CalibrationTables:
         "volume_mm": calibration.volume.tolist(),
         "tool_mm": calibration.tool.tolist(),
         "straightness_reference": calibration.straightness_reference,
-        "temperature_reference_c": calibration.temperature_reference,
-        "temperature_as_found_c": None
-        if calibration.temperature_as_found is None
-        else calibration.temperature_as_found.tolist(),
+        **temperature_of(calibration),
+        "expansion_um_per_m_k": expansion,
+        "fixed_point_mm": None if calibration.expansion is None else calibration.fixed_point.tolist(),
         "functions": _by_node(calibration.functions, "slope_determined", slopes),
         "reversal_errors": _by_node(calibration.reversal, "constant_determined", constants),
         "squarenesses": _squarenesses(calibration.squareness),

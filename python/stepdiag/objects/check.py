@@ -19,7 +19,7 @@ class CheckedFile(TypedDict):
     error: str | None
     """Why it is not valid."""
     kind: str | None
-    """scenario, head, study, measurement, calibration, error map, raw readings; null: not valid"""
+    """scenario, head, study, measurement, calibration, error map, raw readings, compensation.ini; null: not valid"""
     summary: str | None
     warnings: list[str]
     fit: Fit | None

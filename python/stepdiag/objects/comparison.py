@@ -9,11 +9,11 @@ from typing_extensions import TypedDict
 from stepdiag._core import Calibration, __version__
 from stepdiag.calibration import truth, volume_change
 from stepdiag.calibration.comparison import Comparison, Difference
-from stepdiag.objects.calibration import Fit, fit_of, unit_key
+from stepdiag.objects.calibration import Fit, Temperature, fit_of, temperature_of, unit_key
 from stepdiag.objects.writer import in_unit, measured, number
 
 
-class ComparedCalibration(TypedDict):
+class ComparedCalibration(Temperature):
     file: str
     fit: Fit
     method: str
@@ -167,6 +167,7 @@ def _compared(calibration: Calibration, file: Path) -> ComparedCalibration:
         "fit": fit_of(calibration),
         "method": calibration.method,
         "date": calibration.date,
+        **temperature_of(calibration),
         "tool_mm": calibration.tool.tolist(),
         "provenance": dict(calibration.provenance),
     }

@@ -9,6 +9,7 @@ from typing_extensions import TypedDict
 from stepdiag._core import (
     Adjustment,
     Calibration,
+    DriftEstimate,
     ExpansionEstimate,
     Fault,
     FaultClass,
@@ -202,6 +203,25 @@ class FoundExpansion(TypedDict):
     """Standard uncertainty before the run."""
 
 
+class FoundDriftByTime(TypedDict):
+    """A drift of the functional point, which was an unknown."""
+
+    axis: str
+    value_um_per_h: float | None
+    standard_uncertainty_um_per_h: float | None
+    prior_um_per_h: float | None
+    """Standard uncertainty before the run."""
+
+
+class FoundDriftByTemperature(TypedDict):
+    """The same, with a recorded temperature."""
+
+    axis: str
+    value_um_per_k: float | None
+    standard_uncertainty_um_per_k: float | None
+    prior_um_per_k: float | None
+
+
 class AdjustmentPart(TypedDict):
     """What an adjustment finds beside the calibration."""
 
@@ -211,6 +231,7 @@ class AdjustmentPart(TypedDict):
     iterations: int
     setup: list[SetupLength | SetupOffset | SetupAngle | SetupShare | SetupRate]
     expansion: list[FoundExpansion]
+    machine_drift: list[FoundDriftByTime | FoundDriftByTemperature]
     faults: list[Faults]
     combinations: list[SlopeCombination | SetupCombination]
     """What is known of unknowns that are not determined one by one."""
@@ -285,7 +306,7 @@ def evaluation_object(
         "readings": readings_of(measurement, known),
         "calibration": tables_of(written),
         "largest_standard_uncertainties": largest_of(written, uncertainty=True),
-        "adjustment": _adjustment(result) if isinstance(result, Adjustment) else None,
+        "adjustment": _adjustment(result, known) if isinstance(result, Adjustment) else None,
         "linear": _linear(result) if isinstance(result, JudgedEvaluation) else None,
         "notes": [*cosine_rows(measurement, known), *drift_rows(measurement, known)] if adjusted else [],
     }
@@ -398,7 +419,13 @@ def by_kind(native: Mapping[Any, float]) -> ByKind:
     }
 
 
-def _adjustment(found: Adjustment) -> AdjustmentPart:
+def _machine_drift(found: DriftEstimate, known: Known) -> Any:
+    by_time = known.machine_drift is None or known.machine_drift.record == "time"
+    numbers = {"value": found.value, "standard_uncertainty": found.standard_uncertainty, "prior": found.prior}
+    return {"axis": "XYZ"[found.axis], **measured("um_per_h" if by_time else "um_per_k", **numbers)}
+
+
+def _adjustment(found: Adjustment, known: Known) -> AdjustmentPart:
     return {
         "degrees_of_freedom": found.degrees_of_freedom,
         "weighted_square_sum": number(found.weighted_square_sum),
@@ -406,6 +433,7 @@ def _adjustment(found: Adjustment) -> AdjustmentPart:
         "iterations": found.iterations,
         "setup": setup_of(found.setup),
         "expansion": [_expansion(one) for one in found.expansion],
+        "machine_drift": [_machine_drift(one, known) for one in found.machine_drift],
         "faults": [_faults(one) for one in found.faults],
         "combinations": combinations_of(found.combinations),
         "smoothness": _smoothness(found.smoothness),

@@ -8,7 +8,7 @@ from typing_extensions import TypedDict
 
 from stepdiag._core import Calibration, __version__
 from stepdiag.calibration.volume import Interval, VolumeErrors, VolumeFigure
-from stepdiag.objects.calibration import Fit, fit_of
+from stepdiag.objects.calibration import Fit, fit_of, temperature_of
 from stepdiag.objects.writer import in_unit, measured
 
 
@@ -42,6 +42,10 @@ class VolumeObject(TypedDict):
     fit: Fit
     warnings: list[str]
     file: str
+    temperature_reference_c: float | None
+    """Positioning errors are referred to it; null: they are as found."""
+    temperature_as_found_c: list[float] | None
+    """Of the scales of X, Y, Z; null: not recorded, or referred to a temperature."""
     tool_mm: list[float]
     box_mm: list[list[float]]
     """Lowest and highest positions of X, Y, Z."""
@@ -93,6 +97,7 @@ def volume_object(found: VolumeErrors, file: Path, warnings: Sequence[str]) -> V
         "fit": fit_of(found.source),
         "warnings": list(warnings),
         "file": str(file),
+        **temperature_of(found.source),
         "tool_mm": found.tool.tolist(),
         "box_mm": found.box.tolist(),
         "positions": list(found.shape),

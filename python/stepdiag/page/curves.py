@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from stepdiag._core import Calibration
+from stepdiag.calibration.temperature_text import temperature_mark
 from stepdiag.page.figure import Figures, value_table, values
 from stepdiag.page.html import Markup, element, markup, section
 from stepdiag.page.look import BAND, BEFORE, GRID, INK, LINE, NEGATIVE, QUIET
@@ -48,10 +49,17 @@ def _legend(calibration: Calibration, before: Calibration | None) -> Markup:
         element(
             "p",
             "Actual less commanded, by the names of ISO 230-1. Rotations follow the right-hand rule. "
-            "All panels of a family have the same scale.",
+            f"All panels of a family have the same scale. {_temperatures(calibration, before)}",
         ),
         element("ul", *keys, class_="keys", aria_label="Legend of the curves"),
     )
+
+
+def _temperatures(calibration: Calibration, before: Calibration | None) -> str:
+    """To which temperature positioning errors belong, of both where there are two."""
+    mark = temperature_mark(calibration)
+    earlier = "" if before is None or temperature_mark(before) == mark else f"; before: {temperature_mark(before)}"
+    return f"Positioning errors: {mark}{earlier}."
 
 
 def _family(

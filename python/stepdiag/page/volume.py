@@ -9,6 +9,7 @@ import numpy as np
 
 from stepdiag._core import Calibration, Machine
 from stepdiag.calibration.table_sums import FloatArray
+from stepdiag.calibration.temperature_text import temperature_mark
 from stepdiag.calibration.volume import Interval, VolumeErrors, volume_errors
 from stepdiag.page.contents import Contents
 from stepdiag.page.figure import rounded, value_table, values
@@ -158,6 +159,8 @@ def _what_it_is(figures: VolumeErrors) -> str:
         text += f" Errors between the nodes: standard uncertainty {with_ends(figures.between_nodes, None)}, {kind}."
     elif isinstance(figures.source, Calibration) and figures.source.covariance is None:
         text += " There is no interval, because the file of the calibration has no covariance."
+    if isinstance(figures.source, Calibration):
+        text += f" Positioning errors: {temperature_mark(figures.source)}."
     return text
 
 

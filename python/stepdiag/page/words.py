@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from stepdiag._core import Calibration
-from stepdiag.calibration.finding_text import MEANING, NOISE_ALONE, NOT_SEEN, PROVENANCE
+from stepdiag.calibration.finding_text import MEANING, NOISE_ALONE, NOT_SEEN, PROVENANCE, mistake_reason
 from stepdiag.calibration.largest_by_kind import largest_entries, largest_uncertainties
 from stepdiag.calibration.temperature_text import temperature_text
 from stepdiag.calibration.volume import VolumeErrors
@@ -19,7 +19,7 @@ from stepdiag.page.html import Markup, definitions, element, listed, markup, sec
 from stepdiag.page.numbers import COVERAGE_FACTOR, NBSP, NOT_KNOWN, moment, position, shown, with_interval
 from stepdiag.page.volume import ErrorInVolume, place_of_largest, why_not_known, with_ends
 from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, in_report_units, kind_of
-from stepdiag.report.mistakes import mistake_rows
+from stepdiag.report.mistakes import mistake_text
 from stepdiag.units import MICROMETRE
 
 HEADLINE: Final = {
@@ -96,9 +96,11 @@ def verdict_block(contents: Contents) -> Markup:
         if others:
             parts.append(element("details", element("summary", f"{len(others)} more reasons"), listed(others)))
     if contents.mistakes:
-        what, *edits = [row.partition(": ")[2] for row in mistake_rows(contents.mistakes)]
-        parts.append(element("p", element("strong", "Mistake that would explain it: "), f"{what}."))
-        parts.append(element("p", element("strong", "To change: " if len(edits) == 1 else "To change if so:")))
+        reason = mistake_reason(mistake_text(contents.mistakes))
+        if reason not in calibration.fit_reasons:  # of a file that an older version wrote
+            parts.append(element("p", _sentence(reason)))
+        edits = [mistake.edit for mistake in contents.mistakes]
+        parts.append(element("p", element("strong", "To change:" if len(edits) == 1 else "To change if so:")))
         parts.append(listed(map(_sentence, edits)))
     notes = []
     if calibration.uncertainty_scaled is not None:

@@ -87,6 +87,11 @@ def not_measured(known: Known, plan: Mapping[str, Any] | None = None) -> Known:
     out."""
     keys, uncertainty = known.keys, known.keys.uncertainty
     planned = keys.plan.model_copy(update=plan)
+    at = {
+        "check_points": min(planned.check_points, planned.steps),
+        "check_point": min(planned.check_point, planned.steps),
+    }
+    planned = planned.model_copy(update=at)
     if not planned.scale_lines:  # then there is nothing that these could be about
         stated = {name: getattr(uncertainty, name) for name in uncertainty.model_fields_set - {*OF_SCALE_LINES}}
         uncertainty = UncertaintySection.model_construct(**stated)

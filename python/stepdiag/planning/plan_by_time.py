@@ -54,6 +54,8 @@ class Candidate:
     scale_lines: tuple[str, ...]
     steps: int
     repeats: int
+    check_points: int = 0
+    """Steps after which the program returns to a line's check point; 0: never."""
 
     @property
     def description(self) -> str:
@@ -101,7 +103,8 @@ def candidates(scenario: Scenario) -> list[Candidate]:
     """All plans to choose from. Raises InvalidArgument where the scenario names lines that there are not."""
     known = scenario.known
     keys, plan = known.keys.plan_by_time, known.plan
-    own = Candidate(tuple(plan.lines), tuple(plan.scale_lines), plan.steps, known.keys.plan.repeats)
+    stated = known.keys.plan
+    own = Candidate(tuple(plan.lines), tuple(plan.scale_lines), plan.steps, stated.repeats, stated.check_points)
     sets = {(own.lines, own.scale_lines): None}
     for index, lines in enumerate(_USUAL_SETS if keys.line_sets is None else keys.line_sets):
         measured = tuple(line for line in lines if _moved(line) != 1)
@@ -110,13 +113,25 @@ def candidates(scenario: Scenario) -> list[Candidate]:
             _core.Plan(plan.volume, list(measured), plan.steps, scale_lines=list(scales))
         sets[measured, scales] = None
     steps, repeats = sorted({*keys.steps, own.steps}), sorted({*keys.repeats, own.repeats})
-    count = len(sets) * len(steps) * len(repeats)
+    returns = {n: _returns(known, n) for n in steps}
+    count = len(sets) * sum(map(len, returns.values())) * len(repeats)
     if count > MOST_CANDIDATES:
         raise InvalidArgument(
             f"{scenario.path}: plan_by_time: expected at most {MOST_CANDIDATES} plans to choose from, got {count} "
             f"({len(sets)} sets of lines, {len(steps)} numbers of steps, {len(repeats)} of repeats)"
         )
-    return [Candidate(*lines, n, r) for lines, n, r in itertools.product(sets, steps, repeats)]
+    return [
+        Candidate(*lines, n, r, every)
+        for lines, n, r in itertools.product(sets, steps, repeats)
+        for every in returns[n]
+    ]
+
+
+def _returns(known: Known, steps: int) -> list[int]:
+    """After how many steps plans of so many steps return to a check point: as the scenario says, and, where the drift
+    of the functional point is an unknown, never and after each fourth of a line."""
+    own = min(known.keys.plan.check_points, steps)
+    return sorted({own} if known.machine_drift is None else {0, own, math.ceil(steps / 4)})
 
 
 def outcomes(scenario: Scenario, progress: Callable[[int, int], None] | None = None) -> list[Outcome]:
@@ -142,6 +157,7 @@ def outcome(scenario: Scenario, candidate: Candidate) -> Outcome:
         candidate.steps,
         order=known.plan.orders,
         scale_lines=list(candidate.scale_lines),
+        check_points=_core.CheckPoints(candidate.check_points, min(plan_keys.check_point, candidate.steps)),
     )
     times = times_of(known.keys.plan_by_time, f"{known.path}: plan_by_time")
     runs = candidate.repeats * runs_of(plan_keys) // plan_keys.repeats
@@ -167,6 +183,7 @@ def _usual(scenario: Scenario, candidate: Candidate, between: float) -> Scenario
         "scale_lines": candidate.scale_lines,
         "steps": candidate.steps,
         "repeats": candidate.repeats,
+        "check_points": candidate.check_points,
         "seconds_per_reading": between or None,
     }
     planned = not_measured(scenario.known, changes)

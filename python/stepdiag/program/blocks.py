@@ -1,6 +1,6 @@
 """The blocks of a measuring program: its header, and the lines for each action."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +30,11 @@ def header(known: Known, options: Options, space: Space, times: Times, visits: l
     yield f"each line measured {f'{runs} times' if runs > 1 else 'once'}{backward}"
     yield f"home, where all positions are 0, is at {_triple(space.origin)} {_meaning(options)}"
     yield f"safe position {_triple(space.safe)}: one axis at a time to it, in the order {' '.join(space.retreat)}"
-    yield f"overrun {space.overrun:g} mm before the first point of every visit, around the volume too"
+    if space.overrun > 0.0:
+        shortened = ", as far as the limits allow" if options.limits is not None else ""
+        yield f"overrun {space.overrun:g} mm before the first point of every visit, around the volume too{shortened}"
+    else:
+        yield "no overrun: the axes come to the first point of a visit from where they were"
     yield f"feed {times.feed * MINUTE:g} mm/min, settling {times.settle:g} s, a reading {times.measure:g} s"
     yield "heads stand outside the volume; nothing else is within it and the overrun around it"
 
@@ -66,6 +70,7 @@ class Body:
     trigger: Trigger
     times: Times
     space: Space
+    unlike: Mapping[int, str]  # by visit: points that axes do not come to as it says
 
     def lines(self, action: Action) -> list[str]:
         writer = self.writer
@@ -78,8 +83,10 @@ class Body:
                 sides = " ".join(
                     f"{name}{'+' if way > 0 else '-'}" for name, way in zip(AXES, visit.approach, strict=True)
                 )
+                unlike = self.unlike.get(visit.number)
                 return writer.comment(
                     f"visit {visit.number}: line {visit.line} run {visit.run} {visit.direction}, axes come in {sides}"
+                    + (f", but {unlike}" if unlike else "")
                 )
             case Rapid(axis, position):
                 return [writer.move("G0", {AXES[axis]: position})]

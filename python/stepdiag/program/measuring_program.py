@@ -9,12 +9,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stepdiag.planning.measuring_time import Times, times_of
+from stepdiag.program.approach import approaches, otherwise
 from stepdiag.program.blocks import Body, header, modes
 from stepdiag.program.gcode import Writer, numbered
 from stepdiag.program.options import Options, space_of, trigger_of, writer_of
-from stepdiag.program.path import AXES, Action, Begin, Feed, Rapid, Read, SetUp, Space, actions_of
+from stepdiag.program.path import Action, Feed, Rapid, Read, SetUp, Space, actions_of
 from stepdiag.scenario.known import Known
-from stepdiag.scenario.order_of_run import Visit, visits_of
+from stepdiag.scenario.order_of_run import visits_of
 from stepdiag.units import MINUTE
 
 
@@ -27,7 +28,7 @@ class Program:
     seconds: float
     set_up_seconds: float
     rounding: float  # mm, largest
-    unapproached: list[str] = field(default_factory=list)  # points without a full overrun
+    unapproached: list[str] = field(default_factory=list)  # which points axes do not come to as the plan says
 
     @property
     def summary(self) -> list[str]:
@@ -50,6 +51,7 @@ def measuring_program(known: Known, options: Options) -> Program:
     space = space_of(known, options)
     visits = list(visits_of(known))
     actions = list(actions_of(visits, space, align=options.align))
+    unlike = otherwise(approaches(actions, writer), space.overrun, writer)
     seconds, set_up_seconds = _duration(actions, space, times)
     program = Program(
         text="",
@@ -57,9 +59,13 @@ def measuring_program(known: Known, options: Options) -> Program:
         seconds=seconds,
         set_up_seconds=set_up_seconds,
         rounding=_rounding(actions, writer),
-        unapproached=_unapproached(actions, space),
+        unapproached=[
+            f"visit {visit.number}, line {visit.line}: {unlike[visit.number]}"
+            for visit in visits
+            if visit.number in unlike
+        ],
     )
-    body = Body(known, options, writer, trigger, times, space)
+    body = Body(known, options, writer, trigger, times, space, unlike)
     lines = ["%"] if options.dialect == "iso" else []
     for text in [*header(known, options, space, times, visits), *program.summary, *program.unapproached]:
         lines += writer.comment(text)
@@ -97,27 +103,6 @@ def _duration(actions: list[Action], space: Space, times: Times) -> tuple[float,
         elif isinstance(action, SetUp):
             set_ups += times.scale_line_change if action.visit.is_scale_line else times.line_change
     return seconds + set_ups, set_ups
-
-
-def _unapproached(actions: list[Action], space: Space) -> list[str]:
-    """Texts for points that the limits of travel keep from a full approach."""
-    texts = []
-    visit: Visit | None = None
-    for action in actions:
-        if isinstance(action, Begin):
-            visit = action.visit
-        elif isinstance(action, Feed) and action.short and visit is not None:
-            first = visit.positions[0] + space.origin
-            ways = [
-                f"{AXES[axis]} {first[axis]:g} from {'below' if visit.approach[axis] > 0 else 'above'} "
-                f"by {abs(first[axis] - action.position[axis]):.3g} mm only"
-                for axis in action.short
-            ]
-            texts.append(
-                f"visit {visit.number}, line {visit.line}, point {visit.points[0]}: "
-                f"the limits let it be approached in {', '.join(ways)}"
-            )
-    return texts
 
 
 def _minutes(seconds: float) -> str:

@@ -62,7 +62,6 @@ class Rapid:
 @dataclass(frozen=True)
 class Feed:
     position: Vector  # (3,)
-    short: tuple[int, ...] = ()  # axes whose overrun the limits shorten
 
 
 @dataclass(frozen=True)
@@ -90,24 +89,22 @@ def actions_of(visits: list[Visit], space: Space, *, align: bool = True) -> Iter
                 yield Align(visit)
             set_up = visit.set_up
         yield Begin(visit)
-        yield from _approach(positions[0], visit, space)
-        for position, point in zip(positions, visit.points, strict=True):
+        for index, (position, point) in enumerate(zip(positions, visit.points, strict=True)):
+            if index == 0 or np.any((position - positions[index - 1]) * visit.approach < -SLACK):
+                yield from _approach(position, visit, space)
             yield Feed(position)
             yield Read(visit, int(point))
     yield from _one_at_a_time(space.safe, space.retreat)
 
 
-def _approach(first: Vector, visit: Visit, space: Space) -> Iterator[Feed]:
-    """Move beyond the first point, such that every axis approaches it from the specified side.
+def _approach(point: Vector, visit: Visit, space: Space) -> Iterator[Feed]:
+    """Move beyond a point, such that every axis approaches it from the specified side, as far as limits allow.
 
-    The later steps of the line keep that direction: moved axes continue as they came, the others
-    stand still."""
+    That is needed for the first point, and where the way goes back to a check point. Steps keep the
+    direction: moved axes continue as they came, the others stand still."""
     if space.overrun == 0.0:
         return
-    wanted = first - space.overrun * visit.approach
-    beyond = np.clip(wanted, space.lowest, space.highest)
-    short = tuple(int(axis) for axis in np.flatnonzero(np.abs(beyond - wanted) > SLACK))
-    yield Feed(beyond, short)
+    yield Feed(np.clip(point - space.overrun * visit.approach, space.lowest, space.highest))
 
 
 def _one_at_a_time(position: Vector, order: str) -> Iterator[Rapid]:

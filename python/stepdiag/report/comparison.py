@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from stepdiag._core import Calibration
-from stepdiag.calibration.comparison import Comparison, Difference
+from stepdiag.calibration.comparison import Comparison, Difference, made_of
 from stepdiag.calibration.truth import TruthAgreement
 from stepdiag.calibration.volume_change import VolumeChange
 from stepdiag.io.comparison_read import COMPARISON_FORMAT
@@ -87,7 +87,10 @@ def _micrometres(value: float) -> str:
 
 
 def _described(calibration: Calibration) -> str:
-    return f"{calibration.method or 'method not known'}, {calibration.date or 'date not known'}"
+    made = made_of(calibration)
+    return ", ".join(
+        filter(None, (made["method"] or "method not known", made["date"] or "date not known", made["temperature"]))
+    )
 
 
 def _row(comparison: Comparison, difference: Difference) -> str:
@@ -176,7 +179,7 @@ def comparison_csv(comparison: Comparison) -> str:
 
 def _made(a: Calibration, b: Calibration) -> dict[str, str]:
     """How and from what both calibrations were made."""
-    facts = {which: {"method": c.method, "date": c.date} | c.provenance for which, c in (("a", a), ("b", b))}
+    facts = {which: made_of(c) | c.provenance for which, c in (("a", a), ("b", b))}
     return {f"{key}_{which}": text for which, own in facts.items() for key, text in own.items()}
 
 

@@ -2,10 +2,18 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Final
 
 import numpy as np
 
-from stepdiag._core import Adjustment, Calibration, ExpansionEstimate, Measurement, straightness_reference
+from stepdiag._core import (
+    Adjustment,
+    Calibration,
+    DriftEstimate,
+    ExpansionEstimate,
+    Measurement,
+    straightness_reference,
+)
 from stepdiag.calibration.finding_text import NOISE_ALONE, combination_text, fault_rows, fit_rows, verdict_rows
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.calibration.temperature_text import temperature_rows
@@ -14,13 +22,15 @@ from stepdiag.mistakes.copies import passes_of
 from stepdiag.mistakes.search import FoundMistake
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.fault_control import control_rows
-from stepdiag.report.mistakes import mistake_rows, unchecked_row
+from stepdiag.report.mistakes import change_rows, unchecked_row
 from stepdiag.report.prior_effects import cosine_rows, drift_rows
 from stepdiag.report.setup_table import NOTHING_LEARNT, setup_rows
 from stepdiag.scenario.description import JudgedEvaluation, reduced_run
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
-from stepdiag.units import MICRO
+from stepdiag.units import HOUR, MICRO, MICROMETRE
+
+SIGNIFICANT: Final = 2.58  # times its standard uncertainty: one of a hundred that are 0
 
 
 def evaluation_report(
@@ -29,8 +39,8 @@ def evaluation_report(
     known: Known,
     mistakes: Sequence[FoundMistake] = (),
 ) -> Iterator[str]:
-    """The verdict of the fit, the mistakes that would explain it, lost readings, largest standard uncertainties and
-    what is not determined; of an adjustment also the faults of the readings, and how head and mirror were set up."""
+    """The verdict of the fit, what to change if a mistake explains it, lost readings, largest standard uncertainties
+    and what is not determined; of an adjustment also faults of the readings, and how head and mirror were set up."""
     if isinstance(result, JudgedEvaluation):
         return _published(result, measurement, known, mistakes)
     return _adjusted(result, measurement, known, mistakes)
@@ -48,7 +58,7 @@ def _published(
         f"({adjusted})"
     )
     yield from rest
-    yield from mistake_rows(mistakes)
+    yield from change_rows(mistakes)
     yield from _what_was_done(calibration, measurement, known)
     yield from uncertainty_rows(calibration)
     yield from undetermined_rows(calibration)
@@ -63,7 +73,7 @@ def _adjusted(
 ) -> Iterator[str]:
     calibration = adjustment.calibration
     yield from verdict_rows(adjustment)
-    yield from mistake_rows(mistakes)
+    yield from change_rows(mistakes)
     yield from _what_was_done(calibration, measurement, known)
     yield from fault_rows(adjustment.faults)
     yield from uncertainty_rows(calibration)
@@ -74,6 +84,7 @@ def _adjusted(
         yield "set-up found, 12.3(45) being 12.3 with a standard uncertainty of 4.5:"
         yield from rows
     yield from expansion_rows(adjustment.expansion)
+    yield from machine_drift_rows(adjustment.machine_drift, known)
     yield from undetermined_rows(calibration, map(combination_text, adjustment.combinations))
     yield from smoothness_rows(adjustment.smoothness)
     yield from cosine_rows(measurement, known)
@@ -105,6 +116,22 @@ def expansion_rows(estimates: Iterable[ExpansionEstimate], *, values: bool = Tru
         if u < NOTHING_LEARNT * prior:
             found = f"found {value:.4g} ± {u:.2g}" if values else f"found to ± {u:.2g}"
         yield f"expansion of {scales}: stated {stated:.4g} ± {prior:.2g} µm/(m·K), {found}"
+
+
+def machine_drift_rows(estimates: Iterable[DriftEstimate], known: Known, *, values: bool = True) -> Iterator[str]:
+    """The drift of the functional point, where it was an unknown, and whether it is more than chance makes; without
+    `values` its standard uncertainty alone."""
+    by_time = known.machine_drift is None or known.machine_drift.record == "time"
+    factor, unit = (HOUR / MICROMETRE, "µm/h") if by_time else (1.0 / MICROMETRE, "µm/K")
+    for estimate in estimates:
+        value, u, prior = (factor * x for x in (estimate.value, estimate.standard_uncertainty, estimate.prior))
+        found = "the readings tell nothing more"
+        if u < NOTHING_LEARNT * prior:
+            found = f"found to ± {u:.2g}"
+            if values:
+                size = "significant" if abs(value) > SIGNIFICANT * u else "not significant"
+                found = f"found {value:.3g} ± {u:.2g}, {size}"
+        yield f"drift of the functional point along {'XYZ'[estimate.axis]}: taken as 0 ± {prior:.2g} {unit}, {found}"
 
 
 def air_rows(measurement: Measurement, known: Known) -> Iterator[str]:

@@ -9,9 +9,10 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import Calibration, InvalidArgument
-from stepdiag.calibration.finding_text import frame_deviation_texts
+from stepdiag.calibration.finding_text import check_angles, frame_deviation_texts, implausible_texts
 from stepdiag.io.data_files import is_netcdf, read_calibration, read_measurement
 from stepdiag.io.file_kind import NETCDF_BEGINS, head_of, kind_of_text
+from stepdiag.io.refused_files import import_hint
 from stepdiag.io.whole_files import check_input, read_beginning
 from stepdiag.positions.readings import read_positions
 
@@ -47,6 +48,7 @@ def examine(path: Path) -> Finding:
         "measurement": _measurement,
         "table of target readings": _positions,
         "TOML file": _toml,
+        "compensation.ini": _compensation,
     }
     kind = kind_of_text(text)
     if kind in readers:
@@ -58,6 +60,7 @@ def examine(path: Path) -> Finding:
     raise InvalidArgument(
         f"{path}: expected a scenario or a head (TOML), a measurement, an error map or a calibration (CSV or .nc); "
         f'a CSV file begins with "line,point,..." or "parameter,position_mm,..."'
+        f"{import_hint(path, 'measurement')}"
     )
 
 
@@ -127,11 +130,15 @@ def _raw(path: Path) -> Finding:
     readings = content.readings().values()
     lost = sum(1 for reading in readings if reading.is_lost)
     summary = f"{len(readings)} of {content.planned} readings of {', '.join(content.header.channels)}, {lost} lost"
+    rows = sum(1 for record in content.records if record.record == "temperatures")
+    if rows:
+        summary += f"; {rows} rows of temperatures"
     return Finding("raw readings", summary, () if content.torn is None else (content.torn,))
 
 
 def _error_map(path: Path) -> Finding:
     errors = _core.read_error_map(path)
+    check_angles(errors, str(path))
     count = len(errors.functions) + len(errors.squareness)
     return Finding("error map", f"{count} of 21 parameters", tuple(_warnings(errors)))
 
@@ -147,6 +154,14 @@ def _calibration(path: Path) -> Finding:
     return Finding("calibration", summary, tuple(calibration.undetermined), calibration)
 
 
+def _compensation(path: Path) -> Finding:
+    from stepdiag.io.comp_set import check_set
+
+    tables = check_set(path)
+    known = "" if tables else "no fingerprints of its tables: an export of an earlier version"
+    return Finding("compensation.ini", f"{tables} tables of the same export", (known,) if known else ())
+
+
 def _warnings(errors: _core.ErrorMap) -> Iterator[str]:
     """Against the volume that the map's header names, else against the ends of its own tables."""
     try:
@@ -160,3 +175,4 @@ def _warnings(errors: _core.ErrorMap) -> Iterator[str]:
         }
         volume = [float(ends[axis]) for axis in "XYZ"]
     yield from frame_deviation_texts(errors, volume)
+    yield from implausible_texts(errors, volume, _core.PlausibleLimits())

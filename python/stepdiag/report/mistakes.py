@@ -3,16 +3,14 @@
 from collections.abc import Iterator, Sequence
 
 from stepdiag._core import InvalidArgument, Measurement
+from stepdiag.calibration.finding_text import mistake_reason
 from stepdiag.display import point_text
 from stepdiag.mistakes.search import FoundMistake, MistakeSearch
 from stepdiag.scenario.known import Known
 
 
-def mistake_rows(found: Sequence[FoundMistake]) -> Iterator[str]:
-    """What may have happened, and what to change; several are alternatives."""
-    if not found:
-        return
-    yield f"mistake: {mistake_text(found)}"
+def change_rows(found: Sequence[FoundMistake]) -> Iterator[str]:
+    """What to change; several are alternatives."""
     for one in found:
         yield f"to change{'' if len(found) == 1 else ' if so'}: {one.edit}"
 
@@ -25,7 +23,7 @@ def mistake_text(found: Sequence[FoundMistake]) -> str:
         texts.append(f"one of {best.alternatives} more")
     said = texts[0] if len(texts) == 1 else f"either {'; or '.join(texts)}"
     if best.or_faults:
-        said += ", or it is the faults below, which no reading tells from that"
+        said += ", or it is the faults that were found, which no reading tells from that"
     before = "" if best.variance_factor_before is None else f" in place of {best.variance_factor_before:.3g}"
     return f"{said}; with that undone the fit is {best.fit} (variance factor {best.variance_factor:.3g}{before})"
 
@@ -44,7 +42,9 @@ def with_mistake(
     """The refusal of a run, with the mistake that explains it, if one does. `found`: what is known of that already."""
     if search is not None and not found:
         found = search.after(None, refused=True)
-    return InvalidArgument(f"{error}\n{chr(10).join(mistake_rows(found))}") if found else error
+    if not found:
+        return error
+    return InvalidArgument("\n".join([str(error), mistake_reason(mistake_text(found)), *change_rows(found)]))
 
 
 def unchecked_row(known: Known) -> str:

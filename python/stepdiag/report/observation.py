@@ -6,10 +6,11 @@ from typing import Final
 from stepdiag import _core
 from stepdiag._core import Adjustment
 from stepdiag.calibration.finding_text import combination_text
+from stepdiag.calibration.temperature_text import reference_mark
 from stepdiag.io.csv_text import csv_text
 from stepdiag.parameters import KINDS, REPORT_UNIT, in_report_units
 from stepdiag.planning.observation import Prospect, extents, growth
-from stepdiag.report.evaluation import expansion_rows, uncertainty_rows, undetermined_rows
+from stepdiag.report.evaluation import expansion_rows, machine_drift_rows, uncertainty_rows, undetermined_rows
 from stepdiag.report.prior_effects import cosine_rows, drift_rows
 from stepdiag.report.setup_table import setup_rows
 from stepdiag.scenario.known import Known
@@ -38,12 +39,15 @@ def observation_report(found: Adjustment, run: _core.Measurement, known: Known) 
     # All values are 0 here, to rounding.
     combinations = (combination_text(combination, value=False) for combination in found.combinations)
     yield from undetermined_rows(calibration, combinations)
+    if calibration.temperature_reference is not None:
+        yield f"temperature: positioning errors are {reference_mark(calibration.temperature_reference)}"
     yield from uncertainty_rows(calibration)
     rows = list(setup_rows(found.setup, [*plan.lines, *plan.scale_lines], values=False))
     if rows:
         yield "set-up, standard uncertainties:"
         yield from rows
     yield from expansion_rows(found.expansion, values=False)
+    yield from machine_drift_rows(found.machine_drift, known, values=False)
     yield from cosine_rows(run, known)
     yield from drift_rows(run, known)
 

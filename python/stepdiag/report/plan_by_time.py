@@ -21,16 +21,18 @@ def plan_rows(found: Sequence[Outcome], choice: Choice, minutes: float, family: 
     longest = max([FAR * minutes, *(o.minutes for o in shown if o is not None)])
     plans = [o for o in everything if o.minutes <= longest] or everything[:1]
     lines = [name for name in LINES if any(o.candidate.counts[name] for o in plans)]
+    returns = ["returns"] if any(o.candidate.check_points for o in plans) else []
     rows = [
-        ["minutes", *(LINES[name] for name in lines), "steps", "spacing", "repeats", *KINDS],
-        ["", *("" for _ in lines), "", "mm", "", *(REPORT_UNIT[kind] for kind in KINDS)],
+        ["minutes", *(LINES[name] for name in lines), "steps", "spacing", "repeats", *returns, *KINDS],
+        ["", *("" for _ in lines), "", "mm", "", *("after" for _ in returns), *(REPORT_UNIT[kind] for kind in KINDS)],
     ]
     for o in plans:
         c = o.candidate
         time = f"{'* ' if o is choice.taken else ''}{o.minutes:.1f}"
         counts = [f"{c.counts[name] or '-'}" for name in lines]
         cells = [_cell(kind, o) for kind in KINDS]
-        rows.append([time, *counts, f"{c.steps}", f"{o.spacing:.3g}", f"{c.repeats}", *cells])
+        every = [f"{c.check_points or '-'}" for _ in returns]
+        rows.append([time, *counts, f"{c.steps}", f"{o.spacing:.3g}", f"{c.repeats}", *every, *cells])
     table = list(text_columns(rows, left=()))
     in_time = sum(o.minutes <= minutes for o in plans)
     if in_time < len(plans):
@@ -84,7 +86,8 @@ def _told(one: Controlled) -> str:
 def _named(one: Outcome) -> str:
     c = one.candidate
     times = {1: "once", 2: "twice"}.get(c.repeats, f"{c.repeats} times")
-    return f"{c.description}, {c.steps} steps ({one.spacing:.3g} mm), {times}"
+    returns = f", returning to check points after every {c.check_points} steps" if c.check_points else ""
+    return f"{c.description}, {c.steps} steps ({one.spacing:.3g} mm), {times}{returns}"
 
 
 def _said(one: Outcome) -> str:
@@ -113,13 +116,22 @@ def plan_csv(found: Sequence[Outcome]) -> str:
     """All plans as a file, also those that others beat; what is not determined is an empty field."""
     kept = {id(o) for o in front(found)}
     columns = (
-        "minutes,lines,scale_lines,steps,spacing_mm,repeats,mirror_width_mm,mirror_height_mm,parameters_determined,"
+        "minutes,lines,scale_lines,steps,spacing_mm,repeats,check_points,mirror_width_mm,mirror_height_mm,parameters_determined,"
         "u_positioning_um,u_straightness_um,u_angle_urad,u_squareness_urad,on_front"
     )
     rows = []
     for o in sorted(found, key=lambda o: o.seconds):
         c = o.candidate
         cells = [in_report_units(kind, o.largest[kind]) if kind in o.largest else None for kind in KINDS]
-        plan = [o.minutes, " ".join(c.lines), " ".join(c.scale_lines), c.steps, o.spacing, c.repeats, *o.mirror]
+        plan = [
+            o.minutes,
+            " ".join(c.lines),
+            " ".join(c.scale_lines),
+            c.steps,
+            o.spacing,
+            c.repeats,
+            c.check_points,
+            *o.mirror,
+        ]
         rows.append([*plan, len(o.determined), *cells, int(id(o) in kept)])
     return csv_text(columns.split(","), rows)

@@ -10,7 +10,7 @@ from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement
 from stepdiag.calibration.finding_text import verdict_rows
 from stepdiag.io.data_files import read_measurement
 from stepdiag.mistakes.search import FoundMistake
-from stepdiag.report.mistakes import mistake_rows, searchable, with_mistake
+from stepdiag.report.mistakes import change_rows, mistake_text, searchable, with_mistake
 from stepdiag.scenario.description import adjust_scenario, read_scenario
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import check_points, lost_readings
@@ -53,6 +53,8 @@ def _adjusted(known: Known, run: Measurement) -> FoundTogether:
         raise with_mistake(error, search, mistakes) from None
     if search and not mistakes:
         mistakes = search.after(adjustment)
+    if mistakes and not (mistakes[0].or_faults and adjustment.verdict.fit == "accepted"):
+        adjustment = adjustment.with_mistake(mistake_text(mistakes))
     return FoundTogether(tuple(_said(known, run, adjustment, mistakes)), adjustment.calibration, tuple(mistakes))
 
 
@@ -60,4 +62,6 @@ def _said(known: Known, run: Measurement, adjustment: Adjustment, mistakes: Sequ
     incomplete, missing = lost_readings(run, known.plan, known.signals)
     yield f"{len(run)} rows, {incomplete} without a complete reading; {missing} points of the plan without a row"
     yield from verdict_rows(adjustment)
-    yield from mistake_rows(mistakes)
+    if mistakes and adjustment.verdict.fit == "accepted":  # by its faults, which were corrected
+        yield f"note: {mistake_text(mistakes)}"
+    yield from change_rows(mistakes)

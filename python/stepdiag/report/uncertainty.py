@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag import _core
+from stepdiag.calibration.temperature_text import reference_mark
 from stepdiag.report.text_columns import text_columns
 from stepdiag.scenario.uncertain_inputs import key_unit
 from stepdiag.uncertainty.result import FloatArray, UncertaintyResult, label, volume_units
@@ -50,6 +51,8 @@ def opening_rows(result: UncertaintyResult) -> Iterator[str]:
         f"uncertain: {len(known.uncertain.inputs)} inputs, {len(known.uncertain.noise)} kinds of noise; "
         f"outputs: {result.entries} values of the 21 parameters" + (f", {derived} derived" if derived else "")
     )
+    reference = None if known.expansion is None else known.expansion.expansion.reference
+    yield f"temperature: positioning errors are {reference_mark(reference)}"
 
 
 def result_rows(result: UncertaintyResult) -> Iterator[str]:

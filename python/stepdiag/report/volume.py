@@ -8,6 +8,7 @@ import numpy as np
 
 from stepdiag._core import Calibration, Machine
 from stepdiag.calibration.table_sums import FloatArray
+from stepdiag.calibration.temperature_text import temperature_rows
 from stepdiag.calibration.volume import MOST_NODES, Interval, VolumeContribution, VolumeErrors, VolumeFigure
 from stepdiag.units import report_value
 
@@ -96,6 +97,8 @@ def _frame_rows(found: VolumeErrors) -> Iterator[str]:
         yield f"95 % intervals in brackets; between nodes ({kind}): standard uncertainty {_um(found.between_nodes)} µm"
     elif isinstance(found.source, Calibration) and found.source.covariance is None:
         yield "no intervals: the file has no covariance; evaluate writes it to netCDF (-o calibration.nc)"
+    if isinstance(found.source, Calibration):
+        yield from temperature_rows(found.source)
     yield "error: of the functional point, actual minus nominal; 0 at home, so it depends on that reference"
 
 

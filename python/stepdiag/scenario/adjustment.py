@@ -10,6 +10,7 @@ from stepdiag.config.adjustment_keys import AdjustmentKeys, AdjustmentSection, S
 from stepdiag.config.key_errors import show
 from stepdiag.config.scenario_keys import KnownKeys, PlausibleSection
 from stepdiag.config.toml_text import located
+from stepdiag.scenario.temperature import three
 from stepdiag.setup_quantities import ADJUSTED, SETUP_QUANTITIES
 from stepdiag.units import MICROMETRE, MICRORADIAN, native
 
@@ -45,6 +46,19 @@ def _priors(keys: AdjustmentKeys, layout: str, place: str) -> _core.SetupPriors:
             )
     with located(place):
         return _core.SetupPriors(**{q.name: native(q.key, choices[q.name]) for q in ADJUSTED if q.name in choices})
+
+
+def machine_drift_of(keys: AdjustmentSection, path: Path) -> _core.MachineDrift | None:
+    """None where the functional point is not taken to drift. Raises InvalidArgument naming the key."""
+    by_time = three(native("_um_per_h", keys.machine_drift_um_per_h))
+    by_temperature = three(native("_um_per_k", keys.machine_drift_um_per_k))
+    if any(by_time) and any(by_temperature):
+        raise InvalidArgument(
+            f"{path}: adjustment: expected machine_drift_um_per_h or machine_drift_um_per_k, got both"
+        )
+    if any(by_temperature):
+        return _core.MachineDrift(by_temperature, record=keys.machine_drift_with)
+    return _core.MachineDrift(by_time) if any(by_time) else None
 
 
 def smoothness_of(keys: SmoothnessSection, path: Path) -> _core.Smoothness | None:

@@ -5,7 +5,7 @@ evaluates takes a scenario's known half, and has no way from there to the other.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
@@ -14,16 +14,17 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
-from stepdiag.calibration.finding_text import FITS, MEANING
+from stepdiag.calibration.finding_text import FITS, MEANING, mistake_reason
 from stepdiag.config.key_errors import models_of, suggest
 from stepdiag.config.key_types import narrowed
 from stepdiag.config.scenario_keys import SECTIONS_BY_LINE, TABLES_BY_NAME, KnownKeys, ScenarioKeys, TruthKeys
 from stepdiag.config.toml_text import check_keys, located, parse_toml
 from stepdiag.display import Displayed, Facts
+from stepdiag.io.refused_files import explained
 from stepdiag.io.whole_files import read_text
 from stepdiag.scenario.heads import describe_heads, make_heads, of_run
 from stepdiag.scenario.known import Known, known_of, runs_of
-from stepdiag.scenario.planned_readings import only
+from stepdiag.scenario.planned_readings import only, with_channels
 from stepdiag.scenario.setup import counted_with
 from stepdiag.scenario.temperature import scales_of
 from stepdiag.scenario.truth import Truth, errors_of, truth_of
@@ -66,33 +67,26 @@ def simulate_scenario(scenario: Scenario) -> _core.Measurement:
     return only(_with_air(run, scenario), scenario.known.signals)
 
 
-def _with_air(run: _core.Measurement, scenario: Scenario) -> _core.Measurement:
-    """The run with the columns of the air that an instrument with a constant index needs."""
+def air_of(scenario: Scenario) -> dict[str, float]:
+    """The true air by channel, where the instrument counts with a constant index; else empty."""
     assumed = scenario.known.assumed_air
     if assumed is None:
-        return run
+        return {}
     state = (scenario.truth.environment or assumed).state
     if state is None:
         raise InvalidArgument(
             f'{scenario.path}: environment.readings: "constant_index" goes with a state of the air, got an index'
         )
-    channels = {
-        f"air_{name}": np.full(len(run), state[quantity])
-        for name, quantity in (
-            ("temperature", "temperature"),
-            ("pressure", "pressure"),
-            ("humidity", "relative_humidity"),
-        )
-    }
-    return _core.Measurement(
-        run.line,
-        run.point.tolist(),
-        run.position,
-        {**run.channels, **channels},
-        run=run.run.tolist(),
-        direction=run.direction,
-        standard_uncertainty=run.standard_uncertainty,
-    )
+    quantities = {"temperature": "temperature", "pressure": "pressure", "humidity": "relative_humidity"}
+    return {f"air_{name}": state[quantity] for name, quantity in quantities.items()}
+
+
+def _with_air(run: _core.Measurement, scenario: Scenario) -> _core.Measurement:
+    """The run with the columns of the air that an instrument with a constant index needs."""
+    channels = {name: np.full(len(run), value) for name, value in air_of(scenario).items()}
+    if not channels:
+        return run
+    return with_channels(run, channels)
 
 
 def reduced_run(known: Known, measurement: _core.Measurement) -> _core.Measurement:
@@ -144,6 +138,15 @@ class JudgedEvaluation:
     own: str
     adjustment: _core.Adjustment | None
     refusal: str = ""
+
+    def with_mistake(self, mistake: str) -> "JudgedEvaluation":
+        """The same, rejected because this mistake would explain the readings."""
+        reasons = [mistake_reason(mistake), *self.calibration.fit_reasons]
+        return replace(
+            self,
+            calibration=self.calibration.judged("rejected", reasons),
+            adjustment=self.adjustment and self.adjustment.with_mistake(mistake),
+        )
 
 
 def evaluate_beside_adjustment(
@@ -210,6 +213,7 @@ def simulation_options(scenario: Scenario) -> _core.SimulationOptions:
         backward=keys.plan.backward,
         seconds_per_reading=keys.plan.seconds_per_reading,
         scales=truth.scales or (None if known.expansion is None else scales_of(known.expansion)),
+        machine_drift=truth.machine_drift,
     )
 
 
@@ -238,6 +242,7 @@ def adjustment_options(
         full_covariance=full_covariance,
         plausible=known.plausible,
         expansion=known.expansion,
+        machine_drift=known.machine_drift,
         reliability=reliability,
         search_faults=search_faults,
     )
@@ -245,7 +250,8 @@ def adjustment_options(
 
 def read_scenario(path: str | PathLike[str]) -> Scenario:
     """Reads and checks a scenario file. Raises InvalidArgument naming the file and the line or key."""
-    return parse_scenario(read_text(Path(path)), path)
+    with explained(Path(path), "scenario"):
+        return parse_scenario(read_text(Path(path)), path)
 
 
 def parse_scenario(text: str, path: str | PathLike[str] = "scenario.toml") -> Scenario:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from stepdiag._core import Chain, ErrorMap, InvalidArgument
-from stepdiag.calibration.finding_text import frame_deviation_texts
+from stepdiag.calibration.finding_text import frame_deviation_texts, implausible_texts
 from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.known import Known
 
@@ -19,8 +19,9 @@ def scenario_warnings(scenario: Scenario) -> Iterator[str]:
 
 
 def map_warnings(errors: ErrorMap, known: Known) -> Iterator[str]:
-    """The map against the frame's zeros, and its leading lines against the machine that it is used for."""
+    """The map against the frame's zeros and what is plausible, its leading lines against the machine that uses it."""
     yield from frame_deviation_texts(errors, known.plan.volume)
+    yield from implausible_texts(errors, known.plan.volume, known.plausible)
     header = errors.header
     chain = header.get("chain")
     if chain is not None and not _is_chain(chain, known.chain):

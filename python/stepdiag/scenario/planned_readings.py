@@ -1,9 +1,10 @@
-"""A plan's points: the empty sheet to fill in, and what a run lacks of them."""
+"""A plan's points: the empty sheet to fill in, what a run lacks of them, and copies of runs with other channels."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from stepdiag._core import InvalidArgument, Measurement, Plan
 
@@ -45,6 +46,24 @@ def lost_readings(measurement: Measurement, plan: Plan, signals: Sequence[str]) 
     missing = sum(1 for run, name in visited for k in range(points.get(name, 0)) if (run, name, k) not in given)
     unvisited = sum(count for name, count in points.items() if not any(line == name for _, line in visited))
     return incomplete, missing + unvisited
+
+
+def with_channels(
+    measurement: Measurement,
+    channels: Mapping[str, npt.ArrayLike],
+    standard_uncertainty: Mapping[str, npt.ArrayLike] | None = None,
+) -> Measurement:
+    """The run with these channels in place of its own or beside them, and standard uncertainties likewise."""
+    every: dict[str, npt.ArrayLike] = {**measurement.channels, **channels}
+    return Measurement(
+        measurement.line,
+        measurement.point.tolist(),
+        measurement.position,
+        every,
+        run=measurement.run.tolist(),
+        direction=measurement.direction,
+        standard_uncertainty={**measurement.standard_uncertainty, **(standard_uncertainty or {})},
+    )
 
 
 def only(measurement: Measurement, signals: Sequence[str]) -> Measurement:

@@ -12,7 +12,8 @@ from stepdiag.units import native
 Triple = tuple[float, float, float]
 
 
-def _three(value: float | Triple) -> Triple:
+def three(value: float | Triple) -> Triple:
+    """One number for X, Y, Z, or three."""
     return value if isinstance(value, tuple) else (value, value, value)
 
 
@@ -29,16 +30,16 @@ def known_expansion(keys: KnownTemperatureKeys | None, path: Path) -> _core.Know
         )
     with located(place):
         expansion = _core.Expansion(
-            _three(native("expansion_um_per_m_k", coefficient)),
+            three(native("expansion_um_per_m_k", coefficient)),
             fixed_point=keys.fixed_point_mm,
             reference=keys.reference_c,
         )
         return _core.KnownExpansion(
             expansion,
-            _three(native("u_expansion_um_per_m_k", uncertainty)),
+            three(native("u_expansion_um_per_m_k", uncertainty)),
             one_coefficient=not isinstance(coefficient, tuple),
             sensor_uncertainty=keys.u_temperature_c,
-            temperature=None if keys.axes_c is None else _three(keys.axes_c),
+            temperature=None if keys.axes_c is None else three(keys.axes_c),
             one_temperature=not isinstance(keys.axes_c, tuple),
         )
 
@@ -49,7 +50,7 @@ def true_scales(
     """Of a simulated run. Raises InvalidArgument naming the key."""
     if known is None or keys is None:
         return None
-    rate = _three(native("axes_c_per_h", keys.axes_c_per_h))
+    rate = three(native("axes_c_per_h", keys.axes_c_per_h))
     if any(rate) and seconds_per_reading is None:
         raise InvalidArgument(f"{path}: temperature.axes_c_per_h: expected plan.seconds_per_reading as well, got none")
     return scales_of(known, rate, one_sensor=not isinstance(keys.axes_c_per_h, tuple))
@@ -59,5 +60,5 @@ def scales_of(
     known: _core.KnownExpansion, rate: Triple = (0.0, 0.0, 0.0), *, one_sensor: bool = True
 ) -> _core.ScaleTemperatures:
     """Scales that start at what is known of them, or at the reference temperature."""
-    start = _three(known.expansion.reference) if known.temperature is None else known.temperature
+    start = three(known.expansion.reference) if known.temperature is None else known.temperature
     return _core.ScaleTemperatures(known.expansion, start, rate, one_sensor=one_sensor and known.one_temperature)

@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
+from stepdiag.calibration.finding_text import check_angles
 from stepdiag.config.key_errors import show
 from stepdiag.config.scenario_keys import TruthKeys
 from stepdiag.config.toml_text import located
@@ -15,9 +16,9 @@ from stepdiag.io.whole_files import check_input
 from stepdiag.scenario.heads import PoseErrors
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.setup import environments, misalignments, noise_of
-from stepdiag.scenario.temperature import true_scales
+from stepdiag.scenario.temperature import three, true_scales
 from stepdiag.scenario.uncertain_inputs import STATE_OF_AIR
-from stepdiag.units import MICROMETRE, MICRORADIAN
+from stepdiag.units import MICROMETRE, MICRORADIAN, native
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -27,7 +28,7 @@ class Truth(Displayed):
     Truth() is that of a perfect machine and a perfect set-up, read without noise. `error_map`: the file that [machine]
     names, read when the machine is simulated. `pose_errors`: by the place of a head's keys. `assumed_environment`: what
     the instrument takes the air for, with which it reduces its readings; the true air, where nothing else is said.
-    `scales`: how warm they are; None where they do not expand."""
+    `scales`: how warm they are; None where they do not expand. `machine_drift`: of the functional point, mm/s."""
 
     keys: TruthKeys = field(default_factory=TruthKeys)
     error_map: Path | None = None
@@ -37,6 +38,7 @@ class Truth(Displayed):
     environment: _core.Environment | None = None
     assumed_environment: _core.Environment | None = None
     scales: _core.ScaleTemperatures | None = None
+    machine_drift: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def _facts(self) -> Facts:
         random = self.keys.machine.random
@@ -69,8 +71,15 @@ def truth_of(keys: TruthKeys, pose_errors: Mapping[str, PoseErrors], known: Know
         noise=noise_of(keys.noise),
         environment=environment,
         assumed_environment=assumed,
+        machine_drift=_machine_drift(keys, known),
         scales=true_scales(known.expansion, keys.temperature, known.keys.plan.seconds_per_reading, path),
     )
+
+
+def _machine_drift(keys: TruthKeys, known: Known) -> tuple[float, float, float]:
+    if any(keys.machine.drift_um_per_h) and known.keys.plan.seconds_per_reading is None:
+        raise InvalidArgument(f"{known.path}: machine.drift_um_per_h: expected plan.seconds_per_reading as well")
+    return three(native("_um_per_h", keys.machine.drift_um_per_h))
 
 
 def _check_air(keys: TruthKeys, known: Known) -> None:
@@ -90,7 +99,9 @@ def errors_of(truth: Truth, known: Known) -> _core.ErrorMap:
     if truth.error_map is not None:
         with located(f"{known.path}: machine.errors"):
             check_input(truth.error_map)
-            return _core.read_error_map(truth.error_map)
+            errors = _core.read_error_map(truth.error_map)
+            check_angles(errors, str(truth.error_map))
+            return errors
     if random is None:
         return _core.ErrorMap()
     with located(f"{known.path}: machine.random"):

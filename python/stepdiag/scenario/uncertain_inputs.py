@@ -111,7 +111,7 @@ def _of_scales(keys: KnownKeys, place: str) -> Iterator[_core.UncertainInput]:
     """By axis where [temperature] has a number for each, else in common."""
     scales, section = keys.temperature, keys.uncertainty
     if scales is None:
-        for name in ("expansion_um_per_m_k", "scale_temperature_c"):
+        for name in ("expansion_um_per_m_k", "scale_temperature_c", "scale_temperature_c_per_h"):
             if getattr(section, name) is not None:
                 raise InvalidArgument(f"{place}.{name}: goes with [temperature], which is missing")
         return
@@ -120,6 +120,7 @@ def _of_scales(keys: KnownKeys, place: str) -> Iterator[_core.UncertainInput]:
     for name, by_axis in (
         ("expansion_um_per_m_k", coefficients if isinstance(coefficients, tuple) else (coefficients,)),
         ("scale_temperature_c", (scales.u_temperature_c,) * sensors),
+        ("scale_temperature_c_per_h", (0.0,) * sensors),
     ):
         quantity = QUANTITIES[name].name if len(by_axis) == 3 else f"common_{QUANTITIES[name].name}"
         for axis, uncertainty in enumerate(by_axis):

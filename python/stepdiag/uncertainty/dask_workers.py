@@ -13,6 +13,7 @@ import ipaddress
 import logging
 import os
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -192,12 +193,31 @@ def workers_of(
         with _connected(distributed, scheduler, warn) as client:
             yield Workers(client, warn)
         return
-    with (
-        _local_cluster(distributed, count) as cluster,
-        distributed.Client(cluster, set_as_default=False) as client,
-    ):
-        client.wait_for_workers(count or 1, timeout=START_SECONDS)  # they start at different times
-        yield Workers(client, warn)
+    for is_last in (False, False, True):
+        with (
+            _local_cluster(distributed, count) as cluster,
+            distributed.Client(cluster, set_as_default=False) as client,
+        ):
+            if not _arrive(client, cluster, count or 1) and not is_last:
+                continue
+            yield Workers(client, warn)
+            return
+
+
+def _arrive(client: Any, cluster: Any, count: int) -> bool:
+    """Whether all workers have started. Rarely the process of one dies at its start, where this process has had workers
+    before (Python 3.13); Dask waits for it in vain."""
+    deadline = time.monotonic() + START_SECONDS
+    while True:
+        try:
+            client.wait_for_workers(count, timeout=1.0)  # they start at different times
+        except TimeoutError:
+            if any(worker.status.name == "closed" for worker in cluster.workers.values()):
+                return False
+            if time.monotonic() > deadline:
+                raise
+        else:
+            return True
 
 
 @contextmanager

@@ -50,6 +50,10 @@ class UncertaintyRequest:
         """Raises InvalidArgument for wishes that do not go together."""
         if not 0.0 < self.coverage < 1.0:
             raise InvalidArgument(f"`coverage`: expected a probability between 0 and 1, got {self.coverage:g}")
+        if self.samples is not None and self.samples < 1:
+            raise InvalidArgument(
+                f"`samples`: expected at least 1, or None for the propagation alone, got {self.samples}"
+            )
         named = {
             "compare": self.compare,
             "covariance": self.covariance,
@@ -82,6 +86,7 @@ def evaluate_uncertainty(
     """Propagates, and draws if samples are asked for, by the executor where there is one. `progress(done, total)` is
     told of samples; what it raises ends the run, which then leaves its checkpoint. Raises InvalidArgument for what
     cannot be done."""
+    request.check()
     model, entries = model_for(scenario, request)
     kept = [find_output(model.outputs, name, "keep") for name in request.keep]
     joint = [[find_output(model.outputs, name, "joint") for name in names] for names in request.joint]
@@ -106,7 +111,7 @@ def evaluate_uncertainty(
     )
     found = run_monte_carlo(
         model,
-        samples=request.samples or MOST_SAMPLES,
+        samples=MOST_SAMPLES if request.samples is None else request.samples,
         adaptive=request.adaptive,
         options=options,
         threads=request.threads,

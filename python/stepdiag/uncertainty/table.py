@@ -263,6 +263,8 @@ def attributes_of(result: UncertaintyResult) -> dict[str, Any]:
         "tool_mm": np.array(known.tool),
         "coverage": result.coverage,
     }
+    if known.expansion is not None:
+        attributes["temperature_reference_c"] = known.expansion.expansion.reference
     if found is not None:
         attributes |= {
             "samples": found.samples,

@@ -28,7 +28,17 @@ const char* stepdiag_c11_failure(const char* path, const char* chain) {
     }
     EXPECT(stepdiag_command(compensator, nowhere, NULL, command) == STEPDIAG_REFUSED);
     EXPECT(isnan(command[0]) && command[1] == 0.0);
+    EXPECT(stepdiag_command_at_temperature(compensator, position, NULL, NULL, command) == 0);
+    EXPECT(stepdiag_command_at_temperature(compensator, position, NULL, position, command) ==
+           (STEPDIAG_REFUSED | STEPDIAG_TEMPERATURE)); /* none was stated when it was loaded */
+    EXPECT(isnan(stepdiag_temperature_reference(compensator)));
     stepdiag_compensator_free(compensator);
+
+    options.temperatures[0] = 10.0;
+    options.temperatures[1] = 35.0;
+    EXPECT(stepdiag_compensator_load(path, chain, &options, message, sizeof message) == NULL);
+    EXPECT(strstr(message, "referred to a temperature") != NULL);
+    options = stepdiag_default_options();
 
     options.outside = STEPDIAG_REFUSE;
     options.origin[0] = 1000.0;

@@ -76,24 +76,29 @@ TEST(Compensator, ErrorIsExactAtTheLargestAnglesThatAreTaken) {
 
 TEST(Compensator, EveryInstructionSetGivesTheSameAnswers) {
     if (!are_fused_answers_known()) GTEST_SKIP() << "this processor knows one of them";
-    for (const std::string& chain : all_chains()) {
-        const auto tables = make_tables(random_table(50, chain), "table", chain, {});
-        const Answers plain = answers_for(Chain::parse(chain), false), fused = answers_for(Chain::parse(chain), true);
-        const double* tool = tables->tool.data();
-        for (const Position& p : random_positions(50, 10.0)) {
-            Position a, b, turn_a, turn_b;
-            EXPECT_EQ(plain.error(*tables, p.data(), tool, a.data(), turn_a.data()),
-                      fused.error(*tables, p.data(), tool, b.data(), turn_b.data()));
-            EXPECT_LE(distance(a, b), 1e-15);            // sums of errors of 0.1 mm, each rounded to 1e-17 mm
-            EXPECT_LE(distance(turn_a, turn_b), 1e-18);  // of 1e-4 rad
-            EXPECT_EQ(plain.command(*tables, p.data(), tool, a.data()),
-                      fused.command(*tables, p.data(), tool, b.data()));
-            EXPECT_LE(distance(a, b), 1e-10);  // both within the bound of their forward
-            EXPECT_EQ(plain.forward(*tables, a.data(), tool, b.data()),
-                      plain.command(*tables, p.data(), tool, a.data()));
-            EXPECT_LE(distance(b, p), 1e-10);
+    const Position temperature = {23.0, 27.5, 11.0};
+    for (const std::string& chain : all_chains())
+        for (const bool warm : {false, true}) {
+            CompensatorOptions options;
+            options.temperatures = {10.0, 30.0};
+            const auto tables = make_tables(expanding(random_table(50, chain)), "table", chain, options);
+            const Chain order = Chain::parse(chain);
+            const Answers plain = answers_for(order, false, warm), fused = answers_for(order, true, warm);
+            const double *tool = tables->tool.data(), *t = temperature.data();
+            for (const Position& p : random_positions(50, 10.0)) {
+                Position a, b, turn_a, turn_b;
+                EXPECT_EQ(plain.error(*tables, p.data(), tool, t, a.data(), turn_a.data()),
+                          fused.error(*tables, p.data(), tool, t, b.data(), turn_b.data()));
+                EXPECT_LE(distance(a, b), 1e-15);            // sums of errors of 0.1 mm, each rounded to 1e-17 mm
+                EXPECT_LE(distance(turn_a, turn_b), 1e-18);  // of 1e-4 rad
+                EXPECT_EQ(plain.command(*tables, p.data(), tool, t, a.data()),
+                          fused.command(*tables, p.data(), tool, t, b.data()));
+                EXPECT_LE(distance(a, b), 1e-10);  // both within the bound of their forward
+                EXPECT_EQ(plain.forward(*tables, a.data(), tool, t, b.data()),
+                          plain.command(*tables, p.data(), tool, t, a.data()));
+                EXPECT_LE(distance(b, p), 1e-10);
+            }
         }
-    }
 }
 
 TEST(Compensator, NodesMayStandAnywhere) {

@@ -127,6 +127,26 @@ TEST(Plan, RunsTakeTheirOrdersInTurn) {
     }
 }
 
+TEST(Plan, ReturnsToACheckPointStandWhereTheyAreMade) {
+    const Plan plan(volume, lines({"npp", "pp0"}), 4, stepdiag::all_axes, lines({"p00"}), {2, 1});
+    const auto points = plan.points(Line::parse("npp"));
+    ASSERT_EQ(points.size(), 15u);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        EXPECT_EQ(points[k].number, int(k));
+        EXPECT_EQ(points[k].is_check, k == 7 || k == 14);
+        EXPECT_EQ(points[k].moved.has_value(), k != 0 && !points[k].is_check);
+    }
+    EXPECT_EQ(points[7].node, (std::array{3, 1, 1}));
+    EXPECT_EQ(points[7].commanded, Vector3d(600.0, 150.0, 125.0));
+    EXPECT_EQ(points[8].node, (std::array{1, 2, 2}));
+    EXPECT_EQ(plan.points(Line::parse("pp0")).size(), 11u);
+    EXPECT_EQ(plan.points(Line::parse("p00")).size(), 2u);
+    // Where the line is at its check point anyway, there is nothing to return from.
+    EXPECT_EQ(Plan(volume, diagonals, 4, stepdiag::all_axes, {}, {1, 4}).points(diagonals[0]).size(), 13u);
+    expect_refused([&] { Plan(volume, diagonals, 4, stepdiag::all_axes, {}, {5, 0}); }, "check_points every");
+    expect_refused([&] { Plan(volume, diagonals, 4, stepdiag::all_axes, {}, {1, -1}); }, "check_points at");
+}
+
 TEST(Plan, SmallestMirrorHoldsTheBeamInEveryOrder) {
     const auto size = [](std::vector<stepdiag::StepOrder> orders) {
         return Plan(volume, lines({"ppp", "npp"}), 4, std::move(orders)).smallest_mirror();

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "stepdiag/controller/compensator.hpp"
+#include "stepdiag/machine/expansion.hpp"
 #include "stepdiag/machine/machine.hpp"
 
 namespace stepdiag {
@@ -31,6 +32,16 @@ inline ParameterTable random_table(int intervals = 50, const std::string& chain 
     options.seed = seed;
     options.intervals = intervals;
     return with_header(make_random_error_map(test_volume, options).table(), chain);
+}
+
+// The table with scales of steel, aluminium and Zerodur, fixed somewhere; its errors are referred to 20 degrees
+// Celsius.
+inline const Expansion test_expansion = {{11.5e-6, 23.8e-6, -0.05e-6}, {150.0, -40.0, 500.0}, 20.0};
+inline ParameterTable expanding(ParameterTable table) {
+    table.header["temperature_reference_c"] = "20.0";
+    table.header["expansion_per_k"] = "1.15e-05 2.38e-05 -5e-08";
+    table.header["fixed_point_mm"] = "150 -40 500";
+    return table;
 }
 
 // Random positions from -outside to volume + outside, mm.

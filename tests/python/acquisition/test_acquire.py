@@ -26,7 +26,9 @@ def to_picometres(values: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("head", [BEAMS, IDEAL])
-@pytest.mark.parametrize("plan", [LINES, SMALL + "\nrepeats = 2\nseconds_per_reading = 3.0"])
+@pytest.mark.parametrize(
+    "plan", [LINES, SMALL + "\nrepeats = 2\nseconds_per_reading = 3.0", LINES + "\ncheck_points = 2"]
+)
 def test_acquired_run_is_the_simulated_run_to_the_picometre(tmp_path: Path, head: str, plan: str) -> None:
     described = scenario(plan=plan, head=head, noise="distance_um = 0.1\ncommon_um = 0.2\nseed = 3")
     with Twin(described) as twin:
@@ -47,10 +49,15 @@ def test_acquired_run_is_the_simulated_run_to_the_picometre(tmp_path: Path, head
     assert np.all(np.diff(run.channels["time"]) >= 0.0)
 
 
-def test_drift_of_a_set_up_is_that_of_the_simulated_run(tmp_path: Path) -> None:
-    plan = SMALL + "\nseconds_per_reading = 60.0"
+@pytest.mark.parametrize(
+    ("section", "drift"),
+    [("[misalignment]", "drift_um_per_h = 40.0"), ("[machine]", "drift_um_per_h = [9.0, -4.0, 2.5]")],
+)
+def test_drift_is_that_of_the_simulated_run(tmp_path: Path, section: str, drift: str) -> None:
+    """Of a set-up, and of the functional point."""
+    plan = SMALL + "\nseconds_per_reading = 60.0\ncheck_points = 1"
     text = acquiring.SCENARIO.format(plan=plan, head=BEAMS, noise="")
-    described = parse_scenario(text.replace("[misalignment]", "[misalignment]\ndrift_um_per_h = 40.0"))
+    described = parse_scenario(text.replace(section, f"{section}\n{drift}"))
     with Twin(described) as twin:
         acquire_through(described, twin, tmp_path / "run.csv")
     run, expected = read_measurement(tmp_path / "run.csv"), simulate_scenario(described)

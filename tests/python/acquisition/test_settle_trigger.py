@@ -303,8 +303,9 @@ def test_mirror_at_rest_elsewhere_waits_for_the_point(tmp_path: Path) -> None:
     assert any("the mirror rests " in text and "point 2 at X80 Y60 Z0" in text for text in operator.told)
 
 
-def test_program_that_takes_up_backlash_is_followed(tmp_path: Path) -> None:
-    described = scenario(plan=LINE + "\nbackward = true")
+@pytest.mark.parametrize("more", ["\nbackward = true", "\ncheck_points = 1"])
+def test_program_that_takes_up_backlash_is_followed(tmp_path: Path, more: str) -> None:
+    described = scenario(plan=LINE + more)
     space = space_of(described.known, Options(dialect="iso"))
     aligned = threading.Event()
 

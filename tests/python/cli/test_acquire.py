@@ -4,6 +4,7 @@ import io
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import acquiring
@@ -82,6 +83,28 @@ def test_run_is_made_from_the_raw_file_alone(folder: Path, capsys: pytest.Captur
     assert read_measurement(folder / "zero.nc").channels["d1"][0] == 100.0
 
 
+def test_temperatures_are_read_with_the_run_and_from_the_raw_file(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "t.csv").write_text(f"time,temperature_c\n{time.time() - 100.0},21.5\n")
+    with instrument(sound) as (host, port):
+        command = ["acquire", "scenario.toml", "--source", f"ids3010://{host}:{port}", *FAST]
+        assert "t.csv: is also an input" in refused(capsys, *command, "--temperatures", "t.csv", "-o", "t.csv")
+        monkeypatch.setattr(sys, "stdin", io.StringIO("\n" * 5))
+        error = refused(capsys, *command, "--temperatures", "t.csv", "-o", "run.csv")
+        assert "standard input ended" in error
+        assert set(read_measurement(folder / "run.csv").channels["temperature"]) == {21.5}
+        monkeypatch.setattr(sys, "stdin", io.StringIO("\n" * 30))
+        assert main([*command, "--resume", "-o", "run.csv"]) == 0
+        assert "without --temperatures others have none" in capsys.readouterr().out
+    again = ["acquire", "--from-raw", "run.raw.jsonl", "-o", "again.csv"]
+    assert main(again) == 0
+    assert (folder / "again.csv").read_bytes() == (folder / "run.csv").read_bytes()
+    assert main([*again[:-1], "strict.csv", "--temperature-age", "50"]) == 0
+    assert np.isnan(read_measurement(folder / "strict.csv").channels["temperature"]).all()
+    assert "reads no --temperatures" in refused(capsys, *again, "--temperatures", "t.csv")
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -105,6 +128,8 @@ def test_run_is_made_from_the_raw_file_alone(folder: Path, capsys: pytest.Captur
         (["scenario.toml", "--source", "ids3010://h", "--settle-limit-um", "0"], "settle-limit-um"),
         (["scenario.toml", "--source", "ids3010://h", "--settle-limit-um", "nan"], "limit_um: expected"),
         (["scenario.toml", "--source", "ids3010://h", "--timeout", "inf"], "timeout: expected"),
+        (["scenario.toml", "--source", "ids3010://h", "--temperatures", "t.csv"], "t.csv: cannot be read"),
+        (["scenario.toml", "--source", "ids3010://h", "--temperature-age", "inf"], "temperature_age: expected"),
         (["scenario.toml", "--source", "ids3010://h", "--resume"], "run.raw.jsonl: cannot be continued"),
         (
             ["scenario.toml", "--source", "ids3010://h", "--resume", "--restart-line"],
@@ -138,6 +163,7 @@ def test_head_without_three_axes_is_refused(folder: Path, capsys: pytest.Capture
         (["--play", "nan"], "play: expected seconds above 0"),
         (["--lose", "3"], "expected VISIT:POINT such as 2:5"),
         (["--settling-ms", "-1"], "settling-ms"),
+        (["--temperatures", "t.csv"], "scenario.toml: expected [temperature] or the air of a constant index, got none"),
         (["--host", "no such host"], "twin: cannot listen on no such host:9090"),
     ],
 )

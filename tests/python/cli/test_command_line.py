@@ -160,7 +160,10 @@ MISTAKES: list[tuple[list[str], str]] = [
     (["simulat", "scenario.toml"], "No such command 'simulat'"),
     (["simulate", "scenario.toml", "-o", "out.csv", "--fast"], "No such option"),
     (["simulate", "no.toml", "-o", "out.csv"], "no.toml: cannot be read: No such file or directory"),
-    (["simulate", "run.csv", "-o", "out.csv"], "run.csv: not valid TOML"),
+    (
+        ["simulate", "run.csv", "-o", "out.csv"],
+        "run.csv: expected a scenario, got a measurement: are the files in the wrong order?",
+    ),
     (["simulate", "scenario.toml", "-o", "no/out.csv"], "no/out.csv: cannot be written: the folder no does not exist"),
     (["simulate", "scenario.toml", "-o", "."], "cannot be written: it is a folder"),
     (["simulate", "scenario.toml", "-o", "/dev/null"], "/dev/null: cannot be written: expected the name of a file"),

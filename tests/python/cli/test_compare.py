@@ -28,7 +28,7 @@ def test_command_tells_methods_dates_and_marks_what_is_significant(
 ) -> None:
     assert main(["compare", "a.csv", "b.nc"]) == 0
     said = capsys.readouterr().out.splitlines()
-    assert said[0] == "A: a.csv: enhanced, 2026-01-02T03:04:05Z"
+    assert said[0] == "A: a.csv: enhanced, 2026-01-02T03:04:05Z, temperature not recorded"
     assert said[1].startswith("B: b.nc: adjustment, 2026-11-21T")
     assert {line.split()[0] for line in said if line.endswith("significant")} == {"EXX"}
     assert any("Bonferroni" in line for line in said)

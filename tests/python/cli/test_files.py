@@ -1,5 +1,6 @@
 """The commands check and init: telling files apart, and beginning with new ones."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -173,3 +174,40 @@ def test_sheet_has_the_runs_of_all_orders_and_directions(here: Path) -> None:
         assert getattr(sheet, name) == getattr(simulated, name)
     for name in ("run", "point", "position"):
         assert getattr(sheet, name).tolist() == getattr(simulated, name).tolist()
+
+
+MAP = "parameter,position_mm,value,unit,standard_uncertainty\n"
+
+
+def test_check_says_what_is_implausible_of_an_error_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "map.csv"
+    # 1 mm/m, 2000 µm and 5000 µrad are the limits; X has 400 mm.
+    rows = "EXX,0,0,um,\nEXX,400,399,um,\nEYY,0,0,um,\nEYY,400,401,um,\nEZX,0,0,um,\nEZX,200,-2001,um,\nEZX,400,0,um,\n"
+    path.write_text(MAP + rows + "EAZ,0,0,urad,\nEAZ,400,4999,urad,\nC0Y,,5001,urad,\n")
+    assert main(["check", str(path)]) == 0
+    warnings = [line.split(": warning: ")[1] for line in capsys.readouterr().out.splitlines() if "warning" in line]
+    assert warnings == [
+        "C0Y is 5001 µrad, beyond what a machine can be (5000 µrad); used as given",
+        "EYY is 401 µm at 400 mm, beyond what a machine can be (400 µm); used as given",
+        "EZX is -2001 µm at 200 mm, beyond what a machine can be (2000 µm); used as given",
+    ]
+
+
+@pytest.mark.parametrize("row", ["EAX,400,1e12,urad,", "B0Z,,-100000,urad,"])
+def test_angles_that_no_machine_has_are_refused_wherever_they_would_be_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], row: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    head = "# format=stepdiag error map 1\n# chain=[w X' b Y Z t]\n# volume_mm=80 60 50\n# tool_mm=0 0 0\n"
+    Path("map.csv").write_text(head + MAP + row + "\n")
+    Path("scenario.toml").write_text(of_map("map.csv"))
+    for command in (
+        ["check", "map.csv"],
+        ["check", "scenario.toml"],
+        ["simulate", "scenario.toml", "-o", "run.csv"],
+        ["export", "map.csv", "--to", "csv-grid", "-o", "grid.csv"],
+    ):
+        assert main(command) == 2, command
+        assert re.search(rf"map.csv: {row[:3]} is \S+ µrad.*, expected less than 0.1 rad", capsys.readouterr().err)
+    Path("map.csv").write_text(head + MAP + "B0Z,,-99999,urad,\n")
+    assert main(["check", "scenario.toml"]) == 0

@@ -36,6 +36,7 @@ PLACES: Final = ("FILE", "DIR", "OUT", "FOLDER", "PATH", "HEAD", "SCENARIO")  # 
 # Every option that writes a file: how it is used, and the endings that it takes. What it reads stands in the command.
 FILES: dict[tuple[str, str], list[tuple[list[str], tuple[str, ...]]]] = {
     ("simulate", "output"): [(["scenario.toml", "-o", OUT], (".csv", ".nc"))],
+    ("import", "output"): [(["run.csv", "-o", OUT], (".csv", ".nc"))],
     ("evaluate", "output"): [(["scenario.toml", "run.csv", "-o", OUT], (".csv", ".nc"))],
     ("observe", "output"): [(["scenario.toml", "--steps", "2", "-o", OUT], (".csv",))],
     ("plan", "output"): [(["scenario.toml", "-o", OUT], (".csv", ".png", ".svg", ".pdf"))],
@@ -74,11 +75,14 @@ INPUTS = {
     *{(name, "scenario") for name in ("simulate", "evaluate", "observe", "plan", "uncertainty", "nc")},
     *{("acquire", "scenario"), ("acquire", "from_raw"), ("twin", "scenario"), ("init", "scenario"), ("study", "file")},
     *{("report", name) for name in ("calibrations", "scenario", "run", "uncertainty", "logo")},
-    *{("evaluate", "run"), ("compare", "a"), ("compare", "b"), ("positions", "file")},
+    *{("import", "files"), ("import", "scenario"), ("evaluate", "run")},
+    *{("compare", "a"), ("compare", "b"), ("positions", "file")},
     *{("export", "calibration"), ("volume", "calibration")},
     *{("check", "files"), ("head show", "name"), ("head check", "name"), ("head sensitivity", "name")},
-    *{("plot", "files"), ("plot", "truth"), ("plot", "scenario")},
+    *{("plot", "files"), ("plot", "truth"), ("plot", "scenario"), ("acquire", "temperatures")},
 }
+# Of files that are continued, if their header is that of the command; others are refused (test_temperatures.py).
+APPENDED = {("twin", "temperatures")}
 
 
 @dataclass(frozen=True)
@@ -190,7 +194,7 @@ def test_every_option_that_writes_is_known_here() -> None:
             elif isinstance(parameter.type, click.Path | click.File) or named in PLACES:
                 reads.add((name, parameter.name))
     assert writes == FILES.keys() | FOLDERS
-    assert reads == INPUTS
+    assert reads == INPUTS | APPENDED
 
 
 @every_way
@@ -246,6 +250,7 @@ def test_older_result_is_replaced_where_it_can_be_computed_again(
 ) -> None:
     refusals = {
         "simulate": "perhaps the work of hours: --overwrite replaces it",
+        "import": "perhaps the work of hours: --overwrite replaces it",
         "uncertainty": "is the checkpoint of an earlier run: --resume continues it; or remove it",
         "acquire": "exists already: --resume" if way.ending == ".jsonl" else "move it away, or name another -o",
     }
@@ -253,7 +258,7 @@ def test_older_result_is_replaced_where_it_can_be_computed_again(
     if "--resume" in way.arguments:
         with nothing_is_lost(folder, "a raw file that is complete"):
             assert way.run() == 0
-    elif way.command in ("simulate", "acquire") or way.ending == ".checkpoint":
+    elif way.command in ("simulate", "import", "acquire") or way.ending == ".checkpoint":
         with nothing_is_lost(folder, str(way)):
             assert way.run() == 2
         assert refusals[way.command] in capsys.readouterr().err

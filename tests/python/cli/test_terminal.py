@@ -16,10 +16,11 @@ from small_scenario import SCENARIO
 from terminals import needs_terminal
 
 import stepdiag as sd
+from stepdiag.cli import main
 from stepdiag.cli.acquire import acquire
 from stepdiag.cli.evaluate import evaluate
 from stepdiag.cli.options import Grouped
-from stepdiag.cli.terminal import WIDEST, say
+from stepdiag.cli.terminal import LONGEST, WIDEST, say
 from stepdiag.cli.uncertainty import uncertainty
 
 ANSI = re.compile(r"\x1b\[[0-9;]*m")
@@ -74,6 +75,44 @@ def test_rest_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_file_gets_the_line_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     line = "fit: accepted: " + "the readings agree with each other " * 10
     assert said(monkeypatch, line, io.StringIO()) == f"{line}\n"
+
+
+def test_controls_are_shown_escaped_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    line = "method: \x1b[31mred\x1b[0m\rbell\x07 \x9b2J \u202etxt\ttab"
+    for stream in (io.StringIO(), Terminal()):
+        shown = said(monkeypatch, line, stream)
+        assert shown == "method: \\x1b[31mred\\x1b[0m\\rbell\\x07 \\x9b2J \\u202etxt\\ttab\n"
+
+
+@pytest.mark.parametrize("command", ["check", "report", "compare", "evaluate"])
+def test_no_command_lets_the_controls_of_a_file_through(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("scenario.toml").write_text(SCENARIO)
+    assert main(["simulate", "scenario.toml", "-o", "run.csv"]) == 0
+    assert main(["evaluate", "scenario.toml", "run.csv", "-o", "c.csv"]) == 0
+    for path in map(Path, ("c.csv", "run.csv")):
+        text = path.read_text().replace("method=adjustment", "method=\x1b[31mX\x1b]0;title\x07", 1)
+        path.write_text(text.replace("\nppp,", "\np\x1b[2Jp,", 1))
+    commands = {"evaluate": ["scenario.toml", "run.csv", "-o", "d.csv"], "compare": ["c.csv", "c.csv"]}
+    main([command, *commands.get(command, ["c.csv"])])
+    shown = "".join(capsys.readouterr())
+    assert "\\x1b[" in shown
+    assert not set(shown) & {"\x1b", "\x07"}
+
+
+@pytest.mark.parametrize("arguments", [["check"], ["check", "--json"], ["report"]])
+def test_message_about_a_long_line_is_short(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str]
+) -> None:
+    path = tmp_path / "map.csv"
+    path.write_text(f"parameter,position_mm,value,unit,standard_uncertainty\nEXX,{'A' * 10**6},1,um,\n")
+    assert main([*arguments, str(path)]) == 2
+    out, err = capsys.readouterr()
+    assert "line 2" in err
+    assert " … " in err
+    assert len(out) + len(err) < 3 * LONGEST
 
 
 @pytest.mark.parametrize(

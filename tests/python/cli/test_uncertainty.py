@@ -254,6 +254,12 @@ def test_result_is_on_the_disk_before_the_checkpoint_goes(folder: Path, monkeypa
 
 
 # --- what is refused -------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("samples", [0, -1])
+def test_a_request_without_samples_is_refused(folder: Path, samples: int) -> None:
+    with pytest.raises(sd.InvalidArgument, match=f"`samples`: expected at least 1, .* got {samples}"):
+        evaluate_uncertainty(sd.read_scenario("scenario.toml"), UncertaintyRequest(samples=samples))
+
+
 REFUSED = [
     (["-n", "many"], "expected a whole number such as 100000 or 1e6, got 'many'"),
     (["-n", "1.5"], "expected a whole number"),

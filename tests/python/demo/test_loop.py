@@ -8,7 +8,7 @@ import pytest
 
 from stepdiag import Machine, read_calibration, read_measurement
 from stepdiag.cli import main
-from stepdiag.demo.loop_cases import CLEAN, NOISE, RADIUS, SCREW, LoopCase
+from stepdiag.demo.loop_cases import CLEAN, IN_USE, NOISE, RADIUS, SCREW, VOLUME, WARM, LoopCase
 from stepdiag.demo.loop_job import Calculated
 from stepdiag.demo.loop_outcome import LoopOutcome, repetitions, run_case, whole_grid
 from stepdiag.demo.loop_points import Sizes, agreement, grid_nodes, random_points
@@ -94,6 +94,45 @@ def test_a_screw_error_stays_between_nodes(tmp_path: Path) -> None:
     assert after["random"] > 3e-3
 
 
+@pytest.fixture(scope="module")
+def warm(tmp_path_factory: pytest.TempPathFactory) -> LoopOutcome:
+    return outcome_of(WARM, tmp_path_factory.mktemp("warm"))
+
+
+def test_measured_while_it_warms_up_a_machine_is_compensated_at_another_temperature(
+    clean: LoopOutcome, warm: LoopOutcome
+) -> None:
+    before, after = (Sizes.of(errors).largest for errors in (warm.points["nodes"].before, warm.points["nodes"].after))
+    assert before > 0.1
+    assert before > 1000.0 * after
+    # The calibration is that of the machine whose scales are always at 20 °C, and it knows how they expand.
+    for name, (_, values, _) in clean.calibration.functions.items():
+        np.testing.assert_allclose(warm.calibration.functions[name][1], values, rtol=0.0, atol=1e-7)
+    np.testing.assert_allclose(warm.calibration.expansion, 11.5e-6, rtol=0.0, atol=1e-10)
+
+
+def test_without_the_temperatures_the_expansion_of_the_scales_is_left(warm: LoopOutcome) -> None:
+    points = warm.points["nodes"]
+    assert points.cold is not None
+    expected = 11.5e-6 * (np.array(IN_USE) - 20.0) * points.targets
+    # At nodes nothing else is left but for what stands beside them, and the tilts of axes that stand elsewhere.
+    np.testing.assert_allclose(points.cold, expected, rtol=0.0, atol=1e-4)
+    assert np.abs(expected).max() == pytest.approx(11.5e-6 * 6.0 * VOLUME[0], rel=1e-12)  # 55 µm
+
+
+def test_the_first_warm_run_is_what_simulate_makes_but_for_picometres(warm: LoopOutcome) -> None:
+    run, simulated = read_measurement(warm.table.with_name("run.csv")), simulate_scenario(warm.scenario)
+    for name in ("d1", "d2", "d3"):
+        np.testing.assert_allclose(run.channels[name], simulated.channels[name], rtol=0.0, atol=0.51e-9)
+    np.testing.assert_array_equal(run.channels["temperature"], simulated.channels["temperature"])
+
+
+def test_the_second_calibration_of_a_warm_machine_shows_that_the_errors_are_gone(warm: LoopOutcome) -> None:
+    assert warm.first.length > 0.02
+    assert warm.second.length < 5e-5
+    assert warm.second.squareness < 1e-7
+
+
 def test_what_noise_leaves_agrees_with_the_calibrations_own_uncertainty(tmp_path: Path) -> None:
     outcome = outcome_of(NOISE, tmp_path, 5)
     found = repetitions(outcome, 60)["nodes"]
@@ -142,6 +181,13 @@ def test_the_report_says_what_is_left(clean: LoopOutcome) -> None:
     text = "\n".join(report_lines([clean], None, "no controller"))
     assert "nodes of the plan" in text
     assert "clean: largest error at any of the 1,331 nodes, calculated: " in text
+
+
+def test_the_report_says_what_temperatures_do(warm: LoopOutcome) -> None:
+    text = "\n".join(report_lines([warm], None, "no controller"))
+    assert "measured while they warmed up from 22 to 23.07 °C" in text
+    assert "in use at 26, 25, 18.5 °C" in text
+    assert "nodes of the plan, after, without temperatures       65.7" in text
 
 
 def test_the_command_says_what_a_controller_needs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

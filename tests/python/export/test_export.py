@@ -42,6 +42,37 @@ def test_every_format_tells_chain_sign_and_loss(
     assert any(words in said for words in ("loses at most", "loss: ", "deviates", "differs"))
 
 
+@pytest.mark.parametrize(
+    ("temperature", "said", "in_table"),
+    [
+        ({"temperature_reference": 20.0}, "referred to 20 °C", "temperature_reference_c=20.0"),
+        (
+            {"temperature_as_found": (23.1, 23.0, 22.8)},
+            "as found, with the scales of X, Y, Z at 23.1, 23.0, 22.8 °C",
+            "temperature_as_found_c=23.1 23.0 22.8",
+        ),
+        ({}, "no temperature was recorded", ""),
+    ],
+)
+@pytest.mark.parametrize("to", FORMATS)
+def test_every_export_says_for_which_temperature_it_is(
+    tmp_path: Path, to: str, temperature: dict[str, Any], said: str, in_table: str
+) -> None:
+    """In a comment of the file, in ASCII; a COMP_FILE takes none, and the INI lines beside it have it."""
+    calibration = sd.Calibration(**parts_of(random_calibration(5)), **temperature)
+    report = export(calibration, to, tmp_path / OUTPUT[to])
+    assert any(line.startswith("temperature: ") and said in line for line in report)
+    folder = tmp_path / OUTPUT[to]
+    lines = (folder / "compensation.ini" if folder.is_dir() else folder).read_text("utf-8").splitlines()
+    if to == "linuxcnc-kins":  # a calibration file, with the keys of one
+        assert not in_table or f"# {in_table}" in lines
+        return
+    comment, separator = ("//", ": ") if to == "isg" else ("#", "=" if to == "csv-grid" else ": ")
+    (line,) = [line for line in lines if line.startswith(f"{comment} temperature{separator}")]
+    assert said.replace("°C", "degC") in line
+    assert line.isascii()
+
+
 @pytest.mark.parametrize("to", FORMATS)
 def test_netcdf_and_csv_are_exported_alike(calibration_file: Path, to: str) -> None:
     calibration = sd.read_calibration("calibration.csv")
@@ -164,6 +195,20 @@ def test_the_kinematics_table_may_be_for_another_tool(tmp_path: Path) -> None:
     assert table.tool.tolist() == [0.0, 0.0, 125.0]
     again = sd.Calibration(**parts_of(table) | {"tool": calibration.tool})
     assert same_calibration(again, calibration)
+
+
+def test_the_kinematics_table_keeps_the_expansion_of_the_scales(tmp_path: Path) -> None:
+    parts = parts_of(random_calibration(5)) | {"covariance": None}
+    expansion = {"temperature_reference": 20.0, "expansion": (1.15e-5, 8e-6, 0.0), "fixed_point": (0.0, 300.0, -1.5)}
+    report = export(
+        sd.Calibration(**parts, **expansion), "linuxcnc-kins", tmp_path / "table.csv", tool=(0.0, 0.0, 125.0)
+    )
+    assert any("temperatures=LOWEST,HIGHEST" in line for line in report)
+    table = sd.read_calibration(tmp_path / "table.csv")
+    assert (tuple(table.expansion), tuple(table.fixed_point)) == (expansion["expansion"], expansion["fixed_point"])
+    assert sd.Compensator(tmp_path / "table.csv", table.chain, temperatures=(10, 35)).temperature_reference == 20.0
+    told = export(random_calibration(5), "linuxcnc-kins", tmp_path / "as_found.csv")
+    assert not any("temperatures=" in line for line in told)
 
 
 def test_an_export_is_written_whole_or_not_at_all(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from hypothesis import strategies as st
 from refusal import refused
 
 import stepdiag as sd
+from stepdiag.cli import main
+from stepdiag.io import whole_files
 
 # Second order: trims are exact at the rows, and between them a kink of the inverse stands beside its row by the error,
 # at most 24 µm, where the slope changes by at most 8 mm/m (40 µm over 7 mm, twice).
@@ -179,3 +182,64 @@ def test_only_what_the_lines_need_must_be_determined(tmp_path: Path) -> None:
     report = export(lacking, "linuxcnc-comp", tmp_path / "b", incomplete=True)
     assert any("NOT COMPENSATED" in line and "EAY" in line for line in report)
     assert "NOT COMPENSATED" in (tmp_path / "b/compensation.ini").read_text()
+
+
+def largest_errors(lines: list[str]) -> tuple[float, float]:
+    (row,) = [line for line in lines if line.startswith("largest error")]
+    without, with_it = re.findall(r"compensation (\S+) µm|with it (\S+) µm", row)
+    return float(without[0]), float(with_it[1])
+
+
+def test_a_compensation_that_makes_the_machine_worse_is_warned_of_with_both_figures(tmp_path: Path) -> None:
+    # X carries the workpiece: it is off by ECX (y + tool y), ±3 µm at its end. Right at one edge, it is off by 6 µm at
+    # the other. Along Y it is off by ECX x, 8 µm, with and without.
+    yaw = calibration_of(one_error("ECX", [0.0, 80.0], [0.0, 100e-6]))
+    report = export(yaw, "linuxcnc-comp", tmp_path / "edge", at=(0.0, 60.0, 0.0), tool=(0.0, -30.0, 0.0))
+    (warning,) = [line for line in report if line.startswith("warning:")]
+    figures = [float(figure) for figure in re.findall(r"(\S+) µm", warning)]
+    assert figures == pytest.approx([np.hypot(3.0, 8.0), 10.0], rel=1e-3)
+    assert warning.replace("µ", "u") in (tmp_path / "edge/compensation.ini").read_text()
+    report = export(yaw, "linuxcnc-comp", tmp_path / "middle", at=(0.0, 30.0, 0.0), tool=(0.0, -30.0, 0.0))
+    assert not [line for line in report if line.startswith("warning:")]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_warning_stands_where_the_stated_figures_say_so(tmp_path: Path, seed: int) -> None:
+    report = export(random_calibration(seed), "linuxcnc-comp", tmp_path)
+    before, after = largest_errors(report)
+    assert any(line.startswith("warning:") for line in report) == (after > before)
+
+
+def test_check_finds_a_set_of_two_exports(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    companion = tmp_path / "compensation.ini"
+    export(random_calibration(1), "linuxcnc-comp", tmp_path)
+    old = (tmp_path / "joint1.comp").read_bytes()
+    assert f"sha256 of joint1.comp: {hashlib.sha256(old).hexdigest()}\n" in companion.read_text()
+    assert main(["check", str(companion)]) == 0
+    assert "3 tables of the same export" in capsys.readouterr().out
+    export(random_calibration(2), "linuxcnc-comp", tmp_path)
+    assert main(["check", str(companion)]) == 0
+    (tmp_path / "joint1.comp").write_bytes(old)
+    assert main(["check", str(companion)]) == 2
+    assert "joint1.comp: is not the table that compensation.ini was written with" in capsys.readouterr().err
+    (tmp_path / "joint1.comp").unlink()
+    assert main(["check", str(companion)]) == 2
+
+
+def test_all_files_are_on_the_disk_before_the_first_takes_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    export(random_calibration(1), "linuxcnc-comp", tmp_path)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    synced = []
+
+    def full(handle: int) -> None:
+        synced.append(handle)
+        if len(synced) == 4:
+            raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(whole_files.os, "fsync", full)
+        with pytest.raises(sd.InvalidArgument, match="No space left on device"):
+            export(random_calibration(2), "linuxcnc-comp", tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -81,6 +82,20 @@ def test_rejected_fit_is_marked_in_the_heading_and_in_every_panel(calibration: s
     assert any(
         "scatter more, less or otherwise" in text for text in texts(draw_calibration(calibration.judged("doubtful")))
     )
+
+
+@pytest.mark.parametrize(
+    ("temperature", "words"),
+    [
+        ({"temperature_reference": 20.0}, "referred to 20 °C"),
+        ({"temperature_as_found": (23.1, 23.0, 22.8)}, "as found at X 23.1, Y 23.0, Z 22.8 °C"),
+        ({}, "temperature not recorded"),
+    ],
+)
+def test_figures_say_for_which_temperature_they_are(temperature: dict[str, Any], words: str) -> None:
+    calibration = sd.Calibration(**parts_of(calibrate(1)), **temperature)
+    assert any(words in text for text in texts(calibration.plot()))
+    assert any(words in text for text in texts(sd.volume_errors(calibration, ranking=False).plot()))
 
 
 def test_undetermined_parameters_are_marked_and_named() -> None:

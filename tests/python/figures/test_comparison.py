@@ -55,6 +55,18 @@ def test_file_gives_the_same_differences(comparison: Comparison, name: str, tmp_
     assert {line.get_gid() for axes in figure.axes for line in axes.lines} >= {"significant-EXX"}
 
 
+@pytest.mark.parametrize("name", [None, "c.csv", "c.nc"])
+def test_heading_says_for_which_temperature_both_are(name: str | None, tmp_path: Path) -> None:
+    parts = parts_of(calibrate(2)) | {"date": ""}
+    made = {"temperature_reference": 20.0}, {"temperature_as_found": (23.1, 23.0, 22.8)}
+    drawn = sd.compare_calibrations(*(sd.Calibration(**parts, **temperature) for temperature in made))
+    if name is not None:
+        write_comparison(drawn, tmp_path / name)
+        drawn = read_comparison(tmp_path / name)
+    (facts,) = [text for text in texts(draw_comparison(drawn)) if text.startswith("A: ")]
+    assert facts.startswith("A: adjustment referred to 20 °C; B: adjustment as found at X 23.1, Y 23.0, Z 22.8 °C; ")
+
+
 BAD = [
     ("# limit=0.05\n", "", "limit and values: expected two numbers"),
     ("# limit=0.05\n", "# limit=2\n", "limit: expected a probability between 0 and 1, got 2"),

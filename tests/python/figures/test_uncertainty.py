@@ -13,6 +13,7 @@ from small_scenario import SCENARIO
 import stepdiag as sd
 from stepdiag.figures.uncertainty import draw_observation, draw_uncertainty, read_drawn_uncertainty
 from stepdiag.parameters import FUNCTIONS
+from stepdiag.report.uncertainty import opening_rows
 from stepdiag.uncertainty.write import write_uncertainty
 
 UNCERTAIN = SCENARIO + "[uncertainty]\ndistance_um = 0.1\nscale_ppm = 0.5\nreflector_urad = 300.0\n"
@@ -44,6 +45,32 @@ def test_curves_are_standard_uncertainties_and_bars_are_shares_of_the_variance(r
     expected = np.array(list(by_group.values())) / sum(by_group.values()) * 100.0
     column = [label.get_text().split("\n")[0] for label in bars[0][0].axes.get_xticklabels()].index("EXX")
     np.testing.assert_allclose(heights[:, column], expected, rtol=1e-9, atol=1e-12)  # of 100: rounding
+
+
+@pytest.mark.parametrize("name", [None, "u.nc", "u.csv"])
+@pytest.mark.parametrize(
+    ("section", "words"),
+    [
+        ("", "positioning as found"),
+        (
+            "[temperature]\nexpansion_um_per_m_k = 11.5\nu_expansion_um_per_m_k = 1.0\nu_temperature_c = 0.1\n"
+            "reference_c = 22.5\naxes_c = 24.0\n",
+            "positioning referred to 22.5 °C",
+        ),
+    ],
+)
+def test_heading_says_whether_positioning_is_as_found(
+    tmp_path: Path, name: str | None, section: str, words: str
+) -> None:
+    known = sd.parse_scenario(UNCERTAIN + section)
+    result = sd.evaluate_uncertainty(known, sd.UncertaintyRequest())
+    assert f"temperature: positioning errors are {words.removeprefix('positioning ')}" in list(opening_rows(result))
+    if name is not None:
+        write_uncertainty(result, tmp_path / name)
+    drawn = result if name is None else read_drawn_uncertainty(tmp_path / name)
+    assert any(text.endswith(words) for text in texts(draw_uncertainty(drawn)))
+    run, found = sd.observe(known)
+    assert any(text.endswith(words) for text in texts(draw_observation(run, found, known.known)))
 
 
 def test_file_gives_the_same_figure(result: sd.UncertaintyResult, tmp_path: Path) -> None:

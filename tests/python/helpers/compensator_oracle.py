@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from reference import AXES, DIGITS_40, MP, ErrorTable, Table, Vector, pose
+from reference import AXES, DIGITS_40, FORWARD, MP, ErrorTable, Scales, Table, Vector, pose
 
 OUTSIDE, CAPPED, REFUSED = 1, 2, 4
 Three = tuple[float, float, float]
@@ -48,6 +48,7 @@ class Oracle:
         self.volume = [MP.mpf(v) for v in keys["volume_mm"].split()]
         self.tool = [float(v) for v in keys["tool_mm"].split()]
         self.origin = vector(origin)
+        self.keys = keys
         self.outside, self.margin, self.largest_correction = outside, MP.mpf(margin), largest_correction
         table = read_table(text, approach)
         if margin:
@@ -56,23 +57,25 @@ class Oracle:
             table = ErrorTable(functions, table.squareness)
         self.table = table
 
-    def error(self, position: Any, tool: Any = None) -> Answer:
-        """Actual minus nominal functional point at an axis position, and the rotation vector of the tool."""
+    def error(self, position: Any, tool: Any = None, temperature: Any = None) -> Answer:
+        """Actual minus nominal functional point at an axis position, and the rotation vector of the tool.
+
+        temperature: of the scales, °C; without it they are as in the table."""
         at = vector(position) - self.origin
         status = self._status(at)
         if status & REFUSED:
             return Answer(vector((0, 0, 0)), vector((0, 0, 0)), status)
-        e, rotation = self._model(at, tool)
+        e, rotation = self._model(at, tool, temperature)
         return Answer(e, rotation_vector(rotation), status | (CAPPED if length(e) > self.largest_correction else 0))
 
-    def forward(self, command: Any, tool: Any = None) -> Vector:
-        return vector(command) + self._correction(vector(command), tool)
+    def forward(self, command: Any, tool: Any = None, temperature: Any = None) -> Vector:
+        return vector(command) + self._correction(vector(command), tool, temperature)
 
-    def command(self, target: Any, tool: Any = None) -> Vector:
+    def command(self, target: Any, tool: Any = None, temperature: Any = None) -> Vector:
         """c with c + e(c) = t, to 30 digits."""
         c = t = vector(target)
         for _ in range(100):
-            before, c = c, t - self._correction(c, tool)
+            before, c = c, t - self._correction(c, tool, temperature)
             if length(c - before) < MP.mpf("1e-30"):
                 return c
         raise AssertionError("the errors are too steep for the oracle")
@@ -84,15 +87,24 @@ class Oracle:
         held = self.outside == "hold" or (self.outside == "linear" and beyond <= self.margin)
         return OUTSIDE if held else OUTSIDE | REFUSED
 
-    def _model(self, at: Vector, tool: Any) -> tuple[Vector, Any]:
+    def _model(self, at: Vector, tool: Any, temperature: Any) -> tuple[Vector, Any]:
         """Beyond the volume and its margin, the error of the nearest point."""
         at = np.array([min(max(p, -self.margin), edge + self.margin) for p, edge in zip(at, self.volume, strict=True)])
         tool = self.tool if tool is None else tool
-        rotation, point = pose(self.chain, self.table, tool, at, DIGITS_40)
+        scales = None if temperature is None else self._scales(temperature)
+        rotation, point = pose(self.chain, self.table, tool, at, DIGITS_40, FORWARD, scales)
         return point - at - vector(tool), rotation
 
-    def _correction(self, command: Vector, tool: Any) -> Vector:
-        e, _ = self._model(command - self.origin, tool)
+    def _scales(self, temperature: Any) -> Scales:
+        def three(key: str) -> Three:
+            x, y, z = map(float, self.keys.get(key, "0 0 0").split())
+            return x, y, z
+
+        reference = float(self.keys["temperature_reference_c"])
+        return Scales(three("expansion_per_k"), temperature, fixed_point=three("fixed_point_mm"), reference=reference)
+
+    def _correction(self, command: Vector, tool: Any, temperature: Any) -> Vector:
+        e, _ = self._model(command - self.origin, tool, temperature)
         return e if length(e) <= self.largest_correction else e * (self.largest_correction / length(e))
 
 

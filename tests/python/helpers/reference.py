@@ -140,8 +140,10 @@ def pose(
     approach: Approach = FORWARD,
     scales: Scales | None = None,
     time: float = 0.0,
+    drift: Any = (0.0, 0.0, 0.0),
 ) -> tuple[Any, Vector]:
-    """(rotation, functional point) by homogeneous 4x4 matrices, from w to t; each axis approached as said."""
+    """(rotation, functional point) by homogeneous 4x4 matrices, from w to t; each axis approached as said. `drift`: of
+    each axis along itself, mm/s."""
     links = re.findall(r"[XYZ]|b", chain)
     bed = links.index("b")
     total = np.array([[a.number(float(i == j)) for j in range(4)] for i in range(4)])
@@ -151,6 +153,7 @@ def pose(
         p = a.number(commanded[AXES.index(link)])
         delta, theta = axis_errors(table, link, p, a, approach[AXES.index(link)])
         delta[AXES.index(link)] += scales.position(AXES.index(link), p, time, a) if scales else p
+        delta[AXES.index(link)] += a.number(drift[AXES.index(link)]) * a.number(time)
         rotation, shift = homogeneous(turn(theta, a), None, a), homogeneous(None, delta, a)
         total = total @ rotation @ shift if place < bed else total @ shift @ rotation
     total = total @ homogeneous(None, a.vector(tool), a)
@@ -188,6 +191,8 @@ class Scenario:
     backward: bool = False
     seconds_per_reading: float | None = None
     scales: Scales | None = None
+    machine_drift: tuple[float, float, float] = (0.0, 0.0, 0.0)  # along X, Y, Z since the run's first reading, mm/s
+    check_points: tuple[int, int] = (0, 0)  # after every so many steps back to where the line is after so many
 
 
 def commanded_points(scenario: Scenario, line: str) -> list[tuple[float, float, float]]:
@@ -199,12 +204,17 @@ def commanded_points(scenario: Scenario, line: str) -> list[tuple[float, float, 
         return x, y, z
 
     points = [position()]
-    for _ in range(steps):
+    every, at = (0, 0) if line in scenario.scale_lines else scenario.check_points
+    starts = [position()]  # of steps
+    for step in range(1, steps + 1):
         for axis in scenario.order:
             i = AXES.index(axis)
             if line[i] != "0":
                 node[i] += 1 if line[i] == "p" else -1
                 points.append(position())
+        starts.append(position())
+        if every and step % every == 0 and step > at:
+            points.append(starts[at])
     return points
 
 
@@ -237,7 +247,9 @@ def mirror_of(
     """The functional point and the mirror's normal, in the machine frame; `time` since the run's first reading."""
     reflector = scenario.misalignment.get(line, {}).get("reflector", (0.0, 0.0))
     approach = approach_of(line, backward)
-    rotation, point = pose(scenario.chain, table, scenario.tool, commanded, a, approach, scenario.scales, time)
+    rotation, point = pose(
+        scenario.chain, table, scenario.tool, commanded, a, approach, scenario.scales, time, scenario.machine_drift
+    )
     local = frame(line, scenario.volume, a)
     return point, rotation @ local @ turn([*reflector, 0.0], a) @ a.vector([0, 0, 1])
 

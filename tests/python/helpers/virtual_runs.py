@@ -89,7 +89,12 @@ def random_scenario(rng: np.random.Generator, **given: Any) -> reference.Scenari
 
 def plan_of(scenario: reference.Scenario) -> sd.Plan:
     return sd.Plan(
-        scenario.volume, scenario.lines, scenario.steps, order=scenario.order, scale_lines=scenario.scale_lines
+        scenario.volume,
+        scenario.lines,
+        scenario.steps,
+        order=scenario.order,
+        scale_lines=scenario.scale_lines,
+        check_points=sd.CheckPoints(*scenario.check_points),
     )
 
 

@@ -32,7 +32,7 @@ def test_evaluate_names_the_mistake_of_a_rejected_fit(folder: Path, capsys: pyte
     assert main(["evaluate", "scenario.toml", "run.csv", "-o", "calibration.csv"]) == 3
     said = capsys.readouterr().out
     assert said.startswith("fit: REJECTED")
-    assert "mistake: the head is turned by 180° about its beam (upside down) on all lines" in said
+    assert "rejected because a mistake explains the readings: the head is turned by 180° about its beam" in said
     assert "to change: turn the head, or in the run multiply alpha_urad, beta_urad by -1" in said
 
 
@@ -46,14 +46,17 @@ def test_where_the_adjustment_does_not_settle_the_calibration_is_rejected(
     assert main(["evaluate", "scenario.toml", "run.csv", "-o", "calibration.csv"]) == 3
     said = capsys.readouterr().out
     assert said.startswith("fit: REJECTED")
-    assert "mistake: alpha has the wrong sign on all lines" in said
+    assert "a mistake explains the readings: alpha has the wrong sign on all lines" in said
     assert sd.read_calibration("calibration.csv").fit == "rejected"
 
 
 def test_evaluate_has_it_as_an_object(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(2.0, "alpha", "beta")
-    assert main(["evaluate", "scenario.toml", "run.csv", "-o", "calibration.csv", "--json"]) == 0  # doubtful
-    (mistake,) = json.loads(capsys.readouterr().out)["mistakes"]
+    assert main(["evaluate", "scenario.toml", "run.csv", "-o", "calibration.csv", "--json"]) == 3
+    said = json.loads(capsys.readouterr().out)
+    # Without the mistake it is doubtful.
+    assert said["fit"]["reasons"][0].startswith("a mistake explains the readings: alpha and beta are too large")
+    (mistake,) = said["mistakes"]
     assert mistake["entry"] == "factor"
     assert mistake["fit"] == "accepted"
     assert mistake["variance_factor"] == pytest.approx(1.0, abs=0.5)
@@ -63,7 +66,7 @@ def test_evaluate_names_the_mistake_of_a_run_that_it_refuses(folder: Path, capsy
     write(2.0, "distance")
     assert main(["evaluate", "scenario.toml", "run.csv", "-o", "calibration.csv"]) == 2
     said = capsys.readouterr().err
-    assert "mistake: distance is too large by a factor of 2 on all lines" in said
+    assert "a mistake explains the readings: distance is too large by a factor of 2 on all lines" in said
     assert "to change: in the run multiply distance_mm by 0.5" in said
     assert not Path("calibration.csv").exists()
 
@@ -71,7 +74,7 @@ def test_evaluate_names_the_mistake_of_a_run_that_it_refuses(folder: Path, capsy
 def test_check_names_it_and_says_nothing_of_a_sound_run(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(-1.0, "beta")
     assert main(["check", "scenario.toml", "run.csv"]) == 3
-    assert "mistake: beta has the wrong sign on all lines" in capsys.readouterr().out
+    assert "a mistake explains the readings: beta has the wrong sign on all lines" in capsys.readouterr().out
     write(1.0)
     assert main(["check", "scenario.toml", "run.csv"]) == 0
     assert "mistake" not in capsys.readouterr().out

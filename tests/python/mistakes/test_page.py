@@ -9,8 +9,9 @@ from mistaken import changed, moved, rows_of
 from places import DOCS, EXAMPLES
 
 import stepdiag as sd
+from stepdiag.calibration.finding_text import mistake_reason
 from stepdiag.mistakes.catalogue import CATALOGUE
-from stepdiag.report.mistakes import mistake_rows
+from stepdiag.report.mistakes import change_rows, mistake_text
 
 PAGE = (DOCS / "mistakes.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```\n(.*?)```", PAGE, re.DOTALL)
@@ -46,7 +47,8 @@ MADE: list[Callable[[sd.Measurement], sd.Measurement]] = [
 def test_page_says_what_the_program_says(number: int) -> None:
     scenario = sd.read_scenario(EXAMPLES / "scenario.toml")
     found = sd.find_mistakes(scenario, MADE[number](sd.simulate_scenario(scenario)))
-    said = [re.sub(r" \(variance factor [^)]*\)$", "", line) for line in mistake_rows(found)]
+    what = re.sub(r" \(variance factor [^)]*\)$", "", mistake_text(found))
+    said = [f"rejected because {mistake_reason(what)}", *change_rows(found)]
     assert BLOCKS[number].splitlines() == said
 
 

@@ -135,6 +135,17 @@ def test_drawings_are_those_that_plotly_knows(evaluated: Path) -> None:
         go.Figure(data=drawing["data"], layout={**content["layout"], **drawing["layout"]})
 
 
+def test_curves_and_volume_say_for_which_temperature_they_are(evaluated: Path) -> None:
+    lines = Path("calibration.csv").read_text().splitlines(keepends=True)
+    Path("found.csv").write_text("".join([lines[0], "# temperature_as_found_c=23.1 23.0 22.8\n", *lines[1:]]))
+    Path("referred.csv").write_text("".join([lines[0], "# temperature_reference_c=20.0\n", *lines[1:]]))
+    page = page_of(calibration=Path("referred.csv"), before=Path("found.csv"))
+    assert "Positioning errors: referred to 20 °C; before: as found at X 23.1, Y 23.0, Z 22.8 °C." in page.text
+    assert "Positioning errors: referred to 20 °C. " in page.text
+    assert page.values()["volume"]["temperature_reference_c"] == 20.0
+    assert page_of(calibration=Path("calibration.csv")).text.count("Positioning errors: temperature not recorded.") == 2
+
+
 def test_temperatures_are_those_of_the_run(here: Path) -> None:
     header, *rows = Path("run.csv").read_text().splitlines()
     temperature = [f"{20.0 + 0.25 * k}" for k in range(len(rows))]
@@ -226,8 +237,9 @@ def test_mistake_is_said_beside_the_verdict(here: Path) -> None:
     for name in ("calibration.nc", "calibration.csv"):
         assert main(["evaluate", "scenario.toml", "run.csv", "-o", name]) == 3
         page = page_of(calibration=Path(name), scenario=Path("scenario.toml"), run=Path("run.csv"))
-        said = page.text.index("Mistake that would explain it: the head is turned by 180° about its beam")
+        said = page.text.index("mistake explains the readings: the head is turned by 180° about its beam")
         assert page.text.index("Fit REJECTED") < said < page.text.index("Summary")
+        assert page.text.count("mistake explains the readings") == 1, "of the file's reasons"
         assert "Turn the head, or in the run multiply alpha_urad, beta_urad by -1." in page.text
 
 

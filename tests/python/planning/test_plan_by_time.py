@@ -296,3 +296,24 @@ def test_keys_that_are_wrong_are_named(
     said = capsys.readouterr().err
     assert said.startswith("stepdiag: error: scenario.toml: ")
     assert message in said
+
+
+# --- returns to check points -----------------------------------------------------------------------------------------
+def test_plans_with_and_without_returns_are_compared_where_the_functional_point_may_drift() -> None:
+    few = (
+        '[plan_by_time]\nsteps = [8]\nrepeats = [1]\nline_sets = [["ppp", "npp", "pnp", "nnp", "p00", "0p0", "00p"]]\n'
+    )
+    assert {one.check_points for one in candidates(parse_scenario(SCENARIO + few))} == {0}
+    drifting = parse_scenario(
+        SCENARIO.replace("seed = 3", "tilt_urad = 1.0\nseed = 3")
+        + few
+        + "[adjustment]\nmachine_drift_um_per_h = 20.0\n"
+    )
+    found = [outcome(drifting, one) for one in candidates(drifting) if one.steps == 8]
+    without, returning = sorted(found, key=lambda one: one.candidate.check_points)
+    assert (without.candidate.check_points, returning.candidate.check_points) == (0, 2)
+    assert returning.seconds > without.seconds
+    assert returning.largest["squareness"] < without.largest["squareness"]
+    table = "\n".join(plan_rows(found, choose(found, 60.0, 20.0, "squareness"), 60.0, "squareness"))
+    assert "returns" in table
+    assert "returning to check points after every 2 steps" in "\n".join(advice([returning], 60.0, 20.0))

@@ -44,6 +44,8 @@ PLANS = [
     (BODY, 'order = ["XYZ", "YZX"]\nbackward = true'),
     (FACES, "backward = true\nrepeats = 2"),
     (BODY, "repeats = 3"),
+    (BODY, "check_points = 3"),
+    (FACES, "check_points = 2\ncheck_point = 1\nbackward = true"),
 ]
 CASES = pytest.mark.parametrize(("lines", "plan"), PLANS)
 
@@ -121,17 +123,59 @@ def test_the_head_is_where_the_conventions_put_the_beams_origin() -> None:
     np.testing.assert_allclose([float(value) for value in match.groups()], first - 100.0 * towards, atol=0.51e-3)
 
 
-def test_travel_that_ends_at_the_volume_is_kept_and_what_cannot_be_approached_is_said() -> None:
+def test_travel_that_ends_at_the_volume_is_kept_and_every_point_not_approached_as_said_is_named() -> None:
     scenario = scenario_of('["ppp"]')
     program = measuring_program(scenario, Options(limits=(0.0, 800.0, -0.25, 601.0, -5.0, 505.0)))
     ways = np.array(trace(program.text, iso=False).ways)
     assert np.all(np.nanmin(ways, axis=0) == (0.0, -0.25, -1.0))
-    assert program.unapproached[0] == (
-        "visit 1, line ppp, point 0: the limits let it be approached in "
-        "X 0 from below by 0 mm only, Y 0 from below by 0.25 mm only"
-    )
+    # From the safe position, 400 300 500; Y waits one step, and X comes back for the scale lines.
+    assert program.unapproached == [
+        "visit 1, line ppp: X comes to point 0 from above; Y comes to points 0 to 1 from below by 0.25 mm only",
+        "visit 2, line p00: X comes to point 0 from above; Y comes to points 0 to 1 from below by 0.25 mm only",
+        "visit 3, line 0n0: X comes to points 0 to 1 from above",
+    ]
     assert f"({program.unapproached[0][:60]}" in program.text
     assert not measuring_program(scenario, Options(limits=(-1.0, 801.0, -1.0, 601.0, -1.0, 501.0))).unapproached
+
+
+def named_of(program: Program) -> dict[tuple[int, str, int], str]:
+    """What the texts say: by visit, axis and point."""
+    named = {}
+    for text in program.unapproached:
+        visit, parts = re.fullmatch(r"visit (\d+), line ...: (.*)", text).groups()  # type: ignore[union-attr]
+        for part in parts.split("; "):
+            axis, ranges, how = re.fullmatch(r"([XYZ]) comes to points? ([\d ,to]*\d) (from .*)", part).groups()  # type: ignore[union-attr]
+            for one in ranges.split(", "):
+                first, last = map(int, (one.split(" to ") * 2)[:2])
+                way = 1 if last >= first else -1
+                named |= {(int(visit), axis, point): how for point in range(first, last + way, way)}
+    return named
+
+
+@CASES
+@pytest.mark.parametrize(
+    "options", [Options(overrun=0.0), Options(limits=(0.0, 800.0, 0.0, 600.0, 0.0, 500.0), safe=(0.0, 300.0, 500.0))]
+)
+def test_the_points_named_are_those_that_a_trace_of_the_program_finds(lines: str, plan: str, options: Options) -> None:
+    scenario = scenario_of(lines, plan)
+    program = measuring_program(scenario, options)
+    traced = trace(program.text, iso=False)
+    named = named_of(program)
+    for visit in visits_of(scenario):
+        for point in visit.points:
+            came = traced.came[[name for name, _ in traced.readings].index((visit.number, int(point)))]
+            for axis, name in enumerate("XYZ"):
+                said = named.pop((visit.number, name, int(point)), "")
+                if came[axis] == 0.0:
+                    assert said == "from where it stood before the program"
+                elif came[axis] != visit.approach[axis]:
+                    assert said == ("from below" if came[axis] > 0.0 else "from above")
+                else:
+                    assert said == ""
+    assert not named
+    assert program.unapproached
+    for text in program.unapproached:
+        assert text.split(": ")[1][:30] in re.sub(r"\)\n\(\.\.\. ", " ", program.text).split("\nG21")[1]
 
 
 @pytest.mark.parametrize(
@@ -189,7 +233,7 @@ def test_the_command_writes_the_program_and_tells_its_time(tmp_path: Path, capsy
     out, err = capsys.readouterr()
     assert "14 readings, about" in out
     assert "positions are rounded, by up to 0.33 nm" in out
-    assert "warning: visit 1, line ppp, point 0" in err
+    assert "warning: visit 1, line ppp: X comes to point 0 from above\n" in err
     assert (
         output.read_text()
         == measuring_program(

@@ -138,7 +138,7 @@ def test_every_key_reaches_the_core_in_native_units(key: str) -> None:
     assert ours
     unit = {  # written out, so that a wrong factor is not compared with itself
         "um": 1e-3, "mm": 1.0, "urad": 1e-6, "ppm": 1e-6, "c": 1.0, "hpa": 100.0, "percent": 0.01, "um_per_h": 1e-3 / 3600,
-        "um_per_m_k": 1e-6,         "um_per_sqrt_h": 1e-3 / 60,
+        "um_per_m_k": 1e-6, "c_per_h": 1.0 / 3600, "um_per_sqrt_h": 1e-3 / 60,
     }  # fmt: skip
     ending = next((e for e in sorted(unit, key=len, reverse=True) if key.endswith(f"_{e}")), None)
     assert (ending is None) == (key in ("gain", "reading_model"))

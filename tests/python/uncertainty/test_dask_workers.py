@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from small_models import Sums
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument, PartialStatistics, StatisticsOptions
+from stepdiag.uncertainty import dask_workers
 from stepdiag.uncertainty.dask_workers import Platform, Workers, WorkersLost, check_scheduler, this_machine, workers_of
 from stepdiag.uncertainty.model_source import KEPT, model_of
 from stepdiag.uncertainty.monte_carlo import run_monte_carlo
@@ -134,3 +136,19 @@ def test_missing_dask_is_said_with_what_to_install(monkeypatch: pytest.MonkeyPat
         workers_of(count=2),
     ):
         pass
+
+
+@pytest.mark.parametrize(("status", "arrived"), [("running", True), ("closed", False)])
+def test_a_worker_that_died_at_its_start_is_not_waited_for(status: str, *, arrived: bool) -> None:
+    """Of a cluster whose second worker comes after a while, or never."""
+    waits = iter([TimeoutError, None])
+
+    class Client:
+        def wait_for_workers(self, count: int, timeout: float) -> None:
+            error = next(waits)
+            if error is not None:
+                raise error(count, timeout)
+
+    workers = {0: SimpleNamespace(status=SimpleNamespace(name="running"))}
+    workers[1] = SimpleNamespace(status=SimpleNamespace(name=status))
+    assert dask_workers._arrive(Client(), SimpleNamespace(workers=workers), 2) is arrived

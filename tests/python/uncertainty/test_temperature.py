@@ -111,6 +111,37 @@ def test_published_evaluations_correct_their_lengths_first(method: str) -> None:
     scenario = replace(scenario, truth=replace(scenario.truth, misalignment={}, noise=sd.Noise()))
     found = sd.evaluate_scenario(scenario, sd.simulate_scenario(scenario), method=method)
     assert found.temperature_reference == 20.0
+    assert found.expansion == pytest.approx([11.5e-6] * 3, rel=1e-15)
     largest = max(float(np.max(np.abs(value))) for _, value, _ in found.functions.values())
     assert largest <= 1e-9  # 27.6 um without; what is left is of second order in 3e-5
     assert adjustment_options(scenario.known).expansion is not None
+
+
+def test_a_ramp_of_the_temperature_is_that_of_a_run_that_warms_up_unseen() -> None:
+    """The sensor goes on saying 23 °C while the scales warm up by 2 K/h."""
+    text = LARGE.replace("[plan]", "[plan]\nseconds_per_reading = 20.0") + STEEL.format(u=0.0, sensor=0.0)
+    scenario = parse_scenario(text + "\n[uncertainty]\nscale_temperature_c_per_h = 2.0\n")
+    known, rate = scenario.known, 2.0 / 3600.0
+    assert known.expansion is not None
+    scales = known.expansion.expansion
+
+    def of_run(rate: float) -> float:
+        warm = sd.ScaleTemperatures(scales, (23.0,) * 3, (rate,) * 3, one_sensor=True)
+        misalignment = dict(scenario.truth.misalignment)
+        run = sd.simulate(
+            scenario.machine(),
+            known.plan,
+            known.head,
+            scales=warm,
+            seconds_per_reading=20.0,
+            misalignment=misalignment,
+        )
+        said = {**run.channels, "temperature": np.full(len(run), 23.0)}
+        unseen = sd.Measurement(run.line, run.point, run.position, said)
+        return float(sd.evaluate_scenario(scenario, unseen, method="enhanced").functions["EXX"][1][-1])
+
+    of = virtual_calibrations(scenario, method="enhanced", seed=1)
+    nominal, ramped = (end_of_x(values, of) for values in of.evaluate_at(np.array([[0.0, rate]])).T)
+    assert nominal == pytest.approx(of_run(0.0), abs=1e-12)
+    assert ramped - nominal > 5e-3
+    assert ramped - nominal == pytest.approx(of_run(rate) - of_run(0.0), rel=1e-3)

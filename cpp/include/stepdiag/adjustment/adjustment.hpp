@@ -47,6 +47,15 @@ struct Smoothness {
 enum class Slips { report, estimate };
 std::string name(Slips slips);  // "report", "estimate"
 
+// A drift that is no expansion of scales: of spindle, structure, or the mounts of heads. The functional point moves
+// along each axis, as if the axis stood further on, in proportion to what has passed since the run's first reading of
+// `record`: time, or a temperature (the channels temperature, temperature_x, ..., air_temperature).
+struct MachineDrift {
+    // By axis: of the prior with mean 0, mm/s, or mm/K with a temperature; 0: none.
+    Eigen::Vector3d standard_uncertainty = Eigen::Vector3d::Zero();
+    std::string record = "time";
+};
+
 struct AdjustmentOptions {
     ReadingUncertainty uncertainty;
     SetupPriors setup = {};
@@ -70,6 +79,7 @@ struct AdjustmentOptions {
     // Coefficients of which the standard uncertainty is not 0 are unknowns, with it as their prior. Deviations of the
     // sensors are no unknowns, because no reading tells them from a scale error: they enter the uncertainties.
     std::optional<KnownExpansion> expansion = {};
+    std::optional<MachineDrift> machine_drift = {};  // its rates are unknowns
     bool reliability = false;  // also say which faults the readings control: Adjustment::reliability
     // false: where it is known already what is wrong with the run as a whole. No faults of readings are looked for, and
     // where the minimum is not reached soon, values are those that were, and rejected.
@@ -94,6 +104,14 @@ struct ExpansionEstimate {
     double standard_uncertainty;  // 1/K
     double stated;                // 1/K: the prior's value
     PriorUncertainty prior;       // 1/K: its standard uncertainty
+};
+
+// A rate of the machine's drift, as it was found: mm/s, or mm/K with a temperature.
+struct DriftEstimate {
+    int axis;  // 0, 1, 2
+    double value;
+    double standard_uncertainty;
+    PriorUncertainty prior;
 };
 
 // One reading: by row of the measurement and channel.
@@ -162,6 +180,7 @@ enum class FitFinding {
     fault,          // gain in chi-square of a fault that was found and not corrected
     alternatives,   // what alternative faults make of one parameter differs by this much, mm or rad
     scaled,         // root of the variance factor, by which the uncertainties were multiplied (scale_uncertainty)
+    mistake,        // one in the whole run or its scenario would explain the readings; adjust() looks for none
 };
 std::string name(FitFinding finding);  // "no_redundancy", ...
 
@@ -182,13 +201,13 @@ struct FitReason {
     double limit;  // of an uneven misfit that of the other readings; of noise, trends, prior_scatter what is expected
     std::string line = {};     // of an uneven misfit, a trend or a prior; empty: all
     std::string channel = {};  // of an uneven misfit or a trend: "distance", ..., empty: all; of priors: the quantity
-    int component = 0;         // of a prior; of "expansion" the axis, -1: of all in common
+    int component = 0;         // of a prior; of "expansion" the axis, -1: of all in common; of "machine_drift" the axis
     double standard_uncertainty = 0.0;  // of the value of a misfit, no_misfit, trend, scaled
     int run = -1;                       // of an uneven misfit: this run alone; -1: all
     FitAspect aspect = FitAspect::whole;
     bool alternative = false;    // of a trend: instead of the one before; the readings do not tell which
     int fault = 0;               // of a fault and of alternatives: number of the class, from 1
-    std::string parameter = {};  // of alternatives: "EXX", ...
+    std::string parameter = {};  // of alternatives: "EXX", ...; of a mistake what it is
 };
 
 // Whether the readings of an adjustment agree with each other, with their uncertainties and with the priors. It does
@@ -262,14 +281,15 @@ struct Adjustment {
     std::vector<FaultControl> reliability = {};  // if it was asked for
     std::vector<UnseenFault> unseen = {};
     std::vector<ExpansionEstimate> expansion = {};
+    std::vector<DriftEstimate> machine_drift = {};
 
     double variance_factor() const;             // weighted_square_sum/degrees_of_freedom; 1 without freedom
     std::vector<std::size_t> outliers() const;  // readings that were left out: into `residuals`, by their number
 };
 
 // Throws InvalidArgument for readings that do not belong to the plan, channels that do not fit the head, a drift that
-// is not fixed without times, options that make no sense, where nothing at all can be determined, or for a result that
-// is not plausible.
+// is not fixed without what it goes with, options that make no sense, where nothing at all can be determined, or for a
+// result that is not plausible.
 Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
                   const HeadCalibrations& heads, const AdjustmentOptions& options = {});
 

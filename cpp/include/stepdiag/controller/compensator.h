@@ -17,7 +17,7 @@ enum stepdiag_outside { STEPDIAG_HOLD = 0, STEPDIAG_LINEAR = 1, STEPDIAG_REFUSE 
 enum stepdiag_approach { STEPDIAG_MEAN = 0, STEPDIAG_POSITIVE = 1, STEPDIAG_NEGATIVE = 2 };
 
 /* Flags of a status (see CompensationStatus). 0: the position is inside the volume. */
-enum stepdiag_status { STEPDIAG_OUTSIDE = 1, STEPDIAG_CAPPED = 2, STEPDIAG_REFUSED = 4 };
+enum stepdiag_status { STEPDIAG_OUTSIDE = 1, STEPDIAG_CAPPED = 2, STEPDIAG_REFUSED = 4, STEPDIAG_TEMPERATURE = 16 };
 
 /* See CompensatorOptions. Initialise with stepdiag_default_options(), so that future options have their defaults. */
 typedef struct {
@@ -27,7 +27,8 @@ typedef struct {
     double largest_correction;
     int approach; /* enum stepdiag_approach */
     double largest_tool;
-    int accept_rejected; /* 1: accept a table whose fit was rejected */
+    int accept_rejected;    /* 1: accept a table whose fit was rejected */
+    double temperatures[2]; /* lowest and highest that a call may state, degrees Celsius; both 0: none may */
 } stepdiag_options;
 
 stepdiag_options stepdiag_default_options(void);
@@ -47,6 +48,18 @@ unsigned stepdiag_command(const stepdiag_compensator* compensator, const double 
                           double command[3]);
 unsigned stepdiag_forward(const stepdiag_compensator* compensator, const double command[3], const double tool[3],
                           double actual[3]);
+
+/* The same with the temperatures of the scales of X, Y, Z, degrees Celsius; NULL: without. A temperature that is not
+ * finite or outside options.temperatures is refused: STEPDIAG_REFUSED | STEPDIAG_TEMPERATURE. */
+unsigned stepdiag_error_at_temperature(const stepdiag_compensator* compensator, const double position[3],
+                                       const double tool[3], const double temperature[3], double error[3],
+                                       double orientation[3]);
+unsigned stepdiag_command_at_temperature(const stepdiag_compensator* compensator, const double target[3],
+                                         const double tool[3], const double temperature[3], double command[3]);
+unsigned stepdiag_forward_at_temperature(const stepdiag_compensator* compensator, const double command[3],
+                                         const double tool[3], const double temperature[3], double actual[3]);
+/* Temperature of the scales at which they add nothing, degrees Celsius; NAN unless options.temperatures are stated. */
+double stepdiag_temperature_reference(const stepdiag_compensator* compensator);
 
 uint64_t stepdiag_fingerprint(const stepdiag_compensator* compensator);
 double stepdiag_inverse_bound(const stepdiag_compensator* compensator);

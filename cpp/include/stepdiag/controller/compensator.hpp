@@ -7,6 +7,12 @@
 // positions in the controller's machine coordinates, mm; `origin` gives these coordinates of home, the corner of the
 // calibrated volume. Angles in rad.
 //
+// A call may state the temperatures of the scales of X, Y, Z, degrees Celsius. e(c) then has the scales' expansion
+// (machine/expansion.hpp) in it, inside the chain: the table's expansion_per_k and fixed_point_mm, from its
+// temperature_reference_c on. Without them e(c) is that of the table. The coefficients are the table's own and no
+// option: its positioning errors were referred to the reference with them, and any others would be wrong where it was
+// measured.
+//
 // Loading allocates memory and may throw. All other functions are noexcept, take a bounded time, do not allocate, lock
 // or make system calls, and may be called from several threads concurrently. compensator.h is the interface for C.
 #pragma once
@@ -42,15 +48,19 @@ struct CompensatorOptions {
     CompensatedApproach approach = CompensatedApproach::mean;
     double largest_tool = 1000.0;  // mm; longer tools are refused; inverse_bound() is valid for all shorter tools
     bool accept_rejected = false;  // accept a table whose fit was rejected
+    // Lowest and highest temperature of a scale that calls may state, degrees Celsius; both 0: none may be stated.
+    std::array<double, 2> temperatures = {0.0, 0.0};
 };
 
 // Flags. 0: the position is inside the volume.
 enum CompensationStatus : unsigned {
     compensation_outside = 1,  // outside the volume: held, extrapolated or refused
     compensation_capped = 2,   // the error exceeds largest_correction; corrections are shortened
-    compensation_refused = 4   // refused: outside with Outside::refuse, beyond the margin, a position that is not
+    compensation_refused = 4,  // refused: outside with Outside::refuse, beyond the margin, a position that is not
                                // finite or farther than 100 m, or a tool longer than largest_tool. The function returns
                                // the given position or an error of 0. The machine must not move.
+    compensation_temperature = 16  // with `refused`: a temperature that is not finite or outside CompensatorOptions::
+                                   // temperatures. (8 is a flag of the LinuxCNC module.)
 };
 
 struct MachineError {
@@ -73,6 +83,7 @@ public:
     //   - a table without chain, volume_mm or tool_mm, or with a chain other than `chain`
     //   - a table without parameters, or with nodes that do not match its volume
     //   - errors with slopes so large that the inverse has no bound
+    //   - a table as found, or without its expansion, if options.temperatures are stated
     //   - options out of range
     static Compensator load(const std::string& path, const std::string& chain, const CompensatorOptions& options = {});
     // The same for a table in memory. Messages call it `name`.
@@ -82,25 +93,39 @@ public:
     Compensator(Compensator&&) noexcept;
     Compensator& operator=(Compensator&&) noexcept;
 
-    // `tool`: offset of the functional point from the tool's origin, mm.
+    // `tool`: offset of the functional point from the tool's origin, mm. `temperature`: of the scales of X, Y, Z.
     MachineError error(const std::array<double, 3>& position, const std::array<double, 3>& tool) const noexcept;
     CompensatedPosition command(const std::array<double, 3>& target, const std::array<double, 3>& tool) const noexcept;
     CompensatedPosition forward(const std::array<double, 3>& command, const std::array<double, 3>& tool) const noexcept;
+    MachineError error(const std::array<double, 3>& position, const std::array<double, 3>& tool,
+                       const std::array<double, 3>& temperature) const noexcept;
+    CompensatedPosition command(const std::array<double, 3>& target, const std::array<double, 3>& tool,
+                                const std::array<double, 3>& temperature) const noexcept;
+    CompensatedPosition forward(const std::array<double, 3>& command, const std::array<double, 3>& tool,
+                                const std::array<double, 3>& temperature) const noexcept;
 
     // The same with arrays of three numbers, as in C. They return the status. Input and output may be the same array. A
-    // null `tool` means the tool of the calibration. A null `orientation` is not computed, which saves a third of the
-    // time.
+    // null `tool` means the tool of the calibration, a null `temperature` that none is stated. A null `orientation` is
+    // not computed, which saves a third of the time.
     unsigned error(const double* position, const double* tool, double* error, double* orientation) const noexcept;
     unsigned command(const double* target, const double* tool, double* command) const noexcept;
     unsigned forward(const double* command, const double* tool, double* actual) const noexcept;
+    unsigned error(const double* position, const double* tool, const double* temperature, double* error,
+                   double* orientation) const noexcept;
+    unsigned command(const double* target, const double* tool, const double* temperature,
+                     double* command) const noexcept;
+    unsigned forward(const double* command, const double* tool, const double* temperature,
+                     double* actual) const noexcept;
 
-    // Hash that identifies the corrections of the table: chain, volume, tool, nodes and values. It does not depend on
-    // the spelling and order of the file, on options, uncertainties, method and date.
+    // Hash that identifies the corrections of the table: chain, volume, tool, nodes and values, and its expansion if it
+    // has one. It does not depend on the spelling and order of the file, on options, uncertainties, method and date.
     std::uint64_t fingerprint() const noexcept;
-    // Upper bound of |forward(command(t)) - t|, mm, for all targets, tools and options.
+    // Upper bound of |forward(command(t)) - t|, mm, for all targets, tools, temperatures and options.
     double inverse_bound() const noexcept;
     std::array<double, 3> volume() const noexcept;  // mm
     std::array<double, 3> tool() const noexcept;    // of the calibration, mm
+    // Temperature at which its scales add nothing, degrees Celsius; NaN unless options.temperatures are stated.
+    double temperature_reference() const noexcept;
     // Verdict of the table's fit: "accepted", "doubtful", "rejected" or "unchecked"; empty if the table has none. Warn
     // the user about a doubtful or unchecked table.
     const std::string& fit() const noexcept;

@@ -85,6 +85,10 @@ struct Calibration {
     // (by axis, means over all readings); neither: nothing was recorded.
     std::optional<double> temperature_reference = {};
     std::optional<Eigen::Vector3d> temperature_as_found = {};
+    // The scales' expansion by which they are referred: at other temperatures the machine stands where the calibration
+    // says only with the same coefficients. By axis, 1/K; in an adjustment as it was found. None: not known.
+    std::optional<Eigen::Vector3d> expansion = {};
+    Eigen::Vector3d fixed_point = Eigen::Vector3d::Zero();  // from which the scales expand, by axis, mm
 
     std::map<std::string, std::string> provenance = {};  // by provenance_keys, as far as it is known
 };
@@ -115,10 +119,11 @@ bool is_anything_determined(const Calibration& calibration);
 ParameterTable to_parameter_table(const Calibration& calibration);
 
 // CSV with format, chain, volume_mm, tool_mm, method, date, fit, variance_factor, uncertainty_scaled,
-// between_nodes_mm, temperature_reference_c or temperature_as_found_c, fit_reasons, unseen_faults,
-// straightness_reference, provenance_keys, undetermined_slopes, undetermined_reversal_constants and undetermined in the
-// leading lines; not kept are the covariance and the uncertainty of a reversal error, which is not that of its two
-// tables. Reading throws InvalidArgument naming file and line, also where chain, volume or tool is missing.
+// between_nodes_mm, temperature_reference_c with expansion_per_k and fixed_point_mm, or temperature_as_found_c,
+// fit_reasons, unseen_faults, straightness_reference, provenance_keys, undetermined_slopes,
+// undetermined_reversal_constants and undetermined in the leading lines; not kept are the covariance and the
+// uncertainty of a reversal error, which is not that of its two tables. Reading throws InvalidArgument naming file and
+// line, also where chain, volume or tool is missing.
 void write_calibration(const Calibration& calibration, const std::string& path);
 Calibration read_calibration(const std::string& path);
 

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "stepdiag/measurement/measurement.hpp"
@@ -20,6 +21,11 @@ std::vector<double> recorded(const Measurement& measurement, const Channel* chan
 // is none.
 std::vector<Eigen::Vector3d> scale_temperatures(const Measurement& measurement,
                                                 const std::optional<Eigen::Vector3d>& otherwise);
+
+// By row: how much this record (time, or a temperature) has grown since the run's first reading; s or K; 0 for a row
+// without readings of which it says nothing. Throws InvalidArgument, naming the row, where another one has none; of
+// time nothing is interpolated.
+std::vector<double> since_first_reading(const Measurement& measurement, const std::string& record);
 
 // Whether one sensor, or one statement, serves all three axes, so that its deviation is common to them.
 bool has_one_sensor(const Measurement& measurement);

@@ -18,6 +18,14 @@ struct PlanPoint {
     Eigen::Vector3d commanded;  // mm, machine frame
     std::array<int, 3> node;    // per axis
     std::optional<Axis> moved;  // the axis that moved from the previous point; empty for the first point
+    bool is_check = false;      // a return to a check point; no axis counts as moved there
+};
+
+// Returns to one point of each line, which tell a drift from the machine's errors: after every so many steps, a step
+// being one move of each axis. Scale lines have none.
+struct CheckPoints {
+    int every = 0;  // 0: there are none
+    int at = 0;     // the point is that after so many steps; 0: the line's first
 };
 
 // Range of the beam's position on the mirror, in local x and y of the line, mm. The mirror moves with the tool and the
@@ -39,12 +47,12 @@ public:
 
     // `volume`: edges X, Y, Z, mm. Scale lines are single-axis lines of two points. Throws InvalidArgument if there is
     // no line, a line is given twice, an edge is outside 0.001 to 1e6 mm, `steps` is outside 1 to largest_step_count,
-    // a scale line moves more than one axis, or there is no order.
+    // a scale line moves more than one axis, there is no order, or check points are outside 0 to `steps`.
     Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, StepOrder order = all_axes,
-         std::vector<Line> scale_lines = {});
+         std::vector<Line> scale_lines = {}, const CheckPoints& check_points = {});
     // Run r uses orders[r modulo the number of orders].
     Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::vector<StepOrder> orders,
-         std::vector<Line> scale_lines = {});
+         std::vector<Line> scale_lines = {}, const CheckPoints& check_points = {});
 
     const Eigen::Vector3d& volume() const { return volume_; }
     const std::vector<Line>& lines() const { return lines_; }
@@ -52,6 +60,7 @@ public:
     int steps() const { return steps_; }
     const std::vector<StepOrder>& orders() const { return orders_; }
     const StepOrder& order(int run = 0) const;
+    const CheckPoints& check_points() const { return check_points_; }
 
     bool contains(const Line& line) const;  // among the lines or the scale lines
     bool is_scale_line(const Line& line) const;
@@ -60,7 +69,8 @@ public:
     Eigen::Matrix3d frame(const Line& line) const { return line_frame(line, volume_); }
 
     // The points of a line in the order of travel. For N steps: 3N+1 on a body diagonal, 2N+1 on a face diagonal, N+1
-    // on a single-axis line, 2 on a scale line. Throws InvalidArgument for a line that is not in the plan.
+    // on a single-axis line, 2 on a scale line; and the returns to the check point where they are made, which have
+    // numbers of their own. Throws InvalidArgument for a line that is not in the plan.
     std::vector<PlanPoint> points(const Line& line, int run = 0) const;
 
     LateralExcursion lateral_excursion(const Line& line) const;  // over all orders
@@ -74,6 +84,7 @@ private:
     int steps_;
     std::vector<StepOrder> orders_;
     std::vector<Line> scale_lines_;
+    CheckPoints check_points_;
 };
 
 // Accepts a permutation of "XYZ"; throws InvalidArgument for any other text.

@@ -55,10 +55,14 @@ struct SimulationOptions {
     bool backward = false;                           // each forward run of a line is followed by a backward run
     std::optional<double> seconds_per_reading = {};  // makes the channel time, which counts from the first reading
     std::optional<ScaleTemperatures> scales = {};    // none: they do not expand, and nothing is recorded
+    // Of the functional point along each axis, as if the axis stood further on, since the run's first reading, mm/s.
+    Eigen::Vector3d machine_drift = Eigen::Vector3d::Zero();
 
     static constexpr int largest_repeat_count = 1'000;
 
     Misalignment misalignment_of(const Line& line) const;
+    // What moves the axes along themselves at a commanded position in a row of the run, beside their errors, mm.
+    Eigen::Vector3d shift(const Eigen::Vector3d& commanded, std::uint64_t row) const;
     // Whoever says what air is assumed means air; else usual_environment.
     Environment environment_of(const Head& head) const;
     ReadingConditions conditions_of(const Head& head) const;

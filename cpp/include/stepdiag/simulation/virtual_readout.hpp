@@ -23,9 +23,7 @@ public:
 
 private:
     Machine machine_;
-    Noise noise_;
-    std::optional<ScaleTemperatures> scales_;
-    double seconds_;  // from row to row
+    SimulationOptions options_;
     PassReader reader_;
 };
 

@@ -32,14 +32,16 @@ enum class SharedQuantity {
     // Machine.
     machine_drift,  // mm/s, component x, y, z, of the functional point since the first reading of the run
     // Scales (machine/expansion.hpp), component x, y, z; or the same deviation of all axes.
-    expansion,                // 1/K: true minus stated coefficient
-    common_expansion,         // 1/K
-    scale_temperature,        // K: true temperature minus that of the run's channels
-    common_scale_temperature  // K
+    expansion,                 // 1/K: true minus stated coefficient
+    common_expansion,          // 1/K
+    scale_temperature,         // K: true temperature minus that of the run's channels
+    common_scale_temperature,  // K
+    scale_ramp,                // K/s: how that grows since the run's first reading
+    common_scale_ramp          // K/s
 };
 
 using InputQuantity = std::variant<SetupQuantity, SharedQuantity>;
-std::string name(InputQuantity quantity);  // "reflector", ..., "common_scale_temperature"
+std::string name(InputQuantity quantity);  // "reflector", ..., "common_scale_ramp"
 InputQuantity parse_input_quantity(const std::string& name);
 
 struct UncertainInput {
