@@ -20,10 +20,10 @@ install(DIRECTORY "${PROJECT_BINARY_DIR}/include/" DESTINATION "${CMAKE_INSTALL_
 configure_package_config_file(cmake/stepdiagConfig.cmake.in stepdiagConfig.cmake INSTALL_DESTINATION "${config_dir}")
 write_basic_package_version_file(stepdiagConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES "${PROJECT_BINARY_DIR}/stepdiagConfig.cmake" "${PROJECT_BINARY_DIR}/stepdiagConfigVersion.cmake"
-              cmake/FindLibCsv.cmake DESTINATION "${config_dir}")
+              cmake/FindLibCsv.cmake cmake/FindLibMd.cmake DESTINATION "${config_dir}")
 
 # A C program that links the archive has to name what the archive needs; the shared library brings it along.
-set(needed_by_archive "-lcsv -lstdc++ -lm")
+set(needed_by_archive "-lcsv -lmd -lstdc++ -lm")
 if(BUILD_SHARED_LIBS)
   set(pkg_config_libs "")
   set(pkg_config_libs_private "${needed_by_archive}")

@@ -1,4 +1,4 @@
-// Uses the dependencies that a static archive must link: Embree (optics) and libcsv (tables).
+// Uses the dependencies that a static archive must link: Embree (optics) and libcsv and libmd (tables).
 #include <cstdio>
 #include <cstring>
 #include <stepdiag/core/error.hpp>

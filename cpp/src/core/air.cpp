@@ -69,15 +69,20 @@ double ciddor(const Air& air, double S) {
     return 1.0 + rho_a / rho_axs * r_axs + rho_v / rho_vs * r_vs;
 }
 
-// Dispersion of standard air, n_s - 1 = 1e-8 [c0 + c1/(130 - S) + c2/(38.9 - S)].
-struct EdlenDispersion {
-    double c0, c1, c2;
-};
+double vapour_pressure(const Air& air) { return air.relative_humidity * saturation_vapour_pressure(air.temperature); }
 
-double edlen(const Air& air, double S, const EdlenDispersion& dispersion) {
-    const double t = air.temperature, p = air.pressure;
-    const double p_v = air.relative_humidity * saturation_vapour_pressure(t);
-    const double n_s_1 = 1e-8 * (dispersion.c0 + dispersion.c1 / (130.0 - S) + dispersion.c2 / (38.9 - S));
+// In torr, as published.
+double edlen_1966(const Air& air, double S) {
+    constexpr double torr = 101325.0 / 760.0;  // Pa
+    const double t = air.temperature, p = air.pressure / torr, f = vapour_pressure(air) / torr;
+    const double n_s_1 = 1e-8 * (8342.13 + 2406030.0 / (130.0 - S) + 15997.0 / (38.9 - S));
+    const double X = (1.0 + 1e-6 * (0.817 - 0.0133 * t) * p) / (1.0 + 0.003661 * t);
+    return 1.0 + p * n_s_1 * X / 720.775 - 1e-8 * (5.722 - 0.0457 * S) * f;
+}
+
+double modified_edlen(const Air& air, double S) {
+    const double t = air.temperature, p = air.pressure, p_v = vapour_pressure(air);
+    const double n_s_1 = 1e-8 * (8342.54 + 2406147.0 / (130.0 - S) + 15998.0 / (38.9 - S));
     const double X = (1.0 + 1e-8 * (0.601 - 0.00972 * t) * p) / (1.0 + 0.003661 * t);
     return 1.0 + p * n_s_1 * X / 96095.43 - 1e-10 * (292.75 / (t + celsius_zero)) * (3.7345 - 0.0401 * S) * p_v;
 }
@@ -96,8 +101,8 @@ double refractive_index(const Air& air, double wavelength, AirEquation equation)
     check(air, wavelength);
     const double S = 1e6 / (wavelength * wavelength);  // wave number squared, 1/um^2
     switch (equation) {
-        case AirEquation::modified_edlen: return edlen(air, S, {8342.54, 2406147.0, 15998.0});
-        case AirEquation::edlen_1966: return edlen(air, S, {8342.13, 2406030.0, 15997.0});
+        case AirEquation::modified_edlen: return modified_edlen(air, S);
+        case AirEquation::edlen_1966: return edlen_1966(air, S);
         default: return ciddor(air, S);
     }
 }

@@ -163,6 +163,7 @@ CsvFile parse_csv(std::string_view text, const std::string& file_name) {
     if (text.substr(0, byte_order_mark.size()) == byte_order_mark) text.remove_prefix(byte_order_mark.size());
     int number = 0;
     while (!text.empty()) {
+        const std::string_view rest = text;
         const auto end = text.find('\n');
         std::string_view line = text.substr(0, end);
         text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
@@ -177,6 +178,7 @@ CsvFile parse_csv(std::string_view text, const std::string& file_name) {
         CsvRow row{parse_record(line, where), number};
         if (file.header.fields.empty()) {
             file.header = std::move(row);
+            file.body = rest;
             continue;
         }
         if (row.fields.size() != file.header.fields.size())

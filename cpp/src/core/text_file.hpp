@@ -26,6 +26,7 @@ struct CsvFile {
     std::vector<CsvRow> comments;  // leading "# ..." lines, each as one field without the "#"
     CsvRow header;
     std::vector<CsvRow> rows;  // each with as many fields as the header; blank lines are skipped
+    std::string_view body;     // of the text that was parsed: from the header row to the end
 };
 
 // Throws InvalidArgument, which names `file_name` and line, for text that is not CSV, a row with another number of

@@ -105,7 +105,8 @@ NominalHead nominal_head(const HeadDesign& design, double distance, const Enviro
             if (design.layout == HeadLayout::psd && !(offset.norm() < smallest_offset)) {
                 std::ostringstream text;
                 text << "beam " << design.beams[b].name << ": a psd head measures its distance at x = 0, y = 0, got "
-                     << offset.x() << ", " << offset.y() << " mm";
+                     << offset.x() << ", " << offset.y() << " mm; move the beam by " << 0.0 - offset.x() << ", "
+                     << 0.0 - offset.y() << " mm (position_mm)";
                 throw InvalidArgument(text.str());
             }
             continue;

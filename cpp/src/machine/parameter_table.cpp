@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/sha256.hpp"
 #include "core/text_file.hpp"
 #include "stepdiag/core/error.hpp"
 
@@ -11,7 +12,9 @@ namespace {
 
 // Keys written first, because readers look for them first. The other keys follow in alphabetical order.
 const std::vector<std::string> first_keys = {"format", "chain", "volume_mm", "tool_mm"};
-// Number of rows after the header row. It belongs to the file and is not kept in the table.
+// They belong to the file and are not kept in the table: the checksum of what follows the leading lines, and the number
+// of rows after the header row, which files of earlier versions have in its place.
+const std::string checksum_key = "sha256";
 const std::string rows_key = "rows";
 
 // Power of ten from the unit in the file to the native one.
@@ -26,6 +29,13 @@ std::string trimmed(std::string_view text) {
                                            : std::string(text.substr(first, text.find_last_not_of(' ') + 1 - first));
 }
 
+// The same for both kinds of line ends, which programs change that do not mean to change a file.
+std::string checksum(std::string_view body) {
+    std::string text(body);
+    for (std::size_t at = 0; (at = text.find("\r\n", at)) != std::string::npos; ++at) text.erase(at, 1);
+    return sha256(text);
+}
+
 class Reader {
 public:
     Reader(std::string_view text, const std::string& file_name)
@@ -34,7 +44,6 @@ public:
     ParameterTable read() {
         read_header();
         find_columns();
-        check_rows();
         for (const CsvRow& row : csv_.rows) read_row(row);
         for (int i = 0; i < function_count; ++i)
             if (!table_.functions[i]) std::swap(table_.functions[i], table_.negative_functions[i]);
@@ -59,8 +68,9 @@ private:
             if (key == "format" && given != error_map_format && given != calibration_format)
                 fail(comment.line, "format: expected " + quoted(error_map_format) + " or " +
                                        quoted(calibration_format) + ", got " + quoted(given));
-            if (key == rows_key) {
-                rows_ = {{given}, comment.line};
+            if (key == rows_key || key == checksum_key) {
+                expect(key, comment.line, given,
+                       key == rows_key ? std::to_string(csv_.rows.size()) : checksum(csv_.body));
                 continue;
             }
             const bool is_known = std::find(first_keys.begin(), first_keys.end(), key) != first_keys.end();
@@ -70,12 +80,11 @@ private:
         }
     }
 
-    // A file truncated between two rows is otherwise valid; only the number of rows reveals it.
-    void check_rows() const {
-        const std::string came = std::to_string(csv_.rows.size());
-        if (rows_.line > 0 && rows_.fields.front() != came)
-            fail(rows_.line, "rows: expected " + quoted(rows_.fields.front()) + ", got " + came +
-                                 "; the file was cut, or rows were added: without this line it is read as it is");
+    // A file that was cut between two rows, or within the digits of its last number, is otherwise valid.
+    void expect(const std::string& key, int line, const std::string& given, const std::string& found) const {
+        if (given != found)
+            fail(line, key + ": expected " + quoted(given) + ", got " + found +
+                           "; the file was cut or changed: without this line it is read as it is");
     }
 
     void find_columns() {
@@ -166,7 +175,6 @@ private:
     CsvFile csv_;
     std::array<std::optional<std::size_t>, column_count> field_;
     std::map<std::string, bool> is_directed_;  // by parameter
-    CsvRow rows_{{}, 0};                       // the leading line "# rows="
     ParameterTable table_;
 };
 
@@ -205,10 +213,10 @@ ParameterTable read_parameter_table(const std::string& path) {
 }
 
 std::string format_parameter_table(const ParameterTable& table) {
-    std::string text;
-    int count = 0;
     const bool directed = std::any_of(table.negative_functions.begin(), table.negative_functions.end(),
                                       [](const auto& function) { return function.has_value(); });
+    std::string text =
+        std::string("parameter,position_mm,value,unit,standard_uncertainty") + (directed ? ",direction" : "") + "\n";
     const auto row = [&](const std::string& parameter, const std::string& position, double value, bool rotation,
                          std::optional<double> uncertainty, const char* direction) {
         if (!std::isfinite(value) || !std::isfinite(uncertainty.value_or(0.0)))
@@ -216,7 +224,6 @@ std::string format_parameter_table(const ParameterTable& table) {
         const int shift = rotation ? -micro_to_radian : -micro_to_milli;
         text += parameter + "," + position + "," + format_decimal(value, shift) + (rotation ? ",urad," : ",um,") +
                 (uncertainty ? format_decimal(*uncertainty, shift) : "") + (directed ? "," : "") + direction + "\n";
-        ++count;
     };
     const auto rows = [&](FunctionId id, const FunctionTable& function, const char* direction) {
         for (std::size_t k = 0; k < function.position.size(); ++k)
@@ -235,9 +242,8 @@ std::string format_parameter_table(const ParameterTable& table) {
     for (const Squareness s : all_squarenesses)
         if (const auto& entry = table.squarenesses[static_cast<int>(s)])
             row(name(s), "", entry->value, true, entry->standard_uncertainty, "");
-    const std::string counted = table.header.empty() ? "" : "# " + rows_key + "=" + std::to_string(count) + "\n";
-    return format_header(table.header) + counted + "parameter,position_mm,value,unit,standard_uncertainty" +
-           (directed ? ",direction" : "") + "\n" + text;
+    const std::string guard = table.header.empty() ? "" : "# " + checksum_key + "=" + checksum(text) + "\n";
+    return format_header(table.header) + guard + text;
 }
 
 std::string format_lengths(const Eigen::Vector3d& lengths) {

@@ -3,6 +3,7 @@
 labelled_tables.py, netcdf_read.py and docs/files.md describe their contents.
 """
 
+import hashlib
 import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -22,14 +23,17 @@ from stepdiag.io.whole_files import read_bytes, whole_file
 _FREE_SIZE = 64 * 2**20
 _LARGEST_COMPRESSION = 100
 
+_CHECKSUM = "sha256"
+_OF_OTHERS = ("history",)  # attributes that other programs add to, as their conventions want
 _FILL = netCDF4.default_fillvals["f8"]  # netCDF's mark of values never written
 
 
 def write_dataset(dataset: xr.Dataset, path: Path, attributes: dict[str, Any]) -> None:
     """Write a table, with these global attributes before its own.
 
-    Texts are stored as characters. Numbers get a Fletcher-32 checksum, so that readers notice
-    damage. Raises InvalidArgument if the file cannot be written."""
+    Texts are stored as characters. The attribute `sha256` is the checksum of all values and
+    attributes; arrays get Fletcher-32 too, which every netCDF library checks. Raises
+    InvalidArgument if the file cannot be written."""
     first = {"Conventions": "CF-1.11", "source": f"stepdiag {__version__}"} | attributes
     dataset = dataset.assign_attrs(first)
     dataset.attrs = first | dataset.attrs
@@ -41,6 +45,7 @@ def write_dataset(dataset: xr.Dataset, path: Path, attributes: dict[str, Any]) -
         variable.encoding = {"fletcher32": variable.ndim > 0}
         if variable.dtype.kind == "f" and not np.isnan(variable.values).any():
             variable.encoding["_FillValue"] = None
+    dataset.attrs[_CHECKSUM] = _checksum(dataset)
     with whole_file(path) as temporary:
         try:
             dataset.to_netcdf(temporary, mode="w", engine="netcdf4", format="NETCDF4")
@@ -65,7 +70,9 @@ def open_dataset(path: Path) -> Iterator["NetcdfFile"]:
     except Exception as error:  # the libraries raise anything for a damaged file
         raise InvalidArgument(f"{path}: expected a netCDF file: {_one_line(error)}") from None
     with dataset:
-        yield NetcdfFile(path, dataset)
+        file_of = NetcdfFile(path, dataset)
+        file_of.check()
+        yield file_of
 
 
 class NetcdfFile:
@@ -74,6 +81,20 @@ class NetcdfFile:
     def __init__(self, path: Path, dataset: xr.Dataset) -> None:
         self.path = path
         self._dataset = dataset
+
+    def check(self) -> None:
+        """Compare the content with the checksum of the file, if it has one. Raises InvalidArgument."""
+        expected = self._dataset.attrs.get(_CHECKSUM)
+        if expected is None:
+            return
+        for name in self.names:
+            self._load(name, self._variable(name))
+        if expected != _checksum(self._dataset):
+            raise self.fail(
+                f"attribute {_CHECKSUM}",
+                f"expected {_show(expected)}, got {_checksum(self._dataset)}; the file was damaged or changed: "
+                "without this attribute it is read as it is",
+            )
 
     def __contains__(self, name: str) -> bool:
         return name in self._dataset.variables
@@ -175,6 +196,37 @@ class NetcdfFile:
             return np.asarray(variable.values)
         except Exception as error:  # such as a wrong checksum
             raise self.fail(name, f"cannot be read: {_one_line(error)}") from None
+
+
+def _checksum(dataset: xr.Dataset) -> str:
+    """SHA-256 of all attributes and of the variables with their dimensions, in the order of their names.
+
+    A name is followed by its values: numbers as little-endian doubles, NaN as NumPy's, texts in
+    UTF-8, each text ended by a zero byte. docs/files.md describes it for other programs."""
+    digest = hashlib.sha256()
+
+    def add(name: str, value: Any) -> None:
+        digest.update(name.encode() + b"\0")
+        values = np.atleast_1d(np.asarray(value))
+        if values.dtype.kind in "fiub":
+            numbers = values.astype("<f8")
+            numbers[np.isnan(numbers)] = np.nan
+            digest.update(numbers.tobytes())
+            return
+        for text in values.ravel().tolist():
+            digest.update((text if isinstance(text, bytes) else str(text).encode()) + b"\0")
+
+    def add_attributes(owner: str, attributes: dict[str, Any]) -> None:
+        for key in sorted(attributes):
+            if key not in (_CHECKSUM, *_OF_OTHERS):
+                add(f"{owner}:{key}", attributes[key])
+
+    add_attributes("", dataset.attrs)
+    for name in sorted(map(str, dataset.variables)):
+        variable = dataset.variables[name]
+        add(f"{name}({','.join(map(str, variable.dims))})", variable.values)
+        add_attributes(name, variable.attrs)
+    return digest.hexdigest()
 
 
 def _check_size(file: netCDF4.Dataset, size: int, path: Path) -> None:

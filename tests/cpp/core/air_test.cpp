@@ -43,16 +43,21 @@ TEST(AirIndex, SensitivitiesAtTheHeadsWavelengthAreTheKnownOnes) {
     EXPECT_NEAR(index(20, 101325, 0.505) * 1e6 - index(20, 101325, 0.495) * 1e6, -0.009, 0.0005);
 }
 
-TEST(AirIndex, OldEdlenDiffersByItsDispersionOnly) {
-    // Refractivities of standard air at 633 nm from the two sets of constants, by hand: 2.7653e-4 each, 3.8e-9 apart.
-    const Air air{20.0, 101325.0, 0.0, 450.0};
-    const double S = 1e6 / (633.0 * 633.0);
-    const double change =
-        1e-8 * ((8342.54 - 8342.13) + (2406147.0 - 2406030.0) / (130 - S) + (15998.0 - 15997.0) / (38.9 - S));
-    const double density = 101325.0 / 96095.43 * (1 + 1e-8 * (0.601 - 0.1944) * 101325.0) / (1 + 0.07322);
-    EXPECT_NEAR(refractive_index(air, 633.0, AirEquation::modified_edlen) -
-                    refractive_index(air, 633.0, AirEquation::edlen_1966),
-                change * density, 1e-15);  // differences of numbers near 1
+// Recomputed from the published constants with 40 digits (mpmath).
+TEST(AirIndex, EdlenOf1966HasItsOwnDensityAndWater) {
+    const auto index = [](double t, double humidity, double wavelength) {
+        return refractive_index(Air{t, 101325.0, humidity, 450.0}, wavelength, AirEquation::edlen_1966);
+    };
+    EXPECT_NEAR(index(20.0, 0.5, 633.0), 1.000271295519, 1e-12);
+    EXPECT_NEAR(index(30.0, 0.8, 633.0), 1.000261366444, 1e-12);
+    EXPECT_NEAR(index(20.0, 0.5, 1530.0), 1.000268094079, 1e-12);
+}
+
+TEST(AirIndex, EdlenOf1966IsItsDispersionInStandardAir) {
+    // Standard air is dry, 15 degrees Celsius, 760 torr; the constants of the density make that 1 to 4e-7 of 2.8e-4.
+    const double S = 1e6 / (633.0 * 633.0), standard = 1e-8 * (8342.13 + 2406030.0 / (130 - S) + 15997.0 / (38.9 - S));
+    EXPECT_NEAR(refractive_index(Air{15.0, 101325.0, 0.0, 300.0}, 633.0, AirEquation::edlen_1966), 1.0 + standard,
+                2e-10);
 }
 
 TEST(AirIndex, WhatIsOutOfRangeIsRefusedByName) {

@@ -250,18 +250,52 @@ TEST(ParameterTable, FormatChainVolumeAndToolAreWrittenFirst) {
     table.header = {{"a", "1"},      {"chain", "c"},   {"format", stepdiag::calibration_format},
                     {"method", "m"}, {"tool_mm", "t"}, {"volume_mm", "v"}};
     const std::string text = format_parameter_table(table);
-    EXPECT_EQ(text.substr(0, text.find("parameter")),
-              "# format=stepdiag calibration 1\n# chain=c\n# volume_mm=v\n# tool_mm=t\n# a=1\n# method=m\n# rows=0\n");
+    EXPECT_EQ(text.substr(0, text.find("# sha256")),
+              "# format=stepdiag calibration 1\n# chain=c\n# volume_mm=v\n# tool_mm=t\n# a=1\n# method=m\n");
 }
 
-TEST(ParameterTable, FileThatWasCutBetweenRowsIsRefused) {
+// The two sums are those of `grep -v '^#' FILE | sha256sum`.
+TEST(ParameterTable, ChecksumIsThatOfTheLinesBelowTheLeadingOnes) {
+    ParameterTable table;
+    table.header = {{"format", stepdiag::calibration_format}};
+    EXPECT_EQ(format_parameter_table(table),
+              "# format=stepdiag calibration 1\n"
+              "# sha256=adf5583612d2fabd1fa2a6de1ff2662fc0bb57dd75f55cbf664e132b85fe3aaf\n" +
+                  header);
+    table.functions[0] = FunctionTable{{0.0, 1.0}, {0.0, 2.0}, {std::nullopt, std::nullopt}};
+    EXPECT_EQ(format_parameter_table(table),
+              "# format=stepdiag calibration 1\n"
+              "# sha256=a0d21d8f00d714afab9477b9931b3ec704e146ea3071d3fb99e08ebe0a953558\n" +
+                  header + "EXX,0.0,0.0,um,\nEXX,1.0,2000.0,um,\n");
+}
+
+TEST(ParameterTable, FileThatWasCutAnywhereInItsRowsIsRefused) {
+    ParameterTable table;
+    table.header = {{"format", stepdiag::calibration_format}};
+    table.functions[0] = FunctionTable{{0.0, 1.0}, {0.0, 2.0}, {std::nullopt, 0.125}};
+    const std::string text = format_parameter_table(table);
+    EXPECT_EQ(parse_parameter_table(text, "t.csv").header, table.header);  // the sum is the file's, not the table's
+    const std::string cut = text.substr(0, text.size() - 2);               // within its last number
+    for (std::size_t size = text.find("EXX"); size < text.size(); ++size)
+        EXPECT_THROW(parse_parameter_table(text.substr(0, size), "t.csv"), stepdiag::InvalidArgument) << size;
+    expect_refused([&] { parse_parameter_table(cut, "t.csv"); }, "t.csv, line 2: sha256: expected \"");
+}
+
+TEST(ParameterTable, LineEndsDoNotChangeTheChecksum) {
     ParameterTable table;
     table.header = {{"format", stepdiag::calibration_format}};
     table.functions[0] = FunctionTable{{0.0, 1.0}, {0.0, 2.0}, {std::nullopt, std::nullopt}};
     const std::string text = format_parameter_table(table);
-    EXPECT_EQ(parse_parameter_table(text, "t.csv").header, table.header);  // the count is the file's, not the table's
+    std::string windows;
+    for (const char c : text) windows += c == '\n' ? std::string("\r\n") : std::string(1, c);
+    EXPECT_EQ(parse_parameter_table(windows, "t.csv").functions[0]->value, table.functions[0]->value);
+}
+
+TEST(ParameterTable, FileOfAnEarlierVersionThatWasCutBetweenRowsIsRefused) {
+    const std::string text = "# rows=2\n" + header + "EXX,0.0,0.0,um,\nEXX,1.0,2.0,um,\n";
+    EXPECT_TRUE(parse_parameter_table(text, "t.csv").header.empty());  // the count is the file's, not the table's
     const std::string cut = text.substr(0, text.rfind("EXX"));
-    expect_refused([&] { parse_parameter_table(cut, "t.csv"); }, "t.csv, line 2: rows: expected \"2\", got 1");
+    expect_refused([&] { parse_parameter_table(cut, "t.csv"); }, "t.csv, line 1: rows: expected \"2\", got 1");
 }
 
 TEST(ParameterTable, HeaderThatCouldNotBeReadBackIsNotWritten) {

@@ -111,7 +111,7 @@ MALFORMED = {
     "plate too thin": (put(PSD, WINDOW, "thickness_mm = 0.009"), "window: too thin; expected at least 0.01 mm, got 0.009 mm"),
     # the whole
     "laser's wavelength out of range": (put(PSD, LASER, "wavelength_nm = 200.0"), "beam.laser: N-BK7, wavelength in nm: expected 334.000000 to 2325.000000, got 200.000000"),
-    "interferometer beside the origin": (put(PSD, "position_mm = [0.0, 0.0, 0.0]", "position_mm = [0.5, 0.0, 0.0]"), "beam interferometer: a psd head measures its distance at x = 0, y = 0, got 0.5, "),
+    "interferometer beside the origin": (put(PSD, "position_mm = [0.0, 0.0, 0.0]", "position_mm = [0.5, 0.0, 0.0]"), "beam interferometer: a psd head measures its distance at x = 0, y = 0, got 0.5, 0 mm; move the beam by -0.5, 0 mm (position_mm)"),
     "overlapping bodies": (put(BLOCK, "position_mm = [12.5, 0.0, 40.0]", "position_mm = [12.5, 0.0, 15.5]"), "window and block: overlap or touch; expected a gap of at least 0.01 mm, got 0 mm"),
     "bodies that touch": (put(BLOCK, "position_mm = [12.5, 0.0, 40.0]", "position_mm = [12.5, 0.0, 16.0]"), "window and block: overlap or touch; expected a gap of at least 0.01 mm, got 0 mm"),
     "body inside another": (put(BLOCK, "position_mm = [12.5, 0.0, 40.0]", "position_mm = [12.5, 0.0, 12.5]"), "window and block: overlap or touch; expected a gap of at least 0.01 mm, got 0 mm"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import struct
 import subprocess
 import sys
 from collections.abc import Callable
@@ -40,7 +42,8 @@ READERS: dict[str, Callable[[Path], Any]] = {
 
 def changed(file: Path, change: Change, target: Path) -> Path:
     with xr.open_dataset(file) as table:
-        change(table.load()).to_netcdf(target, engine="netcdf4")
+        without_checksum = attribute(None, "sha256", None)(table.load())
+        change(without_checksum).to_netcdf(target, engine="netcdf4")
     return target
 
 
@@ -204,6 +207,39 @@ def test_damaged_number_is_noticed(folder: Path, tmp_path: Path) -> None:
     content[content.index(distances[30:33].tobytes())] ^= 1
     (tmp_path / "damaged.nc").write_bytes(content)
     refused(sd.read_measurement, tmp_path / "damaged.nc", names="damaged.nc: distance: cannot be read")
+
+
+def test_damaged_squareness_is_noticed(folder: Path, tmp_path: Path) -> None:
+    """A scalar has no checksum of the netCDF library; the file's own covers it."""
+    content = bytearray((folder / "calibration.nc").read_bytes())
+    value, _ = sd.read_calibration(folder / "calibration.nc").squareness["C0Y"]
+    content[content.index(np.float64(value).tobytes())] ^= 1
+    (tmp_path / "damaged.nc").write_bytes(content)
+    refused(sd.read_calibration, tmp_path / "damaged.nc", names="damaged.nc: attribute sha256: expected ")
+
+
+def test_file_without_its_checksum_is_read_as_it_is(folder: Path, tmp_path: Path) -> None:
+    file = changed(folder / "calibration.nc", put("EXX", 3, 0.001), tmp_path / "changed.nc")
+    assert sd.read_calibration(file).functions["EXX"][1][3] == 0.001
+
+
+def test_checksum_is_what_the_documentation_says(folder: Path) -> None:
+    with xr.open_dataset(folder / "calibration.nc") as table:
+        parts = [(f":{key}", value) for key, value in table.attrs.items() if key not in ("sha256", "history")]
+        names = sorted(map(str, table.variables))
+        ordered = [(name, value) for name, value in sorted(parts)]
+        for name in names:
+            variable = table.variables[name]
+            ordered.append((f"{name}({','.join(map(str, variable.dims))})", variable.values))
+            ordered += [(f"{name}:{key}", value) for key, value in sorted(variable.attrs.items())]
+        digest = hashlib.sha256()
+        for name, value in ordered:
+            digest.update(name.encode() + b"\0")
+            for one in np.ravel(value):
+                is_text = isinstance(one, str | bytes)
+                text = one if isinstance(one, bytes) else str(one).encode()
+                digest.update(text + b"\0" if is_text else struct.pack("<d", one))
+        assert table.attrs["sha256"] == digest.hexdigest()
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ enum class AirEquation {
     ciddor,          // P. E. Ciddor, Appl. Opt. 35 (1996) 1566, with the IAPWS vapour pressure
     modified_edlen,  // K. P. Birch, M. J. Downs, Metrologia 30 (1993) 155 and 31 (1994) 315; water term as in the NIST
                      // Engineering Metrology Toolbox
-    edlen_1966,      // B. Edlen, Metrologia 2 (1966) 71 for the dispersion; density and water as for modified_edlen
+    edlen_1966,      // B. Edlen, Metrologia 2 (1966) 71: dispersion, density and water, with 300 ppm of carbon dioxide
 };
 
 // Accepts "ciddor", "modified_edlen" and "edlen_1966"; throws InvalidArgument for any other text.

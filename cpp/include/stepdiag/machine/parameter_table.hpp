@@ -48,7 +48,8 @@ inline constexpr const char* calibration_format = "stepdiag calibration 1";
 // which names file and line, for:
 //   - a file that is unreadable, binary or of another format
 //   - format, chain, volume_mm or tool_mm given twice
-//   - a number of rows other than that of the leading line "# rows=" (a truncated file)
+//   - rows that do not have the checksum of the leading line "# sha256=" (a truncated or changed file), or not the
+//     number of the line "# rows=" that files of earlier versions have in its place
 //   - a missing, unknown or repeated column
 //   - an unknown parameter or unit, a text that is not a finite number
 //   - positions that do not ascend, a squareness with a position or given twice
