@@ -123,7 +123,6 @@ if TYPE_CHECKING:
     from stepdiag.acquisition.settling import Settling
     from stepdiag.acquisition.tcp_trigger import TcpTrigger
     from stepdiag.acquisition.triggers import KeyTrigger
-    from stepdiag.acquisition.twin import Twin
     from stepdiag.calibration.comparison import Comparison, Difference, compare_calibrations
     from stepdiag.calibration.functional_point import functional_point_straightness
     from stepdiag.calibration.largest_by_kind import Deviation, largest_deviations, largest_uncertainties
@@ -163,6 +162,7 @@ if TYPE_CHECKING:
     from stepdiag.scenario.known import Known
     from stepdiag.scenario.provenance import provenance_of
     from stepdiag.scenario.truth import Truth
+    from stepdiag.twin.server import Twin
     from stepdiag.uncertainty.dask_workers import workers_of
     from stepdiag.uncertainty.model_source import ModelSource
     from stepdiag.uncertainty.monte_carlo import run_monte_carlo
@@ -349,7 +349,7 @@ _LATER = {
     "acquisition.settling": ("Settling",),
     "acquisition.tcp_trigger": ("TcpTrigger",),
     "acquisition.triggers": ("KeyTrigger",),
-    "acquisition.twin": ("Twin",),
+    "twin.server": ("Twin",),
     "calibration.comparison": (
         "Comparison",
         "Difference",

@@ -11,18 +11,19 @@ from pathlib import Path
 from typing import Any
 
 from stepdiag.acquisition.acquire import acquire, raw_path
-from stepdiag.acquisition.ids3010 import Ids3010, InstrumentError
+from stepdiag.acquisition.ids3010 import Ids3010
 from stepdiag.acquisition.ids3010_messages import JsonStream
+from stepdiag.acquisition.instrument import InstrumentError
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.raw_file import read_raw
 from stepdiag.acquisition.run_from_raw import measurement_of
 from stepdiag.acquisition.settling import Settling
 from stepdiag.acquisition.tcp_trigger import _expectation
 from stepdiag.acquisition.triggers import KeyTrigger
-from stepdiag.acquisition.twin import Answers, Twin
-from stepdiag.acquisition.twin_instrument import TwinInstrument
 from stepdiag.scenario.description import parse_scenario
 from stepdiag.scenario.order_of_run import Visit
+from stepdiag.twin.instrument import TwinInstrument
+from stepdiag.twin.server import Answers, Twin
 
 SCENARIO = parse_scenario(
     """

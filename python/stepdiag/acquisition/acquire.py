@@ -1,17 +1,19 @@
 """Acquisition of a run: from the instrument to a raw file, then to a measurement file."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.ids3010 import Ids3010, InstrumentError, parse_source
+from stepdiag.acquisition.ids3010 import Ids3010, parse_source
+from stepdiag.acquisition.ids3010_instrument import Ids3010Instrument
+from stepdiag.acquisition.instrument import Instrument, InstrumentError
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.raw_file import RawContent, RawFile, check_new
 from stepdiag.acquisition.raw_records import Header, Record
-from stepdiag.acquisition.reading_plan import channels_of, check_axes, described_plan, digest_of
+from stepdiag.acquisition.reading_plan import channels_of_axes, check_axes, described_plan, digest_of
 from stepdiag.acquisition.run_from_raw import measurement_of
 from stepdiag.acquisition.temperature_file import TemperatureFile
 from stepdiag.acquisition.triggers import Operator, Silent, Trigger
@@ -79,10 +81,7 @@ def acquire(
     """
     known, options, operator = scenario.known, options or AcquireOptions(), operator or Silent()
     try:
-        channels = channels_of(known)
-        axes = options.axes or tuple(range(1, len(channels) + 1))
-        check_axes(axes, channels)
-        host, port = parse_source(source)
+        instrument = instrument_of(source, known, options)
         check_output(output)
         path = raw or raw_path(output)
         if path.resolve() == output.resolve():
@@ -93,17 +92,19 @@ def acquire(
         if temperatures is not None:
             followed = TemperatureFile(temperatures, age=options.temperature_age, tell=operator.tell)
         plan = described_plan(known)
-        header = Header(
-            created=datetime.now(UTC),
-            scenario=known.path.name,
-            digest=digest_of(channels, plan),
-            channels=channels,
-            axes=list(axes),
-            sign=options.sign,
-            plan=plan,
-        )
-        instrument = Ids3010(host, port, timeout=options.timeout, attempts=options.attempts)
-        with instrument, _opened(path, header, resume, instrument) as (file, content):
+        with ExitStack() as opened:
+            opened.enter_context(instrument)
+            columns = instrument.columns
+            header = Header(
+                created=datetime.now(UTC),
+                scenario=known.path.name,
+                digest=digest_of([column.channel for column in columns], plan),
+                columns=[column.name for column in columns],
+                axes=list(instrument.axes),
+                sign=options.sign,
+                plan=plan,
+            )
+            file, content = opened.enter_context(_opened(path, header, resume, instrument))
             work = Acquisition(known, header, file, instrument, trigger, operator, options, followed)
             if content is not None:
                 work.go_on(content, resume or "point")
@@ -133,9 +134,19 @@ def acquire(
     return Acquired(path, output, len(work.done), lost, sum(len(visit.points) for visit in plan))
 
 
+def instrument_of(source: str, known: Known, options: AcquireOptions) -> Instrument:
+    """The instrument of a source, not yet connected. Raises InvalidArgument."""
+    channels = channels_of_axes(known)
+    axes = options.axes or tuple(range(1, len(channels) + 1))
+    check_axes(axes, channels)
+    host, port = parse_source(source)
+    client = Ids3010(host, port, timeout=options.timeout, attempts=options.attempts)
+    return Ids3010Instrument(client, channels, axes, start=options.start, start_timeout=options.start_timeout)
+
+
 @contextmanager
 def _opened(
-    path: Path, header: Header, resume: Resume | None, instrument: Ids3010
+    path: Path, header: Header, resume: Resume | None, instrument: Instrument
 ) -> Iterator[tuple[RawFile, RawContent | None]]:
     """Open the raw file: a new one, or one to continue together with its content."""
     if resume is None:
@@ -146,7 +157,12 @@ def _opened(
         return
     file, content = RawFile.resume(path)
     with file:
-        for key, what in (("digest", "plan, head or channels"), ("axes", "axes"), ("sign", "sign")):
+        for key, what in (
+            ("digest", "plan, head or channels"),
+            ("read_columns", "instrument"),
+            ("axes", "axes"),
+            ("sign", "sign"),
+        ):
             if getattr(content.header, key) != getattr(header, key):
                 raise InvalidArgument(f"{path}: was begun with another {what}; resume it with the same")
         yield file, content

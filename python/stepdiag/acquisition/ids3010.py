@@ -13,6 +13,7 @@ from urllib.parse import urlsplit
 
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.ids3010_messages import JsonStream, encoded, shown
+from stepdiag.acquisition.instrument import InstrumentError
 from stepdiag.io.whole_files import reason
 
 PORT: Final = 9090
@@ -26,16 +27,12 @@ INTERFACES: Final = ("com.attocube.ids", "com.attocube.sen")
 LARGEST_POSITION: Final = 2**63  # pm
 
 
-class InstrumentError(OSError):
-    """The instrument cannot be reached, gives no valid answer, or reports an error."""
-
-
 class _Refused(InstrumentError):
     """The instrument understood the request and reports an error."""
 
 
 @dataclass(frozen=True)
-class Sample:
+class Positions:
     """Simultaneous positions of the requested axes, pm (None: beam lost), and warning numbers."""
 
     pm: tuple[int | None, ...]
@@ -91,7 +88,7 @@ class Ids3010:
 
     # --- measured values ---
 
-    def read(self, axes: Sequence[int]) -> Sample:
+    def read(self, axes: Sequence[int]) -> Positions:
         """Read the absolute positions of these axes (numbered from 0).
 
         If the common request returns a warning, every axis is read by itself. A position with a
@@ -99,10 +96,10 @@ class Ids3010:
         if len(axes) > 1:
             warning, *positions = self._positions("getAbsolutePositions", (), AXES)
             if warning == 0:
-                return Sample(tuple(positions[axis] for axis in axes), (0,) * len(axes))
+                return Positions(tuple(positions[axis] for axis in axes), (0,) * len(axes))
         read = [self._positions("getAbsolutePosition", (axis,), 1) for axis in axes]
         warnings = tuple(warning for warning, _ in read)
-        return Sample(tuple(None if warning else position for warning, position in read), warnings)
+        return Positions(tuple(None if warning else position for warning, position in read), warnings)
 
     def _positions(self, method: str, params: Sequence[int], count: int) -> list[int]:
         result = self.ask(f"displacement.{method}", params)
@@ -150,12 +147,11 @@ class Ids3010:
             try:
                 result = self._request(method, (0, number), self._attempts)  # ask() calls this
             except InstrumentError:
-                return f"number {number}"
+                result = [1]
             words = [value for value in result if isinstance(value, str)]
-            if result[0] != 0 or not words:
-                return f"number {number}"
-            self._texts[number] = words[-1]
-        return f"number {number}: {self._texts[number]}"
+            known = f": {words[-1]}" if result[0] == 0 and words else ""
+            self._texts[number] = f"number {number}{known}"  # also one without a text is asked for once
+        return self._texts[number]
 
     def wait_for(self, mode: str, timeout: float) -> None:
         """Wait until the instrument reports this mode.

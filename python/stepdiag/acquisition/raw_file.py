@@ -6,14 +6,15 @@ its reading, and the places where an acquisition began or was resumed (raw_recor
 
 import fcntl
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, parse_record
+from stepdiag.acquisition.instrument import Number
+from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, Value, parse_record
 from stepdiag.io.whole_files import check_output, read_bytes, reason, sync_folder
 
 
@@ -150,4 +151,12 @@ def read_raw(path: Path) -> RawContent:
     for number, record in enumerate(records, start=2):
         if isinstance(record, Header):
             raise InvalidArgument(f"{path}, line {number}: expected one header, got another one")
+        if isinstance(record, Value | RawReading):
+            _check_whole(record.read, header, f"{path}, line {number}")
     return RawContent(path, header, tuple(records), sound, len(data) - sound)
+
+
+def _check_whole(row: Sequence[Number | None], header: Header, place: str) -> None:
+    for column, value in zip(header.read_columns, row, strict=False):
+        if column.unit == "pm" and isinstance(value, float):
+            raise InvalidArgument(f"{place}: read: {column.name}: expected whole picometres, got {value!r}")

@@ -1,14 +1,34 @@
 """The records of a raw file, one per line."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import AwareDatetime, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import (
+    AliasChoices,
+    AwareDatetime,
+    Field,
+    PlainValidator,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
 
 from stepdiag._core import InvalidArgument
+from stepdiag.acquisition.instrument import Number, ReadColumn
 from stepdiag.acquisition.settling import ValueKind
 from stepdiag.config.key_types import Section, Triple
 
-Picometres = Annotated[int, Field(gt=-(2**63), lt=2**63)]
+LARGEST: Final = 2**63  # pm; 9 km
+
+
+def _quantity(value: Any) -> Number:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < LARGEST:
+        raise ValueError("expected a finite number")
+    return value
+
+
+# Whole picometres, or mm and urad. Files of version 1 have only the former, under the names `pm` and `sd_pm`.
+Quantity = Annotated[Number, PlainValidator(_quantity)]
+Quantities = Annotated[list[Quantity | None], Field(validation_alias=AliasChoices("read", "pm"))]
 Count = Annotated[int, Field(ge=0, le=10**9)]
 Direction = Literal["forward", "backward"]
 RecordedColumn = Literal[
@@ -47,14 +67,32 @@ class Header(Section):
 
     record: Literal["header"] = "header"
     format: Literal["stepdiag raw readings"] = "stepdiag raw readings"
-    version: Literal[1] = 1
+    version: Literal[1, 2] = 2
     created: AwareDatetime
     scenario: str
     digest: str  # of channels and plan, see digest_of
-    channels: Annotated[list[str], Field(min_length=1)]
-    axes: list[Count]  # instrument axis (from 1) of each channel
+    # Channels with the units of `read`, such as d1_pm or spot_x_mm; in version 1 the `channels` alone, in pm.
+    columns: list[str] = Field(min_length=1, validation_alias=AliasChoices("columns", "channels"))
+    axes: list[Count]  # instrument axis (from 1) of each column; empty where the instrument names its columns
     sign: Literal[1, -1]  # -1: positions decrease as the distance increases
     plan: list[Visited]
+
+    @model_validator(mode="after")
+    def _has_columns(self) -> Self:
+        for name in self.columns if self.version == 2 else ():
+            ReadColumn.of(name)
+        return self
+
+    @property
+    def read_columns(self) -> tuple[ReadColumn, ...]:
+        """What each value of `read` is."""
+        if self.version == 1:
+            return tuple(ReadColumn(channel, "pm") for channel in self.columns)
+        return tuple(ReadColumn.of(name) for name in self.columns)
+
+    @property
+    def channels(self) -> list[str]:
+        return [column.channel for column in self.read_columns]
 
 
 class Session(Section):
@@ -100,12 +138,12 @@ class Point(Section):
 
 
 class Value(Point):
-    """One value of every axis; null where the beam was missing."""
+    """One value of every column; null where it was missing."""
 
     record: Literal["value"] = "value"
     time: AwareDatetime
     kind: ValueKind
-    pm: list[Picometres | None]
+    read: Quantities
 
 
 class RawReading(Point):
@@ -116,15 +154,15 @@ class RawReading(Point):
 
     record: Literal["reading"] = "reading"
     time: AwareDatetime
-    pm: list[Picometres | None]
-    sd_pm: list[float | None]
+    read: Quantities
+    sd: list[float | None] = Field(validation_alias=AliasChoices("sd", "sd_pm"))
     values: Count
     lost: dict[str, str]
 
     @property
     def is_lost(self) -> bool:
-        """Whether at least one beam is missing."""
-        return any(pm is None for pm in self.pm)
+        """Whether at least one value is missing."""
+        return None in self.read
 
 
 Record = Annotated[Header | Session | Again | TemperatureRow | Value | RawReading, Field(discriminator="record")]

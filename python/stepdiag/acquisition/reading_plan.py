@@ -13,8 +13,8 @@ from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import Visit, visits_of
 
 
-def channels_of(known: Known) -> list[str]:
-    """Channels filled by the instrument's axes. Raises InvalidArgument for an unsuitable head."""
+def channels_of_axes(known: Known) -> list[str]:
+    """Channels filled by the axes of an IDS3010. Raises InvalidArgument for an unsuitable head."""
     head = known.head
     if head.layout == "multi_beam":
         if len(head.signals) != AXES:
@@ -26,7 +26,8 @@ def channels_of(known: Known) -> list[str]:
         return ["distance"]  # the conventional evaluation needs no other channel
     raise InvalidArgument(
         f'{known.path}: head: the layout "{head.layout}" cannot be read: the IDS3010 gives distances and no spot; '
-        f'expected "multi_beam" with {AXES} beams, or "ideal" of which one axis reads the distance'
+        f'expected "multi_beam" with {AXES} beams, or "ideal" of which one axis reads the distance, or a source of '
+        "lines, which gives anything"
     )
 
 

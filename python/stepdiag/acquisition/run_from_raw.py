@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from datetime import datetime
+from decimal import Decimal
 from pathlib import Path
 from typing import Final, Literal
 
@@ -10,13 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag._core import InvalidArgument, Measurement
+from stepdiag.acquisition.instrument import Number, ReadColumn
 from stepdiag.acquisition.raw_file import RawContent, read_raw
 from stepdiag.acquisition.raw_records import RawReading, TemperatureRow, Visited
 from stepdiag.config.toml_text import located
 from stepdiag.io.data_files import write_measurement
 from stepdiag.units import native
 
-PICOMETRES = 10**9  # per mm
+PICOMETRE: Final = Decimal("1e-9")  # mm
 TEMPERATURE_AGE: Final = 600.0  # s for which a temperature holds, unless told otherwise
 
 Zero = Literal["none", "first"]
@@ -57,17 +59,19 @@ def measurement_of(
     """
     header, readings = content.header, content.readings()
     rows = _rows(content, readings)
-    constants = _constants(rows, header.sign, len(header.channels)) if zero == "first" else {}
+    columns = header.read_columns
+    constants = _constants(rows, header.sign, columns) if zero == "first" else {}
     values = {name: np.full(len(rows), np.nan) for name in header.channels}
     deviations = {name: np.full(len(rows), np.nan) for name in header.channels}
     for row, (visit, _, reading) in enumerate(rows):
-        for i, name in enumerate(header.channels):
-            pm, deviation = reading.pm[i], reading.sd_pm[i]
-            if pm is not None:
-                # A single division rounds once: the double nearest to the picometres.
-                values[name][row] = (header.sign * pm - constants.get((visit.set_up, i), 0)) / PICOMETRES
+        for i, column in enumerate(columns):
+            value, deviation = reading.read[i], reading.sd[i]
+            if value is not None:
+                # Rounded once: the double nearest to the decimal number that was read.
+                constant = constants.get((visit.set_up, i), Decimal(0))
+                values[column.channel][row] = float(_signed(column, value, header.sign) - constant)
             if deviation is not None and deviation > 0.0 and reading.values > 0:
-                deviations[name][row] = deviation / math.sqrt(reading.values) / PICOMETRES
+                deviations[column.channel][row] = float(column.native(deviation / math.sqrt(reading.values)))
     times = [reading.time for _, _, reading in rows]
     start = min(times)
     recorded = [record for record in content.records if isinstance(record, TemperatureRow)]
@@ -100,7 +104,7 @@ def _rows(content: RawContent, readings: dict[tuple[int, int], RawReading]) -> l
         where = f"{content.path}: visit {key[0]}, point {key[1]}"
         if key not in places:
             raise InvalidArgument(f"{where}: not in the plan of the header")
-        if not len(reading.pm) == len(reading.sd_pm) == count:
+        if not len(reading.read) == len(reading.sd) == count:
             raise InvalidArgument(f"{where}: expected {count} values ({', '.join(content.header.channels)})")
     return [(*place, readings[key]) for key, place in places.items() if key in readings]
 
@@ -126,13 +130,18 @@ def _recorded(
     return channels
 
 
-def _constants(rows: list[Row], sign: int, channels: int) -> dict[tuple[int, int], int]:
-    """By set-up and channel: first reading minus nominal distance, pm."""
-    constants: dict[tuple[int, int], int] = {}
+def _signed(column: ReadColumn, value: Number, sign: int) -> Decimal:
+    """A value in mm or rad; `sign` is that of distances."""
+    return column.native(value) * (sign if column.is_distance else 1)
+
+
+def _constants(rows: list[Row], sign: int, columns: Sequence[ReadColumn]) -> dict[tuple[int, int], Decimal]:
+    """By set-up and column of a distance: first reading minus nominal distance, mm."""
+    constants: dict[tuple[int, int], Decimal] = {}
     for visit, index, reading in rows:
-        for i in range(channels):
-            pm = reading.pm[i]
-            if pm is not None:
-                nominal = round(visit.nominal_mm[index] * PICOMETRES)
-                constants.setdefault((visit.set_up, i), sign * pm - nominal)
+        for i, column in enumerate(columns):
+            value = reading.read[i]
+            if value is not None and column.is_distance:
+                nominal = Decimal(repr(visit.nominal_mm[index])).quantize(PICOMETRE)
+                constants.setdefault((visit.set_up, i), _signed(column, value, sign) - nominal)
     return constants

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Final
 
-from stepdiag.acquisition.settling import Reading, Settling
+from stepdiag.acquisition.instrument import ReadColumn, Row, change_of_distance
+from stepdiag.acquisition.settling import Reading, Settling, spread
 from stepdiag.acquisition.triggers import Context, Stopped, of_start, point_text
 from stepdiag.scenario.order_of_run import Visit
 
@@ -17,9 +18,6 @@ STEP_SHARE: Final = 0.25
 AWAY: Final = 0.1
 BACK: Final = 0.05
 SMALLEST: Final = 0.01
-PICOMETRE: Final = 1e-9  # mm
-
-Row = tuple[int | None, ...]  # position of every axis, pm
 
 
 class SettleTrigger:
@@ -77,12 +75,12 @@ class SettleTrigger:
         window: deque[Row] = deque(maxlen=context.settling.count)
         was_away = False
         while time.monotonic() < deadline:
-            window.append(context.read().pm)
-            moved = _change(window[-1], last, context.sign)
+            window.append(context.read().values)
+            moved = context.change(window[-1], last)
             if moved is None:
                 self._complain("no beam: cannot tell where the mirror rests")
                 window.clear()
-            elif at_rest(window, context.settling):
+            elif at_rest(window, context.columns, context.settling):
                 self._rest = window[-1]
                 if abs(moved - step) <= tolerance:
                     return True
@@ -105,14 +103,15 @@ class SettleTrigger:
 
     def doubt(self, reading: Reading) -> str | None:
         """Report a mirror that moved on before its reading was complete (dwell too short)."""
-        moved = None if self._rest is None else _change(tuple(reading.mean_pm), self._rest, 1)
+        moved = None if self._rest is None else of_start(self._context).change(reading.mean, self._rest)
         if moved is None or abs(moved) <= BACK:
             return None
         return f"the mirror moved on by {abs(moved):.4f} mm while it was read"
 
-    def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
-        if any(value is not None for value in pm):  # else the step starts earlier
-            self._last, self._last_nominal = tuple(pm), self._nominal
+    def stored(self, visit: Visit, index: int, row: Row) -> None:
+        columns = of_start(self._context).columns
+        if change_of_distance(columns, row, row) is not None:  # else the step starts earlier
+            self._last, self._last_nominal = row, self._nominal
 
     def failed(self, why: str) -> None:
         pass
@@ -121,19 +120,18 @@ class SettleTrigger:
         pass
 
 
-def at_rest(window: Sequence[Row], settling: Settling) -> bool:
-    """Whether the values agree on every axis that has a beam in all of them."""
+def at_rest(window: Sequence[Row], columns: Sequence[ReadColumn], settling: Settling) -> bool:
+    """Whether the values agree in every column that has one in all of them, a distance among these."""
     if len(window) < settling.count:
         return False
-    columns = [[pm for pm in column if pm is not None] for column in zip(*window, strict=True)]
-    whole = [column for column in columns if len(column) == len(window)]
-    return bool(whole) and all(max(column) - min(column) <= settling.limit_pm for column in whole)
-
-
-def _change(row: Row, last: Row, sign: int) -> float | None:
-    """Change of the distance since the last reading, mm: mean over the beams present in both."""
-    changes = [now - then for now, then in zip(row, last, strict=True) if now is not None and then is not None]
-    return sign * sum(changes) / len(changes) * PICOMETRE if changes else None
+    whole = [
+        (column, [value for value in values if value is not None])
+        for column, values in zip(columns, zip(*window, strict=True), strict=True)
+        if None not in values
+    ]
+    return any(column.is_distance for column, _ in whole) and all(
+        spread(values) <= settling.limit(column) for column, values in whole
+    )
 
 
 def _shortest(nominal: Sequence[float], step: float) -> float:

@@ -3,16 +3,14 @@
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from fractions import Fraction
 from typing import Literal
 
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.ids3010 import Sample
-
-PICOMETRES_PER_MICROMETRE = 1_000_000
+from stepdiag.acquisition.instrument import EXPONENTS, Number, ReadColumn, Row, Sample
 
 
 @dataclass(frozen=True)
@@ -22,8 +20,10 @@ class Settling:
     Raises InvalidArgument naming the field."""
 
     count: int = 5  # consecutive values that must agree
-    # Largest range of these on every axis, and largest distance of averaged values from their mean.
-    limit_um: float = 0.5
+    # Largest range of these in every column, and largest distance of averaged values from their mean.
+    limit_um: float = 0.5  # of distances
+    limit_spot_um: float = 5.0
+    limit_tilt_urad: float = 5.0
     timeout: float = 20.0  # s; after that the reading is lost
     average: int = 10  # number of values
     interval: float = 0.01  # s between two values
@@ -40,6 +40,8 @@ class Settling:
                 raise InvalidArgument(f"settling: {name}: expected at least {lowest}, got {value}")
         for name, number, positive in (
             ("limit_um", self.limit_um, True),
+            ("limit_spot_um", self.limit_spot_um, True),
+            ("limit_tilt_urad", self.limit_tilt_urad, True),
             ("timeout", self.timeout, True),
             ("interval", self.interval, False),
             ("retry_wait", self.retry_wait, False),
@@ -48,9 +50,12 @@ class Settling:
                 least = "a finite number above 0" if positive else "a finite number of at least 0"
                 raise InvalidArgument(f"settling: {name}: expected {least}, got {number!r}")
 
-    @property
-    def limit_pm(self) -> float:
-        return self.limit_um * PICOMETRES_PER_MICROMETRE
+    def limit(self, column: ReadColumn) -> float:
+        """The limit of a column, in its own unit."""
+        if column.is_tilt:
+            return self.limit_tilt_urad
+        micrometres = self.limit_um if column.is_distance else self.limit_spot_um
+        return micrometres * float(10 ** (-3 - EXPONENTS[column.unit]))
 
 
 ValueKind = Literal["settling", "average", "lost"]
@@ -58,58 +63,61 @@ ValueKind = Literal["settling", "average", "lost"]
 
 @dataclass(frozen=True)
 class TakenValue:
-    """One value of every axis."""
+    """One value of every column."""
 
     time: datetime
     kind: ValueKind
-    pm: tuple[int | None, ...]
+    values: Row
 
 
 @dataclass
 class Reading:
-    """All values taken at a point, and why axes are lost.
+    """All values taken at a point, and why columns are lost.
 
     Mean and standard deviation are None there."""
 
-    axes: int
+    columns: Sequence[ReadColumn]
     values: list[TakenValue] = field(default_factory=list)
-    lost: dict[int, str] = field(default_factory=dict)  # reason by index of the axis
+    lost: dict[int, str] = field(default_factory=dict)  # reason by index of the column
 
     @property
-    def averaged(self) -> list[tuple[int | None, ...]]:
-        return [value.pm for value in self.values if value.kind == "average"]
+    def averaged(self) -> list[Row]:
+        return [value.values for value in self.values if value.kind == "average"]
 
     @property
-    def mean_pm(self) -> list[int | None]:
-        """The means, rounded to 1 pm."""
+    def mean(self) -> Row:
+        """The means; whole picometres are rounded to 1 pm."""
         averaged = self.averaged
-        return [None if i in self.lost else _mean(_column(averaged, i)) for i in range(self.axes)]
+        return tuple(
+            None if i in self.lost else column.mean(_values(averaged, i)) for i, column in enumerate(self.columns)
+        )
 
     @property
-    def deviation_pm(self) -> list[float | None]:
+    def deviation(self) -> list[float | None]:
         """Standard deviations of a single value; None for fewer than two values."""
         averaged = self.averaged
         if len(averaged) < 2:
-            return [None] * self.axes
-        return [None if i in self.lost else _deviation(_column(averaged, i)) for i in range(self.axes)]
+            return [None] * len(self.columns)
+        return [None if i in self.lost else _deviation(_values(averaged, i)) for i in range(len(self.columns))]
 
 
-def take_reading(read: Callable[[], Sample], axes: int, options: Settling, told: Callable[[int], str] = str) -> Reading:
-    """Read until the values of every axis settle, then average.
+def take_reading(read: Callable[[], Sample], columns: Sequence[ReadColumn], options: Settling) -> Reading:
+    """Read until the values of every column settle, then average.
 
-    An axis without a beam is given up after `retries` values in a row; the others are read on.
-    Values that do not settle in time are lost. `told` returns the text of a warning number."""
-    return _Taking(axes, options, told).take(read)
+    A column without a value is given up after `retries` samples in a row; the others are read on.
+    Values that do not settle in time are lost."""
+    return _Taking(columns, options).take(read)
 
 
 class _Taking:
-    def __init__(self, axes: int, options: Settling, told: Callable[[int], str]) -> None:
+    def __init__(self, columns: Sequence[ReadColumn], options: Settling) -> None:
+        self._columns = columns
         self._options = options
-        self._told = told
-        self._reading = Reading(axes)
-        self._live = set(range(axes))
-        self._misses = [0] * axes
-        self._window: deque[tuple[int | None, ...]] = deque(maxlen=options.count)
+        self._limits = [options.limit(column) for column in columns]
+        self._reading = Reading(columns)
+        self._live = set(range(len(columns)))
+        self._misses = [0] * len(columns)
+        self._window: deque[Row] = deque(maxlen=options.count)
         self._centre: dict[int, float] | None = None  # mean of the settled window, while averaging
         self._averaged = 0
 
@@ -127,8 +135,8 @@ class _Taking:
         return self._reading
 
     def _add(self, sample: Sample) -> bool:
-        """Add a value. Returns False if a beam is missing."""
-        missing = [i for i in self._live if sample.pm[i] is None]
+        """Add a sample. Returns False if a value is missing."""
+        missing = [i for i in self._live if sample.values[i] is None]
         for i in self._live:
             self._misses[i] = self._misses[i] + 1 if i in missing else 0
         if missing:
@@ -137,55 +145,65 @@ class _Taking:
             for i in missing:
                 if self._misses[i] > self._options.retries:
                     self._live.discard(i)
-                    self._reading.lost[i] = f"no beam ({self._told(sample.warnings[i])})"
+                    what = "no beam" if self._columns[i].is_distance else "no value"
+                    self._reading.lost[i] = f"{what} ({sample.reasons[i]})"
             return False
-        if self._centre is not None and self._stays(sample.pm):
+        if self._centre is not None and self._stays(sample.values):
             self._averaged += 1
             self._note("average", sample)
             return True
         if self._centre is not None:
             self._start_again()
         self._note("settling", sample)
-        self._window.append(sample.pm)
-        if len(self._window) == self._options.count and self._spread() <= self._options.limit_pm:
-            self._centre = {i: float(_mean(_column(self._window, i))) for i in self._live}
+        self._window.append(sample.values)
+        if len(self._window) == self._options.count and not self._unsettled():
+            self._centre = {i: float(self._columns[i].mean(_values(self._window, i))) for i in self._live}
         return True
 
     def _note(self, kind: ValueKind, sample: Sample) -> None:
-        self._reading.values.append(TakenValue(datetime.now(UTC), kind, sample.pm))
+        self._reading.values.append(TakenValue(sample.time or datetime.now(UTC), kind, sample.values))
 
     def _start_again(self) -> None:
         """Discard the average: the mirror was not at rest."""
         values = self._reading.values
-        values[:] = [TakenValue(v.time, "settling" if v.kind == "average" else v.kind, v.pm) for v in values]
+        values[:] = [TakenValue(v.time, "settling" if v.kind == "average" else v.kind, v.values) for v in values]
         self._window.clear()
         self._centre = None
         self._averaged = 0
 
-    def _stays(self, pm: tuple[int | None, ...]) -> bool:
+    def _stays(self, row: Row) -> bool:
         assert self._centre is not None
-        return all(abs((pm[i] or 0) - centre) <= self._options.limit_pm for i, centre in self._centre.items())
+        return all(abs((row[i] or 0) - centre) <= self._limits[i] for i, centre in self._centre.items())
 
-    def _spread(self) -> float:
-        columns = [_column(self._window, i) for i in self._live]
-        return max((max(column) - min(column) for column in columns if column), default=0)
+    def _unsettled(self) -> list[tuple[int, Number]]:
+        """The columns whose values differ by more than the limit, and by how much."""
+        spreads = [(i, spread(_values(self._window, i))) for i in sorted(self._live)]
+        return [(i, wide) for i, wide in spreads if wide > self._limits[i]]
 
     def _give_up(self) -> None:
-        spread = self._spread() / PICOMETRES_PER_MICROMETRE
-        text = f"did not settle within {self._options.timeout:g} s (last values {spread:.3g} um apart)"
+        apart = [
+            f"{self._columns[i].channel} {_in_report_units(self._columns[i], wide)}" for i, wide in self._unsettled()
+        ]
+        told = f" (last values apart: {', '.join(apart)})" if apart else ""
         self._start_again()
         for i in self._live:
-            self._reading.lost[i] = text
+            self._reading.lost[i] = f"did not settle within {self._options.timeout:g} s{told}"
 
 
-def _column(rows: Sequence[tuple[int | None, ...]] | deque[tuple[int | None, ...]], i: int) -> list[int]:
+def spread(values: Sequence[Number]) -> Number:
+    """Largest minus smallest."""
+    return max(values) - min(values) if values else 0
+
+
+def _in_report_units(column: ReadColumn, value: Number) -> str:
+    return f"{value:.3g} urad" if column.is_tilt else f"{float(column.native(value)) * 1e3:.3g} um"
+
+
+def _values(rows: Iterable[Row], i: int) -> list[Number]:
     return [value for row in rows if (value := row[i]) is not None]
 
 
-def _mean(values: Sequence[int]) -> int:
-    return round(Fraction(sum(values), len(values)))
-
-
-def _deviation(values: Sequence[int]) -> float:
-    mean = Fraction(sum(values), len(values))
-    return math.sqrt(sum((value - mean) ** 2 for value in values) / (len(values) - 1))
+def _deviation(values: Sequence[Number]) -> float:
+    exact = [Fraction(value) for value in values]
+    mean = sum(exact, Fraction(0)) / len(exact)
+    return math.sqrt(sum((value - mean) ** 2 for value in exact) / (len(exact) - 1))

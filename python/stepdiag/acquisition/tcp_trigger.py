@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from stepdiag._core import InvalidArgument
+from stepdiag.acquisition.instrument import Row
 from stepdiag.acquisition.settling import Reading
 from stepdiag.acquisition.triggers import Context, Stopped, of_start, point_text
 from stepdiag.io.whole_files import reason
@@ -65,7 +66,7 @@ class TcpTrigger:
     def doubt(self, reading: Reading) -> str | None:
         return None  # a controller waits for its answer
 
-    def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
+    def stored(self, visit: Visit, index: int, row: Row) -> None:
         if self._asking is not None:
             self._answer(self._asking, f"DONE {self._wanted[0]} {self._wanted[1]}")
         self._asking, self._last = None, self._wanted

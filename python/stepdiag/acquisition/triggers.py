@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from stepdiag.acquisition.ids3010 import InstrumentError, Sample
+from stepdiag.acquisition.instrument import InstrumentError, ReadColumn, Row, Sample, change_of_distance
 from stepdiag.acquisition.settling import Reading, Settling
 from stepdiag.scenario.order_of_run import Visit
 
@@ -40,11 +40,17 @@ class Context:
     """What an acquisition offers to its trigger."""
 
     read: Callable[[], Sample]
+    columns: Sequence[ReadColumn]
     settling: Settling
     wait_timeout: float  # s
     sign: int
     operator: Operator
     last: tuple[int, int] | None = None  # visit and point of the last reading
+
+    def change(self, row: Row, last: Row) -> float | None:
+        """Change of the distance, mm: mean over the beams present in both rows."""
+        change = change_of_distance(self.columns, row, last)
+        return None if change is None else self.sign * change
 
 
 class Trigger(Protocol):
@@ -59,7 +65,7 @@ class Trigger(Protocol):
     def doubt(self, reading: Reading) -> str | None:
         """Reason to doubt that the reading was taken at its point, or None."""
 
-    def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
+    def stored(self, visit: Visit, index: int, row: Row) -> None:
         """Called when the reading is on the disk."""
 
     def failed(self, why: str) -> None:
@@ -87,7 +93,7 @@ class KeyTrigger:
     def doubt(self, reading: Reading) -> str | None:
         return None
 
-    def stored(self, visit: Visit, index: int, pm: Sequence[int | None]) -> None:
+    def stored(self, visit: Visit, index: int, row: Row) -> None:
         pass
 
     def failed(self, why: str) -> None:

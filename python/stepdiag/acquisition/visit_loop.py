@@ -7,12 +7,11 @@ from typing import Literal
 import numpy as np
 
 from stepdiag._core import __version__
-from stepdiag.acquisition.ids3010 import RUNNING, STARTING, TWIN, Ids3010, InstrumentError, Sample
+from stepdiag.acquisition.instrument import Instrument, mean_distance
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.raw_file import RawContent, RawFile
 from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, Session, TemperatureRow, Value
 from stepdiag.acquisition.reading_plan import placement
-from stepdiag.acquisition.run_from_raw import PICOMETRES
 from stepdiag.acquisition.settling import Reading, take_reading
 from stepdiag.acquisition.temperature_file import TemperatureFile
 from stepdiag.acquisition.triggers import Context, Operator, Trigger, point_text
@@ -33,10 +32,10 @@ class Acquisition:
         known: Known,
         header: Header,
         file: RawFile,
-        instrument: Ids3010,
+        instrument: Instrument,
         trigger: Trigger,
         operator: Operator,
-        options: "AcquireOptions",
+        options: AcquireOptions,
         temperatures: TemperatureFile | None = None,
     ) -> None:
         self._known, self._header, self._options = known, header, options
@@ -44,8 +43,6 @@ class Acquisition:
         self._trigger, self._operator = trigger, operator
         self._temperatures = temperatures
         self._visits = list(visits_of(known))
-        self._axes = [axis - 1 for axis in header.axes]
-        self._is_twin = False
         self._set_up = 0  # the last set-up for which the instrument was ready
         self._visit = 0  # visit of the last reading
         self.done: dict[tuple[int, int], RawReading] = {}
@@ -78,7 +75,6 @@ class Acquisition:
             self._operator.tell("all points of the plan have been read")
             return
         known = self._instrument.describe()
-        self._is_twin = TWIN in known.get("type", "")
         visit, index = remaining[0]
         self._file.append([self._session(source, known, visit, index)])
         if self.done:
@@ -86,7 +82,15 @@ class Acquisition:
         options = self._options
         last = next(reversed(self.done), None)
         self._trigger.start(
-            Context(self._read, options.settling, options.wait_timeout, options.sign, self._operator, last)
+            Context(
+                self._instrument.read,
+                self._instrument.columns,
+                options.settling,
+                options.wait_timeout,
+                options.sign,
+                self._operator,
+                last,
+            )
         )
         begun = 0
         for visit, index in remaining:
@@ -122,16 +126,18 @@ class Acquisition:
         return visit, visit.points.tolist().index(point)
 
     def _take(self, visit: Visit, index: int, *, once_more: bool = False) -> None:
-        if self._is_twin and visit.number != self._visit:
-            self._instrument.ask("stepdiag.twin.visit", [visit.number, index, self._header.digest])
+        if visit.number != self._visit:
+            self._instrument.visit(visit.number, index, self._header.digest)
         self._visit = visit.number
         if visit.set_up != self._set_up:
-            self._make_ready(visit)
+            is_begun = any(self._visits[number - 1].set_up == visit.set_up for number, _ in self.done)
+            self._instrument.make_ready(is_begun, self._operator.tell)
             self._set_up = visit.set_up
-        reading = take_reading(self._read, len(self._axes), self._options.settling, told=self._instrument.error_text)
+        columns = self._instrument.columns
+        reading = take_reading(self._instrument.read, columns, self._options.settling)
         doubt = self._trigger.doubt(reading)
         if doubt is not None:
-            reading.lost = dict.fromkeys(range(len(self._axes)), doubt)
+            reading.lost = dict.fromkeys(range(len(columns)), doubt)
         *values, stored = _records(visit, index, reading, self._header.channels)
         values = [*self._new_temperatures(), *values]
         assert isinstance(stored, RawReading)
@@ -145,7 +151,7 @@ class Acquisition:
             self._file.append([*values, stored])
             self.done.pop(key, None)
             self.done[key] = stored
-        self._trigger.stored(visit, index, self.done[key].pm)
+        self._trigger.stored(visit, index, tuple(self.done[key].read))
 
     def _new_temperatures(self) -> list[TemperatureRow]:
         rows = [] if self._temperatures is None else self._temperatures.new_rows()
@@ -159,31 +165,6 @@ class Acquisition:
             self._operator.tell(
                 "an interrupted beam may change the constant of this set-up: stop, and use `restart_set_up`"
             )
-
-    def _read(self) -> Sample:
-        return self._instrument.read(self._axes)
-
-    def _make_ready(self, visit: Visit) -> None:
-        """Make sure that the instrument measures and reports no missing beam.
-
-        Moving the head interrupts all beams, so this is called at every set-up."""
-        mode = self._instrument.mode()
-        if mode in STARTING:
-            self._instrument.wait_for(RUNNING, self._options.start_timeout)
-            mode = RUNNING
-        sample = self._read() if mode == RUNNING else None
-        if sample is not None and not any(sample.warnings):
-            return
-        texts = {self._instrument.error_text(warning) for warning in sample.warnings if warning} if sample else {mode}
-        state = f"{self._instrument.name}: {', '.join(sorted(texts))}"
-        if any(self._visits[number - 1].set_up == visit.set_up for number, _ in self.done):
-            raise InstrumentError(
-                f"{state}; restarting the measurement would change the constant of this set-up: use `restart_set_up`"
-            )
-        if self._options.start == "never":
-            raise InstrumentError(f"{state}; expected a running measurement without warnings")
-        self._operator.tell(f"{state}; restarting its measurement")
-        self._instrument.start(self._options.start_timeout)
 
     def _session(self, source: str, instrument: dict[str, str], visit: Visit, index: int) -> Session:
         return Session(
@@ -207,14 +188,16 @@ class Acquisition:
 
     def _remark(self, visit: Visit) -> str | None:
         """What its distances say of a line, beside the nominal way."""
-        read = np.array([self.done[visit.number, int(point)].pm for point in visit.points], dtype=float)  # None: NaN
         plan = self._known.plan
         travel = {
             line: plan.points(line, visit.run)[visit.points] @ plan.frame(line)[:, 2]
             for line in (*plan.lines, *plan.scale_lines)
             if len(plan.points(line, visit.run)) == len(visit.points)
         }
-        distance = self._header.sign * np.mean(read, axis=1) / PICOMETRES
+        columns = self._instrument.columns
+        distance = self._header.sign * np.array(
+            [mean_distance(columns, self.done[visit.number, int(point)].read) for point in visit.points]
+        )
         way = Way(visit.run, visit.line, np.arange(len(visit.points)), travel.pop(visit.line), distance)
         return line_remark(way, travel)
 
@@ -234,7 +217,7 @@ def _records(visit: Visit, index: int, reading: Reading, channels: list[str]) ->
             position_mm=position,
             time=value.time,
             kind=value.kind,
-            pm=list(value.pm),
+            read=list(value.values),
         )
     yield RawReading(
         visit=number,
@@ -244,8 +227,8 @@ def _records(visit: Visit, index: int, reading: Reading, channels: list[str]) ->
         point=point,
         position_mm=position,
         time=reading.values[-1].time if reading.values else datetime.now(UTC),
-        pm=reading.mean_pm,
-        sd_pm=reading.deviation_pm,
+        read=list(reading.mean),
+        sd=reading.deviation,
         values=len(reading.averaged),
         lost={channels[place]: why for place, why in reading.lost.items()},
     )

@@ -338,8 +338,8 @@ def twin(
     """
     import threading
 
-    from stepdiag.acquisition.twin import Twin
-    from stepdiag.acquisition.twin_instrument import TwinBehaviour
+    from stepdiag.twin.instrument import TwinBehaviour
+    from stepdiag.twin.server import Twin
 
     behaviour = TwinBehaviour(
         settling=settling_ms * 1e-3, sampling_noise_um=sampling_noise_um, latch=latch, lost=lose, interrupt=interrupt

@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag import _core
-from stepdiag.acquisition.run_from_raw import PICOMETRES
-from stepdiag.acquisition.twin_instrument import TwinInstrument
+from stepdiag.acquisition.instrument import PICOMETRES
 from stepdiag.demo.loop_cases import CHAIN, RANGE
 from stepdiag.scenario.description import Scenario
 from stepdiag.scenario.order_of_run import visits_of
+from stepdiag.twin.instrument import TwinInstrument
 
 FloatArray = npt.NDArray[np.float64]
 PATIENCE: Final = 20.0  # s for one reading

@@ -23,13 +23,13 @@ from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.settling import Settling
 from stepdiag.acquisition.tcp_trigger import TcpTrigger
 from stepdiag.acquisition.triggers import Context, Silent
-from stepdiag.acquisition.twin import Twin
 from stepdiag.demo.loop_cases import CHAIN, RANGE
 from stepdiag.demo.loop_job import PATIENCE, FloatArray, Job, Say
 from stepdiag.linuxcnc.processes import LinuxcncError
 from stepdiag.linuxcnc.session import LinuxcncSession
 from stepdiag.program.gcode import HANDSHAKE, Writer
 from stepdiag.scenario.order_of_run import Visit, visits_of
+from stepdiag.twin.server import Twin
 
 BRIDGE: Final = Path(__file__).resolve().parents[3] / "controllers" / "linuxcnc" / "stepdiag_bridge.py"
 # The twin is at rest when it is asked, and exact: two values that agree, and one to take.
@@ -158,12 +158,12 @@ class _Recorder(threading.Thread):
 
     def _points(self) -> None:
         visit = _points_visit(self._job)
-        self._trigger.start(Context(self._no_reading, SETTLING, 6 * PATIENCE, 1, Silent()))
+        self._trigger.start(Context(self._no_reading, (), SETTLING, 6 * PATIENCE, 1, Silent()))
         for index in range(len(visit.points)):
             while not self._trigger.wait(visit, index, []):  # the one before once more
-                self._trigger.stored(visit, index, [])
+                self._trigger.stored(visit, index, ())
             self._joints.append(self._twin.instrument.state()["position_mm"])
-            self._trigger.stored(visit, index, [])
+            self._trigger.stored(visit, index, ())
 
     def _no_reading(self) -> Any:
         raise AssertionError("points are not read")

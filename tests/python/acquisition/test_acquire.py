@@ -15,10 +15,10 @@ from stepdiag.acquisition.run_from_raw import measurement_of
 from stepdiag.acquisition.settling import Settling
 from stepdiag.acquisition.tcp_trigger import TcpTrigger
 from stepdiag.acquisition.triggers import KeyTrigger
-from stepdiag.acquisition.twin import Twin
-from stepdiag.acquisition.twin_instrument import TwinBehaviour
 from stepdiag.io.data_files import read_measurement
 from stepdiag.scenario.description import evaluate_scenario, parse_scenario, simulate_scenario
+from stepdiag.twin.instrument import TwinBehaviour
+from stepdiag.twin.server import Twin
 
 
 def to_picometres(values: np.ndarray) -> np.ndarray:
@@ -106,10 +106,10 @@ def test_values_are_averaged_and_every_one_is_kept(tmp_path: Path) -> None:
     for (visit, point), reading in content.readings().items():
         mine = [value for value in values if (value.visit, value.point) == (visit, point)]
         if point == 2:
-            averaged = [value.pm[0] for value in mine if value.kind == "average"]
+            averaged = [value.read[0] for value in mine if value.kind == "average"]
             assert len(averaged) == reading.values == 50
             assert len(mine) >= 53
-            assert reading.pm[0] == round(np.mean([float(pm or 0) for pm in averaged]))
+            assert reading.read[0] == round(np.mean([float(pm or 0) for pm in averaged]))
 
 
 @pytest.mark.parametrize("latch", [True, False])

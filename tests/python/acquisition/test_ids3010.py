@@ -11,8 +11,9 @@ from acquiring import instrument, reply, sound
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stepdiag.acquisition.ids3010 import LARGEST_POSITION, Ids3010, InstrumentError, Sample
+from stepdiag.acquisition.ids3010 import LARGEST_POSITION, Ids3010, Positions
 from stepdiag.acquisition.ids3010_messages import LARGEST, JsonStream
+from stepdiag.acquisition.instrument import InstrumentError
 
 Request = dict[str, Any]
 
@@ -49,13 +50,13 @@ def test_positions_come_to_the_picometre() -> None:
     # The numbers of a real instrument, as a public log has them.
     answer = only("getAbsolutePositions", lambda r: reply(r, 0, 317284613292, 317246920666, 317563277236))
     with instrument(answer) as address, client(address) as ids:
-        assert ids.read((0, 1, 2)) == Sample((317284613292, 317246920666, 317563277236), (0, 0, 0))
+        assert ids.read((0, 1, 2)) == Positions((317284613292, 317246920666, 317563277236), (0, 0, 0))
         assert ids.read((2, 0, 1)).pm == (317563277236, 317284613292, 317246920666)
 
 
 def test_one_axis_is_asked_by_itself() -> None:
     with instrument(sound) as address, client(address) as ids:
-        assert ids.read((1,)) == Sample((100_000_000_002,), (0,))
+        assert ids.read((1,)) == Positions((100_000_000_002,), (0,))
 
 
 def test_warning_loses_the_axes_that_have_one_by_themselves() -> None:
@@ -69,7 +70,7 @@ def test_warning_loses_the_axes_that_have_one_by_themselves() -> None:
         return sound(request)
 
     with instrument(answer) as address, client(address) as ids:
-        assert ids.read((0, 1, 2)) == Sample((1, None, 3), (0, 17, 0))
+        assert ids.read((0, 1, 2)) == Positions((1, None, 3), (0, 17, 0))
 
 
 def test_later_firmware_has_other_names() -> None:

@@ -12,10 +12,10 @@ from acquiring import Listener, acquire_through, scenario
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.raw_file import RawFile, read_raw
 from stepdiag.acquisition.raw_records import Again, Header, RawReading
-from stepdiag.acquisition.twin import Twin
+from stepdiag.twin.server import Twin
 
 NOW = datetime(2026, 11, 22, 1, 2, 3, 4, UTC)
-HEADER = Header(created=NOW, scenario="s.toml", digest="", channels=["d1"], axes=[1], sign=1, plan=[])
+HEADER = Header(created=NOW, scenario="s.toml", digest="", columns=["d1_pm"], axes=[1], sign=1, plan=[])
 
 
 def test_every_reading_is_flushed_to_the_disk_by_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -78,8 +78,8 @@ def test_records_are_read_back_as_they_were(tmp_path: Path) -> None:
         point=0,
         position_mm=(0.1, 1e-17, -2.5),
         time=NOW,
-        pm=[2**63 - 1, None],
-        sd_pm=[0.1 + 0.2, None],
+        read=[2**63 - 1, None],
+        sd=[0.1 + 0.2, None],
         values=3,
         lost={"d2": "no beam \u00b5"},
     )

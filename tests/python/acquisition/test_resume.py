@@ -22,11 +22,11 @@ from stepdiag.acquisition.raw_file import RawFile, read_raw
 from stepdiag.acquisition.run_from_raw import measurement_of
 from stepdiag.acquisition.tcp_trigger import TcpTrigger
 from stepdiag.acquisition.triggers import Stopped
-from stepdiag.acquisition.twin import Twin
 from stepdiag.io.data_files import read_measurement
 from stepdiag.report.file_check import examine
-from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.description import Scenario, simulate_scenario
 from stepdiag.scenario.order_of_run import Visit
+from stepdiag.twin.server import Twin
 
 CHANNELS = ("d1", "d2", "d3")
 
@@ -243,8 +243,8 @@ def replaced(key: str, value: object) -> bytes:
         "position_mm": [0.0, 0.0, 0.0],
         "record": "reading",
         "time": "2026-11-22T01:02:03.000004Z",
-        "pm": [1, 2, 3],
-        "sd_pm": [0.0, 0.0, 0.0],
+        "read": [1, 2, 3],
+        "sd": [0.0, 0.0, 0.0],
         "values": 2,
         "lost": {},
     }
@@ -262,12 +262,12 @@ def replaced(key: str, value: object) -> bytes:
         (b'{"record": "other"}', "record"),
         (b'{"record": "again", "visit": 1}', "time"),
         (replaced("visit", "1"), "visit: Input should be a valid integer, got '1'"),
-        (replaced("pm", [1, 2, 3.5]), "pm.2"),
-        (replaced("pm", [2**70, 2, 3]), "pm.0"),
-        (replaced("pm", [True, 2, 3]), "pm.0"),
+        (replaced("read", [1, 2, 3.5]), "read: d3_pm: expected whole picometres, got 3.5"),
+        (replaced("read", [2**70, 2, 3]), "read.0"),
+        (replaced("read", [True, 2, 3]), "read.0"),
         (replaced("time", "yesterday"), "time"),
         (replaced("time", "2026-11-22T01:02:03"), "time"),
-        (replaced("sd_pm", [float("nan"), 0.0, 0.0]), "sd_pm.0"),
+        (replaced("sd", [float("nan"), 0.0, 0.0]), "sd.0"),
         (replaced("unknown", 1), "unknown"),
         (replaced("values", -1), "values"),
     ],
@@ -288,7 +288,7 @@ def test_readings_that_are_not_in_the_plan_are_refused(whole: Path) -> None:
     for line, message in (
         (replaced("visit", 9), "visit 9, point 0: not in the plan"),
         (replaced("point", 99), "visit 1, point 99: not in the plan"),
-        (replaced("pm", [1, 2]), "expected 3 values"),
+        (replaced("read", [1, 2]), "expected 3 values"),
     ):
         raw.write_bytes(sound + line + b"\n")
         with pytest.raises(InvalidArgument, match=message):
@@ -353,3 +353,32 @@ def test_killed_acquisition_goes_on_in_another_process(tmp_path: Path, whole: Pa
             process.kill()
             process.communicate()
     assert readings(tmp_path / "run.csv") == readings(whole)
+
+
+def as_version_1(raw: Path) -> None:
+    """Rewrite a raw file of an IDS3010 as earlier programs wrote it."""
+    lines = []
+    for line in raw.read_text().splitlines():
+        record = json.loads(line)
+        if record["record"] == "header":
+            record |= {"version": 1, "channels": [name.removesuffix("_pm") for name in record.pop("columns")]}
+        for new, old in (("read", "pm"), ("sd", "sd_pm")):
+            if new in record:
+                record[old] = record.pop(new)
+        lines.append(json.dumps(record) + "\n")
+    raw.write_text("".join(lines))
+
+
+def test_raw_file_of_version_1_is_read_and_continued(tmp_path: Path) -> None:
+    described, output = scenario(), tmp_path / "run.csv"
+    raw = tmp_path / "run.raw.jsonl"
+    with Twin(described) as twin:
+        with pytest.raises(Stopped):
+            acquire_through(described, twin, output, end=9, options=fast(wait_timeout=0.2))
+        as_version_1(raw)
+        earlier = read_raw(raw)
+        assert (earlier.header.version, len(earlier.readings())) == (1, 9)
+        acquire_through(described, twin, output, begin=9, resume="point")
+    assert read_raw(raw).readings().items() >= earlier.readings().items()
+    expected = np.round(simulate_scenario(described).channels["d1"] * 1e9) / 1e9
+    assert np.array_equal(read_measurement(output).channels["d1"], expected)

@@ -13,21 +13,22 @@ from acquiring import SMALL, Listener, fast, points_of, scenario
 
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.acquire import acquire
-from stepdiag.acquisition.ids3010 import Sample
+from stepdiag.acquisition.instrument import ReadColumn, Sample
 from stepdiag.acquisition.raw_file import read_raw
 from stepdiag.acquisition.settle_trigger import SettleTrigger
 from stepdiag.acquisition.settling import Reading, Settling, take_reading
 from stepdiag.acquisition.triggers import Context
-from stepdiag.acquisition.twin import Twin
-from stepdiag.acquisition.twin_instrument import TwinBehaviour
 from stepdiag.io.data_files import read_measurement
 from stepdiag.program.options import Options, space_of
 from stepdiag.program.path import Align, Feed, Read, actions_of
 from stepdiag.scenario.description import simulate_scenario
 from stepdiag.scenario.order_of_run import Visit, visits_of
+from stepdiag.twin.instrument import TwinBehaviour
+from stepdiag.twin.server import Twin
 
 MILLIMETRE = 10**9  # pm
 LINE = 'lines = ["ppp"]\nsteps = 1'
+BEAMS = [ReadColumn(f"d{i}", "pm") for i in (1, 2, 3)]
 SETTLING = Settling(count=3, limit_um=0.1, average=2, interval=0.0)
 Rows = Iterable[tuple[float | None, ...]]
 
@@ -51,7 +52,7 @@ class Followed:
         self.sign = sign
         self.operator = Listener()
         self.trigger = SettleTrigger()
-        self.trigger.start(Context(self.read, SETTLING, 60.0, sign, self.operator))
+        self.trigger.start(Context(self.read, BEAMS, SETTLING, 60.0, sign, self.operator))
         self.visits = list(visits_of(scenario(plan=SMALL).known))
 
     def read(self) -> Sample:
@@ -59,7 +60,7 @@ class Followed:
         if not self.last:
             raise StillWaitingError
         pm = tuple(None if value is None else self.sign * round(value * MILLIMETRE) for value in self.last)
-        return Sample(pm, tuple(9 if value is None else 0 for value in self.last))
+        return Sample(pm, tuple("no beam" if value is None else "" for value in self.last))
 
     def begin(self, visit: int = 1, distance: float | None = 0.0) -> None:
         self.trigger.begin(self.visits[visit - 1], 0, "set-up")
@@ -71,7 +72,7 @@ class Followed:
 
     def stored(self, *distances: float | None) -> None:
         pm = [None if d is None else self.sign * round(d * MILLIMETRE) for d in distances]
-        self.trigger.stored(self.visits[0], 0, pm * (3 // len(pm)))
+        self.trigger.stored(self.visits[0], 0, tuple(pm * (3 // len(pm))))
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -178,8 +179,8 @@ def test_reading_of_a_mirror_that_moved_on_is_doubted() -> None:
     assert followed.wait(1)
     for last, doubt in ((1.01, None), (2.0, "the mirror moved on by 1.0000 mm while it was read")):
         rows = [*at(1.0), *at(*[last] * 4)]
-        pm = [Sample(tuple(round((d or 0.0) * MILLIMETRE) for d in row), (0, 0, 0)) for row in rows]
-        reading = take_reading(iter(pm).__next__, 3, replace(SETTLING, count=4))  # not before it moves
+        pm = [Sample(tuple(round((d or 0.0) * MILLIMETRE) for d in row), ("", "", "")) for row in rows]
+        reading = take_reading(iter(pm).__next__, BEAMS, replace(SETTLING, count=4))  # not before it moves
         assert followed.trigger.doubt(reading) == doubt
 
 

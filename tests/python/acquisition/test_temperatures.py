@@ -20,11 +20,11 @@ from stepdiag.acquisition.run_from_raw import measurement_of, write_run
 from stepdiag.acquisition.tcp_trigger import TcpTrigger
 from stepdiag.acquisition.temperature_file import TemperatureFile
 from stepdiag.acquisition.triggers import Stopped
-from stepdiag.acquisition.twin import Twin
 from stepdiag.io.data_files import read_measurement
 from stepdiag.report.file_check import examine
 from stepdiag.scenario.description import Scenario, evaluate_scenario, parse_scenario
 from stepdiag.scenario.order_of_run import Visit
+from stepdiag.twin.server import Twin
 
 START = datetime(2026, 11, 23, 12, 0, 0, tzinfo=UTC)
 EXPANSION = "\n[temperature]\nexpansion_um_per_m_k = 11.5\nu_expansion_um_per_m_k = 0.0\nu_temperature_c = 0.0\n"
@@ -135,15 +135,15 @@ def content_of(times: Sequence[float], rows: Sequence[tuple[float, dict[Any, flo
     visit = Visited(
         **line, set_up=1, scale_line=True, points=points, position_mm=positions, nominal_mm=[100.0] * len(times)
     )
-    header = Header(created=START, scenario="s", digest="", channels=["distance"], axes=[1], sign=1, plan=[visit])
+    header = Header(created=START, scenario="s", digest="", columns=["distance_pm"], axes=[1], sign=1, plan=[visit])
     records: list[Any] = [
         RawReading(
             **line,
             point=point,
             position_mm=positions[point],
             time=START + timedelta(seconds=seconds),
-            pm=[point],
-            sd_pm=[None],
+            read=[point],
+            sd=[None],
             values=1,
             lost={},
         )

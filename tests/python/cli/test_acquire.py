@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from acquiring import Listener, acquire_through, instrument, scenario, sound
 
-from stepdiag.acquisition.twin import Twin
 from stepdiag.cli import main
 from stepdiag.io.data_files import read_measurement
+from stepdiag.twin.server import Twin
 
 FAST = ["--settle-count", "2", "--average", "2", "--interval-ms", "0"]
 

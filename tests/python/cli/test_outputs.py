@@ -18,7 +18,6 @@ from small_scenario import SCENARIO, of_map
 
 import stepdiag as sd
 from stepdiag._core import InvalidArgument
-from stepdiag.acquisition.twin import Twin
 from stepdiag.cli import main
 from stepdiag.cli.command_line import cli
 from stepdiag.cli.options import Writes
@@ -26,6 +25,7 @@ from stepdiag.demo.loop import claim_loop, run_loop
 from stepdiag.demo.loop_job import Calculated
 from stepdiag.demo.paper import claim_demo, run_demo
 from stepdiag.io.file_kind import kind_of_file
+from stepdiag.twin.server import Twin
 
 PLANNED = SCENARIO + '[plan_by_time]\nsteps = [5]\nrepeats = [1]\nline_sets = [["ppp", "npp", "p00"]]\n'
 STUDY = '[study]\nscenario = "scenario.toml"\nsamples = 0\n[grid]\nplan.steps = [2]\n'

@@ -15,9 +15,9 @@ from stepdiag.acquisition.ids3010 import Ids3010
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.settling import Settling
 from stepdiag.acquisition.tcp_trigger import TcpTrigger
-from stepdiag.acquisition.twin import Twin
 from stepdiag.scenario.description import Scenario, parse_scenario
 from stepdiag.scenario.order_of_run import visits_of
+from stepdiag.twin.server import Twin
 
 BEAMS = 'layout = "multi_beam"\nbeam_offsets_mm = [[15.0, 0.0], [-7.5, 13.0], [-7.5, -13.0]]'
 IDEAL = 'layout = "ideal"'

@@ -15,11 +15,11 @@ from typing import Any, Self
 from stepdiag._core import InvalidArgument, __version__
 from stepdiag.acquisition.ids3010 import AXES, INTERFACES, RUNNING, TWIN
 from stepdiag.acquisition.ids3010_messages import JsonStream, encoded
-from stepdiag.acquisition.twin_instrument import NOT_MEASURING, TEXTS, WRONG_AXIS, TwinBehaviour, TwinInstrument
-from stepdiag.acquisition.twin_temperatures import TwinTemperatures
 from stepdiag.io.whole_files import reason
 from stepdiag.scenario.description import Scenario, read_scenario
 from stepdiag.scenario.order_of_run import visits_of
+from stepdiag.twin.instrument import NOT_MEASURING, TEXTS, WRONG_AXIS, TwinBehaviour, TwinInstrument
+from stepdiag.twin.temperatures import TwinTemperatures
 
 Params = Sequence[Any]
 BETWEEN_TEMPERATURES = 1.0  # s

@@ -12,7 +12,7 @@ import numpy as np
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.ids3010 import AXES, IDLE, RUNNING
-from stepdiag.acquisition.reading_plan import channels_of, described_plan, digest_of
+from stepdiag.acquisition.reading_plan import channels_of_axes, described_plan, digest_of
 from stepdiag.scenario.description import Scenario, simulation_options
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.order_of_run import visits_of
@@ -54,7 +54,7 @@ class TwinInstrument:
 
     def __init__(self, scenario: Scenario, behaviour: TwinBehaviour | None = None) -> None:
         known = scenario.known
-        self._channels = channels_of(known)
+        self._channels = channels_of_axes(known)
         self._scenario = scenario
         self._behaviour = behaviour or TwinBehaviour()
         self._visits = list(visits_of(known))

@@ -1,0 +1,74 @@
+"""The attocube IDS3010 as the instrument of an acquisition."""
+
+from collections.abc import Callable, Sequence
+from types import TracebackType
+from typing import Literal, Self
+
+from stepdiag.acquisition.ids3010 import RUNNING, STARTING, TWIN, Ids3010
+from stepdiag.acquisition.instrument import InstrumentError, ReadColumn, Sample
+
+
+class Ids3010Instrument:
+    """Some axes of an IDS3010, each of which fills a channel of the head. See Instrument."""
+
+    def __init__(
+        self,
+        client: Ids3010,
+        channels: Sequence[str],
+        axes: Sequence[int],
+        *,
+        start: Literal["auto", "never"] = "auto",
+        start_timeout: float = 90.0,
+    ) -> None:
+        """axes: the instrument's axis, from 1, of each channel. start: whether its measurement is started again where
+        it is stopped or warns at a set-up; that takes up to `start_timeout` seconds."""
+        self.name = client.name
+        self.columns = tuple(ReadColumn(channel, "pm") for channel in channels)
+        self.axes = tuple(axes)
+        self._client = client
+        self._start, self._start_timeout = start, start_timeout
+        self._is_twin = False
+
+    def __enter__(self) -> Self:
+        self._client.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._client.__exit__(kind, error, trace)
+
+    def describe(self) -> dict[str, str]:
+        known = self._client.describe()
+        self._is_twin = TWIN in known.get("type", "")
+        return known
+
+    def read(self) -> Sample:
+        read = self._client.read([axis - 1 for axis in self.axes])
+        return Sample(read.pm, tuple(self._client.error_text(number) if number else "" for number in read.warnings))
+
+    def visit(self, number: int, index: int, digest: str) -> None:
+        if self._is_twin:
+            self._client.ask("stepdiag.twin.visit", [number, index, digest])
+
+    def make_ready(self, is_begun: bool, tell: Callable[[str], None]) -> None:
+        """Make sure that the instrument measures and reports no missing beam.
+
+        Moving the head interrupts all beams, so this is called at every set-up."""
+        mode = self._client.mode()
+        if mode in STARTING:
+            self._client.wait_for(RUNNING, self._start_timeout)
+            mode = RUNNING
+        sample = self.read() if mode == RUNNING else None
+        if sample is not None and not any(sample.reasons):
+            return
+        texts = {text for text in sample.reasons if text} if sample else {mode}
+        state = f"{self.name}: {', '.join(sorted(texts))}"
+        if is_begun:
+            raise InstrumentError(
+                f"{state}; restarting the measurement would change the constant of this set-up: use `restart_set_up`"
+            )
+        if self._start == "never":
+            raise InstrumentError(f"{state}; expected a running measurement without warnings")
+        tell(f"{state}; restarting its measurement")
+        self._client.start(self._start_timeout)

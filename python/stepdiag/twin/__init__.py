@@ -1,0 +1,1 @@
+"""The twin: a simulated instrument on a virtual machine, behind a socket."""
