@@ -1,6 +1,6 @@
 """Acquisition of a run: from the instrument to a raw file, then to a measurement file."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -10,6 +10,7 @@ from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.ids3010 import Ids3010, parse_source
 from stepdiag.acquisition.ids3010_instrument import Ids3010Instrument
 from stepdiag.acquisition.instrument import Instrument, InstrumentError
+from stepdiag.acquisition.line_instrument import line_instrument
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.raw_file import RawContent, RawFile, check_new
 from stepdiag.acquisition.raw_records import Header, Record
@@ -63,9 +64,9 @@ def acquire(
     are kept and the acquisition can be resumed. The trigger is closed in any case.
 
     Args:
-        scenario: its `known` half is used; the head must have one channel for each axis read
+        scenario: its `known` half is used; the instrument must give the channels of its head
             (docs/acquisition.md).
-        source: address of the instrument, "ids3010://HOST[:PORT]".
+        source: the instrument: "ids3010://HOST[:PORT]", "lines://HOST:PORT" or "program:COMMAND".
         output: measurement to write, CSV or netCDF (.nc).
         trigger: decides when to read: KeyTrigger, SettleTrigger or TcpTrigger.
         resume: continue a raw file: "point", where it stopped; "line" or "set-up", reading its last
@@ -81,7 +82,7 @@ def acquire(
     """
     known, options, operator = scenario.known, options or AcquireOptions(), operator or Silent()
     try:
-        instrument = instrument_of(source, known, options)
+        instrument = instrument_of(source, known, options, operator.tell)
         check_output(output)
         path = raw or raw_path(output)
         if path.resolve() == output.resolve():
@@ -134,8 +135,17 @@ def acquire(
     return Acquired(path, output, len(work.done), lost, sum(len(visit.points) for visit in plan))
 
 
-def instrument_of(source: str, known: Known, options: AcquireOptions) -> Instrument:
+def instrument_of(source: str, known: Known, options: AcquireOptions, warn: Callable[[str], None]) -> Instrument:
     """The instrument of a source, not yet connected. Raises InvalidArgument."""
+    kind = source.partition(":")[0]
+    if kind in ("lines", "program"):
+        if options.axes is not None:
+            raise InvalidArgument(f"axes: lines name their channels; only an IDS3010 has axes, got {source!r}")
+        return line_instrument(source, known, timeout=options.timeout, warn=warn)
+    if kind != "ids3010":
+        raise InvalidArgument(
+            f"source: expected ids3010://HOST, lines://127.0.0.1:PORT or program:COMMAND, got {source!r}"
+        )
     channels = channels_of_axes(known)
     axes = options.axes or tuple(range(1, len(channels) + 1))
     check_axes(axes, channels)

@@ -1,9 +1,10 @@
 """Commands that read an instrument, and that simulate it."""
 
+import contextlib
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from stepdiag.acquisition.options import AcquireOptions
     from stepdiag.acquisition.triggers import Trigger
     from stepdiag.acquisition.visit_loop import Resume
+    from stepdiag.twin.server import Twin
 
 SECONDS = click.FloatRange(min=0.0, min_open=True)
 
@@ -38,7 +40,10 @@ class _Terminal:
     groups={
         "Instrument": ["source", "axes", "sign", "zero", "timeout"],
         "When to read": ["trigger", "start", "wait_timeout", "retries"],
-        "Settling": ["settle_count", "settle_limit_um", "settle_timeout", "average", "interval_ms"],
+        "Settling": [
+            *("settle_count", "settle_limit_um", "settle_spot_um", "settle_tilt_urad"),
+            *("settle_timeout", "average", "interval_ms"),
+        ],
         "Temperatures": ["temperatures", "temperature_age"],
         "Output": ["output", "uncertainties", "raw"],
         "Continue": ["resume", "restart_line", "restart_set_up", "from_raw"],
@@ -46,7 +51,11 @@ class _Terminal:
     epilog="\b\nExample: stepdiag acquire scenario.toml --source ids3010://192.168.1.1 -o run.csv",
 )
 @click.argument("scenario", type=PATH, required=False)
-@click.option("--source", metavar="URL", help="The instrument: ids3010://HOST or ids3010://HOST:PORT.")
+@click.option(
+    "--source",
+    metavar="URL",
+    help="The instrument: ids3010://HOST[:PORT], lines://127.0.0.1:PORT, or 'program:COMMAND ARGS' (JSON lines).",
+)
 @click.option(
     "--trigger",
     default="key",
@@ -55,7 +64,7 @@ class _Terminal:
     help="When to read: key (at Enter), settle (at rest one step on), or tcp://HOST:PORT (at a controller's request).",
 )
 @click.option(
-    "--axes", metavar="N,N,N", help="Axes of the instrument that give d1, d2, d3 (or distance).  [default: 1,2,3]"
+    "--axes", metavar="N,N,N", help="Axes of the IDS3010 that give d1, d2, d3 (or distance).  [default: 1,2,3]"
 )
 @click.option(
     "--sign",
@@ -79,7 +88,21 @@ class _Terminal:
     type=SECONDS,
     default=0.5,
     show_default=True,
-    help="Largest range of these values on every axis.",
+    help="Largest range of these values, of distances.",
+)
+@click.option(
+    "--settle-spot-um",
+    type=SECONDS,
+    default=5.0,
+    show_default=True,
+    help="Largest range of these values, of spots.",
+)
+@click.option(
+    "--settle-tilt-urad",
+    type=SECONDS,
+    default=5.0,
+    show_default=True,
+    help="Largest range of these values, of tilts.",
 )
 @click.option(
     "--settle-timeout",
@@ -137,7 +160,9 @@ class _Terminal:
 @click.option("--from-raw", type=PATH, metavar="FILE", help="Do not measure; make the output from this raw file.")
 @out_file("Measurement to write, CSV or netCDF (.nc).", MEASUREMENT)
 def acquire(scenario: Path | None, output: OutputFile, from_raw: Path | None, **given: Any) -> None:
-    """Record the readings of SCENARIO's plan from an attocube IDS3010.
+    """Record the readings of SCENARIO's plan from an instrument.
+
+    The instrument is an attocube IDS3010, or anything with an adapter that sends lines.
 
     Before every set-up the command states where head and mirror belong. At every point it waits
     until the distances have settled, then averages. Each value is written to the raw file on disk
@@ -213,6 +238,8 @@ def _options(given: dict[str, Any]) -> "AcquireOptions":
         settling=Settling(
             count=given["settle_count"],
             limit_um=given["settle_limit_um"],
+            limit_spot_um=given["settle_spot_um"],
+            limit_tilt_urad=given["settle_tilt_urad"],
             timeout=given["settle_timeout"],
             average=given["average"],
             interval=given["interval_ms"] * 1e-3,
@@ -319,6 +346,14 @@ def _point(context: click.Context, option: click.Parameter, texts: tuple[str, ..
     help="CSV file to which to append the temperatures of the scales every second.",
 )
 @click.option("--interrupt", is_flag=True, help="Interrupt the beams whenever the head moves to another line.")
+@click.option(
+    "--protocol",
+    type=click.Choice(["ids3010", "lines"]),
+    default="ids3010",
+    show_default=True,
+    help="What it is: an IDS3010, or an adapter that sends JSON lines, with the channels of any head.",
+)
+@click.option("--stdout", is_flag=True, help="Do not listen; send the lines to standard output.")
 def twin(
     scenario: Path,
     host: str,
@@ -330,8 +365,10 @@ def twin(
     latch: bool,
     interrupt: bool,
     temperatures: Path | None,
+    protocol: Literal["ids3010", "lines"],
+    stdout: bool,
 ) -> None:
-    """Simulate the instrument: an IDS3010 that reads SCENARIO's virtual machine.
+    """Simulate the instrument: it reads SCENARIO's virtual machine.
 
     The program that moves the machine reports its moves by stepdiag.twin.moveTo. With --play the
     machine moves by itself, through each visit that a client begins. Ctrl-C ends the command.
@@ -344,10 +381,36 @@ def twin(
     behaviour = TwinBehaviour(
         settling=settling_ms * 1e-3, sampling_noise_um=sampling_noise_um, latch=latch, lost=lose, interrupt=interrupt
     )
-    with Twin(scenario, host=host, port=port, behaviour=behaviour, play=play, temperatures=temperatures) as running:
+    if interrupt and protocol == "lines":
+        raise InvalidArgument("--interrupt: goes with --protocol ids3010; nobody starts a measurement by lines")
+    if stdout and protocol != "lines":
+        raise InvalidArgument("--stdout: goes with --protocol lines")
+    with Twin(
+        scenario,
+        host=host,
+        port=None if stdout else port,
+        behaviour=behaviour,
+        play=play,
+        temperatures=temperatures,
+        protocol=protocol,
+    ) as running:
+        if stdout:
+            _to_standard_output(running)
+            return
         click.echo(f"listening on {running.address[0]}:{running.address[1]} (Ctrl-C ends)")
         sys.stdout.flush()
         try:
             threading.Event().wait()
         except KeyboardInterrupt:
             click.echo("ended")
+
+
+def _to_standard_output(running: "Twin") -> None:
+    from stepdiag.twin.lines import LineSender, send_lines
+
+    def send(line: bytes) -> None:
+        sys.stdout.buffer.write(line)
+        sys.stdout.buffer.flush()
+
+    with contextlib.suppress(KeyboardInterrupt):
+        send_lines(LineSender(running.instrument), sys.stdin, send, goes_on=True)

@@ -1,4 +1,4 @@
-"""The instrument of a twin: an IDS3010 on the head of a virtual machine."""
+"""The instrument of a twin: it reads the head of a virtual machine, as an IDS3010 or an adapter that sends lines."""
 
 import math
 import threading
@@ -12,10 +12,12 @@ import numpy as np
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.ids3010 import AXES, IDLE, RUNNING
+from stepdiag.acquisition.instrument import columns_of_signals
 from stepdiag.acquisition.reading_plan import channels_of_axes, described_plan, digest_of
 from stepdiag.scenario.description import Scenario, simulation_options
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.order_of_run import visits_of
+from stepdiag.units import MICROMETRE, MICRORADIAN
 
 PICOMETRES = 1e9  # in a millimetre
 # The numbers of the real instrument are not public; clients get the texts from errorNumberToString.
@@ -35,7 +37,8 @@ class TwinBehaviour:
     """Deviations from exact readings, to test clients."""
 
     settling: float = 0.0  # s; oscillations after a move decay to 1/e in a fifth of this time
-    sampling_noise_um: float = 0.0  # of every value, in addition to the scenario's noise of each point
+    # Of every value, in addition to the scenario's noise of each point; of tilts as many urad.
+    sampling_noise_um: float = 0.0
     latch: bool = True  # an interrupted beam stays lost until the measurement is started again
     lost: frozenset[tuple[int, int]] = frozenset()  # (visit, point) where all beams are interrupted
     interrupt: bool = False  # moving the head to another line interrupts all beams, as in reality
@@ -47,14 +50,17 @@ class TwinBehaviour:
 
 
 class TwinInstrument:
-    """State and readings, for several threads. Raises InvalidArgument for a head that three axes cannot read.
+    """State and readings, for several threads.
 
     The scenario's noise changes with every move, not with every value. In a visit it is that of the same row of a
     simulated run; a repeated visit has new noise."""
 
-    def __init__(self, scenario: Scenario, behaviour: TwinBehaviour | None = None) -> None:
+    def __init__(self, scenario: Scenario, behaviour: TwinBehaviour | None = None, *, lines: bool = False) -> None:
+        """lines: it gives all channels of the head, else those of an IDS3010. Raises InvalidArgument for a head that
+        three axes cannot read."""
         known = scenario.known
-        self._channels = channels_of_axes(known)
+        self._channels = list(known.signals) if lines else channels_of_axes(known)
+        self.columns = columns_of_signals(self._channels)
         self._scenario = scenario
         self._behaviour = behaviour or TwinBehaviour()
         self._visits = list(visits_of(known))
@@ -75,7 +81,7 @@ class TwinInstrument:
         self._row, self._setup_row = 0, 0
         self._index = 0  # in the visit
         self._moved_at = -math.inf
-        self._before: list[float | None] = [None] * AXES
+        self._before: list[float | None] = [None] * len(self._channels)
         self._exact: list[float | None] | None = None  # mm; None after a change
         self.mode = RUNNING
         self._interrupted = [False] * AXES
@@ -171,13 +177,19 @@ class TwinInstrument:
 
     # --- the instrument ---
 
+    def values(self) -> list[float | None]:
+        """The value of every channel, mm or rad; None without a beam."""
+        with self._lock:
+            return self._now()
+
     def positions(self) -> tuple[list[int], list[int]]:
         """Warning number and position (pm) of every axis."""
         with self._lock:
             if self.mode != RUNNING:
                 return [NOT_MEASURING] * AXES, [0] * AXES
             warnings, positions = [], []
-            for axis, distance in enumerate(self._now()):
+            now = self._now()
+            for axis, distance in enumerate([*now, *[None] * (AXES - len(now))]):
                 if distance is None:
                     self._interrupted[axis] = self._interrupted[axis] or axis < len(self._channels)
                 dark = distance is None or (self._behaviour.latch and self._interrupted[axis])
@@ -210,7 +222,7 @@ class TwinInstrument:
         return warnings, [position - reference for position, reference in zip(positions, self._reference, strict=True)]
 
     def _now(self) -> list[float | None]:
-        """Distances in mm by axis, None without a beam."""
+        """Values by channel, mm or rad, None without a beam."""
         if self._exact is None:
             self._exact = self._distances()
         distances = list(self._exact)
@@ -223,18 +235,20 @@ class TwinInstrument:
                 for now, old in zip(distances, self._before, strict=True)
             ]
         if self._behaviour.sampling_noise_um > 0.0:
-            noise = self._behaviour.sampling_noise_um * 1e-3 * self._random.standard_normal(AXES)
-            distances = [d if d is None else d + float(n) for d, n in zip(distances, noise, strict=True)]
+            noise = self._behaviour.sampling_noise_um * 1e-3 * self._random.standard_normal(len(distances))
+            distances = [
+                now if now is None else now + float(n) * (MICRORADIAN / MICROMETRE if column.is_tilt else 1.0)
+                for now, n, column in zip(distances, noise, self.columns, strict=True)
+            ]
         return distances
 
     def _distances(self) -> list[float | None]:
         if self._point() in self._behaviour.lost:
-            return [None] * AXES
+            return [None] * len(self._channels)
         seconds = self._scenario.known.keys.plan.seconds_per_reading or 0.0
         elapsed = max(0, self._row - self._setup_row) * seconds
         signals = self._readout().read(self._position, self._approach, row=self._row, elapsed=elapsed)
-        count = len(self._channels)
-        return [None if axis >= count or math.isnan(signals[axis]) else float(signals[axis]) for axis in range(AXES)]
+        return [None if math.isnan(value) else float(value) for value in signals[: len(self._channels)]]
 
     def _point(self) -> tuple[int, int] | None:
         if self._visit is None:

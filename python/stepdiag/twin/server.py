@@ -1,16 +1,19 @@
-"""A twin: a simulated IDS3010 behind a socket, which measures a virtual machine that a controller moves.
+"""A twin: a simulated instrument behind a socket, which measures a virtual machine that a controller moves.
 
-In addition to the functions of the instrument it has `stepdiag.twin.moveTo` [x, y, z], `stepdiag.twin.setUp` [number],
+It is an IDS3010, or an adapter that sends lines (lines.py). In addition to the functions of the former it has
+`stepdiag.twin.moveTo` [x, y, z], `stepdiag.twin.setUp` [number],
 `stepdiag.twin.visit` [number, place, digest] and `stepdiag.twin.state` []; docs/acquisition.md describes them.
 """
 
+import contextlib
 import socketserver
 import threading
+import time
 from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Literal, Self, get_args
 
 from stepdiag._core import InvalidArgument, __version__
 from stepdiag.acquisition.ids3010 import AXES, INTERFACES, RUNNING, TWIN
@@ -19,10 +22,15 @@ from stepdiag.io.whole_files import reason
 from stepdiag.scenario.description import Scenario, read_scenario
 from stepdiag.scenario.order_of_run import visits_of
 from stepdiag.twin.instrument import NOT_MEASURING, TEXTS, WRONG_AXIS, TwinBehaviour, TwinInstrument
+from stepdiag.twin.lines import LineSender, send_lines
 from stepdiag.twin.temperatures import TwinTemperatures
 
 Params = Sequence[Any]
+Protocol = Literal["ids3010", "lines"]
 BETWEEN_TEMPERATURES = 1.0  # s
+SLOW = 5.0  # s
+CLIENTS = 16  # at once
+NO_FILES = 0.2  # s
 PARSE_ERROR, NO_METHOD, BAD_PARAMS = -32700, -32601, -32602  # JSON-RPC 2.0
 
 
@@ -34,12 +42,15 @@ class Twin:
         scenario: Scenario | str | PathLike[str],
         *,
         host: str = "127.0.0.1",
-        port: int = 0,
+        port: int | None = 0,
         behaviour: TwinBehaviour | None = None,
         play: float | None = None,
         temperatures: Path | None = None,
+        protocol: Protocol = "ids3010",
     ) -> None:
-        """port: 0 takes any free one. play: the twin moves through visits by itself, with this time at every point, s.
+        """port: 0 takes any free one; None: it does not listen. protocol: "lines" gives the channels of any head.
+
+        play: the twin moves through visits by itself, with this time at every point, s.
 
         temperatures: the CSV file to which it appends every second what the sensors of the scales show.
 
@@ -48,21 +59,31 @@ class Twin:
         described = scenario if isinstance(scenario, Scenario) else read_scenario(scenario)
         if play is not None and not 0.0 < play < 1e6:
             raise InvalidArgument(f"play: expected seconds above 0, got {play!r}")
-        self.instrument = TwinInstrument(described, behaviour)
+        if protocol not in get_args(Protocol):
+            raise InvalidArgument(f"protocol: expected {' or '.join(get_args(Protocol))}, got {protocol!r}")
+        self._protocol = protocol
+        self.instrument = TwinInstrument(described, behaviour, lines=protocol == "lines")
         self.instrument.moves_itself = play is not None
         self._visits = list(visits_of(described.known))
         self._play = play
         self._temperatures = None if temperatures is None else TwinTemperatures(described, temperatures)
         self._ended = threading.Event()
+        self._server = None if port is None else self._listening(host, port)
+        self._threads: list[threading.Thread] = []
+
+    def _listening(self, host: str, port: int) -> "_Server":
         try:
-            self._server = _Server((host, port), _Client)
+            server = _Server((host, port), _LineClient if self._protocol == "lines" else _Client)
         except (OSError, OverflowError) as error:
             raise InvalidArgument(f"twin: cannot listen on {host}:{port}: {reason(error)}") from None
-        self._server.answer = Answers(self.instrument).answer
-        self._threads: list[threading.Thread] = []
+        server.answer = Answers(self.instrument).answer
+        server.sender = LineSender(self.instrument)
+        server.ended = self._ended
+        return server
 
     @property
     def address(self) -> tuple[str, int]:
+        assert self._server is not None, "port: None does not listen"
         host, port = self._server.server_address[:2]
         return str(host), int(port)
 
@@ -70,10 +91,12 @@ class Twin:
     def source(self) -> str:
         """The source that `acquire` takes."""
         host, port = self.address
-        return f"ids3010://{host}:{port}"
+        return f"{self._protocol}://{host}:{port}"
 
     def __enter__(self) -> Self:
-        targets: list[Callable[[], None]] = [lambda: self._server.serve_forever(poll_interval=0.05)]
+        targets: list[Callable[[], None]] = []
+        if (server := self._server) is not None:
+            targets.append(lambda: server.serve_forever(poll_interval=0.05))
         if self._play is not None:
             targets.append(self._move_on)
         if self._temperatures is not None:
@@ -89,8 +112,9 @@ class Twin:
     ) -> None:
         self._ended.set()
         self.instrument.visit_begun.set()
-        self._server.shutdown()
-        self._server.server_close()
+        if self._server is not None:
+            self._server.shutdown()
+            self._server.server_close()
         for thread in self._threads:
             thread.join()
 
@@ -195,6 +219,33 @@ class _Server(socketserver.ThreadingTCPServer):
     daemon_threads = True
     disable_nagle_algorithm = True
     answer: Callable[[dict[str, Any]], dict[str, Any]]
+    sender: LineSender
+    ended: threading.Event
+
+    def __init__(self, address: tuple[str, int], handler: type[socketserver.BaseRequestHandler]) -> None:
+        self._places = threading.BoundedSemaphore(CLIENTS)
+        super().__init__(address, handler)
+
+    def get_request(self) -> tuple[Any, Any]:
+        try:
+            return super().get_request()
+        except OSError:
+            time.sleep(NO_FILES)  # no more files may be open: the client still waits, and is not asked for without end
+            raise
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        if self._places.acquire(blocking=False):
+            super().process_request(request, client_address)
+            return
+        with contextlib.suppress(OSError):
+            request.sendall(encoded({"error": f"the twin has {CLIENTS} clients already"}) + b"\r\n")
+        self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._places.release()
 
 
 class _Client(socketserver.BaseRequestHandler):
@@ -212,6 +263,13 @@ class _Client(socketserver.BaseRequestHandler):
 
     def _send(self, reply: dict[str, Any]) -> None:
         self.request.sendall(encoded(reply) + b"\r\n")
+
+
+class _LineClient(socketserver.BaseRequestHandler):
+    def handle(self) -> None:
+        assert isinstance(self.server, _Server)
+        self.request.settimeout(SLOW)  # a client that does not read is dropped
+        send_lines(self.server.sender, self.request, self.request.sendall, ended=self.server.ended)
 
 
 def _done(action: Callable[[], None]) -> list[Any]:

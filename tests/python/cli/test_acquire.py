@@ -14,6 +14,7 @@ from acquiring import Listener, acquire_through, instrument, scenario, sound
 
 from stepdiag.cli import main
 from stepdiag.io.data_files import read_measurement
+from stepdiag.scenario.description import read_scenario, simulate_scenario
 from stepdiag.twin.server import Twin
 
 FAST = ["--settle-count", "2", "--average", "2", "--interval-ms", "0"]
@@ -164,6 +165,8 @@ def test_head_without_three_axes_is_refused(folder: Path, capsys: pytest.Capture
         (["--lose", "3"], "expected VISIT:POINT such as 2:5"),
         (["--settling-ms", "-1"], "settling-ms"),
         (["--temperatures", "t.csv"], "scenario.toml: expected [temperature] or the air of a constant index, got none"),
+        (["--stdout"], "--stdout: goes with --protocol lines"),
+        (["--protocol", "lines", "--interrupt"], "--interrupt: goes with --protocol ids3010"),
         (["--host", "no such host"], "twin: cannot listen on no such host:9090"),
     ],
 )
@@ -171,6 +174,27 @@ def test_bad_options_of_the_twin_are_refused(
     folder: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
 ) -> None:
     assert message in refused(capsys, "twin", "scenario.toml", *arguments)
+
+
+def test_twin_on_standard_output_is_acquired_and_ends_with_the_acquisition(folder: Path) -> None:
+    head = 'layout = "psd"\npsd_distance_mm = 80.0'
+    (folder / "psd.toml").write_text(acquiring.SCENARIO.format(plan='lines = ["ppp"]\nsteps = 1', head=head, noise=""))
+    command = f"{sys.executable} -m stepdiag twin psd.toml --protocol lines --stdout --play 0.7"
+    done = subprocess.run(
+        [
+            *(sys.executable, "-m", "stepdiag", "acquire", "psd.toml", "--source", f"program:{command}"),
+            *("--trigger", "settle", *FAST, "-o", "run.csv"),
+        ],
+        input="\n",
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert done.stdout.endswith("wrote run.csv: 4 of 4 readings, 0 lost\n"), done
+    run, expected = read_measurement(folder / "run.csv"), simulate_scenario(read_scenario(folder / "psd.toml"))
+    for name in ("distance", "spot_x", "spot_y"):
+        assert np.max(np.abs(run.channels[name] - expected.channels[name])) < 0.501e-9
 
 
 def test_interrupted_commands_end_and_keep_what_they_have(folder: Path) -> None:
