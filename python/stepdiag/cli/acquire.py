@@ -1,6 +1,5 @@
 """Commands that read an instrument, and that simulate it."""
 
-import contextlib
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -9,8 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from stepdiag._core import InvalidArgument
+from stepdiag.cli.interrupts import unwinding
 from stepdiag.cli.options import PATH, Grouped, Writes, in_flags, out_file, tell
 from stepdiag.cli.terminal import plain
+from stepdiag.interruption import at_end
 from stepdiag.io.outputs import MEASUREMENT, RAW, OutputFile
 
 if TYPE_CHECKING:
@@ -193,17 +194,22 @@ def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
     raw.claim(*inputs, error_map=described.truth.error_map, overwrite=True)
     options, resume = _options(given), _resume(given)
     trigger = _trigger(given["trigger"])
-    result = acquire(
-        described.known,
-        given["source"],
-        path,
-        trigger=trigger,
-        options=options,
-        resume=resume,
-        raw=raw.path,
-        operator=_Terminal(),
-        temperatures=given["temperatures"],
-    )
+
+    def continuation() -> str | None:
+        return f"{raw.path} has the readings so far: repeat the command with --resume" if raw.path.exists() else None
+
+    with at_end(continuation), unwinding():
+        result = acquire(
+            described.known,
+            given["source"],
+            path,
+            trigger=trigger,
+            options=options,
+            resume=resume,
+            raw=raw.path,
+            operator=_Terminal(),
+            temperatures=given["temperatures"],
+        )
     click.echo(f"wrote {result.output}: {result.readings} of {result.planned} readings, {result.lost} lost")
 
 
@@ -399,10 +405,7 @@ def twin(
             return
         click.echo(f"listening on {running.address[0]}:{running.address[1]} (Ctrl-C ends)")
         sys.stdout.flush()
-        try:
-            threading.Event().wait()
-        except KeyboardInterrupt:
-            click.echo("ended")
+        threading.Event().wait()
 
 
 def _to_standard_output(running: "Twin") -> None:
@@ -412,5 +415,4 @@ def _to_standard_output(running: "Twin") -> None:
         sys.stdout.buffer.write(line)
         sys.stdout.buffer.flush()
 
-    with contextlib.suppress(KeyboardInterrupt):
-        send_lines(LineSender(running.instrument), sys.stdin, send, goes_on=True)
+    send_lines(LineSender(running.instrument), sys.stdin, send, goes_on=True)

@@ -4,12 +4,7 @@ Imports inside the commands keep the other commands fast.
 """
 
 import io
-import signal
 import sys
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any, Final
 
 import click
 
@@ -80,53 +75,23 @@ for command, short_help in COMMANDS.items():
     cli.add_command(command)
 
 
-TERMINATED: Final = 128 + signal.SIGTERM
-
-
-class _Terminated(SystemExit):
-    """SIGTERM."""
-
-
-@contextmanager
-def _ended_by_sigterm() -> Iterator[None]:
-    """Let SIGTERM unwind a command, so that nothing temporary stays. A second one ends the process at once.
-
-    A disposition that someone else has chosen stays."""
-
-    def end(*_: Any) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        raise _Terminated(TERMINATED)
-
-    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:
-        yield
-        return
-    signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-
 def _complain(message: str) -> None:
     tell("error", message)
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run the command line and return the exit code.
+def run(arguments: list[str] | None) -> int:
+    """Run the command line and return the exit code. None: the arguments of the process.
 
-    0: done. 1: internal error. 2: error of the user or in a file. 3: done, but the result must not
-    be used. 130: interrupted. 143: ended by SIGTERM."""
+    0: done. 1: internal error. 2: error of the user, in a file, or of too little memory. 3: done,
+    but the result must not be used. 130: interrupted. 143: ended by SIGTERM."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without µ shows the rest of the line
     try:
-        with _ended_by_sigterm():
-            result = cli.main(arguments, prog_name="stepdiag", standalone_mode=False)
+        result = cli.main(arguments, prog_name="stepdiag", standalone_mode=False)
         return result if isinstance(result, int) else 0
     except click.Abort:
         return 130
-    except _Terminated:
-        return TERMINATED
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         return 0
@@ -140,4 +105,7 @@ def main(arguments: list[str] | None = None) -> int:
         return 1
     except OSError as error:
         _complain(str(error))
+    except MemoryError as error:
+        said = str(error)
+        _complain(f"the memory does not suffice{f' ({said})' if said and 'bad_alloc' not in said else ''}")
     return 2

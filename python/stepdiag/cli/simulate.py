@@ -1,13 +1,17 @@
 """Commands that simulate: the run of a scenario, and the demonstrations."""
 
 from pathlib import Path
+from typing import Final
 
 import click
 
+from stepdiag.cli.interrupts import unwinding
 from stepdiag.cli.options import PATH, Writes, out_file, tell
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import MEASUREMENT, OutputFile
 from stepdiag.progress import Progress
+
+LINUXCNC_PATIENCE: Final = 40.0  # s; what a killed LinuxCNC leaves disturbs the next one
 
 
 @click.command(epilog="\b\nExample: stepdiag simulate scenario.toml -o run.csv")
@@ -72,7 +76,8 @@ def demo(output: OutputFile | None, controller: str | None) -> None:
 
         try:
             machine = controller_of(controller)  # refused before a folder is made
-            lines = run_loop(claim_loop(folder), machine, progress=progress)
+            with unwinding(LINUXCNC_PATIENCE, "ending LinuxCNC, which takes some seconds; Ctrl-C again ends at once"):
+                lines = run_loop(claim_loop(folder), machine, progress=progress)
         except LinuxcncError as error:
             raise click.ClickException(str(error)) from error
     for line in lines:

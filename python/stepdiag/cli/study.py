@@ -7,6 +7,7 @@ import click
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, out_file, tell
 from stepdiag.cli.terminal import say
 from stepdiag.cli.workers import chosen_workers, worker_options
+from stepdiag.interruption import at_end
 from stepdiag.io.outputs import STUDY, OutputFile
 from stepdiag.progress import Progress
 
@@ -39,16 +40,21 @@ def study(
     maps = {str(cell.content["machine"]["errors"]) for cell in wanted.cells() if "errors" in cell.content["machine"]}
     path = output.claim(file, wanted.scenario, *(wanted.scenario.parent / name for name in maps))
     finished = FinishedCells(Path(f"{path}.cells"), resume)
+
+    def continuation() -> str | None:
+        if finished.path.stat().st_size == 0:
+            finished.path.unlink()
+            return None
+        return f"{finished.path} has the finished cells: repeat the command with --resume"
+
     try:
-        with chosen_workers(scheduler, workers) as chosen, Progress("cells") as progress:
+        with at_end(continuation), chosen_workers(scheduler, workers) as chosen, Progress("cells") as progress:
             results = run_study(wanted, finished, workers=chosen, progress=progress)
         write_study(wanted, results, path)
     except BaseException:
         finished.close()
-        if finished.path.stat().st_size == 0:
-            finished.remove()
-        else:
-            tell("interrupted", f"{finished.path} has the finished cells: repeat the command with --resume")
+        if said := continuation():
+            tell("interrupted", said)
         raise
     finished.remove()
     failures = [result.failure for result in results.values() if result.failure]

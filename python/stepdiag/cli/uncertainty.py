@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from stepdiag._core import InvalidArgument
+from stepdiag.cli.interrupts import unwinding
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Grouped, Writes, tell
 from stepdiag.cli.terminal import say
 from stepdiag.cli.workers import chosen_workers, worker_options
+from stepdiag.interruption import at_end
 from stepdiag.io.outputs import CHECKPOINT, UNCERTAINTY, OutputFile
 from stepdiag.progress import Progress
 
@@ -222,7 +224,7 @@ def uncertainty(
         kept.claim(*others, error_map=described.truth.error_map, overwrite=resume)
     for warning in scenario_warnings(described):
         tell("warning", warning)
-    with _kept(wanted, KeyboardInterrupt), chosen_workers(scheduler, workers) as chosen:
+    with _kept(wanted, KeyboardInterrupt), chosen_workers(scheduler, workers) as chosen, unwinding():
         result = _evaluate(described, wanted, chosen)
     with _kept(wanted, BaseException):
         if path is not None:
@@ -240,14 +242,20 @@ def uncertainty(
 
 @contextmanager
 def _kept(wanted: "UncertaintyRequest", errors: type[BaseException]) -> Iterator[None]:
-    """State how to continue if one of these errors ends the block."""
-    try:
-        yield
-    except errors as error:
+    """State how to continue if one of these errors, or an interruption, ends the block."""
+    nothing = "no samples were kept"
+
+    def continuation() -> str:
         if wanted.draws and wanted.checkpoint is not None and wanted.checkpoint.exists():
-            tell("interrupted", f"{wanted.checkpoint} has the finished samples: repeat the command with --resume")
-        elif isinstance(error, KeyboardInterrupt):
-            tell("interrupted", "no samples were kept")
+            return f"{wanted.checkpoint} has the finished samples: repeat the command with --resume"
+        return nothing
+
+    try:
+        with at_end(continuation):
+            yield
+    except errors as error:
+        if (said := continuation()) != nothing or isinstance(error, KeyboardInterrupt):
+            tell("interrupted", said)
         if isinstance(error, KeyboardInterrupt):
             raise click.Abort from None
         raise

@@ -17,6 +17,7 @@ import xarray as xr
 from xarray.backends import NetCDF4DataStore
 
 from stepdiag._core import InvalidArgument, __version__
+from stepdiag.interruption import uninterrupted
 from stepdiag.io.whole_files import read_bytes, whole_file
 
 # A file may declare this much, plus a hundred times its size: compression is limited.
@@ -48,7 +49,8 @@ def write_dataset(dataset: xr.Dataset, path: Path, attributes: dict[str, Any]) -
     dataset.attrs[_CHECKSUM] = _checksum(dataset)
     with whole_file(path) as temporary:
         try:
-            dataset.to_netcdf(temporary, mode="w", engine="netcdf4", format="NETCDF4")
+            with uninterrupted():  # an exception inside of them leaves the libraries' locks taken
+                dataset.to_netcdf(temporary, mode="w", engine="netcdf4", format="NETCDF4")
         except RuntimeError as error:  # raised by the C libraries
             raise InvalidArgument(f"{path}: cannot be written: {error}") from None
 

@@ -1,13 +1,16 @@
 """Reads and writes small files, completely or not at all."""
 
+import glob
 import os
 import secrets
 import stat
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 
 from stepdiag._core import InvalidArgument
+from stepdiag.interruption import at_end, uninterrupted
 
 # No scenario is larger. The limit also ends the reading of an endless device.
 LARGEST_TEXT = 16 * 2**20
@@ -79,8 +82,8 @@ def write_whole(path: Path, content: str | bytes) -> None:
 def write_set(files: Mapping[Path, str]) -> None:
     """Write files that belong together: all are on the disk under temporary names before the first is renamed.
 
-    Only what ends the process between two renames leaves old ones beside new ones."""
-    with ExitStack() as stack:
+    Only what ends the process between two renames leaves old ones beside new ones: not Ctrl-C."""
+    with uninterrupted(), ExitStack() as stack:
         for path, text in files.items():
             temporary = stack.enter_context(whole_file(path))
             with open(temporary, "wb") as file:
@@ -94,24 +97,31 @@ def whole_file(path: Path) -> Iterator[Path]:
     """A temporary file beside `path`, which replaces it when the block ends without an error."""
     check_output(path)
     target = Path(os.path.realpath(path))  # keeps a symbolic link
-    # A name of its own, not mkstemp's: SIGTERM may come between the making of the file and its return.
+    # A name of its own, not mkstemp's: Ctrl-C may come between the making of the file and its return.
     temporary = target.with_name(f"{target.name}.{secrets.token_hex(8)}")
     handle = -1
-    try:
-        handle = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
-        yield temporary
-        os.fchmod(handle, target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~_umask())
-        os.fsync(handle)
-        os.replace(temporary, target)
-        sync_folder(target.parent)
-    except BaseException as error:
-        temporary.unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
-        raise
-    finally:
-        if handle >= 0:
-            os.close(handle)
+    with at_end(partial(_remove, temporary)):
+        try:
+            with uninterrupted():
+                handle = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+            yield temporary
+            with uninterrupted():
+                os.fchmod(handle, target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~_umask())
+                os.fsync(handle)
+                os.replace(temporary, target)
+                sync_folder(target.parent)
+        except BaseException as error:
+            _remove(temporary)
+            if isinstance(error, OSError):
+                raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
+            raise
+        finally:
+            if handle >= 0:
+                os.close(handle)
+
+
+def _remove(path: Path) -> None:
+    path.unlink(missing_ok=True)
 
 
 def write_by_core(path: str | os.PathLike[str], write: Callable[[str | os.PathLike[str]], None]) -> None:
@@ -119,10 +129,16 @@ def write_by_core(path: str | os.PathLike[str], write: Callable[[str | os.PathLi
 
     Raises InvalidArgument."""
     check_not_read_only(Path(path))
-    write(path)
     target = Path(os.path.realpath(path))
-    if target.is_file():
-        sync_folder(target.parent)
+
+    def remove() -> None:
+        for temporary in target.parent.glob(f"{glob.escape(target.name)}.{os.getpid()}-*"):  # open_temporary()
+            _remove(temporary)
+
+    with at_end(remove):
+        write(path)
+        if target.is_file():
+            sync_folder(target.parent)
 
 
 def sync_folder(folder: Path) -> None:

@@ -4,10 +4,12 @@ import os
 import shutil
 import subprocess
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 from stepdiag._core import InvalidArgument
+from stepdiag.interruption import at_end, kill_descendants
 from stepdiag.io.whole_files import whole_file
 
 BROWSERS: Final = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -31,7 +33,11 @@ def find_browser() -> str:
 def write_pdf(page: str, path: Path) -> None:
     """Print a page into a file. Raises InvalidArgument if there is no Chromium, or it fails."""
     browser = find_browser()
-    with tempfile.TemporaryDirectory(prefix="stepdiag-") as folder, whole_file(path) as written:
+    with (
+        tempfile.TemporaryDirectory(prefix="stepdiag-") as folder,
+        at_end(partial(_abandon, folder)),
+        whole_file(path) as written,
+    ):
         source, printed = Path(folder) / "report.html", Path(folder) / "report.pdf"
         source.write_text(page, encoding="utf-8")
         command = [
@@ -56,3 +62,9 @@ def write_pdf(page: str, path: Path) -> None:
             said = (done.stderr.strip().splitlines() or ["it wrote nothing"])[-1]
             raise InvalidArgument(f"{path}: {browser} could not print it: {said}")
         shutil.copyfile(printed, written)
+
+
+def _abandon(folder: str) -> None:
+    """For an interruption: end the browser and remove its files."""
+    kill_descendants()
+    shutil.rmtree(folder, ignore_errors=True)

@@ -12,23 +12,31 @@ Dask is an optional dependency and imported on first use.
 import ipaddress
 import logging
 import os
+import re
+import shutil
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
+from multiprocessing import resource_tracker
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 from stepdiag import _core
 from stepdiag._core import Bins, InvalidArgument, PartialStatistics
+from stepdiag.interruption import at_end, kill_descendants
 from stepdiag.uncertainty.model_source import ModelSource, model_of
 from stepdiag.uncertainty.monte_carlo import Executor, LeafRange
 
 TASKS_A_THREAD: Final = 2  # submitted at a time: one computed, one waiting
 CONNECT_SECONDS: Final = 10.0
 START_SECONDS: Final = 120.0
+PARK_SECONDS: Final = 0.2
 LOOPBACK: Final = "127.0.0.1"
 PRELOAD: Final = ["stepdiag.uncertainty.dask_preload"]
 CREDENTIALS: Final = "ca-file, client.cert and client.key in Dask's configuration, distributed.comm.tls"
@@ -234,7 +242,12 @@ def _local_cluster(distributed: Any, count: int | None) -> Iterator[Any]:
         credentials = distributed.Security.temporary()
     except ImportError as error:
         raise InvalidArgument(f"`workers` needs cryptography (pip install 'stepdiag[dask]'): {error}") from None
-    with TemporaryDirectory(prefix="stepdiag-", ignore_cleanup_errors=True) as folder:
+    with (
+        TemporaryDirectory(prefix="stepdiag-", ignore_cleanup_errors=True) as folder,
+        at_end(partial(shutil.rmtree, folder, ignore_errors=True)),
+        _own_loop(distributed) as loop,
+        at_end(partial(_abandon, loop)),
+    ):
         options = {
             "temporary-directory": folder,
             # Dask always starts its HTTP servers: they have no routes, and PRELOAD stops them.
@@ -245,6 +258,7 @@ def _local_cluster(distributed: Any, count: int | None) -> Iterator[Any]:
             with (
                 config.set(options),
                 distributed.LocalCluster(
+                    loop=loop,
                     n_workers=count,
                     threads_per_worker=max(1, (os.cpu_count() or 1) // (count or 1)),
                     host=LOOPBACK,
@@ -259,6 +273,43 @@ def _local_cluster(distributed: Any, count: int | None) -> Iterator[Any]:
                 yield cluster
         finally:
             sys.path[:] = [entry for entry in sys.path if not entry.startswith(folder)]
+
+
+@contextmanager
+def _own_loop(distributed: Any) -> Iterator[Any]:
+    """Dask's event loop. What it starts does not hear Ctrl-C, which is meant for this program, from its first
+    instruction on: a process has the blocked signals of the thread that starts it, and a thread those of its maker."""
+    runner = distributed.utils.LoopRunner()
+    resource_tracker.ensure_running()  # the first call unblocks the signal for its thread
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        runner.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    try:
+        yield runner.loop
+    finally:
+        runner.stop()
+
+
+def _abandon(loop: Any) -> None:
+    """For an interruption: end the workers and remove what they share, without Dask, which takes seconds for it."""
+    parked = threading.Event()
+
+    def park() -> None:  # Dask would start other workers, and warn
+        parked.set()
+        threading.Event().wait()
+
+    loop.add_callback(park)
+    parked.wait(PARK_SECONDS)
+    kill_descendants()
+    # Semaphores, which multiprocessing removes where processes end in order: those that this process has mapped.
+    maps = Path("/proc/self/maps").read_text(errors="replace")
+    inodes = set(re.findall(r" (\d+) +/dev/shm/sem\.", maps))
+    for path in Path("/dev/shm").glob("sem.mp-*"):
+        with suppress(OSError):
+            if str(path.stat().st_ino) in inodes:
+                path.unlink()
 
 
 def check_scheduler(address: str) -> str:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
+from stepdiag.interruption import uninterrupted
 from stepdiag.io.outputs import CELLS, claim
 from stepdiag.io.whole_files import read_text, reason, sync_folder
 from stepdiag.scenario.packed import pack_scenario
@@ -81,9 +82,10 @@ class FinishedCells:
         return self._known.get(task.digest)
 
     def keep(self, task: Task, result: CellResult) -> None:
-        self._file.write(f"{task.digest} {result.to_json()}\n")
-        self._file.flush()
-        os.fsync(self._file.fileno())
+        with uninterrupted():
+            self._file.write(f"{task.digest} {result.to_json()}\n")
+            self._file.flush()
+            os.fsync(self._file.fileno())
 
     def close(self) -> None:
         self._file.close()

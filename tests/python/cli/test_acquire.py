@@ -231,7 +231,7 @@ def test_interrupted_commands_end_and_keep_what_they_have(folder: Path) -> None:
         assert acquire.wait(60) == 130
         assert len(read_measurement(folder / "run.csv")) == 2
         twin.send_signal(signal.SIGINT)
-        assert twin.wait(60) == 0
+        assert twin.wait(60) == 130
     finally:
         for process in (acquire, twin):
             process.kill()

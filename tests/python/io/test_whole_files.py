@@ -23,14 +23,14 @@ def stop(handle):
     print("written", flush=True)
     time.sleep(60)
 os.fsync = stop
-sys.exit(main(sys.argv[1:]))
+sys.exit(main())
 """
 # RLIMIT_FSIZE stands for a full disk: a write comes back short, the next one fails.
 FULL = """
 import resource, sys
 from stepdiag.cli import main
 resource.setrlimit(resource.RLIMIT_FSIZE, (700, 700))
-sys.exit(main(sys.argv[1:]))
+sys.exit(main())
 """
 
 
