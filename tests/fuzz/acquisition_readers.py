@@ -14,6 +14,7 @@ from stepdiag.acquisition.acquire import acquire, raw_path
 from stepdiag.acquisition.ids3010 import Ids3010
 from stepdiag.acquisition.ids3010_messages import JsonStream
 from stepdiag.acquisition.instrument import InstrumentError
+from stepdiag.acquisition.line_instrument import parse_header, parse_sample
 from stepdiag.acquisition.options import AcquireOptions
 from stepdiag.acquisition.raw_file import read_raw
 from stepdiag.acquisition.run_from_raw import measurement_of
@@ -173,6 +174,27 @@ def replies() -> list[bytes]:
     good = [{"jsonrpc": "2.0", "result": result, "id": 7} for result in results]
     error = {"jsonrpc": "2.0", "error": {"code": -32601, "message": "method not found"}, "id": 7}
     return [json.dumps(reply).encode() + b"\r\n" for reply in [*good, error, {"id": 3, "result": [0]}]]
+
+
+# --- lines of an adapter ---
+
+
+def read_lines(path: Path) -> None:
+    names: tuple[str, ...] = ()
+    for line in path.read_bytes().split(b"\n"):
+        try:
+            if names:
+                parse_sample(line, names)
+            else:
+                names = parse_header(line).columns
+        except ValueError:
+            continue
+
+
+def lines() -> list[bytes]:
+    header = b'{"stepdiag_lines": 1, "instrument": "x", "channels": ["distance_mm", "spot_x_mm"], "visits": true}\n'
+    sample = b'{"distance_mm": 100.5, "spot_x_mm": null, "why": "dark", "time": 1738324800.25}\n'
+    return [header + sample, header + sample.replace(b"1738324800.25", b'"2026-01-31T12:00:00Z"') + b'{"visit": 3}\n']
 
 
 # --- lines of a controller ---

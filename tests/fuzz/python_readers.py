@@ -84,6 +84,7 @@ READERS = {
     "raw": Reader(acquisition.read_raw_file, acquisition.raw_files, ".jsonl"),
     "requests": Reader(acquisition.answer_requests, acquisition.requests, ".json"),
     "replies": Reader(acquisition.read_replies, acquisition.replies, ".json"),
+    "lines": Reader(acquisition.read_lines, acquisition.lines, ".jsonl"),
     "wishes": Reader(acquisition.read_wishes, acquisition.wishes, ".txt"),
 }
 

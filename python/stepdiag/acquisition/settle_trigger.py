@@ -4,11 +4,11 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Final
+from typing import Final, NoReturn
 
 from stepdiag.acquisition.instrument import ReadColumn, Row, change_of_distance
 from stepdiag.acquisition.settling import Reading, Settling, spread
-from stepdiag.acquisition.triggers import Context, Stopped, of_start, point_text
+from stepdiag.acquisition.triggers import Context, Missed, Seldom, Stopped, keeps, of_start, point_text
 from stepdiag.scenario.order_of_run import Visit
 
 # mm. A rest is the next point if it is within this share of the plan's shortest step of it. It is
@@ -18,6 +18,7 @@ STEP_SHARE: Final = 0.25
 AWAY: Final = 0.1
 BACK: Final = 0.05
 SMALLEST: Final = 0.01
+MISSED: Final = 3  # points in a row, after which the acquisition stops
 
 
 class SettleTrigger:
@@ -36,7 +37,9 @@ class SettleTrigger:
         self._last_nominal = 0.0
         self._nominal = 0.0  # distance at the point being read
         self._rest: Row | None = None  # rest position; None if the operator asked before the rest
-        self._told = float("-inf")
+        self._is_newest = False  # it is also the newest reading, which was not lost
+        self._complaints = Seldom(1)  # of many looks in a second
+        self._missed = 0  # in a row
 
     def start(self, context: Context) -> None:
         self._context = context
@@ -67,9 +70,11 @@ class SettleTrigger:
             else:
                 self._rest = last
             return True
-        return self._watch(last, visit, index, step, STEP_SHARE * _shortest(nominal, step))
+        following = nominal[index + 1] - self._last_nominal if index + 1 < len(nominal) else step
+        return self._watch(last, visit, index, step, following, STEP_SHARE * _shortest(nominal, step))
 
-    def _watch(self, last: Row, visit: Visit, index: int, step: float, tolerance: float) -> bool:
+    def _watch(self, last: Row, visit: Visit, index: int, step: float, following: float, tolerance: float) -> bool:
+        """step, following: from the last reading to this point and to the one after it, mm of distance."""
         context = of_start(self._context)
         deadline = time.monotonic() + context.wait_timeout
         window: deque[Row] = deque(maxlen=context.settling.count)
@@ -84,8 +89,11 @@ class SettleTrigger:
                 self._rest = window[-1]
                 if abs(moved - step) <= tolerance:
                     return True
-                if abs(moved) <= BACK and was_away:
+                if abs(moved) <= BACK and was_away and self._is_newest:
                     return False
+                # Beyond this point, which it has passed: not so where the way turns.
+                if abs(moved - following) <= tolerance and following / step > 1.0 and abs(following) >= SMALLEST:
+                    self._pass_over(visit, index)
                 if abs(moved) > max(tolerance, BACK):
                     self._complain(
                         f"the mirror rests {moved:+.4f} mm from the last point, but it is {step:+.4f} mm from there "
@@ -96,10 +104,18 @@ class SettleTrigger:
         raise Stopped(f"{point_text(visit, index)}: the mirror did not arrive within {context.wait_timeout:g} s")
 
     def _complain(self, text: str) -> None:
-        """Tell the operator, at most every five seconds: the caller polls many times per second."""
-        if time.monotonic() - self._told > 5.0:
-            self._told = time.monotonic()
-            of_start(self._context).operator.tell(text)
+        self._complaints.tell(of_start(self._context).operator, text)
+
+    def _pass_over(self, visit: Visit, index: int) -> NoReturn:
+        self._missed += 1
+        self._is_newest = False
+        text = "missed: the mirror rests at the point after it"
+        if self._missed < MISSED:
+            raise Missed(text)
+        raise Stopped(
+            f"{point_text(visit, index)}: {text}, the third in a row: the program's dwell is too short, or the "
+            "machine was moved on; bring it to this point, and go on by `resume` (or `restart_line`)"
+        )
 
     def doubt(self, reading: Reading) -> str | None:
         """Report a mirror that moved on before its reading was complete (dwell too short)."""
@@ -108,10 +124,14 @@ class SettleTrigger:
             return None
         return f"the mirror moved on by {abs(moved):.4f} mm while it was read"
 
+    def repeats(self, text: str) -> bool:
+        return keeps(self._context, text)
+
     def stored(self, visit: Visit, index: int, row: Row) -> None:
         columns = of_start(self._context).columns
-        if change_of_distance(columns, row, row) is not None:  # else the step starts earlier
-            self._last, self._last_nominal = row, self._nominal
+        self._is_newest = change_of_distance(columns, row, row) is not None
+        if self._is_newest:  # else the step starts earlier
+            self._last, self._last_nominal, self._missed = row, self._nominal, 0
 
     def failed(self, why: str) -> None:
         pass

@@ -3,13 +3,14 @@
 import selectors
 import socket
 import time
+from collections import Counter
 from collections.abc import Sequence
 from typing import Final
 
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.instrument import Row
 from stepdiag.acquisition.settling import Reading
-from stepdiag.acquisition.triggers import Context, Stopped, of_start, point_text
+from stepdiag.acquisition.triggers import Context, Seldom, Stopped, keeps, of_start, point_text
 from stepdiag.io.whole_files import reason
 from stepdiag.scenario.order_of_run import Visit
 
@@ -23,6 +24,9 @@ class TcpTrigger:
     any free port, see `address`."""
 
     LONGEST: Final = 256  # bytes per line
+    CLIENTS: Final = 4  # at once: one controller, and those that come back before their old connection is gone
+    WRONG: Final = 100  # requests in a row, after which a client is hung up on
+    NO_FILES: Final = 0.2  # s until the next try to accept, where no more files may be open
 
     def __init__(self, host: str = "127.0.0.1", port: int = 0) -> None:
         try:
@@ -33,6 +37,9 @@ class TcpTrigger:
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._server, selectors.EVENT_READ)
         self._clients: dict[socket.socket, bytes] = {}
+        self._wrong: Counter[socket.socket] = Counter()
+        self._refusals = Seldom(5)
+        self._accepts_at: float | None = None  # when to accept again
         self._asking: socket.socket | None = None
         self._context: Context | None = None
         self._last: tuple[int, int] | None = None
@@ -56,15 +63,23 @@ class TcpTrigger:
             client, line = asked
             wanted = _wanted(line)
             if wanted is not None and wanted in (expected, self._last):
+                del self._wrong[client]
                 self._asking, self._wanted = client, wanted
                 return wanted == expected
             wrong = _expectation(expected, line)
-            context.operator.tell(f"refused a request of the controller: {wrong}")
+            self._refusals.tell(context.operator, f"refused a request of the controller: {wrong}")
             self._answer(client, f"FAIL {wrong}")
+            self._wrong[client] += 1
+            if self._wrong[client] >= self.WRONG:
+                self._answer(client, f"FAIL {self.WRONG} wrong requests in a row")
+                self._drop(client)
         raise Stopped(f"{point_text(visit, index)}: no request within {context.wait_timeout:g} s")
 
     def doubt(self, reading: Reading) -> str | None:
         return None  # a controller waits for its answer
+
+    def repeats(self, text: str) -> bool:
+        return keeps(self._context, text)
 
     def stored(self, visit: Visit, index: int, row: Row) -> None:
         if self._asking is not None:
@@ -84,8 +99,14 @@ class TcpTrigger:
 
     def _next_line(self, timeout: float) -> tuple[socket.socket, bytes] | None:
         """Return a complete line and its sender, waiting up to `timeout` s. Clients take turns."""
+        if self._accepts_at is not None:
+            timeout = min(timeout, self.NO_FILES)
+            if time.monotonic() >= self._accepts_at:
+                self._selector.register(self._server, selectors.EVENT_READ)
+                self._accepts_at = None
         ready = any(b"\n" in rest for rest in self._clients.values())
-        for key, _ in self._selector.select(0.0 if ready else timeout):
+        events = self._selector.select(0.0 if ready else timeout)
+        for key, _ in sorted(events, key=lambda event: event[0].fileobj is self._server):  # who leaves makes room first
             if key.fileobj is self._server:
                 self._accept()
             elif isinstance(key.fileobj, socket.socket) and b"\n" not in self._clients[key.fileobj]:
@@ -102,9 +123,17 @@ class TcpTrigger:
         try:
             client, _ = self._server.accept()
         except OSError:
+            if self._accepts_at is None:
+                self._selector.unregister(self._server)  # else it would be ready without end
+                self._accepts_at = time.monotonic() + self.NO_FILES
             return
         client.settimeout(1.0)  # a client that does not read its answers is dropped
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if len(self._clients) >= self.CLIENTS:
+            self._refusals.tell(of_start(self._context).operator, f"refused a client beside {self.CLIENTS} others")
+            self._answer(client, f"FAIL {self.CLIENTS} clients already")
+            client.close()
+            return
         self._clients[client] = b""
         self._selector.register(client, selectors.EVENT_READ)
 
@@ -128,6 +157,7 @@ class TcpTrigger:
             self._drop(client)
 
     def _drop(self, client: socket.socket) -> None:
+        del self._wrong[client]
         if self._clients.pop(client, None) is not None:
             self._selector.unregister(client)
             client.close()

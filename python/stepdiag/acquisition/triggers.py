@@ -3,13 +3,21 @@
 Others: settle_trigger.py (the mirror has come to rest), tcp_trigger.py (a controller requests).
 """
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 from stepdiag.acquisition.instrument import InstrumentError, ReadColumn, Row, Sample, change_of_distance
 from stepdiag.acquisition.settling import Reading, Settling
 from stepdiag.scenario.order_of_run import Visit
+
+AXES: Final = "XYZ"
+SELDOM: Final = 5.0  # s
+
+
+class Missed(Exception):
+    """The machine has passed the point before it could be read. The reading is lost, and the next one is waited for."""
 
 
 class Stopped(InstrumentError):
@@ -24,6 +32,9 @@ class Operator(Protocol):
     def confirm(self, text: str) -> None:
         """Show the text; return when the operator confirms."""
 
+    def repeats(self, text: str) -> bool:
+        """Show what is odd about a reading; return whether the operator wants it once more, else it is kept."""
+
 
 class Silent:
     """No operator: ignores messages and confirms everything."""
@@ -33,6 +44,30 @@ class Silent:
 
     def confirm(self, text: str) -> None:
         pass
+
+    def repeats(self, text: str) -> bool:
+        return False
+
+
+class Seldom:
+    """Tells an operator at most `most` messages in five seconds, and how many others there were."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._since = float("-inf")
+        self._told = self._left_out = 0
+
+    def tell(self, operator: Operator, text: str) -> None:
+        now = time.monotonic()
+        if now - self._since > SELDOM:
+            more = f" (and {self._left_out} more before)" if self._left_out else ""
+            self._since, self._told, self._left_out = now, 0, 0
+            text += more
+        if self._told < self._most:
+            self._told += 1
+            operator.tell(text)
+        else:
+            self._left_out += 1
 
 
 @dataclass(frozen=True)
@@ -60,10 +95,15 @@ class Trigger(Protocol):
         """Called before the first reading of a visit. `text` says where head and mirror stand."""
 
     def wait(self, visit: Visit, index: int, nominal: Sequence[float]) -> bool:
-        """Wait until a reading is wanted. True: of this point. False: of the last one once more."""
+        """Wait until a reading is wanted. True: of this point. False: of the last one once more.
+
+        Raises Missed where this point has been passed."""
 
     def doubt(self, reading: Reading) -> str | None:
         """Reason to doubt that the reading was taken at its point, or None."""
+
+    def repeats(self, text: str) -> bool:
+        """Whether a reading that is not what the plan says is taken once more. `text` says what is odd."""
 
     def stored(self, visit: Visit, index: int, row: Row) -> None:
         """Called when the reading is on the disk."""
@@ -93,6 +133,9 @@ class KeyTrigger:
     def doubt(self, reading: Reading) -> str | None:
         return None
 
+    def repeats(self, text: str) -> bool:
+        return of_start(self.context).operator.repeats(text)
+
     def stored(self, visit: Visit, index: int, row: Row) -> None:
         pass
 
@@ -101,6 +144,12 @@ class KeyTrigger:
 
     def close(self) -> None:
         pass
+
+
+def keeps(context: Context | None, text: str) -> bool:
+    """Warn of an odd reading and keep it: the machine will not wait for an answer."""
+    of_start(context).operator.tell(f"warning: {text}")
+    return False
 
 
 def point_text(visit: Visit, index: int) -> str:

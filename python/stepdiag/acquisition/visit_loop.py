@@ -7,14 +7,15 @@ from typing import Literal
 import numpy as np
 
 from stepdiag._core import __version__
-from stepdiag.acquisition.instrument import Instrument, mean_distance
+from stepdiag.acquisition.instrument import Instrument, Row, mean_distance
 from stepdiag.acquisition.options import AcquireOptions
+from stepdiag.acquisition.point_check import PointCheck
 from stepdiag.acquisition.raw_file import RawContent, RawFile
 from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, Session, TemperatureRow, Value
 from stepdiag.acquisition.reading_plan import placement
 from stepdiag.acquisition.settling import Reading, take_reading
 from stepdiag.acquisition.temperature_file import TemperatureFile
-from stepdiag.acquisition.triggers import Context, Operator, Trigger, point_text
+from stepdiag.acquisition.triggers import Context, Missed, Operator, Trigger, point_text
 from stepdiag.mistakes.nominal_way import Way, line_remark
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.order_of_run import Visit, visits_of
@@ -45,6 +46,7 @@ class Acquisition:
         self._visits = list(visits_of(known))
         self._set_up = 0  # the last set-up for which the instrument was ready
         self._visit = 0  # visit of the last reading
+        self._check = PointCheck(known, instrument.columns, header.sign)
         self.done: dict[tuple[int, int], RawReading] = {}
         self.recorded: list[TemperatureRow] = []
 
@@ -70,6 +72,9 @@ class Acquisition:
 
     def run(self, source: str, write: Callable[[], None]) -> None:
         """Read the remaining points. Calls `write` after every visit."""
+        for number, point in self.done:  # what a set-up that is taken up again is compared with
+            visit = self._visits[number - 1]
+            self._check.look(visit, visit.points.tolist().index(point), tuple(self.done[number, point].read))
         remaining = list(self._remaining())
         if not remaining:
             self._operator.tell("all points of the plan have been read")
@@ -97,9 +102,12 @@ class Acquisition:
             if visit.number != begun:
                 self._trigger.begin(visit, index, self._instruction(visit, begun))
             begun = visit.number
-            while not self._trigger.wait(visit, index, self._header.plan[visit.number - 1].nominal_mm):
-                self._take(*self._last_taken(), once_more=True)
-            self._take(visit, index)
+            try:
+                while not self._trigger.wait(visit, index, self._header.plan[visit.number - 1].nominal_mm):
+                    self._take(*self._last_taken(), once_more=True)
+                self._take(visit, index)
+            except Missed as missed:
+                self._store(visit, index, self._lost(str(missed)))
             if index + 1 == len(visit.points):
                 if rows := self._new_temperatures():
                     self._file.append(rows)
@@ -126,6 +134,20 @@ class Acquisition:
         return visit, visit.points.tolist().index(point)
 
     def _take(self, visit: Visit, index: int, *, once_more: bool = False) -> None:
+        """Read a point, and again as long as the reading is odd and the trigger repeats it."""
+        while True:
+            row = self._store(visit, index, self._reading(visit, index), once_more=once_more)
+            odd = self._check.look(visit, index, row)
+            if odd is None or not self._trigger.repeats(f"{point_text(visit, index)}: {odd}"):
+                break
+            once_more = True
+        self._trigger.stored(visit, index, row)
+
+    def _lost(self, why: str) -> Reading:
+        columns = self._instrument.columns
+        return Reading(columns, lost=dict.fromkeys(range(len(columns)), why))
+
+    def _reading(self, visit: Visit, index: int) -> Reading:
         if visit.number != self._visit:
             self._instrument.visit(visit.number, index, self._header.digest)
         self._visit = visit.number
@@ -138,6 +160,10 @@ class Acquisition:
         doubt = self._trigger.doubt(reading)
         if doubt is not None:
             reading.lost = dict.fromkeys(range(len(columns)), doubt)
+        return reading
+
+    def _store(self, visit: Visit, index: int, reading: Reading, *, once_more: bool = False) -> Row:
+        """Write a reading. Returns what counts: where one more is lost, that is the earlier one."""
         *values, stored = _records(visit, index, reading, self._header.channels)
         values = [*self._new_temperatures(), *values]
         assert isinstance(stored, RawReading)
@@ -151,7 +177,7 @@ class Acquisition:
             self._file.append([*values, stored])
             self.done.pop(key, None)
             self.done[key] = stored
-        self._trigger.stored(visit, index, tuple(self.done[key].read))
+        return tuple(self.done[key].read)
 
     def _new_temperatures(self) -> list[TemperatureRow]:
         rows = [] if self._temperatures is None else self._temperatures.new_rows()

@@ -35,6 +35,18 @@ class _Terminal:
         if not sys.stdin.readline():
             raise InvalidArgument("standard input ended before Enter was pressed; --resume continues")
 
+    def repeats(self, text: str) -> bool:
+        self.tell(f"warning: {text}")
+        while sys.stdin.isatty():
+            click.echo("repeat [r], keep [k]: ", nl=False)
+            sys.stdout.flush()
+            answer = sys.stdin.readline()
+            if not answer:
+                raise InvalidArgument("standard input ended; --resume continues")
+            if answer.strip().lower() in ("r", "k"):
+                return answer.strip().lower() == "r"
+        return False  # nobody to ask
+
 
 @click.command(
     cls=Grouped,

@@ -17,7 +17,7 @@ from stepdiag.acquisition.instrument import ReadColumn, Sample
 from stepdiag.acquisition.raw_file import read_raw
 from stepdiag.acquisition.settle_trigger import SettleTrigger
 from stepdiag.acquisition.settling import Reading, Settling, take_reading
-from stepdiag.acquisition.triggers import Context
+from stepdiag.acquisition.triggers import Context, Missed, Stopped
 from stepdiag.io.data_files import read_measurement
 from stepdiag.program.options import Options, space_of
 from stepdiag.program.path import Align, Feed, Read, actions_of
@@ -92,7 +92,7 @@ def test_moving_mirror_is_not_read_on_its_way() -> None:
     assert followed.last == (1.0, 1.0, 1.0)
 
 
-@pytest.mark.parametrize("elsewhere", [0.5, 2.0, -1.0, 0.2])
+@pytest.mark.parametrize("elsewhere", [0.5, 1.6, -1.0, 0.2])
 def test_rest_elsewhere_is_told_and_not_read(elsewhere: float) -> None:
     followed = Followed(at(0.0, elsewhere))
     followed.begin()
@@ -102,6 +102,77 @@ def test_rest_elsewhere_is_told_and_not_read(elsewhere: float) -> None:
     if abs(elsewhere) > 0.25:  # else it may still be on its way, or be at the last point
         assert told[0].startswith(f"the mirror rests {elsewhere:+.4f} mm from the last point, but it is +1.0000 mm")
     assert len(told) <= 1  # not many times a second
+
+
+def test_mirror_at_rest_one_point_on_has_missed_one() -> None:
+    followed = Followed(at(0.0, 2.01, 2.01, 3.0))  # it stays there
+    followed.begin()
+    with pytest.raises(Missed, match="missed: the mirror rests at the point after it"):
+        followed.wait(1)
+    followed.stored(None)
+    assert followed.wait(2)
+    assert followed.last == (2.01, 2.01, 2.01)
+    followed.stored(2.01)
+    assert followed.wait(3)
+
+
+def test_third_point_missed_in_a_row_stops_and_says_how_to_go_on() -> None:
+    followed = Followed(at(0.0, 2.0, 3.0, 4.0))
+    followed.begin()
+    for index in (1, 2):
+        with pytest.raises(Missed):
+            followed.wait(index)
+        followed.rows = iter(at(index + 2.0))
+        followed.stored(None)
+    with pytest.raises(Stopped, match=r"point 3 .*the third in a row: .*dwell is too short.* go on by `resume`"):
+        followed.wait(3)
+
+
+def test_mirror_on_its_way_back_has_missed_nothing() -> None:
+    """The way to the first point of a visit, or to a check point, leads past others."""
+    followed = Followed(at(5.0, 1.0, 0.0))
+    followed.begin(distance=5.0)
+    followed.trigger._last_nominal = 5.0
+    followed.trigger.begin(followed.visits[1], 0, "stays")
+    assert followed.wait(0, visit=2)
+    assert followed.last == (0.0, 0.0, 0.0)
+
+
+def test_mirror_that_comes_back_after_a_missed_point_is_not_read_as_that() -> None:
+    followed = Followed(at(0.0, 2.0))
+    followed.begin()
+    with pytest.raises(Missed):
+        followed.wait(1)
+    followed.stored(None)
+    followed.rows = iter(at(1.5, 0.0, 2.0))
+    assert followed.wait(2)
+    assert followed.last == (2.0, 2.0, 2.0)
+
+
+def test_run_goes_on_after_a_missed_point(tmp_path: Path) -> None:
+    described = scenario(plan=LINE)
+    points, raw = points_of(described), tmp_path / "run.raw.jsonl"
+    operator = Listener()
+    with Twin(described) as twin, ThreadPoolExecutor(1) as pool:
+        running = pool.submit(
+            acquire,
+            described,
+            twin.source,
+            tmp_path / "run.csv",
+            trigger=SettleTrigger(),
+            options=fast(),
+            operator=operator,
+        )
+        for index in (0, 2, 3):
+            if index:
+                twin.instrument.move_to(points[index][2])
+            wait_for(lambda: taken(raw) > index, f"reading {index}")  # noqa: B023
+        result = running.result(10)
+    assert (result.readings, result.lost) == (4, 1)
+    run, expected = read_measurement(tmp_path / "run.csv"), simulate_scenario(described)
+    assert np.isnan(run.channels["d1"]).tolist() == [False, True, False, False]
+    assert abs(run.channels["d1"][2] - expected.channels["d1"][2]) < 1e-9
+    assert any("point 1 at X80 Y0 Z0: d1 is lost: missed" in text for text in operator.told)
 
 
 def test_mirror_that_leaves_and_comes_back_is_read_once_more() -> None:

@@ -1,5 +1,10 @@
 """Readings are taken when they are wanted: by a controller, by the operator, or where the mirror comes to rest."""
 
+import contextlib
+import errno
+import itertools
+import os
+import selectors
 import socket
 import time
 from collections.abc import Iterator
@@ -131,6 +136,65 @@ def test_client_that_floods_does_not_keep_others_waiting(tmp_path: Path) -> None
         assert running.result(10).complete
         flood.settimeout(10.0)
         assert flood.recv(20) == b"FAIL expected READ <"
+
+
+def test_flood_of_wrong_requests_is_told_in_a_few_lines_and_hung_up_on(tmp_path: Path) -> None:
+    described, trigger = scenario(plan=LINE), TcpTrigger()
+    with Twin(described) as twin, acquiring_from(described, twin, tmp_path / "run.csv", trigger) as (running, operator):
+        for _ in range(20):
+            with socket.create_connection(trigger.address, 10.0) as flood, flood.makefile("rb") as file:
+                with contextlib.suppress(OSError):
+                    flood.sendall(b"READ 9 9\n" * 3000)
+                with contextlib.suppress(OSError):
+                    assert sum(1 for _ in file) <= TcpTrigger.WRONG + 1
+        with Controller(described, twin.address, trigger.address) as controller:
+            controller.run()
+        assert running.result(10).complete
+    assert sum("refused a request" in text for text in operator.told) < 50  # of 2000; five in five seconds
+
+
+def test_clients_beyond_a_few_are_refused(tmp_path: Path) -> None:
+    described, trigger = scenario(plan=LINE), TcpTrigger()
+    with Twin(described) as twin, acquiring_from(described, twin, tmp_path / "run.csv", trigger) as (running, operator):
+        with contextlib.ExitStack() as clients:
+            for _ in range(TcpTrigger.CLIENTS):
+                clients.enter_context(socket.create_connection(trigger.address, 10.0))
+            with socket.create_connection(trigger.address, 10.0) as one, one.makefile("rb") as file:
+                assert file.readline() == b"FAIL 4 clients already\n"
+                assert file.readline() == b""
+        with Controller(described, twin.address, trigger.address) as controller:
+            controller.run()
+        assert running.result(10).complete
+    assert "refused a client beside 4 others" in operator.told
+
+
+def test_trigger_does_not_spin_where_no_more_files_may_be_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    trigger, tries = TcpTrigger(), []
+
+    class Full:
+        """A socket on which somebody waits who cannot be accepted."""
+
+        def accept(self) -> None:
+            tries.append(time.monotonic())
+            raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+        def fileno(self) -> int:
+            return trigger_socket.fileno()
+
+        def close(self) -> None:
+            pass
+
+    trigger_socket = trigger._server
+    trigger._selector.unregister(trigger_socket)
+    full = Full()
+    trigger._selector.register(full, selectors.EVENT_READ)
+    monkeypatch.setattr(trigger, "_server", full)
+    with socket.create_connection(trigger.address, 5.0):
+        for _ in range(10):
+            assert trigger._next_line(0.05) is None
+    trigger_socket.close()
+    assert len(tries) >= 1
+    assert all(later - earlier >= TcpTrigger.NO_FILES for earlier, later in itertools.pairwise(tries))
 
 
 def test_answer_comes_when_the_reading_is_on_the_disk(tmp_path: Path) -> None:

@@ -1,9 +1,11 @@
 """A twin reads the virtual machine as the instrument would read a real one."""
 
+import contextlib
 import json
 import socket
+import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from stepdiag.acquisition.instrument import InstrumentError
 from stepdiag.scenario.description import Scenario, simulate_scenario
 from stepdiag.scenario.order_of_run import visits_of
 from stepdiag.twin.instrument import TwinBehaviour
-from stepdiag.twin.server import Twin
+from stepdiag.twin.server import CLIENTS, Twin
 
 
 def readout(described: Scenario, line: str) -> VirtualReadout:
@@ -267,3 +269,20 @@ def test_twin_that_plays_stands_at_the_point_where_a_visit_is_begun() -> None:
         client.ask("stepdiag.twin.visit", [visit.number, 4])
         _, state = client.ask("stepdiag.twin.state")
     np.testing.assert_array_equal(state["position_mm"], visit.positions[4])
+
+
+@pytest.mark.parametrize("protocol", ["ids3010", "lines"])
+def test_clients_beyond_a_few_are_refused_until_others_leave(protocol: Literal["ids3010", "lines"]) -> None:
+    def first_line() -> bytes:
+        with socket.create_connection(twin.address, 10.0) as client, client.makefile("rb") as file:
+            client.sendall(b'{"method": "none"}\n')
+            return file.readline()
+
+    with Twin(scenario(), protocol=protocol) as twin:
+        with contextlib.ExitStack() as clients:
+            for _ in range(CLIENTS):
+                clients.enter_context(socket.create_connection(twin.address, 10.0))
+            assert first_line() == b'{"error": "the twin has 16 clients already"}\r\n'
+        deadline = time.monotonic() + 10.0
+        while b"clients already" in first_line():
+            assert time.monotonic() < deadline

@@ -77,6 +77,10 @@ class Listener:
     def confirm(self, text: str) -> None:
         self.asked.append(text)
 
+    def repeats(self, text: str) -> bool:
+        self.told.append(text)
+        return False
+
 
 class Controller:
     """Moves the twin through the plan and asks for readings, as a bridge of a controller does."""
