@@ -20,7 +20,8 @@ PIECE: Final = 2**16  # bytes read at once
 PIECES: Final = 16  # in a row, before others have their turn
 BEHIND: Final = 2.0  # s for which there may always be more to read: then the sender is too fast
 QUOTED: Final = 1000  # characters of a program's standard error
-PATIENCE: Final = 2.0  # s that a program has to end
+PATIENCE: Final = 2.0  # s until a program that closed its output has ended
+GRACE: Final = 0.5  # s that a program has to end by SIGTERM; below what Ctrl-C gives to the acquisition
 
 
 class Stream(Protocol):
@@ -124,7 +125,7 @@ class ProgramOutput:
             except PermissionError:
                 self._process.send_signal(number)
             try:
-                self._process.wait(PATIENCE)
+                self._process.wait(GRACE)
             except subprocess.TimeoutExpired:
                 continue
         self._process.wait()

@@ -18,6 +18,7 @@ STEP_SHARE: Final = 0.25
 AWAY: Final = 0.1
 BACK: Final = 0.05
 SMALLEST: Final = 0.01
+STAYS: Final = 60.0  # s at rest at the last point, after which the operator is told
 MISSED: Final = 3  # points in a row, after which the acquisition stops
 
 
@@ -70,13 +71,17 @@ class SettleTrigger:
             else:
                 self._rest = last
             return True
-        following = nominal[index + 1] - self._last_nominal if index + 1 < len(nominal) else step
-        return self._watch(last, visit, index, step, following, STEP_SHARE * _shortest(nominal, step))
+        later = [distance - self._last_nominal for distance in nominal[index + 1 :]]
+        return self._watch(last, visit, index, step, later, STEP_SHARE * _shortest(nominal, step))
 
-    def _watch(self, last: Row, visit: Visit, index: int, step: float, following: float, tolerance: float) -> bool:
-        """step, following: from the last reading to this point and to the one after it, mm of distance."""
+    def _watch(
+        self, last: Row, visit: Visit, index: int, step: float, later: Sequence[float], tolerance: float
+    ) -> bool:
+        """step, later: from the last reading to this point and to those after it, mm of distance."""
         context = of_start(self._context)
-        deadline = time.monotonic() + context.wait_timeout
+        began = time.monotonic()
+        deadline = began + context.wait_timeout
+        is_told = False  # that it stays where it is
         window: deque[Row] = deque(maxlen=context.settling.count)
         was_away = False
         while time.monotonic() < deadline:
@@ -91,14 +96,18 @@ class SettleTrigger:
                     return True
                 if abs(moved) <= BACK and was_away and self._is_newest:
                     return False
-                # Beyond this point, which it has passed: not so where the way turns.
-                if abs(moved - following) <= tolerance and following / step > 1.0 and abs(following) >= SMALLEST:
+                # At a point beyond this one, which it has passed.
+                if any(abs(moved - beyond) <= tolerance and beyond / step > 1.0 for beyond in later):
                     self._pass_over(visit, index)
                 if abs(moved) > max(tolerance, BACK):
                     self._complain(
                         f"the mirror rests {moved:+.4f} mm from the last point, but it is {step:+.4f} mm from there "
                         f"to {point_text(visit, index)}"
                     )
+                elif not is_told and not was_away and time.monotonic() - began > STAYS:
+                    is_told = True
+                    wanted = point_text(visit, index)
+                    context.operator.tell(f"the mirror stays at the last point since {STAYS:g} s; waiting for {wanted}")
             was_away = was_away or (moved is not None and abs(moved) > AWAY)
             time.sleep(max(context.settling.interval, 0.001))
         raise Stopped(f"{point_text(visit, index)}: the mirror did not arrive within {context.wait_timeout:g} s")
@@ -109,7 +118,7 @@ class SettleTrigger:
     def _pass_over(self, visit: Visit, index: int) -> NoReturn:
         self._missed += 1
         self._is_newest = False
-        text = "missed: the mirror rests at the point after it"
+        text = "missed: the mirror rests at a later point"
         if self._missed < MISSED:
             raise Missed(text)
         raise Stopped(

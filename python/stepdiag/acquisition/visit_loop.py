@@ -185,8 +185,10 @@ class Acquisition:
         return rows
 
     def _tell_lost(self, visit: Visit, index: int, reading: RawReading) -> None:
-        for channel, why in reading.lost.items():
-            self._operator.tell(f"{point_text(visit, index)}: {channel} is lost: {why}")
+        for why in dict.fromkeys(reading.lost.values()):
+            channels = [channel for channel, own in reading.lost.items() if own == why]
+            are = "are" if len(channels) > 1 else "is"
+            self._operator.tell(f"{point_text(visit, index)}: {', '.join(channels)} {are} lost: {why}")
         if any("no beam" in why for why in reading.lost.values()):
             self._operator.tell(
                 "an interrupted beam may change the constant of this set-up: stop, and use `restart_set_up`"

@@ -127,7 +127,10 @@ def test_interrupted_beam_is_a_lost_reading(tmp_path: Path, latch: bool) -> None
     assert result.lost == np.count_nonzero(lost)
     for name in ("d1", "d2", "d3"):
         assert np.array_equal(run.channels[name][~lost], to_picometres(expected.channels[name])[~lost])
-    assert any("point 4" in text and "d1 is lost: no beam (number 9001: the beam was" in text for text in operator.told)
+    assert any(
+        "point 4" in text and "d1, d2, d3 are lost: no beam (number 9001: the beam was" in text
+        for text in operator.told
+    )
     assert any("`restart_set_up`" in text for text in operator.told)
 
 

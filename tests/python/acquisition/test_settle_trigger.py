@@ -107,13 +107,32 @@ def test_rest_elsewhere_is_told_and_not_read(elsewhere: float) -> None:
 def test_mirror_at_rest_one_point_on_has_missed_one() -> None:
     followed = Followed(at(0.0, 2.01, 2.01, 3.0))  # it stays there
     followed.begin()
-    with pytest.raises(Missed, match="missed: the mirror rests at the point after it"):
+    with pytest.raises(Missed, match="missed: the mirror rests at a later point"):
         followed.wait(1)
     followed.stored(None)
     assert followed.wait(2)
     assert followed.last == (2.01, 2.01, 2.01)
     followed.stored(2.01)
     assert followed.wait(3)
+
+
+def test_two_points_missed_at_once_are_passed_over() -> None:
+    followed = Followed(at(0.0, *[3.0] * 3))
+    followed.begin()
+    for index in (1, 2):
+        with pytest.raises(Missed):
+            followed.wait(index)
+        followed.stored(None)
+    assert followed.wait(3)
+
+
+def test_mirror_that_stays_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stepdiag.acquisition.settle_trigger.STAYS", 0.0)
+    followed = Followed(at(0.0, 0.0))
+    followed.begin()
+    with pytest.raises(StillWaitingError):
+        followed.wait(1)
+    assert sum("stays at the last point" in text for text in followed.operator.told) == 1
 
 
 def test_third_point_missed_in_a_row_stops_and_says_how_to_go_on() -> None:
@@ -172,7 +191,7 @@ def test_run_goes_on_after_a_missed_point(tmp_path: Path) -> None:
     run, expected = read_measurement(tmp_path / "run.csv"), simulate_scenario(described)
     assert np.isnan(run.channels["d1"]).tolist() == [False, True, False, False]
     assert abs(run.channels["d1"][2] - expected.channels["d1"][2]) < 1e-9
-    assert any("point 1 at X80 Y0 Z0: d1 is lost: missed" in text for text in operator.told)
+    assert any("point 1 at X80 Y0 Z0: d1, d2, d3 are lost: missed" in text for text in operator.told)
 
 
 def test_mirror_that_leaves_and_comes_back_is_read_once_more() -> None:
@@ -440,7 +459,7 @@ def test_repetition_that_is_lost_leaves_the_reading_that_there_is(tmp_path: Path
         )
     assert result.complete
     assert result.lost == 0
-    assert any("d1 is lost: doubted" in text for text in operator.told)
+    assert any("d1, d2, d3 are lost: doubted" in text for text in operator.told)
     records = [record for record in read_raw(tmp_path / "run.raw.jsonl").records if record.record != "session"]
     kinds = [record.record for record in records if record.record != "again" and record.point == 0]
     assert kinds.count("reading") == 1
