@@ -50,6 +50,7 @@ from stepdiag._core import (
     KnownCombination,
     KnownExpansion,
     LateralEffect,
+    LineDeviation,
     Machine,
     MachineDrift,
     Measurement,
@@ -79,6 +80,7 @@ from stepdiag._core import (
     Undetermined,
     Validation,
     Verdict,
+    Verification,
     VirtualCalibrations,
     VirtualReadout,
     VolumetricAccuracy,
@@ -105,6 +107,7 @@ from stepdiag._core import (
     read_head,
     simulate,
     trace_beams,
+    verify,
     volumetric_accuracy,
     with_covariance,
     word_findings_with,
@@ -151,6 +154,7 @@ if TYPE_CHECKING:
     from stepdiag.positions.prediction import PredictedPositions, axis_line, diagonal_line, predict_positions
     from stepdiag.positions.readings import PositionReadings, read_positions
     from stepdiag.progress import Progress
+    from stepdiag.recheck.verification import verify_scenario
     from stepdiag.scenario.description import (
         Scenario,
         adjust_scenario,
@@ -219,6 +223,7 @@ __all__ = [
     "KnownCombination",
     "KnownExpansion",
     "LateralEffect",
+    "LineDeviation",
     "LinuxcncError",
     "LinuxcncSession",
     "Machine",
@@ -267,6 +272,7 @@ __all__ = [
     "Undetermined",
     "Validation",
     "Verdict",
+    "Verification",
     "VirtualCalibrations",
     "VirtualReadout",
     "VolumeChange",
@@ -331,6 +337,8 @@ __all__ = [
     "study_table",
     "trace_beams",
     "uncertainty_table",
+    "verify",
+    "verify_scenario",
     "volume_change",
     "volume_errors",
     "volume_grid",
@@ -420,6 +428,7 @@ _LATER = {
         "read_positions",
     ),
     "progress": ("Progress",),
+    "recheck.verification": ("verify_scenario",),
     "scenario.description": (
         "Scenario",
         "adjust_scenario",

@@ -10,7 +10,7 @@ import os
 import stepdiag.io.displays
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'Verdict', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'trace_beams', 'uncertain_quantities', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -1952,6 +1952,76 @@ class FitQuality:
     @property
     def weighted_square_sum(self) -> float:
         ...
+class LineDeviation:
+    """
+    What a line of one run reads too much from end to end.
+    """
+    @property
+    def deviation(self) -> float:
+        """
+        Read minus predicted, mm; of beams their mean.
+        """
+    @property
+    def direction(self) -> str:
+        """
+        "forward" or "backward".
+        """
+    @property
+    def line(self) -> str:
+        ...
+    @property
+    def normalised(self) -> float:
+        """
+        E_n: the deviation by its expanded uncertainty (k = 2).
+        """
+    @property
+    def run(self) -> int:
+        ...
+    @property
+    def standard_uncertainty(self) -> float:
+        """
+        Of the deviation, mm.
+        """
+class Verification:
+    """
+    How readings agree with a calibration that was made without them.
+    """
+    @property
+    def chi_square(self) -> float:
+        ...
+    @property
+    def degrees_of_freedom(self) -> int:
+        ...
+    @property
+    def deviations(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        channel -> (n,) read minus predicted, mm or rad, by row of the measurement; NaN where nothing was read.
+        """
+    @property
+    def lines(self) -> tuple[LineDeviation, ...]:
+        """
+        A LineDeviation for each pass of a line that has two distances.
+        """
+    @property
+    def normalised(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        channel -> (n,) E_n: deviations by their expanded uncertainties (k = 2); 0 for a reading that only tells how head and mirror stood.
+        """
+    @property
+    def probability(self) -> float:
+        """
+        Of a larger chi-square, if calibration, readings and uncertainties are right.
+        """
+    @property
+    def standard_uncertainties(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        channel -> (n,): of the deviations.
+        """
+    @property
+    def worst(self) -> tuple[int, str]:
+        """
+        Row and channel of the reading with the largest |E_n|.
+        """
 class CalibrationEntry:
     """
     A value of a calibration's tables.
@@ -3122,6 +3192,10 @@ def trace_beams(head: Head, *, distance: typing.SupportsFloat | typing.SupportsI
 def uncertain_quantities() -> tuple[UncertainQuantity, ...]:
     """
     The set-up quantities, what lines share, and the noises.
+    """
+def verify(calibration: Calibration, measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), options: AdjustmentOptions | None = None, **kwargs: typing.Any) -> Verification:
+    """
+    Predicts readings from a calibration that was made without them, with uncertainty, and judges the deviations. Plan, head and options (AdjustmentOptions, or its fields by name) are those of the readings. Raises InvalidArgument, also for a calibration without covariance, of another chain, volume or tool, or without all 21 parameters.
     """
 def volumetric_accuracy(calibration: Calibration, *, tool: numpy.typing.ArrayLike | None = None, coverage: typing.SupportsFloat | typing.SupportsIndex = 0.95, samples: typing.SupportsIndex = 10000, seed: typing.SupportsIndex = 0) -> VolumetricAccuracy:
     """

@@ -20,6 +20,7 @@ BELOW: dict[str, set[str]] = {
     "simulation": {"machine", "plan", "head", "measurement"},
     "evaluation": {"machine", "plan", "measurement"},
     "adjustment": {"evaluation"},
+    "recheck": {"adjustment"},
     "batch": {"adjustment"},
     "uncertainty": {"simulation", "batch", "monte_carlo"},
     "controller": {"machine"},

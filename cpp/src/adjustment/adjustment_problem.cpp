@@ -215,7 +215,7 @@ void AdjustmentProblem::collect_points(const Measurement& measurement, const Adj
         check_station(measurement, row, line);
 
         const LineSetup& setup = setups_[setup_of_row_[row]];
-        AdjustedPoint point{setup_of_row_[row], {no_unknown, no_unknown, no_unknown}, {}, int(readings_.size()), 0};
+        AdjustedPoint point{setup_of_row_[row], {no_unknown, no_unknown, no_unknown}, {}, {}, int(readings_.size()), 0};
         for (int c = 0; c < int(names.size()); ++c)
             if (const auto raw =
                     raw_value(measurement.find(names[c]), row, usual_uncertainty(options.uncertainty, names[c])))
@@ -235,6 +235,7 @@ void AdjustmentProblem::collect_points(const Measurement& measurement, const Adj
         for (const Axis axis : all_axes) {
             const int sign = station.line.sign(axis) * (station.direction == Direction::backward ? -1 : 1);
             const bool negative = reversal_ && sign < 0;
+            point.negative[index(axis)] = sign < 0;
             if (target.node[index(axis)] > 0 || negative)
                 point.node[index(axis)] = node_index(axis, target.node[index(axis)], negative);
         }

@@ -83,7 +83,8 @@ struct EstimatedFault {
 // One point of one pass, and its readings: readings[first_reading .. end_reading).
 struct AdjustedPoint {
     int setup;
-    std::array<int, 3> node;  // by axis: index of the AxisNode; no_unknown: at home
+    std::array<int, 3> node;       // by axis: index of the AxisNode; no_unknown: at home
+    std::array<bool, 3> negative;  // by axis: approached in - direction
     ReadingPlace place;
     int first_reading, end_reading;
 };

@@ -99,6 +99,7 @@ void bind_simulation(py::module_& m);
 void bind_evaluation(py::module_& m);
 void bind_adjustment(py::module_& m);
 void bind_calibration(py::module_& m);  // after bind_evaluation
+void bind_recheck(py::module_& m);      // after bind_calibration
 void bind_batch(py::module_& m);        // after bind_calibration
 void bind_monte_carlo(py::module_& m);
 void bind_uncertainty(py::module_& m);

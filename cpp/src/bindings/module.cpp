@@ -174,6 +174,7 @@ PYBIND11_MODULE(_core, m) {
     bind_evaluation(m);
     bind_adjustment(m);
     bind_calibration(m);
+    bind_recheck(m);
     bind_batch(m);
     bind_monte_carlo(m);
     bind_uncertainty(m);

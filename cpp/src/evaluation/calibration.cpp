@@ -13,8 +13,8 @@ namespace stepdiag {
 namespace {
 
 // A covariance comes from sums over thousands of readings in another order than the standard uncertainties: some 1e-12
-// apart. What is further apart than this belongs to other values.
-constexpr double covariance_tolerance = 1e-9;
+// apart, 1e-9 where three close beams tell the angles. What is further apart than this belongs to other values.
+constexpr double covariance_tolerance = 1e-6;
 
 // NaN: not known.
 bool is_uncertainty(double u) { return std::isnan(u) || (std::isfinite(u) && u >= 0.0); }

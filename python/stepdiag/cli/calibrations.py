@@ -1,4 +1,4 @@
-"""Commands that read calibrations: report one, compare two."""
+"""Commands that read calibrations: report one, compare two, test one with new readings."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -255,4 +255,66 @@ def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None,
     for warning in warnings:
         tell("warning", warning)
     if "rejected" in fits:
+        context.exit(NOT_TO_BE_TRUSTED)
+
+
+@click.command(epilog="\b\nExample: stepdiag verify calibration.nc scenario.toml other_lines.csv")
+@click.argument("calibration", type=PATH)
+@click.argument("scenario", type=PATH)
+@click.argument("run", type=PATH)
+@click.option(
+    "--alpha",
+    type=float,
+    default=0.001,
+    show_default=True,
+    metavar="P",
+    help="Share of tests in which a right calibration may be refused.",
+)
+@json_option
+@click.pass_context
+def verify(context: click.Context, calibration: Path, scenario: Path, run: Path, alpha: float, as_json: bool) -> None:
+    """Test a CALIBRATION (netCDF) with the readings of RUN, from which it was not made.
+
+    SCENARIO has plan, head and uncertainties of RUN: other diagonals, a line once more, another
+    day. Each reading is predicted from the calibration, with the uncertainty of calibration, set-up
+    and noise. The report says by chi-square whether all agree, by E_n (ISO 17043) how each line
+    does, and which reading deviates most. How head and mirror stand is estimated from the readings.
+
+    If the readings do not agree, the command ends with a warning and exit code 3.
+    """
+    from stepdiag.config.toml_text import located
+    from stepdiag.io.data_files import read_calibration, read_measurement
+    from stepdiag.io.whole_files import check_input
+    from stepdiag.recheck.verification import check_other_run, verify_scenario
+    from stepdiag.report.verification import agrees, verification_report
+    from stepdiag.scenario.description import read_scenario
+
+    if not 0.0 < alpha < 1.0:
+        raise InvalidArgument(f"--alpha: expected a probability between 0 and 1, got {alpha:g}")
+    for path in (calibration, run):
+        check_input(path)
+    known = read_scenario(scenario).known
+    tested = read_calibration(calibration)
+    check_other_run(tested, run)
+    measurement = read_measurement(run)
+    with located(f"{calibration}, {run}"), Progress("verify"):
+        verification = verify_scenario(tested, known, measurement)
+    warnings = fit_warnings(calibration, tested.fit)
+    if not agrees(verification, alpha):
+        warnings = [
+            f"{run}: does not agree with {calibration}: do not use the calibration until you know why",
+            *warnings,
+        ]
+    if as_json:
+        from stepdiag.objects.verification import verification_object
+        from stepdiag.objects.writer import json_text
+
+        files = (calibration, run)
+        click.echo(json_text(verification_object(verification, tested, measurement, alpha, files, warnings)))
+    else:
+        for line in verification_report(verification, measurement, alpha):
+            say(line)
+    for warning in warnings:
+        tell("warning", warning)
+    if not agrees(verification, alpha) or tested.fit == "rejected":
         context.exit(NOT_TO_BE_TRUSTED)

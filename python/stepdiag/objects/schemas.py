@@ -20,6 +20,7 @@ OBJECTS: Final = {
     "observation": ("stepdiag.objects.observation", "ObservationObject"),
     "positions": ("stepdiag.objects.positions", "PositionsObject"),
     "report": ("stepdiag.objects.report", "ReportObject"),
+    "verification": ("stepdiag.objects.verification", "VerificationObject"),
     "volume": ("stepdiag.objects.volume", "VolumeObject"),
 }
 

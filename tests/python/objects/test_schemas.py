@@ -15,6 +15,7 @@ SCHEMAS = Path(__file__).parents[3] / "docs" / "json"
 UNITS = ("um", "mm", "urad", "ppm", "um_per_h", "um_per_k", "um_per_m", "um_per_m_k", "c", "minutes")
 # Numbers that have no unit.
 OF_UNIT_ONE = {
+    "alpha",
     *("positioning", "straightness", "angle", "squareness"),  # exponents
     "chi_square",
     "chi_square_gain",

@@ -1,0 +1,111 @@
+#include "recheck/baseline.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+namespace {
+
+// Where the slope of a function is not determined, it is taken to be known to this: no machine has more.
+constexpr double usual_slope = 1e-3;  // mm/mm
+
+struct Interval {
+    std::size_t node;  // its lower end
+    double share;      // of its upper end
+};
+
+// Constant beyond the ends, as interpolate() has it.
+Interval find(const std::vector<double>& nodes, double position) {
+    if (position <= nodes.front()) return {0, 0.0};
+    if (position >= nodes.back()) return {nodes.size() - 1, 0.0};
+    const auto after = std::upper_bound(nodes.begin(), nodes.end(), position);
+    const auto k = std::size_t(after - nodes.begin()) - 1;
+    return {k, (position - nodes[k]) / (nodes[k + 1] - nodes[k])};
+}
+
+double interpolated(const std::vector<double>& values, const Interval& at) {
+    return at.share == 0.0 ? values[at.node] : (1.0 - at.share) * values[at.node] + at.share * values[at.node + 1];
+}
+
+void check_complete(const Calibration& calibration) {
+    std::string missing;
+    const auto miss = [&](const std::string& name) { missing += (missing.empty() ? "" : ", ") + name; };
+    for (int i = 0; i < function_count; ++i)
+        if (!calibration.functions[i]) miss(FunctionId::at(i).name());
+    for (const Squareness s : all_squarenesses)
+        if (!calibration.squarenesses[static_cast<int>(s)]) miss(name(s));
+    if (!missing.empty())
+        throw InvalidArgument("calibration: does not determine " + missing +
+                              "; readings can be predicted only where all 21 parameters are known");
+    if (calibration.covariance.size() == 0)
+        throw InvalidArgument(
+            "calibration: has no covariance, so that predictions have no uncertainty; evaluate its run with the full "
+            "covariance, and keep it as netCDF");
+}
+
+}  // namespace
+
+Baseline::Baseline(Calibration calibration) : calibration_(std::move(calibration)) {
+    check(calibration_);
+    check_complete(calibration_);
+    int entry = 0;
+    for (int i = 0; i < function_count; ++i) {
+        first_entry_[i] = entry;
+        entry += int(calibration_.functions[i]->position.size());
+    }
+    for (int s = 0; s < squareness_count; ++s) first_entry_[function_count + s] = entry++;
+
+    // A covariance may be singular: functions are 0 at home, and the frame takes three straightnesses to 0 at the end.
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(calibration_.covariance);
+    constexpr double rounding = 1e-14;  // of eigenvalues against the largest
+    const double smallest = rounding * parts.eigenvalues().maxCoeff();
+    const Eigen::Index rank = (parts.eigenvalues().array() > smallest).count();
+    std::vector<int> open;
+    for (int i = 0; i < function_count; ++i)
+        if (!calibration_.functions[i]->slope_determined) open.push_back(i);
+    root_.setZero(entry, rank + Eigen::Index(open.size()));
+    root_.leftCols(rank) =
+        parts.eigenvectors().rightCols(rank) * parts.eigenvalues().tail(rank).cwiseSqrt().asDiagonal();
+    for (std::size_t k = 0; k < open.size(); ++k) {
+        const std::vector<double>& nodes = calibration_.functions[open[k]]->position;
+        for (std::size_t n = 0; n < nodes.size(); ++n)
+            root_(first_entry_[open[k]] + int(n), rank + Eigen::Index(k)) = usual_slope * nodes[n];
+    }
+}
+
+AxisErrors Baseline::errors(Axis axis, double position, bool negative, std::vector<Share>& shares) const {
+    AxisErrors errors = AxisErrors::Zero();
+    for (int c = 0; c < 6; ++c) {
+        const int i = FunctionId{axis, Component(c)}.index();
+        const CalibratedFunction& function = *calibration_.functions[i];
+        const Interval at = find(function.position, position);
+        errors[c] = interpolated(function.value, at);
+        shares.push_back({first_entry_[i] + int(at.node), c, 1.0 - at.share});
+        if (at.share > 0.0) shares.push_back({first_entry_[i] + int(at.node) + 1, c, at.share});
+        if (const auto& reversal = calibration_.reversal[i]; negative && reversal)
+            errors[c] -= interpolated(reversal->value, find(reversal->position, position));
+    }
+    for (const Squareness s : all_squarenesses) {
+        const SquarenessTerm term = squareness_term(s);
+        if (term.axis != axis) continue;
+        const int k = static_cast<int>(s);
+        errors[term.component] += term.sign * position * calibration_.squarenesses[k]->value;
+        shares.push_back({first_entry_[function_count + k], term.component, term.sign * position});
+    }
+    return errors;
+}
+
+bool Baseline::is_node(Axis axis, double position) const {
+    constexpr double same = 1e-6;  // mm
+    for (int c = 0; c < 6; ++c) {
+        const auto& nodes = calibration_.functions[FunctionId{axis, Component(c)}.index()]->position;
+        if (std::none_of(nodes.begin(), nodes.end(), [&](double node) { return std::abs(node - position) < same; }))
+            return false;
+    }
+    return true;
+}
+
+}  // namespace stepdiag

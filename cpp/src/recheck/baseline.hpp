@@ -1,0 +1,37 @@
+// A calibration as knowledge: its values between the nodes, and a root of their covariance. Internal: not installed.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "adjustment/channel_model.hpp"
+#include "stepdiag/evaluation/calibration.hpp"
+
+namespace stepdiag {
+
+class Baseline {
+public:
+    // A value of the calibration (order of calibration_entries) that has a share in an error of an axis.
+    struct Share {
+        int entry;
+        int component;  // of AxisErrors
+        double weight;
+    };
+
+    // Throws InvalidArgument for a calibration without covariance, or one that does not determine all parameters.
+    explicit Baseline(Calibration calibration);
+
+    const Calibration& calibration() const { return calibration_; }
+    // Errors of an axis, squareness terms included; `negative`: approached in - direction. Appends to `shares`.
+    AxisErrors errors(Axis axis, double position, bool negative, std::vector<Share>& shares) const;
+    bool is_node(Axis axis, double position) const;  // of all functions of the axis
+    // values = calibration_values + root z, where z has independent components of variance 1.
+    const Eigen::MatrixXd& root() const { return root_; }
+
+private:
+    Calibration calibration_;
+    std::array<int, function_count + squareness_count> first_entry_;
+    Eigen::MatrixXd root_;
+};
+
+}  // namespace stepdiag

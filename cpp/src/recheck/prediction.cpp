@@ -1,0 +1,242 @@
+#include "recheck/prediction.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+namespace {
+
+// A free unknown: far beyond what it may be, but a number, so that what no reading tells stays at 0.
+double usual_prior(PriorUncertainty prior, int column) {
+    if (std::isfinite(prior)) return prior;
+    return record(setup::component(column).quantity).unit == "mm" ? 1e9 : 1e3;  // mm; rad
+}
+
+constexpr int most_steps = 30;
+constexpr double settled = 1e-10;  // decrement of the square sum
+
+}  // namespace
+
+Prediction::Prediction(const AdjustmentProblem& problem, const Baseline& baseline)
+    : problem_(problem), baseline_(baseline) {
+    weigh_readings();
+    collect_rows();
+    z_.setZero(baseline.root().cols() + Eigen::Index(problem.coefficients().size() + problem.sensors().size()));
+}
+
+// What lies between the nodes of the calibration is a deviation of the functional point that no value has.
+void Prediction::weigh_readings() {
+    const double between = baseline_.calibration().between_nodes.value_or(0.0);
+    sigma_.resize(problem_.readings().size());
+    for (const AdjustedPoint& point : problem_.points()) {
+        const bool at_nodes = std::all_of(all_axes.begin(), all_axes.end(), [&](Axis axis) {
+            return baseline_.is_node(axis, point.place.commanded[index(axis)]);
+        });
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            const AdjustedReading& reading = problem_.readings()[r];
+            const bool is_distance = problem_.channel_name(reading).front() == 'd';
+            sigma_[r] = std::hypot(reading.standard_uncertainty, at_nodes || !is_distance ? 0.0 : between);
+        }
+    }
+}
+
+void Prediction::collect_rows() {
+    setups_.resize(problem_.setups().size());
+    place_.resize(sigma_.size());
+    setup_of_.resize(sigma_.size());
+    for (std::size_t p = 0; p < problem_.points().size(); ++p) {
+        const AdjustedPoint& point = problem_.points()[p];
+        SetupRows& rows = setups_[point.setup];
+        rows.points.push_back(int(p));
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            place_[r] = int(rows.readings.size());
+            setup_of_[r] = point.setup;
+            rows.readings.push_back(r);
+        }
+    }
+    for (std::size_t k = 0; k < setups_.size(); ++k) {
+        const LineSetup& setup = problem_.setups()[k];
+        const auto size = Eigen::Index(setup.active.size());
+        setups_[k].weight.resize(size);
+        for (Eigen::Index j = 0; j < size; ++j)
+            setups_[k].weight[j] = std::pow(usual_prior(setup.prior[setup.active[j]], setup.active[j]), -2);
+        setups_[k].value.setZero(size);
+    }
+}
+
+void Prediction::linearise(SetupRows& rows, const Eigen::VectorXd& z, bool derivatives) {
+    const std::size_t k = std::size_t(&rows - setups_.data());
+    const LineSetup& setup = problem_.setups()[k];
+    ChannelModel model = setup.model;
+    Eigen::VectorXd whole = Eigen::VectorXd::Zero(Eigen::Index(setup.prior.size()));
+    for (std::size_t j = 0; j < setup.active.size(); ++j) whole[setup.active[j]] = rows.value[Eigen::Index(j)];
+    model.set_up(whole);
+
+    const Eigen::MatrixXd& root = baseline_.root();
+    const auto& coefficients = problem_.coefficients();
+    const auto& expansion = problem_.expansion();
+    const Eigen::VectorXd values = root * z.head(root.cols());
+    const auto count = Eigen::Index(rows.readings.size());
+    rows.residual.resize(count);
+    if (derivatives) {
+        rows.by_setup.resize(count, Eigen::Index(setup.active.size()));
+        rows.by_baseline.setZero(count, z.size());
+    }
+    Eigen::VectorXd reading(model.channels());
+    ChannelDerivative derivative(model.channels(), 18 + model.setup_size());
+    std::array<std::vector<Baseline::Share>, 3> shares;
+    for (const int p : rows.points) {
+        const AdjustedPoint& point = problem_.points()[p];
+        MachineErrors errors;
+        // By coefficient and sensor: what they add to an axis along itself, by z.
+        std::array<Eigen::VectorXd, 3> added;
+        for (const Axis axis : all_axes) {
+            const int a = index(axis);
+            const double position = point.place.commanded[a];
+            shares[a].clear();
+            errors[a] = baseline_.errors(axis, position, point.negative[a], shares[a]);
+            for (const Baseline::Share& share : shares[a])
+                errors[a][share.component] += share.weight * values[share.entry];
+            added[a].setZero(z.size() - root.cols());
+            if (!expansion) continue;
+            errors[a][a] += expansion->expansion.coefficient[a] * point.place.stretch[a];
+            for (std::size_t c = 0; c < coefficients.size(); ++c)
+                for (const int of : coefficients[c].axes)
+                    if (of == a)
+                        added[a][Eigen::Index(c)] = coefficients[c].prior * coefficients[c].effect(point.place, a);
+            for (std::size_t s = 0; s < problem_.sensors().size(); ++s)
+                for (const int of : problem_.sensors()[s])
+                    if (of == a)
+                        added[a][Eigen::Index(coefficients.size() + s)] = expansion->expansion.coefficient[a] *
+                                                                          expansion->sensor_uncertainty *
+                                                                          point.place.from_fixed[a];
+            errors[a][a] += added[a].dot(z.tail(added[a].size()));
+        }
+        const PoseDerivative pose =
+            differentiate_pose(problem_.chain(), problem_.tool(), point.place.commanded, errors, derivatives);
+        model.read(pose, point.place, reading, derivatives ? &derivative : nullptr);
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            const int channel = problem_.readings()[r].channel;
+            const double weight = 1.0 / sigma_[r];
+            const int i = place_[r];
+            rows.residual[i] = weight * (problem_.readings()[r].value - reading[channel]);
+            if (!derivatives) continue;
+            for (std::size_t j = 0; j < setup.active.size(); ++j)
+                rows.by_setup(i, Eigen::Index(j)) = weight * derivative(channel, 18 + setup.active[j]);
+            for (int a = 0; a < 3; ++a) {
+                for (const Baseline::Share& share : shares[a])
+                    rows.by_baseline.row(i).head(root.cols()) +=
+                        weight * derivative(channel, 6 * a + share.component) * share.weight * root.row(share.entry);
+                rows.by_baseline.row(i).tail(added[a].size()) +=
+                    weight * derivative(channel, 7 * a) * added[a].transpose();
+            }
+        }
+    }
+}
+
+// Each set-up by itself, at the calibration's values: from there the steps of all are few.
+void Prediction::settle_setups() {
+    for (SetupRows& rows : setups_) {
+        double decrement = std::numeric_limits<double>::infinity();
+        for (int i = 0; i < most_steps && decrement > settled; ++i) {
+            linearise(rows, z_, true);
+            Eigen::MatrixXd matrix = rows.by_setup.transpose() * rows.by_setup;
+            matrix.diagonal() += rows.weight;
+            const Eigen::VectorXd gradient =
+                rows.by_setup.transpose() * rows.residual - rows.weight.cwiseProduct(rows.value);
+            const Eigen::VectorXd change = matrix.ldlt().solve(gradient);
+            rows.value += change;
+            decrement = gradient.dot(change);
+        }
+    }
+}
+
+double Prediction::step() {
+    const Eigen::Index size = z_.size();
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Identity(size, size);
+    Eigen::VectorXd gradient = -z_;
+    std::vector<Eigen::VectorXd> own;
+    double decrement = 0.0;
+    for (SetupRows& rows : setups_) {
+        linearise(rows, z_, true);
+        Eigen::MatrixXd corner = rows.by_setup.transpose() * rows.by_setup;
+        corner.diagonal() += rows.weight;
+        rows.factor.compute(corner);
+        const Eigen::MatrixXd coupling = rows.by_setup.transpose() * rows.by_baseline;
+        rows.transfer = rows.factor.solve(coupling);
+        own.push_back(rows.by_setup.transpose() * rows.residual - rows.weight.cwiseProduct(rows.value));
+        matrix.selfadjointView<Eigen::Lower>().rankUpdate(rows.by_baseline.transpose());
+        matrix.triangularView<Eigen::Lower>() -= coupling.transpose() * rows.transfer;
+        gradient += rows.by_baseline.transpose() * rows.residual - rows.transfer.transpose() * own.back();
+    }
+    factor_.compute(matrix.selfadjointView<Eigen::Lower>());
+    const Eigen::VectorXd change = factor_.solve(gradient);
+    z_ += change;
+    decrement += gradient.dot(change);
+    for (std::size_t k = 0; k < setups_.size(); ++k) {
+        SetupRows& rows = setups_[k];
+        const Eigen::VectorXd alone = rows.factor.solve(own[k]);
+        rows.value += alone - rows.transfer * change;
+        decrement += own[k].dot(alone);
+    }
+    return decrement;
+}
+
+void Prediction::solve() {
+    settle_setups();
+    double decrement = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < most_steps && !(decrement < settled * double(sigma_.size())); ++i) decrement = step();
+    if (!(decrement < settled * double(sigma_.size())))
+        throw InvalidArgument("readings: no machine near the calibration gives them; evaluate the run to see why");
+    for (SetupRows& rows : setups_) {
+        rows.spread = factor_.matrixL().solve(rows.transfer.transpose());
+        linearise(rows, Eigen::VectorXd::Zero(z_.size()), false);
+        stated_residual_.push_back(rows.residual);
+        linearise(rows, z_, false);
+    }
+}
+
+double Prediction::chi_square() const {
+    double sum = z_.squaredNorm();
+    for (const SetupRows& rows : setups_) sum += rows.residual.squaredNorm() + rows.value.cwiseAbs2().dot(rows.weight);
+    return sum;
+}
+
+int Prediction::degrees_of_freedom() const {
+    double told = 0.0;  // of the free unknowns, those that the readings tell
+    for (std::size_t k = 0; k < setups_.size(); ++k) {
+        const LineSetup& setup = problem_.setups()[k];
+        const SetupRows& rows = setups_[k];
+        const Eigen::Index size = rows.weight.size();
+        const Eigen::MatrixXd alone = rows.factor.solve(Eigen::MatrixXd::Identity(size, size));
+        for (Eigen::Index j = 0; j < size; ++j)
+            if (!std::isfinite(setup.prior[setup.active[j]]))
+                told += 1.0 - rows.weight[j] * (alone(j, j) + rows.spread.col(j).squaredNorm());
+    }
+    return int(sigma_.size()) - int(std::lround(told));
+}
+
+Prediction::Deviation Prediction::deviation(const std::vector<Term>& sum) const {
+    const int k = setup_of_[sum.front().reading];
+    const SetupRows& rows = setups_[k];
+    Eigen::VectorXd by_setup = Eigen::VectorXd::Zero(rows.weight.size());
+    Eigen::VectorXd by_baseline = Eigen::VectorXd::Zero(z_.size());
+    double value = 0.0, variance = 0.0;
+    for (const Term& term : sum) {
+        const int i = place_[term.reading];
+        const double scale = term.weight * sigma_[term.reading];
+        value += scale * stated_residual_[k][i];
+        variance += scale * scale;
+        by_setup += scale * rows.by_setup.row(i).transpose();
+        by_baseline += scale * rows.by_baseline.row(i).transpose();
+    }
+    variance += by_baseline.squaredNorm();
+    const double told = by_setup.dot(rows.factor.solve(by_setup)) + (rows.spread * by_setup).squaredNorm();
+    constexpr double rounding = 1e-9;
+    return {value, variance - told > rounding * variance ? std::sqrt(variance - told) : 0.0};
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,68 @@
+// Readings predicted from a calibration: linear in what is uncertain of it, z, and in the set-ups of the lines, s.
+// Internal: not installed.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <vector>
+
+#include "adjustment/adjustment_problem.hpp"
+#include "recheck/baseline.hpp"
+
+namespace stepdiag {
+
+// All is in units of standard uncertainties: readings of their own, z of its prior. The normal equations are a dense
+// block of z, bordered by a small block of each set-up, which couple with it alone.
+class Prediction {
+public:
+    Prediction(const AdjustmentProblem& problem, const Baseline& baseline);
+
+    // Gauss-Newton to the minimum of e^T e + z^T z + priors of s. Throws InvalidArgument where it is not reached.
+    void solve();
+    double chi_square() const;
+    int degrees_of_freedom() const;
+
+    // A sum of readings, in native units.
+    struct Term {
+        int reading;
+        double weight;
+    };
+    struct Deviation {
+        double value;                 // read - predicted at z = 0 and the set-ups as they were found
+        double standard_uncertainty;  // of the value
+    };
+    // Of readings of one set-up. After solve().
+    Deviation deviation(const std::vector<Term>& sum) const;
+    double standard_uncertainty(int reading) const { return sigma_[reading]; }  // of the reading, native units
+
+private:
+    struct SetupRows {
+        std::vector<int> points;    // of the problem
+        std::vector<int> readings;  // likewise, in the order of the points
+        Eigen::VectorXd weight;     // 1/u^2 of the priors of s
+        Eigen::MatrixXd by_setup, by_baseline;
+        Eigen::VectorXd residual;
+        Eigen::VectorXd value;  // s
+        // Of the last factorisation: A = S^T S + P, T = A^-1 S^T Z, and L^-1 T^T with the factor L of z.
+        Eigen::LDLT<Eigen::MatrixXd> factor;
+        Eigen::MatrixXd transfer, spread;
+    };
+
+    void weigh_readings();
+    void collect_rows();
+    void linearise(SetupRows& rows, const Eigen::VectorXd& z, bool derivatives);
+    void settle_setups();
+    double step();  // the decrement of the square sum, were the problem linear
+
+    const AdjustmentProblem& problem_;
+    const Baseline& baseline_;
+    std::vector<double> sigma_;  // by reading
+    std::vector<int> place_;     // by reading: row in its set-up
+    std::vector<int> setup_of_;  // by reading
+    std::vector<SetupRows> setups_;
+    Eigen::VectorXd z_;
+    Eigen::LLT<Eigen::MatrixXd> factor_;
+    std::vector<Eigen::VectorXd> stated_residual_;  // by set-up: at z = 0, s^
+};
+
+}  // namespace stepdiag

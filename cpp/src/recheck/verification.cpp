@@ -1,0 +1,128 @@
+#include "stepdiag/recheck/verification.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "evaluation/fit_test.hpp"
+#include "recheck/prediction.hpp"
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+namespace {
+
+std::string text(const Eigen::Vector3d& lengths) { return format_lengths(lengths) + " mm"; }
+
+void check_same_machine(const Calibration& calibration, const Plan& plan, const Chain& chain,
+                        const Eigen::Vector3d& tool) {
+    const auto differ = [](const std::string& what, const std::string& expected, const std::string& came) {
+        throw InvalidArgument(what + ": the calibration has " + expected + ", the readings have " + came);
+    };
+    if (!(calibration.chain == chain)) differ("chain", calibration.chain.name(), chain.name());
+    if (calibration.volume != plan.volume()) differ("volume", text(calibration.volume), text(plan.volume()));
+    if (calibration.tool != tool) differ("tool", text(calibration.tool), text(tool));
+}
+
+void check_same_temperature(const Calibration& calibration, const std::optional<KnownExpansion>& expansion) {
+    const auto& reference = calibration.temperature_reference;
+    if (reference && !expansion)
+        throw InvalidArgument("calibration: is referred to " + std::to_string(*reference) +
+                              " degrees Celsius; readings need the expansion of the scales and their temperatures");
+    if (reference && expansion && *reference != expansion->expansion.reference)
+        throw InvalidArgument("calibration: is referred to " + std::to_string(*reference) +
+                              " degrees Celsius, the readings to " + std::to_string(expansion->expansion.reference));
+    if (!reference && expansion)
+        throw InvalidArgument("calibration: is as it was found, but the readings are to be referred to " +
+                              std::to_string(expansion->expansion.reference) +
+                              " degrees Celsius; evaluate its run with the expansion, too, or leave it out here");
+}
+
+// The first and the last point of each pass that have a distance.
+std::vector<LineDeviation> line_deviations(const Measurement& measurement, const AdjustmentProblem& problem,
+                                           const Prediction& prediction) {
+    struct Ends {
+        std::size_t row;                                   // of the pass, the first
+        int first, last;                                   // points of the line
+        std::map<int, int> first_distance, last_distance;  // reading by channel
+    };
+    std::map<std::tuple<int, int, bool>, Ends> passes;  // by set-up, run and direction
+    for (const AdjustedPoint& point : problem.points()) {
+        std::map<int, int> distances;
+        for (int r = point.first_reading; r < point.end_reading; ++r)
+            if (problem.channel_name(problem.readings()[r]).front() == 'd')
+                distances[problem.readings()[r].channel] = r;
+        if (distances.empty()) continue;
+        const std::size_t row = problem.readings()[point.first_reading].row;
+        const Station& station = measurement.stations()[row];
+        const auto [place, is_new] =
+            passes.try_emplace({point.setup, station.run, station.direction == Direction::backward},
+                               Ends{row, station.point, station.point, distances, distances});
+        Ends& ends = place->second;
+        ends.row = std::min(ends.row, row);
+        if (station.point < ends.first)
+            std::tie(ends.first, ends.first_distance) = std::tuple(station.point, distances);
+        if (station.point > ends.last) std::tie(ends.last, ends.last_distance) = std::tuple(station.point, distances);
+    }
+    std::map<std::size_t, LineDeviation> by_row;
+    for (const auto& [key, ends] : passes) {
+        std::vector<Prediction::Term> sum;
+        for (const auto& [channel, reading] : ends.last_distance)
+            if (const auto other = ends.first_distance.find(channel);
+                other != ends.first_distance.end() && other->second != reading) {
+                sum.push_back({reading, 1.0});
+                sum.push_back({other->second, -1.0});
+            }
+        if (sum.empty()) continue;
+        for (Prediction::Term& term : sum) term.weight *= 2.0 / double(sum.size());
+        const auto [value, uncertainty] = prediction.deviation(sum);
+        const auto& [setup, run, backward] = key;
+        by_row[ends.row] = {run, problem.setups()[setup].line.name(), backward, value, uncertainty};
+    }
+    std::vector<LineDeviation> lines;
+    for (const auto& entry : by_row) lines.push_back(entry.second);
+    return lines;
+}
+
+}  // namespace
+
+Verification verify(const Calibration& calibration, const Measurement& measurement, const Plan& plan,
+                    const Chain& chain, const Eigen::Vector3d& tool, const HeadCalibrations& heads,
+                    const AdjustmentOptions& options) {
+    check_same_machine(calibration, plan, chain, tool);
+    check_same_temperature(calibration, options.expansion);
+    const Baseline baseline(calibration);
+    AdjustmentOptions own = options;
+    own.machine_drift.reset();
+    own.rotations = true;
+    own.reversal = false;  // of the unknowns: the calibration has its own
+    own.smoothness.reset();
+    const AdjustmentProblem problem(measurement, plan, chain, tool, heads, own);
+    if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
+    Prediction prediction(problem, baseline);
+    prediction.solve();
+
+    Verification result{{},
+                        line_deviations(measurement, problem, prediction),
+                        prediction.chi_square(),
+                        prediction.degrees_of_freedom(),
+                        1.0,
+                        0};
+    if (result.degrees_of_freedom < 1)
+        throw InvalidArgument("readings: there are no more of them than unknowns of how head and mirror stood");
+    result.probability = chi_square_probability(result.chi_square, result.degrees_of_freedom);
+    for (int r = 0; r < int(problem.readings().size()); ++r) {
+        const auto [value, uncertainty] = prediction.deviation({{r, 1.0}});
+        const AdjustedReading& reading = problem.readings()[r];
+        result.readings.push_back({reading.row, problem.channel_name(reading), value, uncertainty});
+    }
+    std::stable_sort(result.readings.begin(), result.readings.end(),
+                     [](const auto& a, const auto& b) { return a.row < b.row; });
+    const auto worst = std::max_element(
+        result.readings.begin(), result.readings.end(),
+        [](const auto& a, const auto& b) { return std::abs(a.normalised()) < std::abs(b.normalised()); });
+    result.worst = std::size_t(worst - result.readings.begin());
+    return result;
+}
+
+}  // namespace stepdiag

@@ -1,0 +1,1 @@
+"""Is the last calibration still true: new readings against it."""
