@@ -134,7 +134,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     if (result.degrees_of_freedom > 0)
         result.chi_square_probability = chi_square_probability(result.weighted_square_sum, result.degrees_of_freedom);
     const auto patterns = residual_patterns(result, measurement, solver.equations(), solver.factor());
-    result.verdict = judge(result, patterns, prior_scatter(problem, x, inverse));
+    result.verdict = judge(result, patterns, prior_scatter(problem, x, solver.factor()));
     if (!solution->is_minimum()) {
         const double factor = std::sqrt(result.variance_factor());
         result.verdict = {Fit::rejected, {{FitFinding::noise_factor, factor, largest_noise_factor}}};

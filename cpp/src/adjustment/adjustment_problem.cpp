@@ -125,7 +125,7 @@ double usual_angle(const Plan& plan, const std::map<std::string, LineReadings>& 
 
 AdjustmentProblem::AdjustmentProblem(const Measurement& measurement, const Plan& plan, const Chain& chain,
                                      const Eigen::Vector3d& tool, const HeadCalibrations& heads,
-                                     const AdjustmentOptions& options)
+                                     const AdjustmentOptions& options, Elimination elimination)
     : plan_(plan),
       chain_(chain),
       tool_(tool),
@@ -142,7 +142,7 @@ AdjustmentProblem::AdjustmentProblem(const Measurement& measurement, const Plan&
         reversal_ = reversal_ || (options.reversal && station.direction == Direction::backward);
     collect_setups(measurement, options);
     collect_points(measurement, options);
-    number_unknowns(options);
+    number_unknowns(options, elimination);
 }
 
 // A set-up serves a forward run of a line and the backward runs that follow it, or all runs of the line.
@@ -301,7 +301,7 @@ bool is_zero_at_end(Axis axis, int component) {
 
 }  // namespace
 
-void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options) {
+void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options, Elimination elimination) {
     const int steps = plan_.steps();
     std::vector<int> banded;
     for (std::size_t i = 0; i < nodes_.size(); ++i)
@@ -324,6 +324,7 @@ void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options) {
             if ((c < 3 || options.rotations) && (node.negative || !is_zero_at_end(node.axis, c)))
                 node.unknown[c] = banded_unknowns + border_++;
     }
+    const int first_of_set_ups = border_;
     for (LineSetup& setup : setups_)
         for (int c = 0; c < int(setup.prior.size()); ++c)
             if (setup.prior[c] != fixed_unknown) {
@@ -339,11 +340,6 @@ void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options) {
         for (int a = 0; a < 3; ++a)
             if (const double prior = options.machine_drift->standard_uncertainty[a]; prior > 0.0)
                 coefficients_.push_back({{a}, prior, true, banded_unknowns + border_++});
-
-    if (border_ > largest_border)
-        throw InvalidArgument("adjustment: " + std::to_string(setups_.size()) + " set-ups have more than " +
-                              std::to_string(largest_border) +
-                              " unknowns; where runs of a line have one set-up in common, say so (one_setup_per_line)");
 
     reach_.resize(banded.size());
     for (std::size_t b = 0; b < banded.size(); ++b) reach_[b] = int(b);
@@ -367,9 +363,33 @@ void AdjustmentProblem::number_unknowns(const AdjustmentOptions& options) {
             }
     for (std::size_t b = 1; b < reach_.size(); ++b) reach_[b] = std::max(reach_[b], reach_[b - 1]);
 
+    choose_elimination(elimination, first_of_set_ups);
     sort_points();
 
     weigh_unknowns();
+}
+
+// By the multiplications of a factorisation.
+void AdjustmentProblem::choose_elimination(Elimination elimination, int first_of_set_ups) {
+    constexpr double clearly = 0.5;  // cheaper, so that a single run keeps its band
+    int of_set_ups = 0;
+    for (const LineSetup& setup : setups_) of_set_ups += int(setup.active.size());
+    double set_ups_last = std::pow(double(border_), 3) / 3.0;
+    for (int b = 0; b < blocks(); ++b) set_ups_last += 6.0 * std::pow(6.0 * (reach_[b] - b) + border_, 2);
+    const double rest = size() - of_set_ups;
+    const double nodes_last = std::pow(rest, 3) / 3.0 + of_set_ups * rest * rest;
+    if (elimination == Elimination::set_ups_last || !(nodes_last < clearly * set_ups_last)) {
+        if (border_ > largest_border)
+            throw InvalidArgument(
+                "adjustment: " + std::to_string(setups_.size()) + " set-ups have more than " +
+                std::to_string(largest_border) +
+                " unknowns; where runs of a line have one set-up in common, say so (one_setup_per_line)");
+        return;
+    }
+    leaves_.first = first_of_set_ups;
+    for (const LineSetup& setup : setups_) leaves_.size.push_back(int(setup.active.size()));
+    leaf_unknowns_ = of_set_ups;
+    std::fill(reach_.begin(), reach_.end(), blocks() - 1);
 }
 
 void AdjustmentProblem::weigh_unknowns() {

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "adjustment/bordered_band.hpp"
 #include "adjustment/channel_model.hpp"
 #include "stepdiag/adjustment/adjustment.hpp"
 
@@ -89,10 +90,16 @@ struct AdjustedPoint {
     int first_reading, end_reading;
 };
 
+// Which unknowns the factor eliminates last. The set-ups, in a dense border behind the nodes' band: its time grows with
+// the third power of their number. Or the nodes, which are then dense, and the set-ups are leaves: its time grows with
+// the third power of the number of nodes, and with that of the set-ups.
+enum class Elimination { cheapest, set_ups_last };
+
 class AdjustmentProblem {
 public:
     AdjustmentProblem(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
-                      const HeadCalibrations& heads, const AdjustmentOptions& options);
+                      const HeadCalibrations& heads, const AdjustmentOptions& options,
+                      Elimination elimination = Elimination::cheapest);
 
     const Plan& plan() const { return plan_; }
     const Chain& chain() const { return chain_; }
@@ -113,6 +120,9 @@ public:
     const std::vector<int>& reach() const { return reach_; }  // of the band's block columns
     int blocks() const { return int(reach_.size()); }
     int border() const { return border_; }
+    // Unknowns of the set-ups, by set-up, where they are leaves of the matrix; otherwise none.
+    const Leaves& leaves() const { return leaves_; }
+    int dense_border() const { return border_ - leaf_unknowns_; }
     const std::vector<CoefficientUnknown>& coefficients() const { return coefficients_; }
     const std::optional<KnownExpansion>& expansion() const { return expansion_; }
     bool moves_axes() const { return expansion_ || !coefficients_.empty(); }  // by more than their errors
@@ -140,7 +150,8 @@ public:
 private:
     void collect_setups(const Measurement& measurement, const AdjustmentOptions& options);
     void collect_points(const Measurement& measurement, const AdjustmentOptions& options);
-    void number_unknowns(const AdjustmentOptions& options);
+    void number_unknowns(const AdjustmentOptions& options, Elimination elimination);
+    void choose_elimination(Elimination elimination, int first_of_set_ups);
     void sort_points();
     void weigh_unknowns();
     int node_index(Axis axis, int node, bool negative);
@@ -159,6 +170,8 @@ private:
     std::vector<AdjustedReading> readings_;
     std::vector<int> reach_;
     int border_ = 0;
+    Leaves leaves_;
+    int leaf_unknowns_ = 0;
     std::optional<KnownExpansion> expansion_;
     std::vector<CoefficientUnknown> coefficients_;
     std::vector<AxisGroup> sensors_;

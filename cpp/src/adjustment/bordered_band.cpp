@@ -66,30 +66,53 @@ Matrix6 inverse_of_factor(const BorderedBand::ConstBlock& l) {
 
 // A band's columns are followed by zeros for as many rows as a tile may go beyond them, then by what the upper triangle
 // of the next diagonal blocks may hold.
-BorderedBand::BorderedBand(std::vector<int> reach, int border)
+BorderedBand::BorderedBand(std::vector<int> reach, int border, const Leaves& leaves)
     : reach_(std::move(reach)),
       border_(border),
+      first_leaf_(leaves.first),
+      leaf_start_(1, 0),
+      corner_start_(1, 0),
       band_step_(six * (half_bandwidth(reach_) + tile_blocks) + six),
       border_step_(round_up(border, lanes)),
+      leaf_border_(round_up(six * blocks(), lanes) + lanes),
+      leaf_step_(leaf_border_ + border_step_ + lanes),
       band_(six * blocks() * (band_step_ + 1) + band_step_),
       border_rows_(six * blocks() * border_step_ + lanes),
-      corner_(MatrixXd::Zero(border, border)) {}
+      leaf_columns_(leaves.size.empty() ? 0 : leaf_step_ * (std::reduce(leaves.size.begin(), leaves.size.end()) + six)),
+      corner_(MatrixXd::Zero(border, border)) {
+    assert(leaves.size.empty() || reach_.empty() || reach_.front() + 1 == blocks());
+    for (const int size : leaves.size) {
+        leaf_at_.insert(leaf_at_.end(), size, this->leaves());
+        leaf_start_.push_back(leaf_start_.back() + size);
+        corner_start_.push_back(corner_start_.back() + size * size);
+    }
+    leaf_corners_.assign(corner_start_.back(), 0.0);
+}
 
 void BorderedBand::set_zero() {
     band_.set_zero();
     border_rows_.set_zero();
+    leaf_columns_.set_zero();
+    std::fill(leaf_corners_.begin(), leaf_corners_.end(), 0.0);
     corner_.setZero();
 }
 
 VectorXd BorderedBand::diagonal() const {
     VectorXd all(size());
     for (int j = 0; j < blocks(); ++j) all.segment<6>(6 * j) = block(j, j).diagonal();
-    all.tail(border_) = corner_.diagonal();
+    const Index before = first_leaf_, after = border_ - before;
+    all.segment(six * blocks(), before) = corner_.diagonal().head(before);
+    all.tail(after) = corner_.diagonal().tail(after);
+    for (int l = 0; l < leaves(); ++l)
+        all.segment(first_leaf_unknown() + leaf_start_[l], leaf_size(l)) = leaf(l).diagonal();
     return all;
 }
 
 BorderedFactor::BorderedFactor(const BorderedBand& matrix, double threshold)
-    : threshold_(threshold), l_(matrix), schur_(matrix.border_step_ * round_up(matrix.border_, six)) {
+    : threshold_(threshold),
+      l_(matrix),
+      leaf_order_(matrix.leaf_unknowns()),
+      schur_(matrix.border_step_ * round_up(matrix.border_, six)) {
     factorize();
 }
 
@@ -102,13 +125,13 @@ BorderedFactor::ConstCorner BorderedFactor::corner_factor() const {
 }
 
 void BorderedFactor::factorize(const BorderedBand& matrix) {
-    assert(matrix.reach_ == l_.reach_ && matrix.border_ == l_.border_);
+    assert(matrix.reach_ == l_.reach_ && matrix.border_ == l_.border_ && matrix.leaf_start_ == l_.leaf_start_);
     l_ = matrix;
     factorize();
 }
 
 void BorderedFactor::factorize(BorderedBand&& matrix) {
-    assert(matrix.reach_ == l_.reach_ && matrix.border_ == l_.border_);
+    assert(matrix.reach_ == l_.reach_ && matrix.border_ == l_.border_ && matrix.leaf_start_ == l_.leaf_start_);
     std::swap(l_, matrix);
     factorize();
 }
@@ -116,20 +139,67 @@ void BorderedFactor::factorize(BorderedBand&& matrix) {
 void BorderedFactor::factorize() {
     held_.clear();
     schur() = l_.corner_;
+    smallest_pivots_.resize(six * l_.blocks());
+    for (int j = 0; j < l_.blocks(); ++j) smallest_pivots_.segment<6>(6 * j) = threshold_ * l_.block(j, j).diagonal();
+    eliminate_leaves();
     int first = 0;  // block column that reaches down to `column`
     for (int column = 0; column < l_.blocks(); ++column) {
         while (l_.reach(first) < column) ++first;
         eliminate(column, first);
         const int done = column % chunk + 1;
-        if (done == chunk || column + 1 == l_.blocks()) reduce_corner(column + 1 - done, done);
+        if (done == chunk || column + 1 == l_.blocks()) reduce_corner(l_.border_view(column + 1 - done), six * done);
     }
     factorize_corner();
     std::sort(held_.begin(), held_.end());
 }
 
+// The factor of one leaf, the largest pivots first (each divided by its diagonal entry of N), and its columns of L.
+void BorderedFactor::factorize_leaf(int leaf) {
+    const int size = l_.leaf_size(leaf), start = l_.leaf_start(leaf);
+    auto l = l_.leaf(leaf);
+    for (int j = 0; j < size; ++j)
+        for (int i = 0; i < j; ++i) l(i, j) = l(j, i);
+    Eigen::Map<MatrixXd> columns(l_.leaf_column(start), l_.leaf_step_, size);
+    int* order = leaf_order_.data() + start;
+    std::iota(order, order + size, 0);
+    const VectorXd diagonal = l.diagonal();
+    for (int k = 0; k < size; ++k) {
+        const auto part = [&](int p) { return diagonal[p] > 0.0 ? l(p, p) / diagonal[p] : 0.0; };
+        std::swap(order[k],
+                  *std::max_element(order + k, order + size, [&](int a, int b) { return part(a) < part(b); }));
+        const int own = order[k];
+        const bool determined = part(own) > threshold_;
+        if (!determined) held_.push_back(l_.first_leaf_unknown() + start + own);
+        l(own, own) = determined ? 1.0 / std::sqrt(l(own, own)) : 0.0;
+        columns.col(own) *= l(own, own);
+        for (int i = k + 1; i < size; ++i) l(order[i], own) *= l(own, own);
+        for (int j = k + 1; j < size; ++j) {
+            columns.col(order[j]) -= l(order[j], own) * columns.col(own);
+            for (int i = k + 1; i < size; ++i) l(order[i], order[j]) -= l(order[i], own) * l(order[j], own);
+        }
+    }
+}
+
+// Leaf by leaf, and what they explain of band and corner: N - W W^T.
+void BorderedFactor::eliminate_leaves() {
+    for (int leaf = 0; leaf < l_.leaves(); ++leaf) factorize_leaf(leaf);
+    const std::ptrdiff_t step = l_.leaf_step_;
+    for (int first = 0; first < l_.leaf_unknowns(); first += panel) {
+        const std::ptrdiff_t count = std::min<std::ptrdiff_t>(panel, l_.leaf_unknowns() - first);
+        const double *w = l_.leaf_column(first), *of_border = w + l_.leaf_border_;
+        for (int column = 0; column < l_.blocks(); ++column) {
+            const double* own = w + six * column;
+            subtract_product(six * (l_.blocks() - column), six, count, {own, step}, {own, 1, step},
+                             l_.view(column, column));
+            subtract_product(l_.border_, six, count, {of_border, step}, {own, 1, step}, l_.border_view(column));
+        }
+        reduce_corner({of_border, step}, count);
+    }
+}
+
 // What the block columns before it do to this one, then its own factor.
 void BorderedFactor::eliminate(int column, int first) {
-    const Vector6 smallest_pivots = threshold_ * l_.block(column, column).diagonal();
+    const Vector6 smallest_pivots = smallest_pivots_.segment<6>(six * column);
     const int reach = l_.reach(column);
     const auto columns_before = [&](int from) { return six * (column - from); };
     for (int row = column, from = first; row <= reach; row += tile_blocks) {
@@ -145,13 +215,12 @@ void BorderedFactor::eliminate(int column, int first) {
     divide_by_transpose(l_.border_, l_.view(column, column), l_.border_view(column));
 }
 
-// The corner's lower triangle less what these block columns explain of it: D - C C^T.
-void BorderedFactor::reduce_corner(int first, int count) {
+// The corner's lower triangle less what these columns of the border's rows explain of it: D - C C^T.
+void BorderedFactor::reduce_corner(ConstMatrixView c, std::ptrdiff_t count) {
     const Index border = l_.border_, step = l_.border_step_;
-    const double* c = l_.border_at(first);
     for (Index column = 0; column < border; column += six) {
         const Index row = column / lanes * lanes;
-        subtract_product(border - row, six, six * count, {c + row, step}, {c + column, 1, step},
+        subtract_product(border - row, six, count, {c.from + row, c.step}, {c.from + column, 1, c.step},
                          {schur_.data() + row + column * step, step});
     }
 }
@@ -189,7 +258,8 @@ void BorderedFactor::factorize_corner() {
         first = k + 1;
     }
     corner_rank_ = int(k);
-    for (; k < border; ++k) held_.push_back(int(six) * l_.blocks() + order_[k]);
+    for (; k < border; ++k)
+        held_.push_back(int(six) * l_.blocks() + order_[k] + (order_[k] < l_.first_leaf_ ? 0 : l_.leaf_unknowns()));
 }
 
 // L^-1 of a right side: its band in place, what belongs to the border returned.
@@ -211,22 +281,53 @@ VectorXd BorderedFactor::divide(double* x, double* border_part) const {
     return determined;
 }
 
-double BorderedFactor::inverse_square(const VectorXd& v) const {
-    const Index unknowns = six * l_.blocks(), border = l_.border_;
+// L^-1 of what belongs to a leaf, in place, its part taken off the rest; its square sum.
+double BorderedFactor::divide_leaf(int leaf, double* own, double* band, double* border) const {
+    const int size = l_.leaf_size(leaf), start = l_.leaf_start(leaf);
+    const auto l = l_.leaf(leaf);
+    const int* order = leaf_order_.data() + start;
+    double square = 0.0;
+    for (int k = 0; k < size; ++k) {
+        const int column = order[k];
+        own[column] = l(column, column) == 0.0 ? 0.0 : own[column] * l(column, column);
+        if (own[column] == 0.0) continue;
+        square += own[column] * own[column];
+        for (int i = k + 1; i < size; ++i) own[order[i]] -= l(order[i], column) * own[column];
+        const double* w = l_.leaf_column(start + column);
+        Eigen::Map<VectorXd>(band, six * l_.blocks()) -= own[column] * Eigen::Map<const VectorXd>(w, six * l_.blocks());
+        Eigen::Map<VectorXd>(border, l_.border_) -=
+            own[column] * Eigen::Map<const VectorXd>(w + l_.leaf_border_, l_.border_);
+    }
+    return square;
+}
+
+double BorderedFactor::inverse_square(const VectorXd& v, int only_leaf) const {
+    const Index unknowns = six * l_.blocks(), border = l_.border_, before = l_.first_leaf_;
     AlignedNumbers band(unknowns + lanes), rest(border);
     std::copy_n(v.data(), unknowns, band.data());
-    std::copy_n(v.data() + unknowns, border, rest.data());
+    std::copy_n(v.data() + unknowns, before, rest.data());
+    std::copy_n(v.data() + v.size() - (border - before), border - before, rest.data() + before);
+    double of_leaves = 0.0;
+    const int first = only_leaf == every_leaf ? 0 : only_leaf;
+    const int end = only_leaf == every_leaf ? l_.leaves() : only_leaf + 1;
+    for (int leaf = first; leaf < std::min(end, l_.leaves()); ++leaf) {
+        VectorXd own = v.segment(l_.first_leaf_unknown() + l_.leaf_start(leaf), l_.leaf_size(leaf));
+        of_leaves += divide_leaf(leaf, own.data(), band.data(), rest.data());
+    }
     const VectorXd determined = divide(band.data(), rest.data());
-    return determined.squaredNorm() + Eigen::Map<const VectorXd>(band.data(), unknowns).squaredNorm();
+    return of_leaves + determined.squaredNorm() + Eigen::Map<const VectorXd>(band.data(), unknowns).squaredNorm();
 }
 
 void BorderedFactor::solve(Eigen::Ref<VectorXd> right_hand_side) const {
-    const Index unknowns = six * l_.blocks(), border = l_.border_;
+    const Index unknowns = six * l_.blocks(), border = l_.border_, before = l_.first_leaf_;
     AlignedNumbers band(unknowns + lanes), rest(border);
     double* x = band.data();
     Eigen::Map<VectorXd> y(rest.data(), border);
     std::copy_n(right_hand_side.data(), unknowns, x);
-    y = right_hand_side.tail(border);
+    y.head(before) = right_hand_side.segment(unknowns, before);
+    y.tail(border - before) = right_hand_side.tail(border - before);
+    double* of_leaves = right_hand_side.data() + l_.first_leaf_unknown();
+    for (int leaf = 0; leaf < l_.leaves(); ++leaf) divide_leaf(leaf, of_leaves + l_.leaf_start(leaf), x, y.data());
     VectorXd determined = divide(x, y.data());
     corner_factor().transpose().triangularView<Eigen::Upper>().solveInPlace(determined);
     y.setZero();
@@ -242,12 +343,28 @@ void BorderedFactor::solve(Eigen::Ref<VectorXd> right_hand_side) const {
             own[i] *= l(i, i);
         }
     }
+    const Eigen::Map<const VectorXd> of_band(x, unknowns);
+    for (int leaf = 0; leaf < l_.leaves(); ++leaf) {
+        const auto l = l_.leaf(leaf);
+        const int start = l_.leaf_start(leaf), *order = leaf_order_.data() + start;
+        double* own = of_leaves + start;
+        for (int k = l_.leaf_size(leaf) - 1; k >= 0; --k) {
+            const int column = order[k];
+            const double* w = l_.leaf_column(start + column);
+            own[column] -= Eigen::Map<const VectorXd>(w, unknowns).dot(of_band) +
+                           Eigen::Map<const VectorXd>(w + l_.leaf_border_, border).dot(y);
+            for (int i = k + 1; i < l_.leaf_size(leaf); ++i) own[column] -= l(order[i], column) * own[order[i]];
+            own[column] *= l(column, column);
+        }
+    }
     std::copy_n(x, unknowns, right_hand_side.data());
-    right_hand_side.tail(border) = y;
+    right_hand_side.segment(unknowns, before) = y.head(before);
+    right_hand_side.tail(border - before) = y.tail(border - before);
 }
 
 BorderedBand BorderedFactor::selected_inverse() const {
-    BorderedBand inverse(l_.reach_, l_.border_);
+    BorderedBand inverse = l_;
+    inverse.set_zero();
     selected_inverse(inverse);
     return inverse;
 }
@@ -296,6 +413,54 @@ void BorderedFactor::selected_inverse(BorderedBand& z) const {
         Eigen::Map<MatrixXd, 0, OuterStride<>>(z.at(j + 1, j), band, six, OuterStride<>(z.band_step_)) =
             rows.topLeftCorner(six, band).transpose();
         z.border_rows(j) = rows.block(0, band, six, border).transpose();
+    }
+    if (l_.leaves() > 0) invert_leaves(z);
+}
+
+// With Z of band and border, which is dense here, and the columns W of a leaf:
+//   Z_rl = -Z W L^-1,    Z_ll = L^-T (L^-1 - W^T Z_rl).
+void BorderedFactor::invert_leaves(BorderedBand& z) const {
+    const Index step = l_.leaf_step_, border = l_.border_, at = l_.leaf_border_;
+    AlignedNumbers numbers(step * step);
+    Eigen::Map<MatrixXd> dense(numbers.data(), step, step);
+    for (int j = 0; j < l_.blocks(); ++j) {
+        for (int i = j; i < l_.blocks(); ++i) dense.block<6, 6>(6 * i, 6 * j) = z.block(i, j);
+        dense.block(at, six * j, border, six) = z.border_rows(j);
+    }
+    dense.block(at, at, border, border) = z.corner_;
+    for (Index j = 0; j < step; ++j)
+        for (Index i = 0; i < j; ++i) dense(i, j) = dense(j, i);
+    const Index used = at + border;
+    for (int first = 0; first < l_.leaves();) {
+        int end = first + 1;
+        while (end < l_.leaves() && l_.leaf_start(end + 1) - l_.leaf_start(first) <= panel) ++end;
+        const int start = l_.leaf_start(first), count = l_.leaf_start(end) - start;
+        std::fill_n(z.leaf_column(start), step * count, 0.0);
+        // Whole groups of six columns: those beyond are calculated again.
+        subtract_product(used, round_up(count, six), used, {dense.data(), step}, {l_.leaf_column(start), step, 1},
+                         {z.leaf_column(start), step});
+        for (int leaf = first; leaf < end; ++leaf) {
+            const int size = l_.leaf_size(leaf), *order = leaf_order_.data() + l_.leaf_start(leaf);
+            const auto l = l_.leaf(leaf);
+            Eigen::Map<const MatrixXd> w(l_.leaf_column(l_.leaf_start(leaf)), step, size);
+            Eigen::Map<MatrixXd> columns(z.leaf_column(l_.leaf_start(leaf)), step, size);
+            MatrixXd inverse_of_l = MatrixXd::Zero(size, size);
+            for (int k = size - 1; k >= 0; --k) {
+                for (int i = k + 1; i < size; ++i)
+                    columns.col(order[k]) -= l(order[i], order[k]) * columns.col(order[i]);
+                columns.col(order[k]) *= l(order[k], order[k]);
+            }
+            for (int j = 0; j < size; ++j)
+                for (int i = j; i < size; ++i) {
+                    double sum = i == j ? 1.0 : 0.0;
+                    for (int k = j; k < i; ++k) sum -= l(order[i], order[k]) * inverse_of_l(order[k], order[j]);
+                    inverse_of_l(order[i], order[j]) = sum * l(order[i], order[i]);
+                }
+            MatrixXd own = inverse_of_l;
+            own.noalias() -= w.transpose() * columns;
+            z.leaf(leaf).noalias() = inverse_of_l.transpose() * own;
+        }
+        first = end;
     }
 }
 

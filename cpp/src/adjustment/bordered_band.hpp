@@ -1,6 +1,10 @@
 // Symmetric positive semi-definite matrices N = [A C^T; C D] of the adjustment: A block-banded, six unknowns a block, C
 // a dense border of scalar rows, D its corner. Cholesky factor, solutions and the inverse on the matrix' own pattern,
 // all in time proportional to the number of blocks. Only lower triangles count. Internal.
+//
+// A part of the border may be leaves: groups of a few unknowns (the set-ups of the lines) of which none is coupled with
+// another one, but each with all of the rest. Their time is proportional to their number, because they are eliminated
+// first; what that leaves is dense, so the band then reaches from every block to the last.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,6 +30,12 @@ private:
     std::vector<Line> lines_;
 };
 
+// Unknowns of the border from `first` on, by leaf.
+struct Leaves {
+    int first = 0;
+    std::vector<int> size = {};
+};
+
 class BorderedBand {
 public:
     static constexpr int block_size = 6;
@@ -34,14 +44,42 @@ public:
     using BorderBlock = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 6>, 0, Eigen::OuterStride<>>;
     using ConstBorderBlock = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 6>, 0, Eigen::OuterStride<>>;
 
-    // All zero. Block column j is coupled with block rows j ... reach[j]; reach does not decrease.
-    BorderedBand(std::vector<int> reach, int border);
+    // All zero. Block column j is coupled with block rows j ... reach[j]; reach does not decrease. `border`: without
+    // the leaves; where there are any, all reach to the last block.
+    BorderedBand(std::vector<int> reach, int border, const Leaves& leaves = {});
     void set_zero();
 
     int blocks() const { return int(reach_.size()); }
     int border() const { return border_; }
-    int size() const { return block_size * blocks() + border_; }
+    int size() const { return block_size * blocks() + border_ + leaf_unknowns(); }
     int reach(int column) const { return reach_[column]; }
+
+    int leaves() const { return int(leaf_start_.size()) - 1; }
+    int leaf_unknowns() const { return leaf_start_.back(); }
+    int leaf_start(int leaf) const { return leaf_start_[leaf]; }  // of all leaves: its unknowns, and one beyond
+    int leaf_size(int leaf) const { return leaf_start_[leaf + 1] - leaf_start_[leaf]; }
+    int first_leaf_unknown() const { return block_size * blocks() + first_leaf_; }  // among all unknowns
+    // Where an unknown is: among those of the leaves, or among the border's rows; otherwise negative.
+    int leaf_place(int unknown) const {
+        const int place = unknown - first_leaf_unknown();
+        return place < leaf_unknowns() ? place : -1;
+    }
+    int border_place(int unknown) const {
+        const int place = unknown - block_size * blocks();
+        if (place < first_leaf_) return place;
+        return place < first_leaf_ + leaf_unknowns() ? -1 : place - leaf_unknowns();
+    }
+    // A leaf's own lower triangle, and how one of its unknowns is coupled with one of the band or the border.
+    using Leaf = Eigen::Map<Eigen::MatrixXd>;
+    using ConstLeaf = Eigen::Map<const Eigen::MatrixXd>;
+    Leaf leaf(int l) { return {leaf_corners_.data() + corner_start_[l], leaf_size(l), leaf_size(l)}; }
+    ConstLeaf leaf(int l) const { return {leaf_corners_.data() + corner_start_[l], leaf_size(l), leaf_size(l)}; }
+    int leaf_of(int place) const { return leaf_at_[place]; }
+    double* leaf_column(int place) { return leaf_columns_.data() + leaf_step_ * place; }
+    const double* leaf_column(int place) const { return leaf_columns_.data() + leaf_step_ * place; }
+    int leaf_row(int unknown) const {  // of the band or the border
+        return unknown < block_size * blocks() ? unknown : int(leaf_border_) + border_place(unknown);
+    }
 
     // column <= row <= reach(column)
     Block block(int row, int column) { return Block(at(row, column), Eigen::OuterStride<>(band_step_)); }
@@ -73,10 +111,15 @@ private:
 
     std::vector<int> reach_;
     int border_;
+    int first_leaf_;
+    std::vector<int> leaf_start_, corner_start_, leaf_at_;
     // Element (i, j) of A is at i + j * band_step_ as in a dense matrix, so that rows have a constant step too; columns
     // that are shorter than the matrix overlap only where A is zero.
     std::ptrdiff_t band_step_, border_step_;
-    AlignedNumbers band_, border_rows_;
+    // A leaf's column: rows of the band, from leaf_border_ on rows of the border, each followed by zeros.
+    std::ptrdiff_t leaf_border_, leaf_step_;
+    AlignedNumbers band_, border_rows_, leaf_columns_;
+    std::vector<double> leaf_corners_;
     Eigen::MatrixXd corner_;
 };
 
@@ -97,11 +140,14 @@ public:
 
     // In place. Held unknowns are 0, whatever is on the right.
     void solve(Eigen::Ref<Eigen::VectorXd> right_hand_side) const;
-    // v^T N^-1 v = |L^-1 v|^2 without the held unknowns, in half the time of a solution.
-    double inverse_square(const Eigen::VectorXd& v) const;
+    // v^T N^-1 v = |L^-1 v|^2 without the held unknowns, in half the time of a solution. With `only_leaf`, v is 0 in
+    // all other leaves, and they take no time.
+    static constexpr int every_leaf = -1;
+    double inverse_square(const Eigen::VectorXd& v, int only_leaf = every_leaf) const;
 
-    // L itself: the band with the reciprocals of its pivots, 0 of held ones, and below it the border's rows; the corner
-    // as far as it has rank, its rows and columns being these of the border, in this order.
+    // L itself, of a matrix without leaves: the band with the reciprocals of its pivots, 0 of held ones, and below it
+    // the border's rows; the corner as far as it has rank, its rows and columns being these of the border, in this
+    // order.
     const BorderedBand& band() const { return l_; }
     using ConstCorner = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
     ConstCorner corner_factor() const;
@@ -117,16 +163,22 @@ private:
     Corner schur();  // all of it
 
     Eigen::VectorXd divide(double* band, double* border) const;
+    double divide_leaf(int leaf, double* own, double* band, double* border) const;
     void factorize();
+    void factorize_leaf(int leaf);
+    void eliminate_leaves();
+    void invert_leaves(BorderedBand& inverse) const;
     void eliminate(int column, int first);
-    void reduce_corner(int first, int count);
+    void reduce_corner(ConstMatrixView rows, std::ptrdiff_t count);
     void factorize_corner();
     void invert_corner(Eigen::MatrixXd& inverse) const;
 
     double threshold_;
-    BorderedBand l_;          // with the reciprocals of the band's pivots, 0 of held ones
-    AlignedNumbers schur_;    // the corner's factor, rows and columns in the order of elimination
-    std::vector<int> order_;  // of the border
+    BorderedBand l_;                   // with the reciprocals of the pivots of leaves and band, 0 of held ones
+    std::vector<int> leaf_order_;      // of elimination: by place, into its leaf
+    Eigen::VectorXd smallest_pivots_;  // of the band
+    AlignedNumbers schur_;             // the corner's factor, rows and columns in the order of elimination
+    std::vector<int> order_;           // of the border
     int corner_rank_ = 0;
     std::vector<int> held_;
 };

@@ -139,6 +139,7 @@ FaultTests::FaultTests(const NormalEquations& equations, const BorderedFactor& f
     c_r_c_.resize(all.size());
     scores_.resize(all.size());
     exact_.assign(all.size(), false);
+    zeros_.setZero(equations.problem().size());
     for (std::size_t h = 0; h < all.size(); ++h) {
         if (all[h].kind != FaultKind::reading) continue;
         const int r = *hypotheses.readings(all[h]).begin();
@@ -185,7 +186,16 @@ void FaultTests::test_slips(int most_solutions) {
 void FaultTests::refine(int hypothesis) {
     if (exact_[hypothesis]) return;
     const double all = square(hypothesis);
-    const double q = all - factor_->inverse_square(gradient(hypotheses_->all()[hypothesis]));
+    const FaultHypothesis& h = hypotheses_->all()[hypothesis];
+    add_gradient(h, zeros_);
+    const bool has_leaves = equations_->problem().leaves().size.size() > 0;
+    const int leaf = has_leaves ? hypotheses_->sequences()[h.sequence].setup : BorderedFactor::every_leaf;
+    const double q = all - factor_->inverse_square(zeros_, leaf);
+    for (const int r : hypotheses_->readings(h)) {
+        const NormalEquations::Row row = equations_->row(r);
+        for (int i = 0; i < row.size; ++i)
+            if (row.unknown[i] != no_unknown) zeros_[row.unknown[i]] = 0.0;
+    }
     set(hypothesis, q < controlled_share * all ? 0.0 : q);
     exact_[hypothesis] = true;
 }
@@ -205,19 +215,18 @@ double FaultTests::square(int hypothesis) const {
     return sum;
 }
 
-Eigen::VectorXd FaultTests::gradient(const FaultHypothesis& hypothesis) const {
-    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(equations_->problem().size());
+void FaultTests::add_gradient(const FaultHypothesis& hypothesis, Eigen::VectorXd& gradient) const {
     for (const int r : hypotheses_->readings(hypothesis)) {
         if (weight_[r] == 0.0) continue;
         const NormalEquations::Row row = equations_->row(r);
         for (int i = 0; i < row.size; ++i)
             if (row.unknown[i] != no_unknown) gradient[row.unknown[i]] += weight(hypothesis, r) * row.derivative[i];
     }
-    return gradient;
 }
 
 Eigen::VectorXd FaultTests::effect(const FaultHypothesis& hypothesis) const {
-    Eigen::VectorXd effect = gradient(hypothesis);
+    Eigen::VectorXd effect = Eigen::VectorXd::Zero(equations_->problem().size());
+    add_gradient(hypothesis, effect);
     factor_->solve(effect);
     return effect;
 }

@@ -123,7 +123,7 @@ private:
     double weight(const FaultHypothesis& hypothesis, int reading) const {  // element of c
         return weight_[reading] * hypotheses_->share(hypothesis, reading);
     }
-    Eigen::VectorXd gradient(const FaultHypothesis& hypothesis) const;  // J^T c
+    void add_gradient(const FaultHypothesis& hypothesis, Eigen::VectorXd& gradient) const;  // J^T c
     double controlled(int hypothesis, const Eigen::VectorXd& effect) const;
     void test_slips(int most_solutions);
     void set(int hypothesis, double c_r_c);
@@ -136,6 +136,7 @@ private:
     std::vector<double> c_r_c_;  // q, by hypothesis; 0 where nothing controls it
     std::vector<FaultScore> scores_;
     std::vector<bool> exact_;
+    Eigen::VectorXd zeros_;  // by unknown: for refine, which leaves them so
 };
 
 }  // namespace stepdiag

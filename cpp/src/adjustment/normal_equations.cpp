@@ -1,24 +1,27 @@
 #include "adjustment/normal_equations.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 namespace stepdiag {
 double& element(BorderedBand& matrix, int i, int j) {
     if (i < j) std::swap(i, j);
     const int banded = 6 * matrix.blocks();
-    if (j >= banded) return matrix.corner()(i - banded, j - banded);
-    if (i >= banded) return matrix.border_rows(j / 6).coeffRef(i - banded, j % 6);
+    const int leaf_i = matrix.leaf_place(i), leaf_j = matrix.leaf_place(j);
+    if (leaf_i >= 0 && leaf_j >= 0) {
+        const int leaf = matrix.leaf_of(leaf_i), start = matrix.leaf_start(leaf);
+        assert(matrix.leaf_of(leaf_j) == leaf);
+        return matrix.leaf(leaf).coeffRef(leaf_i - start, leaf_j - start);
+    }
+    if (leaf_i >= 0) return matrix.leaf_column(leaf_i)[matrix.leaf_row(j)];
+    if (leaf_j >= 0) return matrix.leaf_column(leaf_j)[matrix.leaf_row(i)];
+    if (j >= banded) return matrix.corner()(matrix.border_place(i), matrix.border_place(j));
+    if (i >= banded) return matrix.border_rows(j / 6).coeffRef(matrix.border_place(i), j % 6);
     return matrix.block(i / 6, j / 6).coeffRef(i % 6, j % 6);
 }
 
-double element(const BorderedBand& matrix, int i, int j) {
-    if (i < j) std::swap(i, j);
-    const int banded = 6 * matrix.blocks();
-    if (j >= banded) return matrix.corner()(i - banded, j - banded);
-    if (i >= banded) return matrix.border_rows(j / 6)(i - banded, j % 6);
-    return matrix.block(i / 6, j / 6)(i % 6, j % 6);
-}
+double element(const BorderedBand& matrix, int i, int j) { return element(const_cast<BorderedBand&>(matrix), i, j); }
 
 double SmoothRow::value(const Eigen::VectorXd& x) const {
     double value = 0.0;
@@ -217,9 +220,16 @@ void NormalEquations::gather(const AdjustedPoint& point, const BorderedBand& inv
         }
         const auto border = inverse.border_rows(block[a]);
         for (int i = 0; i < all.size; ++i) {
+            const int place = inverse.border_place(all.unknown[i]), leaf = inverse.leaf_place(all.unknown[i]);
             if (all.unknown[i] < banded) continue;
-            covariance.block<1, 6>(i, 6 * a) = border.row(all.unknown[i] - banded);
-            covariance.block<6, 1>(6 * a, i) = border.row(all.unknown[i] - banded).transpose();
+            if (leaf >= 0) {
+                const Eigen::Map<const Eigen::Matrix<double, 6, 1>> column(inverse.leaf_column(leaf) + 6 * block[a]);
+                covariance.block<6, 1>(6 * a, i) = column;
+                covariance.block<1, 6>(i, 6 * a) = column.transpose();
+                continue;
+            }
+            covariance.block<1, 6>(i, 6 * a) = border.row(place);
+            covariance.block<6, 1>(6 * a, i) = border.row(place).transpose();
         }
     }
     for (int i = 0; i < all.size; ++i)
@@ -243,7 +253,9 @@ Eigen::VectorXd NormalEquations::reading_variances(const BorderedBand& inverse) 
     return variances;
 }
 
-BorderedBand NormalEquations::matrix() const { return BorderedBand(problem_->reach(), problem_->border()); }
+BorderedBand NormalEquations::matrix() const {
+    return BorderedBand(problem_->reach(), problem_->dense_border(), problem_->leaves());
+}
 
 void NormalEquations::assemble(BorderedBand& matrix) const {
     matrix.set_zero();
@@ -320,18 +332,32 @@ void NormalEquations::assemble_point(const AdjustedPoint& point, int number, Bor
         }
         auto border = matrix.border_rows(block[a]);
         for (int i = 0; i < size; ++i) {
-            if (unknown[i] < banded) continue;
-            auto row = border.row(unknown[i] - banded);
+            const int place = matrix.border_place(unknown[i]);
+            if (unknown[i] < banded || place < 0) continue;
+            auto row = border.row(place);
             if (i > 6 * a) row += square.block<1, 6>(i, 6 * a);
             else row += square.block<6, 1>(6 * a, i).transpose();
         }
     }
     for (int i = 0; i < size; ++i) {
-        if (unknown[i] < banded) continue;
+        const int place_i = matrix.border_place(unknown[i]);
+        if (unknown[i] < banded || place_i < 0) continue;
         for (int j = 0; j <= i; ++j) {
-            if (unknown[j] < banded) continue;
-            const int low = std::min(unknown[i], unknown[j]) - banded, high = std::max(unknown[i], unknown[j]) - banded;
-            matrix.corner()(high, low) += square(i, j);
+            const int place_j = matrix.border_place(unknown[j]);
+            if (unknown[j] < banded || place_j < 0) continue;
+            matrix.corner()(std::max(place_i, place_j), std::min(place_i, place_j)) += square(i, j);
+        }
+    }
+    for (int i = 0; i < size && matrix.leaf_unknowns() > 0; ++i) {
+        const int leaf_i = matrix.leaf_place(unknown[i]);
+        if (leaf_i < 0) continue;
+        const int leaf = matrix.leaf_of(leaf_i), start = matrix.leaf_start(leaf);
+        double* column = matrix.leaf_column(leaf_i);
+        for (int j = 0; j < size; ++j) {
+            if (unknown[j] == no_unknown) continue;
+            const int leaf_j = matrix.leaf_place(unknown[j]);
+            if (leaf_j < 0) column[matrix.leaf_row(unknown[j])] += square(std::max(i, j), std::min(i, j));
+            else if (leaf_j <= leaf_i) matrix.leaf(leaf)(leaf_i - start, leaf_j - start) += square(i, j);
         }
     }
 }

@@ -23,7 +23,7 @@ double upper_tail(double t, const std::array<double, 3>& sums) {
 }  // namespace
 
 std::vector<ResidualPattern> prior_scatter(const AdjustmentProblem& problem, const Eigen::VectorXd& x,
-                                           const BorderedBand& inverse) {
+                                           const BorderedFactor& factor) {
     constexpr double told = 1e-3;      // of all values' variance; below it second order and rounding may be as much
     constexpr std::size_t most = 500;  // values: time grows with the third power
     struct Value {
@@ -48,9 +48,11 @@ std::vector<ResidualPattern> prior_scatter(const AdjustmentProblem& problem, con
             const Value& a = values[std::size_t(i)];
             t += std::pow(x[a.unknown] / a.prior, 2);
             squares += a.prior * a.prior;
+            Eigen::VectorXd covariance = Eigen::VectorXd::Unit(x.size(), a.unknown);
+            factor.solve(covariance);
             for (Eigen::Index j = 0; j <= i; ++j) {
                 const Value& b = values[std::size_t(j)];
-                m(j, i) = m(i, j) = (i == j ? 1.0 : 0.0) - element(inverse, a.unknown, b.unknown) / (a.prior * b.prior);
+                m(j, i) = m(i, j) = (i == j ? 1.0 : 0.0) - covariance[b.unknown] / (a.prior * b.prior);
             }
         }
         const Eigen::MatrixXd square = m * m;

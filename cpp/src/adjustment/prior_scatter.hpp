@@ -17,6 +17,6 @@ namespace stepdiag {
 
 // Of each quantity that has informative priors and is told at all; probabilities times the number of quantities.
 std::vector<ResidualPattern> prior_scatter(const AdjustmentProblem& problem, const Eigen::VectorXd& x,
-                                           const BorderedBand& inverse);
+                                           const BorderedFactor& factor);
 
 }  // namespace stepdiag

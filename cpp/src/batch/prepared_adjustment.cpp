@@ -9,7 +9,7 @@ PreparedAdjustment::PreparedAdjustment(const Measurement& measurement, const Pla
                                        const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                                        const AdjustmentOptions& options,
                                        const std::array<double, function_count>& smoothness)
-    : problem(measurement, plan, chain, tool, heads, options),
+    : problem(measurement, plan, chain, tool, heads, options, Elimination::set_ups_last),  // SimdFactor knows no leaves
       smoothness_at_start(options.smoothness && options.smoothness->cross_validated
                               ? std::array<double, function_count>{}
                               : smoothness),

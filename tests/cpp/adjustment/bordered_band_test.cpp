@@ -8,6 +8,7 @@
 #include <random>
 #include <string>
 
+#include "adjustment/normal_equations.hpp"
 #include "stepdiag/core/instruction_set.hpp"
 
 namespace {
@@ -222,6 +223,81 @@ TEST(BorderedBand, DiagonalBlocksMayBeFilledBeyondTheirTriangle) {
     EXPECT_EQ(upper.diagonal(), dense(matrix).diagonal());
     EXPECT_EQ(dense(BorderedFactor(upper, threshold).selected_inverse()),
               dense(BorderedFactor(matrix, threshold).selected_inverse()));
+}
+
+// Readings of leaf after leaf, each of all blocks, the border and its leaf: N, dense and on its pattern. In `restrict`
+// columns of J may be changed.
+struct Leafy {
+    static constexpr int blocks = 5, first = 2, border = 7;
+    const std::vector<int> size{3, 0, 12, 1, 2, 40, 5};
+    MatrixXd all;
+    BorderedBand matrix{std::vector<int>(blocks, blocks - 1), border, {first, size}};
+
+    template <class Restrict>
+    explicit Leafy(Restrict restrict) {
+        std::mt19937 engine(3);
+        std::normal_distribution<double> normal;
+        all = MatrixXd::Zero(matrix.size(), matrix.size());
+        for (int leaf = 0; leaf < int(size.size()); ++leaf)
+            for (int reading = 0; reading < 60; ++reading) {
+                VectorXd row = VectorXd::NullaryExpr(matrix.size(), [&] { return normal(engine); });
+                for (int j = 0; j < matrix.size(); ++j)
+                    if (const int place = matrix.leaf_place(j); place >= 0 && matrix.leaf_of(place) != leaf)
+                        row[j] = 0.0;
+                restrict(row);
+                all += row * row.transpose();
+            }
+        for (int i = 0; i < matrix.size(); ++i)
+            for (int j = 0; j <= i; ++j)
+                if (on_pattern(i, j)) stepdiag::element(matrix, i, j) = all(i, j);
+    }
+    bool on_pattern(int i, int j) const {
+        const int a = matrix.leaf_place(i), b = matrix.leaf_place(j);
+        return a < 0 || b < 0 || matrix.leaf_of(a) == matrix.leaf_of(b);
+    }
+    void expect_dense_answers(const std::vector<int>& held) const {
+        const BorderedFactor factor(matrix, threshold);
+        EXPECT_EQ(factor.held(), held);
+        double cond;
+        const MatrixXd inverse = kept_inverse(all, factor.held(), cond);
+        const double tolerance = 10.0 * epsilon * cond * inverse.lpNorm<Eigen::Infinity>();
+        VectorXd right = random_vector(matrix.size(), 7), x = right;
+        factor.solve(x);
+        EXPECT_LE((x - inverse * right).lpNorm<Eigen::Infinity>(), tolerance * right.lpNorm<1>());
+        for (const int i : factor.held()) EXPECT_EQ(x[i], 0.0);
+        const double scale = right.lpNorm<1>() * right.lpNorm<1>();
+        EXPECT_NEAR(factor.inverse_square(right), right.dot(inverse * right), tolerance * scale);
+        for (int j = 0; j < matrix.size(); ++j)
+            if (const int place = matrix.leaf_place(j); place >= 0 && matrix.leaf_of(place) != 2) right[j] = 0.0;
+        EXPECT_NEAR(factor.inverse_square(right, 2), right.dot(inverse * right), tolerance * scale);
+        const BorderedBand selected = factor.selected_inverse();
+        for (int i = 0; i < matrix.size(); ++i)
+            for (int j = 0; j <= i; ++j)
+                if (on_pattern(i, j)) {
+                    EXPECT_NEAR(stepdiag::element(selected, i, j), inverse(i, j), tolerance) << i << ", " << j;
+                }
+        EXPECT_EQ(matrix.diagonal(), VectorXd(all.diagonal()));
+    }
+};
+
+TEST(BorderedBand, LeavesGiveTheAnswersOfTheDenseMatrix) {
+    Leafy([](VectorXd&) {}).expect_dense_answers({});
+}
+
+TEST(BorderedBand, UnknownsOfLeavesThatNothingTellsAreHeld) {
+    constexpr int unobserved = 6 * Leafy::blocks + Leafy::first + 4, node = 8;
+    Leafy([](VectorXd& row) { row[unobserved] = row[node] = 0.0; }).expect_dense_answers({node, unobserved});
+}
+
+TEST(BorderedBand, BorderThatDependsOnLeavesIsHeld) {
+    // The sum of an unknown of each leaf that has readings.
+    constexpr int last = 6 * Leafy::blocks + Leafy::first + 63 + Leafy::border - Leafy::first - 1;
+    const Leafy leafy([](VectorXd& row) {
+        row[last] = 0.0;
+        for (int place : {0, 3, 15, 16, 18, 58}) row[last] += row[6 * Leafy::blocks + Leafy::first + place];
+    });
+    // Leaf 1 has no unknown: its readings see 0.
+    leafy.expect_dense_answers({last});
 }
 
 TEST(BorderedBand, AllInstructionSetsAgreeToRounding) {

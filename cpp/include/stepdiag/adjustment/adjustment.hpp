@@ -61,7 +61,7 @@ struct AdjustmentOptions {
     SetupPriors setup = {};
     std::map<std::string, SetupPriors> setup_by_line = {};  // replaces the quantities that it names
     // A set-up serves a run's line and the backward runs that follow it; or, if true, all runs of the line. The time
-    // for many set-ups grows with the third power of their number: 50 runs of seven lines take seconds.
+    // grows with the number of set-ups: 200 runs of seven lines and 10 steps an axis take seconds.
     bool one_setup_per_line = false;
     bool reversal = true;   // where there are backward runs: tables of their own for nodes approached in - direction
     bool rotations = true;  // false: the machine is taken to have no angular errors
