@@ -2,10 +2,45 @@
 
 #include <Eigen/QR>
 #include <cmath>
+#include <utility>
 
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
+
+Contradictions::Contradictions(Eigen::MatrixXd vectors, Eigen::VectorXd coefficients, Eigen::VectorXd weight, int rank)
+    : vectors_(std::move(vectors)), coefficients_(std::move(coefficients)), weight_(std::move(weight)), rank_(rank) {
+    if (weight_.size() > few) return;
+    columns_.resize(weight_.size(), rows());
+    Eigen::VectorXd row;
+    for (Eigen::Index i = 0; i < rows(); ++i) {
+        calculate(i, row);
+        columns_.col(i) = row;
+    }
+}
+
+void Contradictions::calculate(Eigen::Index i, Eigen::VectorXd& row) const {
+    row.setZero(weight_.size());
+    row[rank_ + i] = 1.0;
+    row.applyOnTheLeft(Eigen::householderSequence(vectors_, coefficients_));
+    row.array() *= weight_.array();
+}
+
+const double* Contradictions::row(Eigen::Index i, Eigen::VectorXd& space) const {
+    if (columns_.size() > 0) return columns_.col(i).data();
+    calculate(i, space);
+    return space.data();
+}
+
+Eigen::MatrixXd Contradictions::matrix() const {
+    Eigen::MatrixXd all(rows(), weight_.size());
+    Eigen::VectorXd row;
+    for (Eigen::Index i = 0; i < rows(); ++i) {
+        calculate(i, row);
+        all.row(i) = row.transpose();
+    }
+    return all;
+}
 
 LeastSquares solve_least_squares(const Eigen::MatrixXd& equations, const Eigen::VectorXd& standard_uncertainty) {
     constexpr double rank_threshold = 1e-9;
@@ -30,8 +65,7 @@ LeastSquares solve_least_squares(const Eigen::MatrixXd& equations, const Eigen::
     result.rank = int(decomposition.rank());
     const Eigen::VectorXd projector = inverse.cwiseProduct(scaled.transpose()).rowwise().sum();
     for (Eigen::Index j = 0; j < unknowns; ++j) result.determined[j] = projector[j] > 1.0 - in_row_space;
-    const Eigen::MatrixXd rotation = decomposition.householderQ();
-    result.contradictions = rotation.rightCols(rotation.cols() - result.rank).transpose() * weight.asDiagonal();
+    result.contradictions = {decomposition.matrixQTZ(), decomposition.hCoeffs(), weight, result.rank};
     result.pseudoinverse = scale.asDiagonal() * inverse * weight.asDiagonal();
     return result;
 }

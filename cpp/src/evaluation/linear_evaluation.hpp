@@ -7,9 +7,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
+#include <numeric>
 #include <vector>
 
 #include "evaluation/fit_test.hpp"
+#include "evaluation/linear_tape.hpp"
 #include "evaluation/step_systems.hpp"
 #include "stepdiag/core/error.hpp"
 
@@ -107,6 +110,92 @@ void for_each_share(const Map& map, const std::vector<Pass>& passes, Take&& take
     }
 }
 
+// Shares one by one take the time of as many applications as there are channels, the tape's way that of as many as
+// there are results, each of them several times as long.
+inline bool is_tape_faster(const std::vector<Pass>& passes, std::size_t results) {
+    constexpr std::size_t times = 4;
+    std::size_t channels = 0;
+    for (const Pass& pass : passes)
+        for (const PassPoint& point : pass.points) channels += point.effects.size();
+    return channels > times * results;
+}
+
+// A map on the tape: covariances of its results from those of the readings.
+template <class Map>
+class TapedMap {
+public:
+    TapedMap(const Map& map, const std::vector<Pass>& passes) : tape_(readings_of(passes).size()) {
+        results_ = map.template apply<TapeNumber>({tape_.inputs(), -1, true});
+        for (const Pass& pass : passes)
+            for (const PassPoint& point : pass.points) {
+                Eigen::Matrix3d& sum = of_readings_.emplace_back(Eigen::Matrix3d::Zero());
+                for (const ChannelEffect& effect : point.effects) sum += effect * effect.transpose();
+            }
+    }
+
+    // Variance of each result.
+    std::vector<double> variances() const {
+        std::vector<double> variances(results_.size(), 0.0);
+        std::vector<Lanes> work;
+        for (std::size_t first = 0; first < results_.size(); first += width) {
+            const std::size_t end = std::min(first + width, results_.size());
+            work.assign(tape_.size(), Lanes::Zero());
+            for (std::size_t i = first; i < end; ++i)
+                if (!is_zero(results_[i]))
+                    work[std::size_t(results_[i].place)][Eigen::Index(i - first)] += results_[i].factor;
+            tape_.backward(work);
+            Lanes sum = Lanes::Zero();
+            for (std::size_t r = 0; r < of_readings_.size(); ++r) {
+                const Lanes* effect = &work[values_per_reading * r];
+                for (int a = 0; a < values_per_reading; ++a)
+                    for (int b = 0; b < values_per_reading; ++b) sum += of_readings_[r](a, b) * effect[a] * effect[b];
+            }
+            for (std::size_t i = first; i < end; ++i) variances[i] = std::max(0.0, sum[Eigen::Index(i - first)]);
+        }
+        return variances;
+    }
+
+    // Of these results: rows.size() x rows.size().
+    Eigen::MatrixXd covariance(const std::vector<int>& rows) const {
+        const std::size_t size = rows.size();
+        Eigen::MatrixXd covariance(size, size);
+        std::vector<Lanes> work;
+        for (std::size_t first = 0; first < size; first += width) {
+            const std::size_t end = std::min(first + width, size);
+            work.assign(tape_.size(), Lanes::Zero());
+            for (std::size_t i = first; i < end; ++i)
+                if (const TapeNumber& result = results_[rows[i]]; !is_zero(result))
+                    work[std::size_t(result.place)][Eigen::Index(i - first)] += result.factor;
+            tape_.backward(work);
+            for (std::size_t r = 0; r < of_readings_.size(); ++r) {
+                Lanes* effect = &work[values_per_reading * r];
+                const std::array<Lanes, values_per_reading> own{effect[0], effect[1], effect[2]};
+                for (int a = 0; a < values_per_reading; ++a) {
+                    effect[a].setZero();
+                    for (int b = 0; b < values_per_reading; ++b) effect[a] += of_readings_[r](a, b) * own[b];
+                }
+            }
+            tape_.forward(work);
+            for (std::size_t i = 0; i < size; ++i) {
+                const TapeNumber& result = results_[rows[i]];
+                for (std::size_t j = first; j < end; ++j)
+                    covariance(Eigen::Index(i), Eigen::Index(j)) =
+                        is_zero(result) ? 0.0
+                                        : result.factor * work[std::size_t(result.place)][Eigen::Index(j - first)];
+            }
+        }
+        return 0.5 * (covariance + covariance.transpose());
+    }
+
+private:
+    static constexpr std::size_t width = 8;
+    using Lanes = Row<int(width)>;
+
+    LinearTape tape_;
+    std::vector<TapeNumber> results_;
+    std::vector<Eigen::Matrix3d> of_readings_;
+};
+
 // Determined parameters, in the order of the tables.
 template <class Map>
 std::vector<int> determined_rows(const Map& map, const ParameterLayout& layout) {
@@ -129,18 +218,26 @@ void evaluate_linear(const Map& map, const std::vector<Pass>& passes, const Plan
         throw InvalidArgument("full_covariance: expected at most " + std::to_string(largest_covariance) +
                               " values, the calibration has " + std::to_string(rows.size()));
     const auto values = map.template apply<Row<1>>({readings_of(passes), -1, true});
-    std::vector<Row<width>> variance(layout.size(), Row<width>::Zero());
-    Eigen::MatrixXd covariance;
-    if (full_covariance) covariance = Eigen::MatrixXd::Zero(Eigen::Index(rows.size()), Eigen::Index(rows.size()));
-    for_each_share<width>(map, passes, [&](const std::vector<Row<width>>& block, int columns) {
-        for (std::size_t i = 0; i < block.size(); ++i) variance[i] += block[i].square();
-        if (!full_covariance) return;
-        Eigen::MatrixXd shares(rows.size(), columns);
-        for (std::size_t i = 0; i < rows.size(); ++i)
-            shares.row(Eigen::Index(i)) = block[rows[i]].head(columns).transpose();
-        covariance.selfadjointView<Eigen::Lower>().rankUpdate(shares);
-    });
-    if (full_covariance) calibration.covariance = covariance.selfadjointView<Eigen::Lower>();
+    std::vector<double> variance(layout.size(), 0.0);
+    if (is_tape_faster(passes, std::size_t(layout.size()))) {
+        const TapedMap<Map> taped(map, passes);
+        variance = taped.variances();
+        if (full_covariance) calibration.covariance = taped.covariance(rows);
+    } else {
+        std::vector<Row<width>> squares(layout.size(), Row<width>::Zero());
+        Eigen::MatrixXd covariance;
+        if (full_covariance) covariance = Eigen::MatrixXd::Zero(Eigen::Index(rows.size()), Eigen::Index(rows.size()));
+        for_each_share<width>(map, passes, [&](const std::vector<Row<width>>& block, int columns) {
+            for (std::size_t i = 0; i < block.size(); ++i) squares[i] += block[i].square();
+            if (!full_covariance) return;
+            Eigen::MatrixXd shares(rows.size(), columns);
+            for (std::size_t i = 0; i < rows.size(); ++i)
+                shares.row(Eigen::Index(i)) = block[rows[i]].head(columns).transpose();
+            covariance.selfadjointView<Eigen::Lower>().rankUpdate(shares);
+        });
+        for (std::size_t i = 0; i < squares.size(); ++i) variance[i] = squares[i].sum();
+        if (full_covariance) calibration.covariance = covariance.selfadjointView<Eigen::Lower>();
+    }
 
     for (int i = 0; i < function_count; ++i) {
         const FunctionId id = FunctionId::at(i);
@@ -148,14 +245,14 @@ void evaluate_linear(const Map& map, const std::vector<Pass>& passes, const Plan
         CalibratedFunction function{plan.nodes(id.axis), {}, {}, map.is_slope_determined(id)};
         for (int k = 0; k < layout.nodes; ++k) {
             function.value.push_back(values[layout.row(i, k)][0]);
-            function.standard_uncertainty.push_back(std::sqrt(variance[layout.row(i, k)].sum()));
+            function.standard_uncertainty.push_back(std::sqrt(variance[layout.row(i, k)]));
         }
         calibration.functions[i] = std::move(function);
     }
     for (const Squareness s : all_squarenesses)
         if (map.is_determined(s))
             calibration.squarenesses[static_cast<int>(s)] =
-                CalibratedSquareness{values[layout.row(s)][0], std::sqrt(variance[layout.row(s)].sum())};
+                CalibratedSquareness{values[layout.row(s)][0], std::sqrt(variance[layout.row(s)])};
 }
 
 // Adds up the solved steps of one axis from home: component c goes to out[c][0] = 0 ... out[c][intervals]. With
@@ -193,6 +290,7 @@ class Thinning {
 public:
     explicit Thinning(std::size_t one_of) : one_of_(one_of) {}
     bool takes() { return seen_++ % one_of_ == 0; }
+    std::size_t seen() const { return seen_; }
 
 private:
     std::size_t one_of_, seen_ = 0;
@@ -201,21 +299,23 @@ private:
 // Sums of right-hand sides, with a row of coefficients for each. `right_sides` computes them, and is called only if one
 // of the sums is selected. Most right-hand sides of a share are 0, and are skipped.
 template <class Number, class RightSides>
-void add_contradictions(const Eigen::MatrixXd& contradictions, const RightSides& right_sides, Thinning& thinning,
+void add_contradictions(const Contradictions& contradictions, const RightSides& right_sides, Thinning& thinning,
                         std::vector<Number>& out) {
     std::vector<Number> sides;
     std::vector<Eigen::Index> some;
+    Eigen::VectorXd space;
     bool made = false;
     for (Eigen::Index i = 0; i < contradictions.rows(); ++i) {
         if (!thinning.takes()) continue;
         if (!made) {
             sides = right_sides();
             for (std::size_t j = 0; j < sides.size(); ++j)
-                if (!(sides[j] == 0.0).all()) some.push_back(Eigen::Index(j));
+                if (!is_zero(sides[j])) some.push_back(Eigen::Index(j));
             made = true;
         }
+        const double* row = contradictions.row(i, space);
         Number sum = Number::Zero();
-        for (const Eigen::Index j : some) sum += contradictions(i, j) * sides[std::size_t(j)];
+        for (const Eigen::Index j : some) sum += row[j] * sides[std::size_t(j)];
         out.push_back(sum);
     }
 }
@@ -241,7 +341,7 @@ void add_contradictions(const AxisSystem& system, const std::vector<Number>& rea
 
 // Gives the contradictions of a map in place of its parameters, thinned out.
 template <class Map>
-struct Contradictions {
+struct ContradictionsOf {
     const Map& map;
     std::size_t one_of = 1;
 
@@ -261,17 +361,27 @@ void test_fit(const Map& map, const std::vector<Pass>& passes, Calibration& cali
     constexpr int width = 8;
     constexpr std::size_t most = 400;
     const ReadingRows<Row<1>> readings{readings_of(passes), -1, true};
-    Contradictions<Map> contradictions{map};
-    const std::size_t count = contradictions.template apply<Row<1>>(readings).size();
+    ContradictionsOf<Map> contradictions{map};
+    Thinning counted(std::numeric_limits<std::size_t>::max());
+    map.template contradictions<Row<1>>(readings, counted);
+    const std::size_t count = counted.seen();
     contradictions.one_of = std::max<std::size_t>(1, (count + most - 1) / most);
     const auto found = contradictions.template apply<Row<1>>(readings);
     Eigen::VectorXd values(found.size());
     for (std::size_t i = 0; i < found.size(); ++i) values[Eigen::Index(i)] = found[i][0];
-    ShareSum covariance(values.size());
-    for_each_share<width>(contradictions, passes, [&](const std::vector<Row<width>>& block, int columns) {
-        for (int c = 0; c < columns; ++c) covariance.add([&](std::size_t i) { return block[i][c]; });
-    });
-    const ChiSquare test = chi_square(values, covariance.matrix());
+    Eigen::MatrixXd all;
+    if (is_tape_faster(passes, found.size())) {
+        std::vector<int> rows(found.size());
+        std::iota(rows.begin(), rows.end(), 0);
+        all = TapedMap<ContradictionsOf<Map>>(contradictions, passes).covariance(rows);
+    } else {
+        ShareSum covariance(values.size());
+        for_each_share<width>(contradictions, passes, [&](const std::vector<Row<width>>& block, int columns) {
+            for (int c = 0; c < columns; ++c) covariance.add([&](std::size_t i) { return block[i][c]; });
+        });
+        all = covariance.matrix();
+    }
+    const ChiSquare test = chi_square(values, all);
     calibration.fit = fit_of_noise(test.square_sum, test.freedom);
     if (test.freedom > 0) calibration.variance_factor = test.square_sum / test.freedom;
 }

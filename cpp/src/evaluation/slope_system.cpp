@@ -22,9 +22,9 @@ Sum sum_over_travel(const std::vector<Pass>& passes, int pass, const AxisSystem&
     Sum sum;
     const Eigen::RowVector3d direction = passes[pass].direction().transpose();
     for (const StepSystem& interval : axis.intervals) {
-        const auto own = std::find_if(interval.steps.begin(), interval.steps.end(),
-                                      [&](const Step& step) { return step.pass == pass; });
-        if (own != interval.steps.end()) {
+        const auto own = std::lower_bound(interval.steps.begin(), interval.steps.end(), pass,
+                                          [](const Step& step, int number) { return step.pass < number; });
+        if (own != interval.steps.end() && own->pass == pass) {
             add_step(sum, passes, *own);
             continue;
         }
@@ -55,22 +55,21 @@ SlopeSystem make_slope_system(const std::vector<Pass>& passes, const Plan& plan,
         }
 
     SlopeSystem system;
-    std::vector<Eigen::RowVectorXd> equations;
-    std::vector<double> uncertainty;
-    const int unknowns = SlopeSystem::laser_angle(int(passes.size()), 0);
+    std::vector<SlopeSystem::Equation> equations;
+    system.unknowns_ = std::size_t(SlopeSystem::laser_angle(int(passes.size()), 0));
     for (std::size_t v = 0; v < passes.size(); ++v)
         for (const Axis axis : all_axes) {
             if (!usable[v] || !passes[v].line.moves(axis)) continue;
             const Sum sum = passes[v].is_scale_line ? sum_of_scale_line(passes[v])
                                                     : sum_over_travel(passes, int(v), lengths[index(axis)]);
             if (sum.empty()) continue;
-            Eigen::RowVectorXd equation = Eigen::RowVectorXd::Zero(unknowns);
+            SlopeSystem::Equation equation{int(v), {}, 0.0};
             const Eigen::Vector3d direction = passes[v].direction();
-            equation[SlopeSystem::scale(axis)] = direction[index(axis)];
+            equation.coefficient[SlopeSystem::scale(axis)] = direction[index(axis)];
             for (const Squareness s : all_squarenesses) {
                 const SquarenessTerm term = squareness_term(s);
                 if (term.axis == axis)
-                    equation[SlopeSystem::squareness(s)] =
+                    equation.coefficient[SlopeSystem::squareness(s)] =
                         term.sign * direction[term.component] * plan.volume()[index(axis)];
             }
             double variance = 0.0;
@@ -79,31 +78,119 @@ SlopeSystem make_slope_system(const std::vector<Pass>& passes, const Plan& plan,
                 const Pass& pass = *pass_of_reading[reading];
                 const Eigen::Vector2d lateral = pass.points[reading - pass.first_reading].lateral;
                 const int angles = SlopeSystem::laser_angle(int(&pass - passes.data()), 0);
-                equation[angles] -= coefficient * lateral.y();
-                equation[angles + 1] += coefficient * lateral.x();
+                equation.coefficient[angles] -= coefficient * lateral.y();
+                equation.coefficient[angles + 1] += coefficient * lateral.x();
                 variance += coefficient * coefficient * variance_of_reading[reading];
                 system.sums_.back().push_back({reading, coefficient});
             }
             // Lateral travel that cancels leaves rounding errors, which must not look like a determined angle.
-            for (double& coefficient : equation.tail(unknowns - SlopeSystem::first_laser_angle))
-                if (std::abs(coefficient) < 1e-9 * plan.volume().norm()) coefficient = 0.0;
-            equations.push_back(equation);
-            uncertainty.push_back(std::sqrt(variance));
+            for (auto& [unknown, coefficient] : equation.coefficient)
+                if (unknown >= SlopeSystem::first_laser_angle && std::abs(coefficient) < 1e-9 * plan.volume().norm())
+                    coefficient = 0.0;
+            equation.standard_uncertainty = std::sqrt(variance);
+            equations.push_back(std::move(equation));
         }
+    system.solve_equations(equations, passes, plan);
+    return system;
+}
 
-    Eigen::MatrixXd matrix(equations.size(), unknowns);
-    for (std::size_t i = 0; i < equations.size(); ++i) matrix.row(Eigen::Index(i)) = equations[i];
+void SlopeSystem::solve_equations(const std::vector<Equation>& equations, const std::vector<Pass>& passes,
+                                  const Plan& plan) {
+    constexpr std::size_t few = 40;  // passes, of which all unknowns are solved at once
+    std::vector<bool> is_eliminated(passes.size(), passes.size() > few);
+    for (const Equation& equation : equations)
+        for (const auto& [unknown, coefficient] : equation.coefficient) {
+            const int pass = (unknown - first_laser_angle) / 2;
+            if (unknown >= first_laser_angle && coefficient != 0.0 && pass != equation.pass)
+                is_eliminated[std::size_t(pass)] = false;
+        }
+    std::vector<int> place(unknowns_, -1);
+    for (int j = 0; j < int(unknowns_); ++j) {
+        if (j >= first_laser_angle && is_eliminated[std::size_t((j - first_laser_angle) / 2)]) continue;
+        place[std::size_t(j)] = int(kept_.size());
+        kept_.push_back(j);
+    }
+    const Eigen::Index kept = Eigen::Index(kept_.size());
+    const auto row_of = [&](const Equation& equation) {
+        Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(kept);
+        for (const auto& [unknown, coefficient] : equation.coefficient)
+            if (const int j = place[std::size_t(unknown)]; j >= 0) row[j] = coefficient;
+        return row;
+    };
+    std::vector<Eigen::RowVectorXd> reduced;
+    std::vector<double> uncertainty;
+    for (std::size_t e = 0; e < equations.size(); ++e) {
+        if (is_eliminated[std::size_t(equations[e].pass)]) continue;
+        direct_.push_back(int(e));
+        reduced.push_back(row_of(equations[e]));
+        uncertainty.push_back(equations[e].standard_uncertainty);
+    }
+    // Angles that nothing tells, and which change lengths of their pass.
+    std::vector<std::pair<int, Eigen::Vector2d>> open;
+    const auto note_open = [&](int pass, const Eigen::Vector2d& angles) {
+        double largest = 0.0;
+        for (const PassPoint& point : passes[std::size_t(pass)].points)
+            largest = std::max(largest, std::abs(point.lateral.y() * angles[0] - point.lateral.x() * angles[1]));
+        if (largest > 1e-9 * plan.volume().norm()) open.emplace_back(laser_angle(pass, 0), angles);
+    };
+    std::vector<bool> has_equations(passes.size(), false);
+    for (const Equation& equation : equations) has_equations[std::size_t(equation.pass)] = true;
+    for (int pass = 0; pass < int(passes.size()); ++pass)
+        for (int k = 0; k < 2 && is_eliminated[std::size_t(pass)] && !has_equations[std::size_t(pass)]; ++k)
+            note_open(pass, Eigen::Vector2d::Unit(k));
+    for (std::size_t e = 0, end; e < equations.size(); e = end) {
+        const int pass = equations[e].pass;
+        for (end = e; end < equations.size() && equations[end].pass == pass;) ++end;
+        if (!is_eliminated[std::size_t(pass)]) continue;
+        const Eigen::Index count = Eigen::Index(end - e);
+        Eigen::MatrixXd by_angle = Eigen::MatrixXd::Zero(count, 2), by_kept(count, kept);
+        Eigen::VectorXd u(count);
+        const int first = laser_angle(pass, 0);
+        for (Eigen::Index i = 0; i < count; ++i) {
+            const Equation& equation = equations[e + std::size_t(i)];
+            for (int k = 0; k < 2; ++k)
+                if (const auto found = equation.coefficient.find(first + k); found != equation.coefficient.end())
+                    by_angle(i, k) = found->second;
+            by_kept.row(i) = row_of(equation);
+            u[i] = equation.standard_uncertainty;
+        }
+        const LeastSquares angles = solve_least_squares(by_angle, u);
+        Eliminated& own = eliminated_.emplace_back();
+        own.first_angle = first;
+        own.first_equation = int(e);
+        own.inverse = angles.pseudoinverse;
+        own.by_kept = angles.pseudoinverse * by_kept;
+        own.without = angles.contradictions.matrix();
+        const Eigen::MatrixXd rest = own.without * by_kept;
+        for (Eigen::Index row = 0; row < rest.rows(); ++row) {
+            reduced.push_back(rest.row(row));
+            // Weights are relative to the pass's best equation, and rows of Q have length 1.
+            uncertainty.push_back(u.minCoeff());
+        }
+        const Eigen::Matrix2d projector = Eigen::Matrix2d::Identity() - angles.pseudoinverse * by_angle;
+        for (int k = 0; k < 2; ++k)
+            if (!angles.determined[std::size_t(k)]) note_open(pass, projector.col(k));
+    }
+
+    Eigen::MatrixXd matrix(Eigen::Index(reduced.size()), kept);
+    for (std::size_t i = 0; i < reduced.size(); ++i) matrix.row(Eigen::Index(i)) = reduced[i];
     const LeastSquares solution = solve_least_squares(
         matrix, Eigen::Map<const Eigen::VectorXd>(uncertainty.data(), Eigen::Index(uncertainty.size())));
-    system.inverse_ = solution.pseudoinverse;
-    system.contradictions_ = solution.contradictions;
-    system.determined_ = solution.determined;
-    const Eigen::MatrixXd projector = Eigen::MatrixXd::Identity(unknowns, unknowns) - solution.pseudoinverse * matrix;
-    const auto open = std::count(solution.determined.begin(), solution.determined.end(), false);
-    system.null_space_.resize(unknowns, open);
-    for (Eigen::Index j = 0, column = 0; j < unknowns; ++j)
-        if (!solution.determined[j]) system.null_space_.col(column++) = projector.col(j);
-    return system;
+    inverse_ = solution.pseudoinverse;
+    contradictions_ = solution.contradictions;
+    determined_ = solution.determined;
+    const Eigen::MatrixXd projector = Eigen::MatrixXd::Identity(kept, kept) - solution.pseudoinverse * matrix;
+    const auto undetermined = std::count(determined_.begin(), determined_.end(), false);
+    null_space_.setZero(Eigen::Index(unknowns_), undetermined + Eigen::Index(open.size()));
+    Eigen::Index column = 0;
+    for (Eigen::Index j = 0; j < kept; ++j) {
+        if (determined_[std::size_t(j)]) continue;
+        for (Eigen::Index i = 0; i < kept; ++i) null_space_(kept_[std::size_t(i)], column) = projector(i, j);
+        for (const Eliminated& pass : eliminated_)
+            null_space_.col(column).segment<2>(pass.first_angle) = -pass.by_kept * projector.col(j);
+        ++column;
+    }
+    for (const auto& [first, angles] : open) null_space_.col(column++).segment<2>(first) = angles;
 }
 
 }  // namespace stepdiag

@@ -3,9 +3,11 @@
 //   n_d . sum_a delta_a(p_a)  -  a_d y + b_d x,      where (a_d, b_d) are the line's laser angles,
 // with delta_X(end) = (EXX, 0, 0), delta_Y(end) = (-C0Y Y, EYY, 0), delta_Z(end) = (B0Z Z, -A0Z Z, EZZ). The three
 // slopes that are 0 are the choice of frame. There is one equation for each line and axis, and one for each scale line.
-// Internal.
+// The angles of a line's lasers are in its own equations, but where lines that lost readings borrow from others. Of
+// many passes they are eliminated pass by pass, so that the rest has few unknowns. Internal.
 #pragma once
 
+#include <map>
 #include <vector>
 
 #include "evaluation/linear_evaluation.hpp"
@@ -28,16 +30,28 @@ public:
 
     template <class Number>
     std::vector<Number> solve(const std::vector<Number>& lengths) const {
-        const std::vector<Number> sums = right_sides(lengths);
-        std::vector<Number> slopes(inverse_.rows(), Number::Zero());
-        for (Eigen::Index j = 0; j < inverse_.rows(); ++j)
-            for (Eigen::Index i = 0; i < inverse_.cols(); ++i) slopes[j] += inverse_(j, i) * sums[i];
+        const std::vector<Number> sums = right_sides(lengths), reduced = reduced_sides(sums);
+        std::vector<Number> slopes(unknowns_, Number::Zero());
+        for (Eigen::Index j = 0; j < inverse_.rows(); ++j) {
+            Number& slope = slopes[std::size_t(kept_[std::size_t(j)])];
+            for (Eigen::Index i = 0; i < inverse_.cols(); ++i) slope += inverse_(j, i) * reduced[std::size_t(i)];
+        }
+        for (const Eliminated& pass : eliminated_)
+            for (int k = 0; k < 2; ++k) {
+                Number& angle = slopes[std::size_t(pass.first_angle + k)];
+                for (Eigen::Index i = 0; i < pass.inverse.cols(); ++i)
+                    angle += pass.inverse(k, i) * sums[std::size_t(pass.first_equation + i)];
+                for (Eigen::Index j = 0; j < pass.by_kept.cols(); ++j)
+                    if (pass.by_kept(k, j) != 0.0)
+                        angle -= pass.by_kept(k, j) * slopes[std::size_t(kept_[std::size_t(j)])];
+            }
         return slopes;
     }
 
     template <class Number>
     void add_contradictions(const std::vector<Number>& lengths, Thinning& thinning, std::vector<Number>& out) const {
-        stepdiag::add_contradictions<Number>(contradictions_, [&] { return right_sides(lengths); }, thinning, out);
+        stepdiag::add_contradictions<Number>(
+            contradictions_, [&] { return reduced_sides(right_sides(lengths)); }, thinning, out);
     }
 
     template <class Number>
@@ -59,6 +73,12 @@ private:
         int reading;
         double coefficient;
     };
+    struct Equation {
+        int pass;
+        std::map<int, double> coefficient;  // by unknown
+        double standard_uncertainty;
+    };
+    void solve_equations(const std::vector<Equation>& equations, const std::vector<Pass>& passes, const Plan& plan);
     template <class Number>
     std::vector<Number> right_sides(const std::vector<Number>& lengths) const {
         std::vector<Number> sums;
@@ -70,10 +90,35 @@ private:
         return sums;
     }
 
+    // The angles of one pass, from its equations and the unknowns that are kept; and the combinations of its equations
+    // that do not have them, a row each.
+    struct Eliminated {
+        int first_angle, first_equation;
+        Eigen::MatrixXd inverse, by_kept, without;
+    };
+    template <class Number>
+    std::vector<Number> reduced_sides(const std::vector<Number>& sums) const {
+        std::vector<Number> reduced;
+        for (const int equation : direct_) reduced.push_back(sums[std::size_t(equation)]);
+        for (const Eliminated& pass : eliminated_)
+            for (Eigen::Index row = 0; row < pass.without.rows(); ++row) {
+                Number sum = Number::Zero();
+                for (Eigen::Index i = 0; i < pass.without.cols(); ++i)
+                    sum += pass.without(row, i) * sums[std::size_t(pass.first_equation + i)];
+                reduced.push_back(sum);
+            }
+        return reduced;
+    }
+
     std::vector<std::vector<Term>> sums_;  // a sum of lengths for each equation
-    Eigen::MatrixXd inverse_, contradictions_;
+    std::size_t unknowns_ = 0;
+    std::vector<int> kept_;    // unknowns that are not eliminated
+    std::vector<int> direct_;  // equations without eliminated ones
+    std::vector<Eliminated> eliminated_;
+    Eigen::MatrixXd inverse_;  // of the kept unknowns, from the reduced sides
+    Contradictions contradictions_;
     Eigen::MatrixXd null_space_;
-    std::vector<bool> determined_;
+    std::vector<bool> determined_;  // of the kept unknowns
 };
 
 // A step that a line has lost is taken from the solution of the other lines. A sum that cannot be completed gives no

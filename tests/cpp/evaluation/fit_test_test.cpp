@@ -47,8 +47,24 @@ TEST(LeastSquares, ContradictionsAreSumsOfEquationsWhoseLeftSidesCancel) {
     const VectorXd uncertainty = VectorXd::Random(6).array() + 2.0;
     const auto solution = stepdiag::solve_least_squares(equations, uncertainty);
     ASSERT_EQ(solution.contradictions.rows(), 3);
-    EXPECT_LT((solution.contradictions * equations).norm(), 1e-13);
-    EXPECT_EQ(Eigen::FullPivLU<MatrixXd>(solution.contradictions).rank(), 3);
+    const MatrixXd contradictions = solution.contradictions.matrix();
+    EXPECT_LT((contradictions * equations).norm(), 1e-13);
+    EXPECT_EQ(Eigen::FullPivLU<MatrixXd>(contradictions).rank(), 3);
+}
+
+TEST(LeastSquares, RowsOfContradictionsAreTheSameForFewAndManyEquations) {
+    for (const int count : {6, 400}) {
+        const MatrixXd equations = MatrixXd::Random(count, 3);
+        const VectorXd uncertainty = VectorXd::Random(count).array() + 2.0;
+        const auto solution = stepdiag::solve_least_squares(equations, uncertainty);
+        const MatrixXd all = solution.contradictions.matrix();
+        EXPECT_LT((all * equations).norm(), 1e-12);
+        VectorXd space;
+        for (Eigen::Index i = 0; i < all.rows(); ++i) {
+            const Eigen::Map<const VectorXd> row(solution.contradictions.row(i, space), count);
+            EXPECT_EQ(VectorXd(all.row(i)), VectorXd(row));
+        }
+    }
 }
 
 }  // namespace
