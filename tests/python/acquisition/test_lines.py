@@ -211,9 +211,9 @@ def test_sample_with_a_time_before_it_was_asked_for_is_not_read() -> None:
             sample = instrument.read()
         assert sample.values[0] == 100.0
         assert sample.time is not None
-    behind = r"no new sample within 0.2 s: .*do the clocks agree\?"
+    behind = r"no new sample within 1 s: .*do the clocks agree\?"
     with (
-        piped(HEADER, timeout=0.2) as (pipe, instrument),
+        piped(HEADER, timeout=1.0) as (pipe, instrument),
         later(pipe, past, past),
         pytest.raises(InstrumentError, match=behind),
     ):
@@ -235,8 +235,8 @@ def test_value_that_is_null_is_lost_with_its_reason(tmp_path: Path) -> None:
 def test_spots_settle_by_a_limit_of_their_own(tmp_path: Path) -> None:
     described = scenario(plan=LINE, head=PSD)
     behaviour = TwinBehaviour(sampling_noise_um=1.0)
-    for limit, lost in ((50.0, 0), (0.01, 4)):
-        settling = Settling(count=3, average=2, interval=0.0, limit_um=50.0, limit_spot_um=limit, timeout=0.2)
+    for limit, timeout, lost in ((50.0, 20.0, 0), (0.01, 0.2, 4)):
+        settling = Settling(count=3, average=2, interval=0.0, limit_um=50.0, limit_spot_um=limit, timeout=timeout)
         with Twin(described, protocol="lines", behaviour=behaviour) as twin:
             result = acquired(described, twin.source, tmp_path / f"{lost}.csv", options=fast(settling=settling))
         assert result.lost == lost
@@ -475,7 +475,7 @@ def test_whatever_comes_an_acquisition_ends(pieces: list[bytes], with_header: bo
     with pytest.raises(InstrumentError, match="pipe: ") as error:
         read_all()
     assert str(error.value).isascii()
-    assert len(str(error.value)) < 300
+    assert len(str(error.value)) < 600  # 60 bytes shown, each as six
     sender.join()
 
 

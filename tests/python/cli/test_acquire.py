@@ -179,7 +179,7 @@ def test_bad_options_of_the_twin_are_refused(
 def test_twin_on_standard_output_is_acquired_and_ends_with_the_acquisition(folder: Path) -> None:
     head = 'layout = "psd"\npsd_distance_mm = 80.0'
     (folder / "psd.toml").write_text(acquiring.SCENARIO.format(plan='lines = ["ppp"]\nsteps = 1', head=head, noise=""))
-    command = f"{sys.executable} -m stepdiag twin psd.toml --protocol lines --stdout --play 0.7"
+    command = f"{sys.executable} -m stepdiag twin psd.toml --protocol lines --stdout --play 2"
     done = subprocess.run(
         [
             *(sys.executable, "-m", "stepdiag", "acquire", "psd.toml", "--source", f"program:{command}"),
