@@ -25,6 +25,7 @@ from stepdiag.cli.simulate import demo, simulate
 from stepdiag.cli.study import study
 from stepdiag.cli.uncertainty import uncertainty
 from stepdiag.cli.volume import volume
+from stepdiag.memory import NotEnoughMemory
 
 EPILOG = """\b
 See everything at once:
@@ -107,6 +108,5 @@ def run(arguments: list[str] | None) -> int:
     except OSError as error:
         _complain(str(error))
     except MemoryError as error:
-        said = str(error)
-        _complain(f"the memory does not suffice{f' ({said})' if said and 'bad_alloc' not in said else ''}")
+        _complain(str(error) if isinstance(error, NotEnoughMemory) else "the memory does not suffice")
     return 2

@@ -13,6 +13,7 @@ from stepdiag._core import Calibration, InvalidArgument, Measurement
 from stepdiag.config.toml_text import located
 from stepdiag.io.labelled_tables import channel_units
 from stepdiag.io.netcdf import NetcdfFile, open_dataset
+from stepdiag.memory import check_memory, for_covariance_file
 from stepdiag.parameters import units_of
 
 MEASUREMENT_FORMAT: Final = "stepdiag measurement 1"
@@ -97,6 +98,12 @@ def read_calibration_netcdf(path: Path) -> Calibration:
         }
         with located(str(path)):
             calibration = Calibration(**parts)
+        if "covariance" in file:
+            check_memory(
+                for_covariance_file(path.stat().st_size),
+                f"{path}: its covariance",
+                "evaluate the run with --no-covariance, or use a computer with more",
+            )
         covariance = _covariance(file, calibration) if "covariance" in file else None
     if covariance is None:
         return calibration

@@ -22,6 +22,8 @@ from stepdiag.config.toml_text import check_keys, located, parse_toml
 from stepdiag.display import Displayed, Facts
 from stepdiag.io.refused_files import explained
 from stepdiag.io.whole_files import read_text
+from stepdiag.memory import check_memory, for_evaluation
+from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 from stepdiag.scenario.heads import describe_heads, make_heads, of_run
 from stepdiag.scenario.known import Known, known_of, runs_of
 from stepdiag.scenario.planned_readings import only, with_channels
@@ -111,6 +113,7 @@ def evaluate_scenario(
     if method == "adjustment":
         adjustment = adjust_scenario(known, measurement, full_covariance=full_covariance)
         return adjustment.calibration.with_between_nodes(known.between_nodes)
+    _check_memory(known, measurement, full_covariance)
     found = _core.evaluate(
         reduced_run(known, measurement),
         known.plan,
@@ -187,6 +190,7 @@ def adjust_scenario(
     also which faults the readings control. `search_faults` False: it is known already what is wrong with the run as a
     whole; no faults of single readings are looked for."""
     known = scenario.known
+    _check_memory(known, measurement, full_covariance)
     return _core.adjust(
         reduced_run(known, measurement),
         known.plan,
@@ -196,6 +200,16 @@ def adjust_scenario(
         adjustment_options(
             known, full_covariance=full_covariance, reliability=reliability, search_faults=search_faults
         ),
+    )
+
+
+def _check_memory(known: Known, measurement: _core.Measurement, full_covariance: bool) -> None:
+    values = len(FUNCTIONS) * (known.plan.steps + 1) * (2 if known.keys.plan.backward else 1) + len(SQUARENESSES)
+    check_memory(
+        for_evaluation(len(measurement), values, full_covariance),
+        f"the evaluation of {len(measurement)} readings"
+        + (f" with the covariance of {values} values" if full_covariance else ""),
+        "leave the covariance out (`no_covariance`)" if full_covariance else "evaluate fewer of its runs at a time",
     )
 
 

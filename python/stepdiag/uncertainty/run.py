@@ -8,6 +8,7 @@ from typing import Final
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.config.toml_text import located
+from stepdiag.memory import check_memory, for_samples
 from stepdiag.scenario.description import Scenario
 from stepdiag.uncertainty.monte_carlo import Executor, run_monte_carlo
 from stepdiag.uncertainty.result import UncertaintyResult, find_output
@@ -90,6 +91,14 @@ def evaluate_uncertainty(
     model, entries = model_for(scenario, request)
     kept = [find_output(model.outputs, name, "keep") for name in request.keep]
     joint = [[find_output(model.outputs, name, "joint") for name in names] for names in request.joint]
+    samples = 0 if not request.draws else MOST_SAMPLES if request.samples is None else request.samples
+    if kept or request.covariance:
+        check_memory(
+            for_samples(len(model.outputs), len(kept), samples, request.covariance),
+            f"{samples} samples of {len(model.outputs)} outputs with "
+            f"{' and '.join(['`covariance`'] * request.covariance + ['`keep`'] * bool(kept))}",
+            "keep fewer outputs, leave `covariance` out, or take fewer steps or samples",
+        )
     with located(str(scenario.path)):
         propagation = _core.propagate(model, covariance=request.volume)
         volume = _volume(model.calibration, propagation, entries, request) if request.volume else None
