@@ -51,10 +51,10 @@ def study(
         with at_end(continuation), chosen_workers(scheduler, workers) as chosen, Progress("cells") as progress:
             results = run_study(wanted, finished, workers=chosen, progress=progress)
         write_study(wanted, results, path)
-    except BaseException:
+    except BaseException as error:
         finished.close()
         if said := continuation():
-            tell("interrupted", said)
+            tell("note" if isinstance(error, Exception) else "interrupted", said)
         raise
     finished.remove()
     failures = [result.failure for result in results.values() if result.failure]

@@ -255,7 +255,7 @@ def _kept(wanted: "UncertaintyRequest", errors: type[BaseException]) -> Iterator
             yield
     except errors as error:
         if (said := continuation()) != nothing or isinstance(error, KeyboardInterrupt):
-            tell("interrupted", said)
+            tell("note" if isinstance(error, Exception) else "interrupted", said)
         if isinstance(error, KeyboardInterrupt):
             raise click.Abort from None
         raise

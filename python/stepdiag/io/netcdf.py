@@ -4,6 +4,7 @@ labelled_tables.py, netcdf_read.py and docs/files.md describe their contents.
 """
 
 import hashlib
+import os
 import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -24,6 +25,7 @@ from stepdiag.io.whole_files import read_bytes, whole_file
 _FREE_SIZE = 64 * 2**20
 _LARGEST_COMPRESSION = 100
 
+_ROOM = 2**19  # bytes of a file beside its values, at most
 _CHECKSUM = "sha256"
 _OF_OTHERS = ("history",)  # attributes that other programs add to, as their conventions want
 _FILL = netCDF4.default_fillvals["f8"]  # netCDF's mark of values never written
@@ -48,6 +50,9 @@ def write_dataset(dataset: xr.Dataset, path: Path, attributes: dict[str, Any]) -
             variable.encoding["_FillValue"] = None
     dataset.attrs[_CHECKSUM] = _checksum(dataset)
     with whole_file(path) as temporary:
+        # The C libraries may crash where a disk gets full, so room is made before; they take it from the start.
+        with open(temporary, "r+b") as file:
+            os.posix_fallocate(file.fileno(), 0, dataset.nbytes + _ROOM)
         try:
             with uninterrupted():  # an exception inside of them leaves the libraries' locks taken
                 dataset.to_netcdf(temporary, mode="w", engine="netcdf4", format="NETCDF4")
