@@ -70,6 +70,20 @@ def passes_of(run: _core.Measurement) -> dict[tuple[int, str], Rows]:
     return {key: np.array(own) for key, own in rows.items()}
 
 
+def of_rows(run: _core.Measurement, rows: Rows) -> _core.Measurement:
+    """These rows of a run alone."""
+    line, direction = run.line, run.direction
+    return _core.Measurement(
+        [line[row] for row in rows],
+        run.point[rows].tolist(),
+        run.position[rows],
+        {name: values[rows] for name, values in run.channels.items()},
+        run=run.run[rows].tolist(),
+        direction=[direction[row] for row in rows],
+        standard_uncertainty={name: values[rows] for name, values in run.standard_uncertainty.items()},
+    )
+
+
 def rows_of(run: _core.Measurement, lines: Iterable[str]) -> Rows:
     named = set(lines)
     return np.flatnonzero([line in named for line in run.line])

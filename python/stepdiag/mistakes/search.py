@@ -5,11 +5,13 @@ scenario as they are (relative to the variance factor that is left, so that nois
 itself rejected, and explains more than the faults of single readings that the adjustment found. What is less than
 `ALTERNATIVE` behind the best is not told from it, and is named with it.
 
-Quick fits take plain steps of Gauss-Newton: what fits is at its minimum after a few, and what does not need not be."""
+Quick fits take plain steps of Gauss-Newton: what fits is at its minimum after a few, and what does not need not be.
+Of many runs some are fitted first, and all only with the best of what explains those."""
 
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -20,7 +22,7 @@ import numpy as np
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.mistakes.catalogue import CATALOGUE
-from stepdiag.mistakes.copies import Copy, Family, Hypothesis, in_turn, passes_of, without
+from stepdiag.mistakes.copies import Change, Copy, Family, Hypothesis, Rows, in_turn, of_rows, passes_of, without
 from stepdiag.mistakes.nominal_way import Way, distance_of, ways_of
 from stepdiag.scenario.description import Scenario, adjust_scenario, adjustment_options, reduced_run
 from stepdiag.scenario.heads import of_run
@@ -40,6 +42,8 @@ SCREENING: Final = 3  # steps of Gauss-Newton after which a run that fits is tol
 ENOUGH: Final = 8  # after which it is at its minimum
 REFINED: Final = 10  # of the best of a screening
 MOST_PARABOLAS: Final = 6
+SAMPLE: Final = 2500  # readings of the runs by which mistakes are screened: the time of a search is then limited
+MOST_DISTURBED: Final = 40  # passes of which one is tried as the disturbed one
 NEAR: Final = 10.0  # times the least square sum of a screening, above which nothing becomes the best
 
 
@@ -128,6 +132,7 @@ class MistakeSearch:
             self._ways = ways_of(known, self._copy.run)
             # However well they fit: no machine is off by so much.
             self._is_impossible = _gross(self._ways) > 0
+        self._sample = _some_runs(self._copy, self._ways)
         self._adjustment: _core.Adjustment | None = None
 
     def before(self) -> list[FoundMistake]:
@@ -165,30 +170,60 @@ class MistakeSearch:
 
     @cached_property
     def _single(self) -> list[_Tried]:
-        return self._singles(self._copy)
+        return self._singles(lambda copy: copy)
 
-    def _singles(self, copy: Copy) -> list[_Tried]:
-        """The best of all mistakes without a number of their own, in the order of the catalogue."""
-        ways = self._ways if copy is self._copy else ways_of(copy.known, copy.run)
+    def _singles(self, begun: Change) -> list[_Tried]:
+        """The best of all mistakes without a number of their own, in the order of the catalogue, in copies that are
+        begun like this."""
+        copy, sample = begun(self._copy), begun(self._sample)
+        ways = ways_of(sample.known, sample.run)
         gross = max(_gross(ways), 1)
 
         def screened(hypothesis: Hypothesis) -> _Tried | None:
-            changed = _changed(hypothesis, copy)
+            changed = _changed(hypothesis, sample)
             # What leaves distances off by millimetres needs no adjustment.
-            if changed is None or not (left := _gross_of(changed, copy, ways)) < gross:
+            if changed is None or not (left := _gross_of(changed, sample, ways)) < gross:
                 return None
             return _Tried(hypothesis, _fit_of(changed, SCREENING if left == 0 else 1))
 
-        tried = [one for one in self._pool.map(screened, _hypotheses(copy)) if one is not None]
+        tried = [one for one in self._pool.map(screened, _hypotheses(sample)) if one is not None]
         sums = sorted(one.fit.square_sum for one in tried)
         limit = min(sums[:REFINED][-1], NEAR * sums[0]) if sums else 0.0
 
         def refined(one: _Tried) -> _Tried:
             if one.fit.factor > PROMISING:
                 return one
-            return replace(one, fit=_fit_of(one.hypothesis.change(copy), ENOUGH))
+            return replace(one, fit=_fit_of(one.hypothesis.change(sample), ENOUGH))
 
-        return list(self._pool.map(refined, [one for one in tried if one.fit.square_sum <= limit]))
+        best = list(self._pool.map(refined, [one for one in tried if one.fit.square_sum <= limit]))
+        return best if sample is copy else list(self._pool.map(self._of_all_runs(copy), best))
+
+    def _of_all_runs(self, copy: Copy) -> Callable[[_Tried], _Tried]:
+        """Fits to all runs what was tried with some of them, where it may be better than the run as it was read."""
+        whole = {(one.entry, one.text): one for one in _hypotheses(copy)}  # which know the rows of their run
+
+        def fitted(one: _Tried) -> _Tried:
+            factor = max(1.0, one.fit.factor)
+            gain = self._sample_as_read.excess(factor) - one.excess(factor)
+            own = whole.get((one.hypothesis.entry, one.hypothesis.text))
+            changed = _changed(own, copy) if own is not None and gain > 0.5 * CLEAR * self._share else None
+            if own is None or changed is None:
+                return replace(one, fit=_NONE)
+            return _Tried(own, _fit_of(changed, ENOUGH if one.fit.factor <= PROMISING else SCREENING))
+
+        return fitted
+
+    @cached_property
+    def _sample_as_read(self) -> _Fit:
+        """As `_as_read`, of the runs by which mistakes are screened."""
+        if self._sample is self._copy or self._is_impossible:
+            return self._as_read
+        return _fit_of(self._sample, ENOUGH)
+
+    @property
+    def _share(self) -> float:
+        """Of all readings, those of these runs."""
+        return len(self._sample.run) / len(self._copy.run)
 
     def _of_families(self, *, of_faults: bool = True) -> list[_Tried]:
         """The best of each family; without `of_faults` not of those that the adjustment looks for itself."""
@@ -197,14 +232,30 @@ class MistakeSearch:
         # Where the adjustment found a factor, or what may be one, its sentence is the one.
         found = self._adjustment.faults if self._adjustment else []
         told = {fault.line for each in found for fault in each.members if fault.kind == "factor"}
-        families = [
+        families = self._families(self._copy, told if of_faults else None)
+        some = self._families(self._sample, told if of_faults else None)
+
+        def best(whole: Family, of_sample: Family) -> _Tried | None:
+            # Readings of more runs tell less gain.
+            value = _best_of(of_sample, self._sample, self._sample_as_read, 0.5 * CLEAR * self._share)
+            if value and self._sample is not self._copy:
+                value = _best_of(whole, self._copy, self._as_read, 0.5 * CLEAR, begin=value)
+            if not value:
+                return None
+            made = whole.make(value)
+            return _Tried(made, _fit_of(made.change(self._copy), ENOUGH))
+
+        return [one for one in self._pool.map(best, families, some) if one is not None]
+
+    @staticmethod
+    def _families(copy: Copy, told: Collection[str] | None) -> list[Family]:
+        """Of a copy; those that the adjustment looks for itself only with `told`, the lines of which it found one."""
+        return [
             family
             for mistake in CATALOGUE
-            for family in mistake.families_of(self._copy)
-            if family.fault is None or (of_faults and family.fault not in told)
+            for family in mistake.families_of(copy)
+            if family.fault is None or (told is not None and family.fault not in told)
         ]
-        best = self._pool.map(lambda family: _best_of(family, self._copy, self._as_read), families)
-        return [one for one in best if one is not None]
 
     def _pairs(self) -> list[_Tried]:
         return [pair for first in self._begun(self._single) for pair in self._with_second(first)]
@@ -223,7 +274,7 @@ class MistakeSearch:
         return begun
 
     def _with_second(self, first: _Tried) -> Iterator[_Tried]:
-        for second in self._singles(first.hypothesis.change(self._copy)):
+        for second in self._singles(first.hypothesis.change):
             a, b = first.hypothesis, second.hypothesis
             yield _Tried(
                 Hypothesis(
@@ -300,7 +351,7 @@ class MistakeSearch:
         def left(rows: "np.typing.NDArray[np.int_]") -> _Fit:
             return _fit_of(without(rows, names)(self._copy), ENOUGH)
 
-        keys = list(passes)
+        keys = self._suspects(passes)
         fits = list(self._pool.map(lambda key: left(passes[key]), keys))
         (number, line), best = min(zip(keys, fits, strict=True), key=lambda pair: pair[1].factor)
         rows, factor = passes[number, line], max(1.0, best.factor)
@@ -339,6 +390,30 @@ class MistakeSearch:
                 left(stretch),
             )
         ]
+
+    def _suspects(self, passes: Mapping[tuple[int, str], Rows]) -> list[tuple[int, str]]:
+        """The passes that may be disturbed: all, or of many those that fit worst."""
+        if len(passes) <= MOST_DISTURBED:
+            return list(passes)
+        if self._adjustment is None:
+            return [key for key in passes if key[0] in set(self._sample.run.run.tolist())][:MOST_DISTURBED]
+        squares = np.zeros(len(self._copy.run))
+        for values in self._adjustment.normalised_residuals.values():
+            squares += np.nan_to_num(values) ** 2
+        return sorted(passes, key=lambda key: -float(np.mean(squares[passes[key]])))[:MOST_DISTURBED]
+
+
+def _some_runs(copy: Copy, ways: Sequence[Way]) -> Copy:
+    """All of a run, or some of its repetitions: those with lines that are off their way, else the first and others
+    evenly among the rest. A mistake in the scenario, or in how it was measured, is in all of them."""
+    runs = sorted(set(copy.run.run.tolist()))
+    count = max(1, SAMPLE * len(runs) // max(len(copy.run), 1))
+    if count >= len(runs):
+        return copy
+    off = Counter(way.run for way in ways if way.is_gross)
+    evenly = {runs[k * len(runs) // count] for k in range(count)}
+    chosen = set(sorted(runs, key=lambda run: (-off[run], run not in evenly, run))[:count])
+    return replace(copy, run=of_rows(copy.run, np.flatnonzero(np.isin(copy.run.run, list(chosen)))))
 
 
 def _pool() -> ThreadPoolExecutor:
@@ -382,9 +457,9 @@ def _fit_of(copy: Copy, steps: int) -> _Fit:
     return _NONE if found is None else _Fit(found.weighted_square_sum, found.degrees_of_freedom)
 
 
-def _best_of(family: Family, copy: Copy, as_read: _Fit) -> _Tried | None:
-    """The hypothesis of a family that fits best; None where it is as things are, where so little would be gained that
-    it is not named, or at the family's end."""
+def _best_of(family: Family, copy: Copy, as_read: _Fit, least_gain: float, *, begin: float = 0.0) -> float:
+    """The number of a family with which a copy fits best; 0 where it is as things are, where less than `least_gain`
+    would be gained, or at the family's end."""
     fits = {0.0: as_read}
 
     def fit(value: float) -> _Fit:
@@ -392,7 +467,9 @@ def _best_of(family: Family, copy: Copy, as_read: _Fit) -> _Tried | None:
             fits[value] = _fit_of(family.make(value).change(copy), ENOUGH)
         return fits[value]
 
-    if as_read.excess(1.0) > CLEAR:  # the minimum may be far
+    if begin:
+        fit(begin)
+    elif as_read.excess(1.0) > least_gain:  # the minimum may be far
         for value in family.far:
             fit(value)
     for _ in range(MOST_PARABOLAS):
@@ -402,12 +479,10 @@ def _best_of(family: Family, copy: Copy, as_read: _Fit) -> _Tried | None:
         if not (math.isfinite(slope) and bend > 0.0):
             break
         # A parabola, as the square sum is one to first order, tells the gain before it is tried.
-        if best == 0.0 and slope * slope / (8.0 * bend) < 0.5 * CLEAR:
-            return None
+        if best == 0.0 and slope * slope / (8.0 * bend) < least_gain:
+            return 0.0
         least = best - family.near * slope / (2.0 * bend)
         if abs(least) >= family.limit or middle - fit(least).square_sum < 0.1:
             break
     best = min(fits, key=lambda value: fits[value].square_sum)
-    if best == 0.0 or abs(best) >= family.limit:
-        return None
-    return _Tried(family.make(best), fits[best])
+    return 0.0 if abs(best) >= family.limit else best

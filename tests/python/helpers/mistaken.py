@@ -63,15 +63,18 @@ def simulated(
     head: sd.Head | None = None,
     chain: str = CHAIN,
     noise: float = 1.0,
+    machine: int | None = None,
 ) -> sd.Measurement:
-    """A run of a random machine. `plan`, `head`, `chain`: what was really measured with; the points then have the
-    positions of the scenario's plan all the same, and the lines its names."""
+    """A run of a random machine, of the seed `machine` or the same one. `plan`, `head`, `chain`: what was really
+    measured with; the points then have the positions of the scenario's plan all the same, and the lines its names."""
     known = scenario.known
     real, stated = plan or known.plan, [*known.plan.lines, *known.plan.scale_lines]
     lines = [*real.lines, *real.scale_lines]
     drawn = list(set_ups(known.head.layout, stated, seed=seed).values())
     run = sd.simulate(
-        sd.Machine(chain, sd.random_error_map(real.volume, seed=seed, intervals=real.steps)),
+        sd.Machine(
+            chain, sd.random_error_map(real.volume, seed=seed if machine is None else machine, intervals=real.steps)
+        ),
         real,
         head or known.head,
         misalignment=dict(zip(lines, drawn, strict=True)),
@@ -89,7 +92,7 @@ def rows_of(run: sd.Measurement, line: str | None) -> np.ndarray:
 
 
 def changed(run: sd.Measurement, fields: Mapping[str, np.ndarray]) -> sd.Measurement:
-    return sd.Measurement(run.line, run.point.tolist(), run.position, {**run.channels, **fields})
+    return sd.Measurement(run.line, run.point.tolist(), run.position, {**run.channels, **fields}, run=run.run.tolist())
 
 
 def moved(run: sd.Measurement, source: np.ndarray) -> sd.Measurement:

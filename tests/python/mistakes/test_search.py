@@ -163,3 +163,33 @@ def test_of_many_alternatives_some_are_counted() -> None:
     one = sd.FoundMistake("sign", "alpha has the wrong sign", "change it", "accepted", 1.0, 90.0)
     text = mistake_text([replace(one, alternatives=3), one])
     assert text.startswith("either alpha has the wrong sign; or alpha has the wrong sign; or one of 3 more; with")
+
+
+@pytest.mark.parametrize("few", [True, False])
+def test_mistakes_of_many_runs_are_those_of_all(few: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is screened by two of six runs is named as by all six: in all, in one of them, with a number of its own."""
+    scenario = described("ideal", steps=4)
+    run = repeated(scenario, 6)
+    alpha, distance = run.channels["alpha"], run.channels["distance"]
+    backwards = np.arange(len(run))
+    one = np.flatnonzero((run.run == 4) & (np.array(run.line) == "npp"))
+    backwards[one] = one[::-1]
+    if few:
+        monkeypatch.setattr("stepdiag.mistakes.search.SAMPLE", len(run) // 3)
+    assert sd.find_mistakes(scenario, run) == []
+    assert sd.find_mistakes(scenario, changed(run, {"alpha": -alpha}))[0].entry == "sign"
+    assert "npp" in sd.find_mistakes(scenario, changed(run, {"distance": distance[backwards]}))[0].text
+    factor = sd.find_mistakes(scenario, changed(run, {"alpha": 1.3 * alpha, "beta": 1.3 * run.channels["beta"]}))
+    assert "1.3" in factor[0].text
+
+
+def repeated(scenario: sd.Scenario, runs: int) -> sd.Measurement:
+    """Runs of one machine, each with set-ups and noise of its own."""
+    single = [simulated(scenario, seed=seed, machine=1) for seed in range(runs)]
+    return sd.Measurement(
+        [line for run in single for line in run.line],
+        [point for run in single for point in run.point.tolist()],
+        np.concatenate([run.position for run in single]),
+        {name: np.concatenate([run.channels[name] for run in single]) for name in single[0].channels},
+        run=[k for k, run in enumerate(single) for _ in run.line],
+    )
