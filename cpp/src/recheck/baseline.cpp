@@ -76,6 +76,44 @@ Baseline::Baseline(Calibration calibration) : calibration_(std::move(calibration
     }
 }
 
+Baseline::Baseline(Calibration calibration, const ChangePriors& priors) : Baseline(std::move(calibration)) {
+    for (const double prior : {priors.scale, priors.bow, priors.slope, priors.squareness})
+        if (!(std::isfinite(prior) && prior >= 0.0))
+            throw InvalidArgument("change: expected priors that are finite and at least 0");
+    const auto add = [&](const std::string& parameter, ChangeKind kind, double prior) {
+        if (prior > 0.0) add_change({parameter, kind, 0.0, prior, prior});
+    };
+    for (int i = 0; i < function_count; ++i) {
+        const FunctionId id = FunctionId::at(i);
+        if (id.is_positioning()) add(id.name(), ChangeKind::scale, priors.scale);
+        else if (id.is_straightness()) add(id.name(), ChangeKind::bow, priors.bow);
+        else add(id.name(), ChangeKind::slope, priors.slope);
+    }
+    for (const Squareness s : all_squarenesses) add(name(s), ChangeKind::squareness, priors.squareness);
+    if (changes_.empty()) throw InvalidArgument("change: expected a prior above 0 for one kind of change at least");
+}
+
+void Baseline::add_change(const ChangeTerm& change) {
+    root_.conservativeResize(Eigen::NoChange, root_.cols() + 1);
+    auto column = root_.col(root_.cols() - 1);
+    column.setZero();
+    changes_.push_back(change);
+    if (const auto squareness = parse_squareness(change.parameter)) {
+        column[first_entry_[function_count + static_cast<int>(*squareness)]] = change.prior;
+        return;
+    }
+    const FunctionId id = *FunctionId::parse(change.parameter);
+    const std::vector<double>& nodes = calibration_.functions[id.index()]->position;
+    const double travel = calibration_.volume[index(id.axis)];
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+        const double share = nodes[k] / travel;
+        column[first_entry_[id.index()] + Eigen::Index(k)] =
+            change.prior * (change.kind == ChangeKind::scale ? nodes[k]
+                            : change.kind == ChangeKind::bow ? 4.0 * share * (1.0 - share)
+                                                             : share);
+    }
+}
+
 AxisErrors Baseline::errors(Axis axis, double position, bool negative, std::vector<Share>& shares) const {
     AxisErrors errors = AxisErrors::Zero();
     for (int c = 0; c < 6; ++c) {

@@ -6,6 +6,7 @@
 
 #include "adjustment/channel_model.hpp"
 #include "stepdiag/evaluation/calibration.hpp"
+#include "stepdiag/recheck/recheck.hpp"
 
 namespace stepdiag {
 
@@ -20,6 +21,8 @@ public:
 
     // Throws InvalidArgument for a calibration without covariance, or one that does not determine all parameters.
     explicit Baseline(Calibration calibration);
+    // The machine may also have changed.
+    Baseline(Calibration calibration, const ChangePriors& priors);
 
     const Calibration& calibration() const { return calibration_; }
     // Errors of an axis, squareness terms included; `negative`: approached in - direction. Appends to `shares`.
@@ -27,11 +30,16 @@ public:
     bool is_node(Axis axis, double position) const;  // of all functions of the axis
     // values = calibration_values + root z, where z has independent components of variance 1.
     const Eigen::MatrixXd& root() const { return root_; }
+    // A column of the root each, the last ones, with their priors; values are not estimated here.
+    const std::vector<ChangeTerm>& changes() const { return changes_; }
 
 private:
+    void add_change(const ChangeTerm& change);
+
     Calibration calibration_;
     std::array<int, function_count + squareness_count> first_entry_;
     Eigen::MatrixXd root_;
+    std::vector<ChangeTerm> changes_;
 };
 
 }  // namespace stepdiag

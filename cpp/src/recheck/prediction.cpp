@@ -154,12 +154,10 @@ void Prediction::settle_setups() {
     }
 }
 
-double Prediction::step() {
+void Prediction::assemble() {
     const Eigen::Index size = z_.size();
-    Eigen::MatrixXd matrix = Eigen::MatrixXd::Identity(size, size);
-    Eigen::VectorXd gradient = -z_;
-    std::vector<Eigen::VectorXd> own;
-    double decrement = 0.0;
+    matrix_.setIdentity(size, size);
+    gradient_ = -z_;
     for (SetupRows& rows : setups_) {
         linearise(rows, z_, true);
         Eigen::MatrixXd corner = rows.by_setup.transpose() * rows.by_setup;
@@ -167,32 +165,51 @@ double Prediction::step() {
         rows.factor.compute(corner);
         const Eigen::MatrixXd coupling = rows.by_setup.transpose() * rows.by_baseline;
         rows.transfer = rows.factor.solve(coupling);
-        own.push_back(rows.by_setup.transpose() * rows.residual - rows.weight.cwiseProduct(rows.value));
-        matrix.selfadjointView<Eigen::Lower>().rankUpdate(rows.by_baseline.transpose());
-        matrix.triangularView<Eigen::Lower>() -= coupling.transpose() * rows.transfer;
-        gradient += rows.by_baseline.transpose() * rows.residual - rows.transfer.transpose() * own.back();
+        rows.gradient = rows.by_setup.transpose() * rows.residual - rows.weight.cwiseProduct(rows.value);
+        matrix_.selfadjointView<Eigen::Lower>().rankUpdate(rows.by_baseline.transpose());
+        matrix_.triangularView<Eigen::Lower>() -= coupling.transpose() * rows.transfer;
+        gradient_ += rows.by_baseline.transpose() * rows.residual - rows.transfer.transpose() * rows.gradient;
     }
-    factor_.compute(matrix.selfadjointView<Eigen::Lower>());
+    matrix_.triangularView<Eigen::StrictlyUpper>() = matrix_.transpose();
+    Eigen::MatrixXd active = matrix_;
+    for (const Eigen::Index j : held_) {
+        active.row(j).setZero();
+        active.col(j).setZero();
+        active(j, j) = 1.0;
+    }
+    factor_.compute(active);
+}
+
+double Prediction::step() {
+    assemble();
+    Eigen::VectorXd gradient = gradient_;
+    for (const Eigen::Index j : held_) gradient[j] = 0.0;
     const Eigen::VectorXd change = factor_.solve(gradient);
     z_ += change;
-    decrement += gradient.dot(change);
-    for (std::size_t k = 0; k < setups_.size(); ++k) {
-        SetupRows& rows = setups_[k];
-        const Eigen::VectorXd alone = rows.factor.solve(own[k]);
+    double decrement = gradient.dot(change);
+    for (SetupRows& rows : setups_) {
+        const Eigen::VectorXd alone = rows.factor.solve(rows.gradient);
         rows.value += alone - rows.transfer * change;
-        decrement += own[k].dot(alone);
+        decrement += rows.gradient.dot(alone);
     }
     return decrement;
 }
 
-void Prediction::solve() {
+void Prediction::solve(bool changed) {
+    const auto changes = Eigen::Index(baseline_.changes().size());
+    if (!changed)
+        for (Eigen::Index j = 0; j < changes; ++j) held_.push_back(baseline_.root().cols() - changes + j);
     settle_setups();
+    const double enough = settled * double(sigma_.size());
     double decrement = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < most_steps && !(decrement < settled * double(sigma_.size())); ++i) decrement = step();
-    if (!(decrement < settled * double(sigma_.size())))
+    for (int i = 0; i < most_steps && !(decrement < enough); ++i) decrement = step();
+    if (!(decrement < enough))
         throw InvalidArgument("readings: no machine near the calibration gives them; evaluate the run to see why");
+    assemble();
     for (SetupRows& rows : setups_) {
-        rows.spread = factor_.matrixL().solve(rows.transfer.transpose());
+        Eigen::MatrixXd transfer = rows.transfer;
+        for (const Eigen::Index j : held_) transfer.col(j).setZero();
+        rows.spread = factor_.matrixL().solve(transfer.transpose());
         linearise(rows, Eigen::VectorXd::Zero(z_.size()), false);
         stated_residual_.push_back(rows.residual);
         linearise(rows, z_, false);

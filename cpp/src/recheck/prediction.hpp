@@ -18,7 +18,8 @@ public:
     Prediction(const AdjustmentProblem& problem, const Baseline& baseline);
 
     // Gauss-Newton to the minimum of e^T e + z^T z + priors of s. Throws InvalidArgument where it is not reached.
-    void solve();
+    // `changed` false: the changes of the baseline are held at 0.
+    void solve(bool changed = true);
     double chi_square() const;
     int degrees_of_freedom() const;
 
@@ -33,7 +34,13 @@ public:
     };
     // Of readings of one set-up. After solve().
     Deviation deviation(const std::vector<Term>& sum) const;
-    double standard_uncertainty(int reading) const { return sigma_[reading]; }  // of the reading, native units
+
+    // After solve(): z, and the inverse of its covariance; of all columns, held ones too. The root's columns come
+    // first, those of the changes last.
+    const Eigen::VectorXd& values() const { return z_; }
+    const Eigen::MatrixXd& information() const { return matrix_; }
+    // Half of the square sum's derivative by z, downwards: 0 but for what is held.
+    const Eigen::VectorXd& gradient() const { return gradient_; }
 
 private:
     struct SetupRows {
@@ -42,8 +49,9 @@ private:
         Eigen::VectorXd weight;     // 1/u^2 of the priors of s
         Eigen::MatrixXd by_setup, by_baseline;
         Eigen::VectorXd residual;
-        Eigen::VectorXd value;  // s
-        // Of the last factorisation: A = S^T S + P, T = A^-1 S^T Z, and L^-1 T^T with the factor L of z.
+        Eigen::VectorXd value;     // s
+        Eigen::VectorXd gradient;  // by s
+        // At the last factorisation: A = S^T S + P, T = A^-1 S^T Z, and L^-1 T^T with the factor L of z.
         Eigen::LDLT<Eigen::MatrixXd> factor;
         Eigen::MatrixXd transfer, spread;
     };
@@ -52,7 +60,8 @@ private:
     void collect_rows();
     void linearise(SetupRows& rows, const Eigen::VectorXd& z, bool derivatives);
     void settle_setups();
-    double step();  // the decrement of the square sum, were the problem linear
+    void assemble();  // the normal equations at z and s, and their factors
+    double step();    // the decrement of the square sum, were the problem linear
 
     const AdjustmentProblem& problem_;
     const Baseline& baseline_;
@@ -61,7 +70,10 @@ private:
     std::vector<int> setup_of_;  // by reading
     std::vector<SetupRows> setups_;
     Eigen::VectorXd z_;
-    Eigen::LLT<Eigen::MatrixXd> factor_;
+    Eigen::MatrixXd matrix_;
+    Eigen::VectorXd gradient_;
+    Eigen::LLT<Eigen::MatrixXd> factor_;            // of what is not held
+    std::vector<Eigen::Index> held_;                // of z
     std::vector<Eigen::VectorXd> stated_residual_;  // by set-up: at z = 0, s^
 };
 

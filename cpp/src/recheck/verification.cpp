@@ -7,36 +7,11 @@
 
 #include "evaluation/fit_test.hpp"
 #include "recheck/prediction.hpp"
+#include "recheck/same_machine.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
 namespace {
-
-std::string text(const Eigen::Vector3d& lengths) { return format_lengths(lengths) + " mm"; }
-
-void check_same_machine(const Calibration& calibration, const Plan& plan, const Chain& chain,
-                        const Eigen::Vector3d& tool) {
-    const auto differ = [](const std::string& what, const std::string& expected, const std::string& came) {
-        throw InvalidArgument(what + ": the calibration has " + expected + ", the readings have " + came);
-    };
-    if (!(calibration.chain == chain)) differ("chain", calibration.chain.name(), chain.name());
-    if (calibration.volume != plan.volume()) differ("volume", text(calibration.volume), text(plan.volume()));
-    if (calibration.tool != tool) differ("tool", text(calibration.tool), text(tool));
-}
-
-void check_same_temperature(const Calibration& calibration, const std::optional<KnownExpansion>& expansion) {
-    const auto& reference = calibration.temperature_reference;
-    if (reference && !expansion)
-        throw InvalidArgument("calibration: is referred to " + std::to_string(*reference) +
-                              " degrees Celsius; readings need the expansion of the scales and their temperatures");
-    if (reference && expansion && *reference != expansion->expansion.reference)
-        throw InvalidArgument("calibration: is referred to " + std::to_string(*reference) +
-                              " degrees Celsius, the readings to " + std::to_string(expansion->expansion.reference));
-    if (!reference && expansion)
-        throw InvalidArgument("calibration: is as it was found, but the readings are to be referred to " +
-                              std::to_string(expansion->expansion.reference) +
-                              " degrees Celsius; evaluate its run with the expansion, too, or leave it out here");
-}
 
 // The first and the last point of each pass that have a distance.
 std::vector<LineDeviation> line_deviations(const Measurement& measurement, const AdjustmentProblem& problem,
@@ -89,15 +64,9 @@ std::vector<LineDeviation> line_deviations(const Measurement& measurement, const
 Verification verify(const Calibration& calibration, const Measurement& measurement, const Plan& plan,
                     const Chain& chain, const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                     const AdjustmentOptions& options) {
-    check_same_machine(calibration, plan, chain, tool);
-    check_same_temperature(calibration, options.expansion);
+    check_same_machine(calibration, plan, chain, tool, options);
     const Baseline baseline(calibration);
-    AdjustmentOptions own = options;
-    own.machine_drift.reset();
-    own.rotations = true;
-    own.reversal = false;  // of the unknowns: the calibration has its own
-    own.smoothness.reset();
-    const AdjustmentProblem problem(measurement, plan, chain, tool, heads, own);
+    const AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine(options));
     if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
     Prediction prediction(problem, baseline);
     prediction.solve();

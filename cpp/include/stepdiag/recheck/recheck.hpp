@@ -1,0 +1,75 @@
+// Has the machine changed since its last calibration? A short run answers it, with that calibration and its covariance
+// as knowledge: the machine is the calibration plus a change with terms of low order, each known to be 0 with a
+// standard uncertainty (its prior) that says how far such a machine may change:
+//   scale       E_aa  += c p                      of each axis
+//   bow         E_ba  += 4 c (p/T)(1 - p/T)       of each straightness, T the travel, c in its middle
+//   slope       E_Ba  += c p/T                    of each rotation, c from end to end
+//   squareness  C0Y, B0Z, A0Z += c
+// Calibration, change and set-ups of the lines are estimated together, by generalised least squares.
+//
+// Whether there is a change at all is tested without the priors: along the directions of change that the readings tell
+// better than the priors do, which the plan decides and not what was read, the estimates by their covariance are
+// chi-square distributed if nothing has changed.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "stepdiag/adjustment/adjustment.hpp"
+
+namespace stepdiag {
+
+enum class ChangeKind { scale, bow, slope, squareness };
+std::string name(ChangeKind kind);  // "scale", ...
+
+// Standard uncertainties with which changes are known to be 0; 0: there is none of this kind.
+struct ChangePriors {
+    double scale = 30e-6;       // mm/mm
+    double bow = 5e-3;          // mm
+    double slope = 30e-6;       // rad
+    double squareness = 50e-6;  // rad
+};
+
+// One term of the change, by the parameter that changes.
+struct ChangeTerm {
+    std::string parameter;  // "EXX", ...
+    ChangeKind kind;
+    double value;                 // in the unit of its prior
+    double standard_uncertainty;  // with the prior
+    double prior;
+    // How much of it the readings tell, 0 to 1: near 1 they tell it alone; in between only with others, in sums.
+    double told = 0.0;
+};
+
+// A sum of changes that the readings tell: weight times change by its prior. The weights have the square sum 1.
+struct ChangeCombination {
+    std::vector<double> weight;   // by term
+    double value;                 // in units of the priors
+    double standard_uncertainty;  // of the readings and the calibration alone
+};
+
+struct Recheck {
+    // Of no change at all.
+    double chi_square;
+    int degrees_of_freedom;
+    double probability;  // of a larger one, if nothing has changed
+    // Of all readings, with the change: whether such a change explains them.
+    double fit_chi_square;
+    int fit_degrees_of_freedom;
+    double fit_probability;
+    std::vector<ChangeTerm> terms;
+    std::vector<ChangeCombination> combinations;  // the best told first
+    Eigen::MatrixXd covariance;                   // of the terms, with their priors
+    // The calibration with the change, and the covariance of both together. Its fit is that of the calibration; method,
+    // date and provenance, too.
+    Calibration updated;
+};
+
+// As verify() (recheck/verification.hpp), which says what counts of `options` and what is refused; and for priors that
+// are negative or all 0.
+Recheck recheck(const Calibration& baseline, const Measurement& measurement, const Plan& plan, const Chain& chain,
+                const Eigen::Vector3d& tool, const HeadCalibrations& heads, const AdjustmentOptions& options = {},
+                const ChangePriors& priors = {});
+
+}  // namespace stepdiag

@@ -1,0 +1,126 @@
+#include "stepdiag/recheck/recheck.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "evaluation/fit_test.hpp"
+#include "recheck/prediction.hpp"
+#include "recheck/same_machine.hpp"
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+namespace {
+
+// What the readings tell of the changes by their priors, everything else being estimated with them.
+struct Told {
+    Eigen::VectorXd information;  // of each direction, ascending: 1 is as much as the priors tell
+    Eigen::MatrixXd direction;    // a column each
+    Eigen::VectorXd estimate;     // along it, 0 where there is no information
+    Eigen::Index first;           // from here on they tell more than the priors
+};
+
+// From the normal equations where the changes are held at 0.
+Told told_of_changes(const Prediction& prediction, Eigen::Index begin, Eigen::Index count) {
+    const Eigen::MatrixXd& matrix = prediction.information();
+    const Eigen::Index size = matrix.rows(), after = size - begin - count;
+    // Everything else: the columns before and after.
+    Eigen::MatrixXd others(size - count, size - count), coupling(size - count, count);
+    others << matrix.topLeftCorner(begin, begin), matrix.topRightCorner(begin, after),
+        matrix.bottomLeftCorner(after, begin), matrix.bottomRightCorner(after, after);
+    coupling << matrix.block(0, begin, begin, count), matrix.block(begin + count, begin, after, count);
+    const Eigen::MatrixXd information = matrix.block(begin, begin, count, count) -
+                                        Eigen::MatrixXd::Identity(count, count) -
+                                        coupling.transpose() * others.llt().solve(coupling);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(information);
+    // At the minimum over everything else their part of the gradient is 0.
+    const Eigen::VectorXd gradient = parts.eigenvectors().transpose() * prediction.gradient().segment(begin, count);
+    Told told{parts.eigenvalues(), parts.eigenvectors(), Eigen::VectorXd::Zero(count), count};
+    for (Eigen::Index k = count; k-- > 0 && told.information[k] >= 1.0;) {
+        told.first = k;
+        told.estimate[k] = gradient[k] / told.information[k];
+    }
+    return told;
+}
+
+Calibration with_change(const Baseline& baseline, const Prediction& prediction) {
+    const Eigen::MatrixXd& root = baseline.root();
+    const Eigen::Index columns = root.cols();
+    const Eigen::VectorXd change = root * prediction.values().head(columns);
+    const Eigen::MatrixXd inverse =
+        prediction.information().llt().solve(Eigen::MatrixXd::Identity(prediction.values().size(), columns));
+    const Eigen::MatrixXd covariance = root * inverse.topRows(columns) * root.transpose();
+    Calibration updated = baseline.calibration();
+    updated.covariance = 0.5 * (covariance + covariance.transpose());
+    Eigen::Index entry = 0;
+    const auto take = [&](double& value, double& uncertainty) {
+        value += change[entry];
+        uncertainty = std::sqrt(std::max(updated.covariance(entry, entry), 0.0));
+        ++entry;
+    };
+    for (auto& function : updated.functions)
+        for (std::size_t k = 0; k < function->value.size(); ++k)
+            take(function->value[k], function->standard_uncertainty[k]);
+    for (auto& squareness : updated.squarenesses) take(squareness->value, squareness->standard_uncertainty);
+    return updated;
+}
+
+}  // namespace
+
+std::string name(ChangeKind kind) {
+    switch (kind) {
+        case ChangeKind::scale: return "scale";
+        case ChangeKind::bow: return "bow";
+        case ChangeKind::slope: return "slope";
+        default: return "squareness";
+    }
+}
+
+Recheck recheck(const Calibration& baseline, const Measurement& measurement, const Plan& plan, const Chain& chain,
+                const Eigen::Vector3d& tool, const HeadCalibrations& heads, const AdjustmentOptions& options,
+                const ChangePriors& priors) {
+    check_same_machine(baseline, plan, chain, tool, options);
+    const Baseline changing(baseline, priors);
+    const AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine(options));
+    if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
+    const auto count = Eigen::Index(changing.changes().size());
+    const Eigen::Index begin = changing.root().cols() - count;
+
+    Prediction unchanged(problem, changing);
+    unchanged.solve(false);
+    const Told told = told_of_changes(unchanged, begin, count);
+    Prediction changed(problem, changing);
+    changed.solve();
+
+    Recheck result{0.0, 0, 1.0, 0.0, 0, 1.0, changing.changes(), {}, {}, with_change(changing, changed)};
+    result.chi_square = told.estimate.cwiseAbs2().dot(told.information);
+    result.degrees_of_freedom = int(count - told.first);
+    if (result.degrees_of_freedom > 0)
+        result.probability = chi_square_probability(result.chi_square, result.degrees_of_freedom);
+    result.fit_chi_square = changed.chi_square();
+    result.fit_degrees_of_freedom = changed.degrees_of_freedom();
+    if (result.fit_degrees_of_freedom < 1)
+        throw InvalidArgument("readings: there are no more of them than unknowns of how head and mirror stood");
+    result.fit_probability = chi_square_probability(result.fit_chi_square, result.fit_degrees_of_freedom);
+
+    const Eigen::MatrixXd inverse =
+        changed.information().llt().solve(Eigen::MatrixXd::Identity(changed.values().size(), changed.values().size()));
+    Eigen::VectorXd prior(count);
+    for (Eigen::Index j = 0; j < count; ++j) prior[j] = changing.changes()[std::size_t(j)].prior;
+    result.covariance = prior.asDiagonal() * inverse.block(begin, begin, count, count) * prior.asDiagonal();
+    const Eigen::MatrixXd strong = told.direction.rightCols(count - told.first);
+    for (Eigen::Index j = 0; j < count; ++j) {
+        ChangeTerm& term = result.terms[std::size_t(j)];
+        term.value = prior[j] * changed.values()[begin + j];
+        term.standard_uncertainty = std::sqrt(result.covariance(j, j));
+        term.told = strong.row(j).squaredNorm();
+    }
+    for (Eigen::Index k = count; k-- > told.first;) {
+        ChangeCombination sum{{}, told.estimate[k], 1.0 / std::sqrt(told.information[k])};
+        for (Eigen::Index j = 0; j < count; ++j) sum.weight.push_back(told.direction(j, k));
+        result.combinations.push_back(std::move(sum));
+    }
+    return result;
+}
+
+}  // namespace stepdiag
