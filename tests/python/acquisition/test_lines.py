@@ -303,7 +303,7 @@ def test_line_that_is_no_header_is_refused(line: bytes, message: str) -> None:
         (text(SAMPLE | {"time": "noon"}), "time: expected seconds since 1970"),
         (text(SAMPLE | {"time": "2026-01-31T12:00:00"}), "time: expected seconds since 1970"),
         (text(SAMPLE | {"time": 1e300}), "time: expected seconds since 1970"),
-        (text(SAMPLE | {"time": time.time() + 1e6}), "time: expected one that is past"),
+        (text(SAMPLE | {"time": 3.25e10}), "time: expected one that is past"),
         (text({"visit": 1.5}), "visit: expected a whole number"),
         (text({"error": "the port was closed"}), "the adapter says: 'the port was closed'"),
     ],
