@@ -24,6 +24,7 @@ from stepdiag._core import (
     CalibrationEntry,
     Camera,
     Chain,
+    ChangePriors,
     CheckPoints,
     Compensator,
     DiagonalErrors,
@@ -64,6 +65,7 @@ from stepdiag._core import (
     RangeModel,
     ReadingNoise,
     ReadingUncertainty,
+    Recheck,
     ReplayMismatch,
     ReturnedBeam,
     SampleModel,
@@ -105,6 +107,7 @@ from stepdiag._core import (
     read_distance,
     read_error_map,
     read_head,
+    recheck,
     simulate,
     trace_beams,
     verify,
@@ -154,7 +157,8 @@ if TYPE_CHECKING:
     from stepdiag.positions.prediction import PredictedPositions, axis_line, diagonal_line, predict_positions
     from stepdiag.positions.readings import PositionReadings, read_positions
     from stepdiag.progress import Progress
-    from stepdiag.recheck.verification import verify_scenario
+    from stepdiag.rechecking.recheck import recheck_scenario
+    from stepdiag.rechecking.verification import verify_scenario
     from stepdiag.scenario.description import (
         Scenario,
         adjust_scenario,
@@ -188,6 +192,7 @@ __all__ = [
     "CalibrationEntry",
     "Camera",
     "Chain",
+    "ChangePriors",
     "CheckPoints",
     "Comparison",
     "Compensator",
@@ -247,6 +252,7 @@ __all__ = [
     "RangeModel",
     "ReadingNoise",
     "ReadingUncertainty",
+    "Recheck",
     "ReplayMismatch",
     "ReturnedBeam",
     "SampleModel",
@@ -329,6 +335,8 @@ __all__ = [
     "read_positions",
     "read_scenario",
     "read_study",
+    "recheck",
+    "recheck_scenario",
     "run_monte_carlo",
     "run_study",
     "shipped_head",
@@ -428,7 +436,8 @@ _LATER = {
         "read_positions",
     ),
     "progress": ("Progress",),
-    "recheck.verification": ("verify_scenario",),
+    "rechecking.recheck": ("recheck_scenario",),
+    "rechecking.verification": ("verify_scenario",),
     "scenario.description": (
         "Scenario",
         "adjust_scenario",

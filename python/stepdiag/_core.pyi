@@ -10,7 +10,7 @@ import os
 import stepdiag.io.displays
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'ChangeCombination', 'ChangePriors', 'ChangeTerm', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'Recheck', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'recheck', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -1952,6 +1952,123 @@ class FitQuality:
     @property
     def weighted_square_sum(self) -> float:
         ...
+class ChangePriors:
+    """
+    Standard uncertainties with which changes of a machine are known to be 0: scale (mm/mm), bow (mm), slope of an angle from end to end (rad), squareness (rad); 0: none of it.
+    """
+    def __init__(self, *, scale: typing.SupportsFloat | typing.SupportsIndex = 3e-05, bow: typing.SupportsFloat | typing.SupportsIndex = 0.005, slope: typing.SupportsFloat | typing.SupportsIndex = 3e-05, squareness: typing.SupportsFloat | typing.SupportsIndex = 5e-05) -> None:
+        ...
+    @property
+    def bow(self) -> float:
+        ...
+    @property
+    def scale(self) -> float:
+        ...
+    @property
+    def slope(self) -> float:
+        ...
+    @property
+    def squareness(self) -> float:
+        ...
+class ChangeTerm:
+    """
+    How a parameter of the machine has changed.
+    """
+    @property
+    def kind(self) -> str:
+        """
+        "scale" (mm/mm), "bow" (mm, in the middle), "slope" (rad, from end to end) or "squareness" (rad).
+        """
+    @property
+    def parameter(self) -> str:
+        ...
+    @property
+    def prior(self) -> float:
+        """
+        Standard uncertainty with which it was known to be 0.
+        """
+    @property
+    def standard_uncertainty(self) -> float:
+        """
+        With the prior.
+        """
+    @property
+    def told(self) -> float:
+        """
+        How much of it the readings tell, 0 to 1: near 1 they tell it alone; in between only in sums.
+        """
+    @property
+    def value(self) -> float:
+        ...
+class ChangeCombination:
+    """
+    A sum of changes, by their priors, that readings tell.
+    """
+    @property
+    def standard_uncertainty(self) -> float:
+        """
+        Of the readings and the calibration alone.
+        """
+    @property
+    def value(self) -> float:
+        """
+        In units of the priors.
+        """
+    @property
+    def weight(self) -> list[float]:
+        """
+        By term; the square sum is 1.
+        """
+class Recheck:
+    """
+    Whether a machine has changed since its calibration, and by what.
+    """
+    @property
+    def chi_square(self) -> float:
+        """
+        Of no change at all.
+        """
+    @property
+    def combinations(self) -> tuple[ChangeCombination, ...]:
+        """
+        The best told first.
+        """
+    @property
+    def covariance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n, n) of the terms.
+        """
+    @property
+    def degrees_of_freedom(self) -> int:
+        """
+        Directions of change that the readings tell better than the priors.
+        """
+    @property
+    def fit_chi_square(self) -> float:
+        """
+        Of all readings, with the change.
+        """
+    @property
+    def fit_degrees_of_freedom(self) -> int:
+        ...
+    @property
+    def fit_probability(self) -> float:
+        """
+        Of a larger one, if such a change explains the readings.
+        """
+    @property
+    def probability(self) -> float:
+        """
+        Of a larger chi-square, if nothing has changed.
+        """
+    @property
+    def terms(self) -> tuple[ChangeTerm, ...]:
+        ...
+    @property
+    def updated(self) -> Calibration:
+        """
+        The calibration with the change, and their joint covariance.
+        """
 class LineDeviation:
     """
     What a line of one run reads too much from end to end.
@@ -3156,6 +3273,10 @@ def read_head(head: Head, *, distance: typing.SupportsFloat | typing.SupportsInd
 def read_measurement(path: str | os.PathLike[str]) -> Measurement:
     """
     Reads a measurement CSV. Raises InvalidArgument naming file and line.
+    """
+def recheck(baseline: Calibration, measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], chain: Chain | str, tool: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), options: AdjustmentOptions | None = None, priors: ChangePriors = ...) -> Recheck:
+    """
+    Whether the machine has changed since its calibration `baseline`, by readings of a short run; plan, head and options (AdjustmentOptions) are those of the readings. Raises InvalidArgument as verify does.
     """
 def run_leaves(model: SampleModel, bins: Bins, first_leaf: typing.SupportsIndex, leaves: typing.SupportsIndex, *, threads: typing.SupportsIndex = 0, progress: collections.abc.Callable[[int], typing.Any] | None = None) -> PartialStatistics:
     """

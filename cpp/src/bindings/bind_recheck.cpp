@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "options.hpp"
+#include "stepdiag/recheck/recheck.hpp"
 #include "stepdiag/recheck/verification.hpp"
 
 namespace stepdiag::bindings {
@@ -38,9 +39,73 @@ VerificationOfRun verify_run(const Calibration& calibration, const Measurement& 
     return {verify(calibration, measurement, plan, kinematics, offset, heads, options), measurement.size()};
 }
 
+Recheck recheck_run(const Calibration& baseline, const Measurement& measurement, const Plan& plan, const HeadLike& head,
+                    const ChainLike& chain, const ArrayLike& tool, const std::optional<AdjustmentOptions>& given,
+                    const ChangePriors& priors) {
+    const AdjustmentOptions options = given.value_or(AdjustmentOptions{});
+    const Eigen::Vector3d offset = to_vector3(tool, "tool");
+    const Chain kinematics = to_chain(chain);
+    const HeadCalibrations heads = to_heads(head, plan).calibration();
+    const py::gil_scoped_release release;
+    return recheck(baseline, measurement, plan, kinematics, offset, heads, options, priors);
+}
+
+void bind_rechecking(py::module_& m) {
+    py::class_<ChangePriors>(m, "ChangePriors",
+                             "Standard uncertainties with which changes of a machine are known to be 0: scale (mm/mm), "
+                             "bow (mm), slope of an angle from end to end (rad), squareness (rad); 0: none of it.")
+        .def(py::init([](double scale, double bow, double slope, double squareness) {
+                 return ChangePriors{scale, bow, slope, squareness};
+             }),
+             py::kw_only(), py::arg("scale") = ChangePriors{}.scale, py::arg("bow") = ChangePriors{}.bow,
+             py::arg("slope") = ChangePriors{}.slope, py::arg("squareness") = ChangePriors{}.squareness)
+        .def_readonly("scale", &ChangePriors::scale)
+        .def_readonly("bow", &ChangePriors::bow)
+        .def_readonly("slope", &ChangePriors::slope)
+        .def_readonly("squareness", &ChangePriors::squareness);
+    py::class_<ChangeTerm>(m, "ChangeTerm", "How a parameter of the machine has changed.")
+        .def_readonly("parameter", &ChangeTerm::parameter)
+        .def_property_readonly(
+            "kind", [](const ChangeTerm& t) { return name(t.kind); },
+            "\"scale\" (mm/mm), \"bow\" (mm, in the middle), \"slope\" (rad, from end to end) or \"squareness\" (rad).")
+        .def_readonly("value", &ChangeTerm::value)
+        .def_readonly("standard_uncertainty", &ChangeTerm::standard_uncertainty, "With the prior.")
+        .def_readonly("prior", &ChangeTerm::prior, "Standard uncertainty with which it was known to be 0.")
+        .def_readonly("told", &ChangeTerm::told,
+                      "How much of it the readings tell, 0 to 1: near 1 they tell it alone; in between only in sums.");
+    py::class_<ChangeCombination>(m, "ChangeCombination", "A sum of changes, by their priors, that readings tell.")
+        .def_readonly("weight", &ChangeCombination::weight, "By term; the square sum is 1.")
+        .def_readonly("value", &ChangeCombination::value, "In units of the priors.")
+        .def_readonly("standard_uncertainty", &ChangeCombination::standard_uncertainty,
+                      "Of the readings and the calibration alone.");
+    py::class_<Recheck>(m, "Recheck", "Whether a machine has changed since its calibration, and by what.")
+        .def_readonly("chi_square", &Recheck::chi_square, "Of no change at all.")
+        .def_readonly("degrees_of_freedom", &Recheck::degrees_of_freedom,
+                      "Directions of change that the readings tell better than the priors.")
+        .def_readonly("probability", &Recheck::probability, "Of a larger chi-square, if nothing has changed.")
+        .def_readonly("fit_chi_square", &Recheck::fit_chi_square, "Of all readings, with the change.")
+        .def_readonly("fit_degrees_of_freedom", &Recheck::fit_degrees_of_freedom)
+        .def_readonly("fit_probability", &Recheck::fit_probability,
+                      "Of a larger one, if such a change explains the readings.")
+        .def_property_readonly("terms", [](const Recheck& r) { return to_tuple(r.terms); })
+        .def_property_readonly(
+            "combinations", [](const Recheck& r) { return to_tuple(r.combinations); }, "The best told first.")
+        .def_property_readonly(
+            "covariance", [](const Recheck& r) { return to_numpy(r.covariance); }, "(n, n) of the terms.")
+        .def_readonly("updated", &Recheck::updated, "The calibration with the change, and their joint covariance.");
+
+    m.def(
+        "recheck", &recheck_run, py::arg("baseline"), py::arg("measurement"), py::arg("plan"), py::arg("head"),
+        py::arg("chain"), py::arg("tool") = zeros(3), py::arg("options") = std::nullopt,
+        py::arg("priors") = ChangePriors{},
+        "Whether the machine has changed since its calibration `baseline`, by readings of a short run; plan, head and "
+        "options (AdjustmentOptions) are those of the readings. Raises InvalidArgument as verify does.");
+}
+
 }  // namespace
 
 void bind_recheck(py::module_& m) {
+    bind_rechecking(m);
     py::class_<LineDeviation>(m, "LineDeviation", "What a line of one run reads too much from end to end.")
         .def_readonly("run", &LineDeviation::run)
         .def_readonly("line", &LineDeviation::line)

@@ -12,11 +12,22 @@ namespace {
 // A free unknown: far beyond what it may be, but a number, so that what no reading tells stays at 0.
 double usual_prior(PriorUncertainty prior, int column) {
     if (std::isfinite(prior)) return prior;
-    return record(setup::component(column).quantity).unit == "mm" ? 1e9 : 1e3;  // mm; rad
+    return record(setup::component(column).quantity).unit == "mm" ? 1e9 : 0.1;  // mm; rad
 }
 
 constexpr int most_steps = 30;
-constexpr double settled = 1e-10;  // decrement of the square sum
+constexpr double settled = 1e-8;  // decrease of the square sum, by reading
+
+// A whole step, or a part of it that makes the square sum smaller: angles that act at second order only, as those of a
+// single axis do, have no step that is right. Returns the sum; with a share of 0 that of `before`.
+template <class At>
+double descend(const At& at, double before) {
+    constexpr int most_halves = 12;
+    double share = 1.0;
+    for (int i = 0; i < most_halves; ++i, share *= 0.5)
+        if (const double sum = at(share); sum <= before) return sum;
+    return at(0.0);
+}
 
 }  // namespace
 
@@ -137,19 +148,30 @@ void Prediction::linearise(SetupRows& rows, const Eigen::VectorXd& z, bool deriv
     }
 }
 
+double Prediction::objective(const SetupRows& rows) {
+    return rows.residual.squaredNorm() + rows.value.cwiseAbs2().dot(rows.weight);
+}
+
 // Each set-up by itself, at the calibration's values: from there the steps of all are few.
 void Prediction::settle_setups() {
     for (SetupRows& rows : setups_) {
-        double decrement = std::numeric_limits<double>::infinity();
-        for (int i = 0; i < most_steps && decrement > settled; ++i) {
-            linearise(rows, z_, true);
+        linearise(rows, z_, true);
+        for (int i = 0; i < most_steps; ++i) {
             Eigen::MatrixXd matrix = rows.by_setup.transpose() * rows.by_setup;
             matrix.diagonal() += rows.weight;
-            const Eigen::VectorXd gradient =
-                rows.by_setup.transpose() * rows.residual - rows.weight.cwiseProduct(rows.value);
-            const Eigen::VectorXd change = matrix.ldlt().solve(gradient);
-            rows.value += change;
-            decrement = gradient.dot(change);
+            const Eigen::VectorXd change =
+                matrix.ldlt().solve(rows.by_setup.transpose() * rows.residual - rows.weight.cwiseProduct(rows.value));
+            const double before = objective(rows);
+            const Eigen::VectorXd value = rows.value;
+            const double decrease = before - descend(
+                                                 [&](double share) {
+                                                     rows.value = value + share * change;
+                                                     linearise(rows, z_, false);
+                                                     return objective(rows);
+                                                 },
+                                                 before);
+            if (decrease < settled * double(rows.readings.size())) break;
+            linearise(rows, z_, true);
         }
     }
 }
@@ -184,15 +206,24 @@ double Prediction::step() {
     assemble();
     Eigen::VectorXd gradient = gradient_;
     for (const Eigen::Index j : held_) gradient[j] = 0.0;
-    const Eigen::VectorXd change = factor_.solve(gradient);
-    z_ += change;
-    double decrement = gradient.dot(change);
-    for (SetupRows& rows : setups_) {
-        const Eigen::VectorXd alone = rows.factor.solve(rows.gradient);
-        rows.value += alone - rows.transfer * change;
-        decrement += rows.gradient.dot(alone);
+    const Eigen::VectorXd z = z_, change = factor_.solve(gradient);
+    std::vector<Eigen::VectorXd> values, changes;
+    for (const SetupRows& rows : setups_) {
+        values.push_back(rows.value);
+        changes.push_back(rows.factor.solve(rows.gradient) - rows.transfer * change);
     }
-    return decrement;
+    const double before = chi_square();
+    const auto after = descend(
+        [&](double share) {
+            z_ = z + share * change;
+            for (std::size_t k = 0; k < setups_.size(); ++k) {
+                setups_[k].value = values[k] + share * changes[k];
+                linearise(setups_[k], z_, false);
+            }
+            return chi_square();
+        },
+        before);
+    return before - after;
 }
 
 void Prediction::solve(bool changed) {
@@ -201,9 +232,9 @@ void Prediction::solve(bool changed) {
         for (Eigen::Index j = 0; j < changes; ++j) held_.push_back(baseline_.root().cols() - changes + j);
     settle_setups();
     const double enough = settled * double(sigma_.size());
-    double decrement = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < most_steps && !(decrement < enough); ++i) decrement = step();
-    if (!(decrement < enough))
+    double decrease = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < most_steps && !(decrease < enough); ++i) decrease = step();
+    if (!(decrease < enough))
         throw InvalidArgument("readings: no machine near the calibration gives them; evaluate the run to see why");
     assemble();
     for (SetupRows& rows : setups_) {
@@ -218,7 +249,7 @@ void Prediction::solve(bool changed) {
 
 double Prediction::chi_square() const {
     double sum = z_.squaredNorm();
-    for (const SetupRows& rows : setups_) sum += rows.residual.squaredNorm() + rows.value.cwiseAbs2().dot(rows.weight);
+    for (const SetupRows& rows : setups_) sum += objective(rows);
     return sum;
 }
 

@@ -61,7 +61,8 @@ private:
     void linearise(SetupRows& rows, const Eigen::VectorXd& z, bool derivatives);
     void settle_setups();
     void assemble();  // the normal equations at z and s, and their factors
-    double step();    // the decrement of the square sum, were the problem linear
+    double step();    // by how much the square sum became smaller
+    static double objective(const SetupRows& rows);
 
     const AdjustmentProblem& problem_;
     const Baseline& baseline_;

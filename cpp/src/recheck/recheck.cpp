@@ -51,6 +51,8 @@ Calibration with_change(const Baseline& baseline, const Prediction& prediction) 
         prediction.information().llt().solve(Eigen::MatrixXd::Identity(prediction.values().size(), columns));
     const Eigen::MatrixXd covariance = root * inverse.topRows(columns) * root.transpose();
     Calibration updated = baseline.calibration();
+    updated.method += (updated.date.empty() ? "" : " of " + updated.date) + ", rechecked";
+    updated.date.clear();
     updated.covariance = 0.5 * (covariance + covariance.transpose());
     Eigen::Index entry = 0;
     const auto take = [&](double& value, double& uncertainty) {

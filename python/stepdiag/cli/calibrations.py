@@ -18,7 +18,7 @@ from stepdiag.cli.options import (
     tell_fit,
 )
 from stepdiag.cli.terminal import say
-from stepdiag.io.outputs import COMPARISON, FUNCTIONAL_POINT, PAGE, PDF, OutputFile
+from stepdiag.io.outputs import CALIBRATION, COMPARISON, FUNCTIONAL_POINT, PAGE, PDF, OutputFile
 from stepdiag.progress import Progress
 
 _WORDS = {
@@ -285,7 +285,7 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     from stepdiag.config.toml_text import located
     from stepdiag.io.data_files import read_calibration, read_measurement
     from stepdiag.io.whole_files import check_input
-    from stepdiag.recheck.verification import check_other_run, verify_scenario
+    from stepdiag.rechecking.verification import check_other_run, verify_scenario
     from stepdiag.report.verification import agrees, verification_report
     from stepdiag.scenario.description import read_scenario
 
@@ -317,4 +317,73 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     for warning in warnings:
         tell("warning", warning)
     if not agrees(verification, alpha) or tested.fit == "rejected":
+        context.exit(NOT_TO_BE_TRUSTED)
+
+
+@click.command(epilog="\b\nExample: stepdiag recheck calibration.nc short.toml monday.csv --update monday.nc")
+@click.argument("baseline", type=PATH)
+@click.argument("scenario", type=PATH)
+@click.argument("run", type=PATH)
+@click.option(
+    "--alpha",
+    type=float,
+    default=0.001,
+    show_default=True,
+    metavar="P",
+    help="Share of rechecks in which an unchanged machine is said to have changed.",
+)
+@click.option(
+    "--update",
+    type=Writes(CALIBRATION),
+    metavar="FILE",
+    help="Calibration to write: the baseline with the change and their joint covariance, netCDF (.nc) or CSV.",
+)
+@click.pass_context
+def recheck(
+    context: click.Context, baseline: Path, scenario: Path, run: Path, alpha: float, update: OutputFile | None
+) -> None:
+    """Test with a short RUN whether the machine has changed since the calibration BASELINE (netCDF).
+
+    SCENARIO has plan, head and uncertainties of RUN, and in [change] how far the machine may have
+    changed: scales, squarenesses, bows of straightnesses, slopes of angles. Reports whether it has
+    changed, which changes the readings tell one by one, which only together, what may be hidden in
+    the volume, and the error there now.
+
+    If the machine has changed, or no such change explains the readings, the command ends with a
+    warning and exit code 3.
+    """
+    from stepdiag.calibration.volume import volume_errors
+    from stepdiag.config.toml_text import located
+    from stepdiag.io.data_files import read_calibration, read_measurement, write_calibration
+    from stepdiag.io.whole_files import check_input
+    from stepdiag.rechecking.recheck import Judged, recheck_scenario
+    from stepdiag.rechecking.verification import check_other_run
+    from stepdiag.report.verification import recheck_report
+    from stepdiag.scenario.description import read_scenario
+    from stepdiag.scenario.provenance import provenance_of
+
+    if not 0.0 < alpha < 1.0:
+        raise InvalidArgument(f"--alpha: expected a probability between 0 and 1, got {alpha:g}")
+    for path in (baseline, run):
+        check_input(path)
+    described = read_scenario(scenario)
+    target = None if update is None else update.claim(baseline, scenario, run, error_map=described.truth.error_map)
+    known = described.known
+    before = read_calibration(baseline)
+    check_other_run(before, run)
+    measurement = read_measurement(run)
+    with located(f"{baseline}, {run}"), Progress("recheck"):
+        judged = Judged(recheck_scenario(before, known, measurement), before, alpha)
+        volume = volume_errors(judged.updated, ranking=False)
+    if target is not None:
+        write_calibration(judged.updated, target, provenance=provenance_of(known, run))
+    for line in recheck_report(judged, volume):
+        say(line)
+    for warning in fit_warnings(baseline, before.fit):
+        tell("warning", warning)
+    if not judged.is_explained:
+        tell("warning", f"{run}: no change of low order explains these readings: evaluate them to see why")
+    elif judged.has_changed:
+        tell("warning", f"{baseline}: the machine has changed since: do not use it as it is")
+    if judged.has_changed or not judged.is_explained or before.fit == "rejected":
         context.exit(NOT_TO_BE_TRUSTED)

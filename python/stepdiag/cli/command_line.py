@@ -10,7 +10,7 @@ import click
 
 from stepdiag._core import InvalidArgument, ReplayMismatch, __version__
 from stepdiag.cli.acquire import acquire, twin
-from stepdiag.cli.calibrations import compare, report, verify
+from stepdiag.cli.calibrations import compare, recheck, report, verify
 from stepdiag.cli.evaluate import evaluate, observe
 from stepdiag.cli.export import export
 from stepdiag.cli.files import check, init
@@ -56,6 +56,7 @@ COMMANDS = {
     report: "Summarise a calibration.",
     volume: "Report the error of the tool in the volume, and whether it is within a limit.",
     verify: "Test a calibration with readings from which it was not made.",
+    recheck: "Test whether the machine has changed since its calibration.",
     compare: "Compare two calibrations.",
     positions: "Evaluate or predict positioning tests (ISO 230-2, 230-6).",
     export: "Write a calibration for a controller.",

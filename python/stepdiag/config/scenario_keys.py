@@ -235,6 +235,17 @@ class PlausibleSection(Section):
     rotation_urad: Positive = key(POSITIVE, "Limit of an angular error or a squareness.", 5000.0, 5000.0)
 
 
+class ChangeSection(Section):
+    """How far the machine may have changed since its calibration: standard uncertainties with which a change is known
+    to be 0, for `stepdiag recheck`. 0: it cannot change like that. The defaults are those of wear, a collision, another
+    temperature and re-levelling."""
+
+    scale_um_per_m: Amplitude = key(AMPLITUDE, "Of the scale of each axis.", 30.0, 30.0)
+    bow_um: Amplitude = key(AMPLITUDE, "Of each straightness, in the middle of the travel.", 5.0, 5.0)
+    slope_urad: Amplitude = key(AMPLITUDE, "Of each angle, from one end of the travel to the other.", 30.0, 30.0)
+    squareness_urad: Amplitude = key(AMPLITUDE, "Of each squareness.", 50.0, 50.0)
+
+
 class KnownKeys(Section):
     """What is known when a run is evaluated: these keys, and how the heads are made by design."""
 
@@ -250,6 +261,7 @@ class KnownKeys(Section):
     adjustment: AdjustmentSection = AdjustmentSection()
     smoothness: SmoothnessSection = SmoothnessSection()
     plausible: PlausibleSection = PlausibleSection()
+    change: ChangeSection = ChangeSection()
     plan_by_time: PlanByTimeSection = PlanByTimeSection()
     report: ReportSection = ReportSection()
 

@@ -131,12 +131,12 @@ _FACTS: Final[Mapping[type, Callable[[Any], Facts]]] = {
 }
 # They show their properties, in native units.
 _PLAIN: Final = """
-BeamSegment BeamSpot CalibrationEntry Camera CheckPoints Compensator DiagonalErrors Distribution DriftEstimate
-ErrorAtPoint Expansion
-ExpansionEstimate Fault FaultClass FaultControl FitReason GaussianMode HeadBeam HeadBody HeadCalibration HeadDesign
-Interferometer KnownCombination KnownExpansion LateralEffect MachineDrift Misalignment MonteCarloResult Noise Outlier
-PlausibleLimits Propagation ReadingNoise ReadingUncertainty ReturnedBeam ScaleTemperatures Sensitivity SetupEstimate
-Smoothness SpotSensor UncertainInput UncertainInputs Undetermined Validation VirtualCalibrations VolumetricAccuracy
+BeamSegment BeamSpot CalibrationEntry Camera ChangeCombination ChangePriors ChangeTerm CheckPoints Compensator
+DiagonalErrors Distribution DriftEstimate ErrorAtPoint Expansion ExpansionEstimate Fault FaultClass FaultControl
+FitReason GaussianMode HeadBeam HeadBody HeadCalibration HeadDesign Interferometer KnownCombination KnownExpansion
+LateralEffect LineDeviation MachineDrift Misalignment MonteCarloResult Noise Outlier PlausibleLimits Propagation
+ReadingNoise ReadingUncertainty Recheck ReturnedBeam ScaleTemperatures Sensitivity SetupEstimate Smoothness SpotSensor
+UncertainInput UncertainInputs Undetermined Validation Verification VirtualCalibrations VolumetricAccuracy
 """
 
 

@@ -1,8 +1,10 @@
-"""The report of `stepdiag verify`."""
+"""The reports of `stepdiag verify` and `stepdiag recheck`."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
-from stepdiag._core import Measurement, Verification
+from stepdiag._core import ChangeCombination, ChangeTerm, Measurement, Verification
+from stepdiag.calibration.volume import VolumeErrors
+from stepdiag.rechecking.recheck import Judged
 from stepdiag.report.text_columns import text_columns
 from stepdiag.units import MICROMETRE, MICRORADIAN
 
@@ -52,3 +54,73 @@ def _worst(verification: Verification, measurement: Measurement) -> str:
     normalised = float(verification.normalised[channel][row])
     place = f"line {measurement.line[row]}, run {measurement.run[row]}, point {measurement.point[row]}"
     return f"{channel} at {place}: {deviation:+.3g} {unit}, U {expanded:.3g} {unit}, E_n {normalised:+.2f}"
+
+
+TOLD = 0.9  # of a change that readings tell alone
+UNTOLD = 0.1
+# Native values of a change in the unit of reports.
+CHANGE_UNITS = {
+    "scale": ("µm/m", 1e-6),
+    "bow": ("µm", MICROMETRE),
+    "slope": ("µrad", MICRORADIAN),
+    "squareness": ("µrad", MICRORADIAN),
+}
+SHARE = 0.2  # of a sum, below which a term is not named
+MOSTLY = 0.5  # of a sum, that has to be of changes told together
+
+
+def recheck_report(judged: Judged, volume: VolumeErrors) -> Iterator[str]:
+    """The verdict first; then what is known of each change, what may be hidden, and the volume's error."""
+    found = judged.recheck
+    tested = (
+        f"chi-square {found.chi_square:.1f} of {found.degrees_of_freedom} directions of change that the readings tell; "
+        f"by chance it is larger in {_percent(found.probability)} of cases (limit {100.0 * judged.alpha:g} %)"
+    )
+    if not judged.is_explained:
+        yield (
+            "the readings do not go with the calibration, nor with a change of low order: a reading is wrong, or the "
+            f"machine has changed otherwise (chi-square {found.fit_chi_square:.1f} with "
+            f"{found.fit_degrees_of_freedom} degrees of freedom, by chance larger in {_percent(found.fit_probability)})"
+        )
+    yield f"the machine has changed: {tested}" if judged.has_changed else f"no change of the machine is seen: {tested}"
+    told = [term for term in found.terms if term.told >= TOLD]
+    if told:
+        yield "changes that the readings tell one by one, U their expanded uncertainty (k = 2):"
+        yield from text_columns([("parameter", "change", "", "U", ""), *map(_change_row, told)], left=(0, 2, 4))
+    together = [term for term in found.terms if UNTOLD < term.told < TOLD]
+    if together:
+        yield f"told together only: {', '.join(f'{term.parameter} ({term.kind})' for term in together)}"
+        sums = [text for one in found.combinations if (text := _sum_text(one, found.terms, together))]
+        yield from (f"  {text}" for text in sums)
+    untold = [f"{term.parameter} ({term.kind})" for term in found.terms if term.told <= UNTOLD]
+    if untold:
+        yield f"not told: {', '.join(untold)}"
+    yield (
+        f"changes that are not seen may move the tool by {judged.hidden / MICROMETRE:.1f} µm somewhere in the volume "
+        "(k = 2, with the priors of [change])"
+    )
+    interval = ""
+    if volume.largest_interval is not None:
+        low, high = (end / MICROMETRE for end in volume.largest_interval)
+        interval = f", 95 % interval {low:.1f} to {high:.1f} µm"
+    yield f"largest error in the volume with the change: {volume.largest / MICROMETRE:.1f} µm{interval}"
+
+
+def _change_row(term: ChangeTerm) -> tuple[str, ...]:
+    unit, scale = CHANGE_UNITS[term.kind]
+    value, expanded = term.value / scale, COVERAGE * term.standard_uncertainty / scale
+    return f"{term.parameter} ({term.kind})", f"{value:+.2f}", unit, f"{expanded:.2f}", unit
+
+
+def _sum_text(one: ChangeCombination, terms: Sequence[ChangeTerm], named: Sequence[ChangeTerm]) -> str:
+    """A sum of changes by their priors, largest shares first; empty if it is mostly of others than `named`."""
+    weights = sorted(zip(one.weight, terms, strict=True), key=lambda pair: -abs(pair[0]))
+    parameters = {(term.parameter, term.kind) for term in named}
+    if sum(weight**2 for weight, term in weights if (term.parameter, term.kind) in parameters) < MOSTLY:
+        return ""
+    shares = [(weight, term) for weight, term in weights if abs(weight) >= SHARE]
+    parts = []
+    for weight, term in shares:
+        unit, scale = CHANGE_UNITS[term.kind]
+        parts.append(f"{weight:+.2f} {term.parameter}/({term.prior / scale:g} {unit})")
+    return f"{' '.join(parts)} = {one.value:+.2f}, U {COVERAGE * one.standard_uncertainty:.2f}"

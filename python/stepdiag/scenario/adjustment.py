@@ -8,7 +8,7 @@ from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.config.adjustment_keys import AdjustmentKeys, AdjustmentSection, SmoothnessSection
 from stepdiag.config.key_errors import show
-from stepdiag.config.scenario_keys import KnownKeys, PlausibleSection
+from stepdiag.config.scenario_keys import ChangeSection, KnownKeys, PlausibleSection
 from stepdiag.config.toml_text import located
 from stepdiag.scenario.temperature import three
 from stepdiag.setup_quantities import ADJUSTED, SETUP_QUANTITIES
@@ -79,6 +79,16 @@ def plausible_limits(keys: PlausibleSection) -> _core.PlausibleLimits:
         positioning=keys.positioning_um_per_m * MICROMETRE / METRE,
         translation=keys.translation_um * MICROMETRE,
         rotation=keys.rotation_urad * MICRORADIAN,
+    )
+
+
+def change_priors(keys: ChangeSection) -> _core.ChangePriors:
+    """How far the scenario's machine may have changed since its calibration."""
+    return _core.ChangePriors(
+        scale=keys.scale_um_per_m * MICROMETRE / METRE,
+        bow=keys.bow_um * MICROMETRE,
+        slope=keys.slope_urad * MICRORADIAN,
+        squareness=keys.squareness_urad * MICRORADIAN,
     )
 
 

@@ -9,7 +9,7 @@ from stepdiag import _core
 from stepdiag.config.scenario_keys import KnownKeys, PlanSection
 from stepdiag.config.toml_text import located
 from stepdiag.display import Displayed, Facts, lengths_text, point_text
-from stepdiag.scenario.adjustment import machine_drift_of, plausible_limits, setup_priors, smoothness_of
+from stepdiag.scenario.adjustment import change_priors, machine_drift_of, plausible_limits, setup_priors, smoothness_of
 from stepdiag.scenario.heads import DescribedHead, check_alike, check_mirrors, heads_by_line, make_heads, signals_of
 from stepdiag.scenario.setup import weights
 from stepdiag.scenario.temperature import known_expansion
@@ -25,9 +25,9 @@ class Known(Displayed):
     `described`: the heads by design, by the place of their keys, also those that measure no line. The other fields
     follow from the first four: chain, tool and plan; by line the head that measures it, as it is described and as it
     is by design; the channels of a run; weights of readings, priors of the set-up, smoothness and limits of what is
-    plausible; what is known of the scales' expansion, None where the scenario has no [temperature]; the drift of the
-    functional point, None where it is no unknown; what is uncertain. `assumed_air`: with whose constant index the
-    instrument counts; None where it compensates for the air."""
+    plausible; how far the machine may change; what is known of the scales' expansion, None where the scenario has no
+    [temperature]; the drift of the functional point, None where it is no unknown; what is uncertain. `assumed_air`:
+    with whose constant index the instrument counts; None where it compensates for the air."""
 
     path: Path
     keys: KnownKeys
@@ -44,6 +44,7 @@ class Known(Displayed):
     setup_by_line: Mapping[str, _core.SetupPriors] = field(compare=False)
     smoothness: _core.Smoothness | None = field(compare=False)
     plausible: _core.PlausibleLimits = field(compare=False)
+    change: _core.ChangePriors = field(compare=False)
     expansion: _core.KnownExpansion | None = field(compare=False)
     machine_drift: _core.MachineDrift | None = field(compare=False)
     uncertain: _core.UncertainInputs = field(compare=False)
@@ -119,6 +120,7 @@ def known_of(
         setup_by_line=MappingProxyType({line: own for line, own in setup_by_line.items() if line in heads}),
         smoothness=smoothness_of(keys.smoothness, path),
         plausible=plausible_limits(keys.plausible),
+        change=change_priors(keys.change),
         expansion=known_expansion(keys.temperature, path),
         machine_drift=machine_drift_of(keys.adjustment, path),
         uncertain=uncertain_inputs(keys, described_heads, heads, path),

@@ -61,6 +61,7 @@ FILES: dict[tuple[str, str], list[tuple[list[str], tuple[str, ...]]]] = {
     ("report", "functional_point"): [(["calibration.csv", "--functional-point", OUT], (".csv",))],
     ("plot", "output"): [(["calibration.csv", "-o", OUT], (".png", ".svg", ".pdf"))],
     ("compare", "output"): [(["calibration.csv", "calibration.nc", "-o", OUT], (".csv", ".nc"))],
+    ("recheck", "update"): [(["calibration.nc", "scenario.toml", "again.nc", "--update", OUT], (".csv", ".nc"))],
     ("export", "output"): [
         (["calibration.csv", "--to", "linuxcnc-kins", "-o", OUT], (".csv",)),
         (["calibration.csv", "--to", "isg", "-o", OUT], (".csv",)),
@@ -77,6 +78,8 @@ INPUTS = {
     *{("report", name) for name in ("calibrations", "scenario", "run", "uncertainty", "logo")},
     *{("import", "files"), ("import", "scenario"), ("evaluate", "run")},
     *{("compare", "a"), ("compare", "b"), ("positions", "file")},
+    *{("verify", name) for name in ("calibration", "scenario", "run")},
+    *{("recheck", name) for name in ("baseline", "scenario", "run")},
     *{("export", "calibration"), ("volume", "calibration")},
     *{("check", "files"), ("head show", "name"), ("head check", "name"), ("head sensitivity", "name")},
     *{("plot", "files"), ("plot", "truth"), ("plot", "scenario"), ("acquire", "temperatures")},
@@ -133,6 +136,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
         Path("study.toml").write_text(STUDY)
         Path("beams.toml").write_text(acquiring.SCENARIO.format(plan=acquiring.SMALL, head=acquiring.BEAMS, noise=""))
         assert main(["simulate", "scenario.toml", "-o", "run.csv"]) == 0
+        assert main(["simulate", "scenario.toml", "-o", "again.nc"]) == 0
         for name in ("calibration.csv", "calibration.nc"):
             assert main(["evaluate", "scenario.toml", "run.csv", "-o", name]) == 0
         shutil.copy(SHIPPED_HEADS / "three_beams.toml", folder)

@@ -61,8 +61,8 @@ struct Recheck {
     std::vector<ChangeTerm> terms;
     std::vector<ChangeCombination> combinations;  // the best told first
     Eigen::MatrixXd covariance;                   // of the terms, with their priors
-    // The calibration with the change, and the covariance of both together. Its fit is that of the calibration; method,
-    // date and provenance, too.
+    // The calibration with the change, and the covariance of both together. Its method names the date of the
+    // calibration, and it has none of its own; fit and provenance are those of the calibration.
     Calibration updated;
 };
 
