@@ -1958,6 +1958,10 @@ class ChangePriors:
     """
     def __init__(self, *, scale: typing.SupportsFloat | typing.SupportsIndex = 3e-05, bow: typing.SupportsFloat | typing.SupportsIndex = 0.005, slope: typing.SupportsFloat | typing.SupportsIndex = 3e-05, squareness: typing.SupportsFloat | typing.SupportsIndex = 5e-05) -> None:
         ...
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def bow(self) -> float:
         ...
@@ -1974,6 +1978,10 @@ class ChangeTerm:
     """
     How a parameter of the machine has changed.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def kind(self) -> str:
         """
@@ -2004,6 +2012,10 @@ class ChangeCombination:
     """
     A sum of changes, by their priors, that readings tell.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def standard_uncertainty(self) -> float:
         """
@@ -2023,6 +2035,14 @@ class Recheck:
     """
     Whether a machine has changed since its calibration, and by what.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
+    def smallest_changes_seen(self, *, alpha: typing.SupportsFloat | typing.SupportsIndex = 0.001, power: typing.SupportsFloat | typing.SupportsIndex = 0.95) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) smallest change of each term, alone, that such readings show with the probability `power` if an unchanged machine is said to have changed with the probability `alpha`; inf where they tell nothing of it. Raises InvalidArgument unless 0 < alpha < power < 1.
+        """
     @property
     def chi_square(self) -> float:
         """
@@ -2062,6 +2082,11 @@ class Recheck:
         Of a larger chi-square, if nothing has changed.
         """
     @property
+    def shape(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (entries of the calibration's covariance, n): what a change of 1 of each term adds to them.
+        """
+    @property
     def terms(self) -> tuple[ChangeTerm, ...]:
         ...
     @property
@@ -2073,6 +2098,10 @@ class LineDeviation:
     """
     What a line of one run reads too much from end to end.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def deviation(self) -> float:
         """
@@ -2103,6 +2132,10 @@ class Verification:
     """
     How readings agree with a calibration that was made without them.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def chi_square(self) -> float:
         ...

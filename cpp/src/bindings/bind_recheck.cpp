@@ -50,6 +50,10 @@ Recheck recheck_run(const Calibration& baseline, const Measurement& measurement,
     return recheck(baseline, measurement, plan, kinematics, offset, heads, options, priors);
 }
 
+DoubleArray seen(const Recheck& recheck, double alpha, double power) {
+    return to_numpy_vector(smallest_changes_seen(recheck, alpha, power));
+}
+
 void bind_rechecking(py::module_& m) {
     py::class_<ChangePriors>(m, "ChangePriors",
                              "Standard uncertainties with which changes of a machine are known to be 0: scale (mm/mm), "
@@ -92,6 +96,13 @@ void bind_rechecking(py::module_& m) {
             "combinations", [](const Recheck& r) { return to_tuple(r.combinations); }, "The best told first.")
         .def_property_readonly(
             "covariance", [](const Recheck& r) { return to_numpy(r.covariance); }, "(n, n) of the terms.")
+        .def_property_readonly(
+            "shape", [](const Recheck& r) { return to_numpy(r.shape); },
+            "(entries of the calibration's covariance, n): what a change of 1 of each term adds to them.")
+        .def("smallest_changes_seen", &seen, py::kw_only(), py::arg("alpha") = 0.001, py::arg("power") = 0.95,
+             "(n,) smallest change of each term, alone, that such readings show with the probability `power` if an "
+             "unchanged machine is said to have changed with the probability `alpha`; inf where they tell nothing of "
+             "it. Raises InvalidArgument unless 0 < alpha < power < 1.")
         .def_readonly("updated", &Recheck::updated, "The calibration with the change, and their joint covariance.");
 
     m.def(

@@ -2,12 +2,45 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <limits>
 #include <unsupported/Eigen/SpecialFunctions>
 
 namespace stepdiag {
+namespace {
+
+// Where a function that rises from below to above 0 is 0.
+template <class Function>
+double rising_root(const Function& function) {
+    double low = 0.0, high = 1.0;
+    while (function(high) < 0.0) high *= 2.0;
+    while (high - low > 1e-12 * high) {
+        const double middle = 0.5 * (low + high);
+        (function(middle) < 0.0 ? low : high) = middle;
+    }
+    return high;
+}
+
+// The probability of a larger square sum if its mean is not 0: a mixture of central ones, by Poisson's probabilities.
+double noncentral_probability(double square_sum, double freedom, double noncentrality) {
+    const double mean = 0.5 * noncentrality;
+    const int most = int(mean + 12.0 * std::sqrt(mean) + 40.0);
+    double sum = 0.0;
+    for (int k = 0; k <= most; ++k)
+        sum += std::exp(k * std::log(mean) - mean - std::lgamma(k + 1.0)) *
+               chi_square_probability(square_sum, freedom + 2.0 * k);
+    return sum;
+}
+
+}  // namespace
 
 double chi_square_probability(double square_sum, double freedom) {
     return Eigen::numext::igammac(0.5 * freedom, 0.5 * square_sum);
+}
+
+double noncentrality(int freedom, double alpha, double power) {
+    if (freedom < 1) return std::numeric_limits<double>::infinity();
+    const double limit = rising_root([&](double x) { return alpha - chi_square_probability(x, freedom); });
+    return rising_root([&](double x) { return noncentral_probability(limit, freedom, x) - power; });
 }
 
 Fit fit_of_noise(double square_sum, int freedom) {

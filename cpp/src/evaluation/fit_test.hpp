@@ -15,6 +15,10 @@ inline constexpr double doubtful_above = 1.0 - 1e-3;
 // The probability of a larger square sum.
 double chi_square_probability(double square_sum, double freedom);
 
+// Of a chi-square test with so many degrees of freedom: the noncentrality with which it refuses with a probability of
+// `power` what it refuses with the probability `alpha` if it is right.
+double noncentrality(int freedom, double alpha, double power);
+
 // The verdict if only the noise is tested: whether it is larger or smaller than stated by a common factor.
 Fit fit_of_noise(double square_sum, int freedom);
 

@@ -40,16 +40,20 @@ Prediction::Prediction(const AdjustmentProblem& problem, const Baseline& baselin
 
 // What lies between the nodes of the calibration is a deviation of the functional point that no value has.
 void Prediction::weigh_readings() {
-    const double between = baseline_.calibration().between_nodes.value_or(0.0);
+    const std::optional<double> between = baseline_.calibration().between_nodes;
     sigma_.resize(problem_.readings().size());
     for (const AdjustedPoint& point : problem_.points()) {
         const bool at_nodes = std::all_of(all_axes.begin(), all_axes.end(), [&](Axis axis) {
             return baseline_.is_node(axis, point.place.commanded[index(axis)]);
         });
+        if (!at_nodes && !between)
+            throw InvalidArgument("calibration: readings at " + format_lengths(point.place.commanded) +
+                                  " mm lie between its nodes, and it states no uncertainty for what is there "
+                                  "(between_nodes_um): use steps that divide those of the calibration, or state it");
         for (int r = point.first_reading; r < point.end_reading; ++r) {
             const AdjustedReading& reading = problem_.readings()[r];
             const bool is_distance = problem_.channel_name(reading).front() == 'd';
-            sigma_[r] = std::hypot(reading.standard_uncertainty, at_nodes || !is_distance ? 0.0 : between);
+            sigma_[r] = std::hypot(reading.standard_uncertainty, at_nodes || !is_distance ? 0.0 : *between);
         }
     }
 }

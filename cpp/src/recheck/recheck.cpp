@@ -69,6 +69,22 @@ Calibration with_change(const Baseline& baseline, const Prediction& prediction) 
 
 }  // namespace
 
+Eigen::VectorXd smallest_changes_seen(const Recheck& recheck, double alpha, double power) {
+    if (!(0.0 < alpha && alpha < power && power < 1.0))
+        throw InvalidArgument("alpha, power: expected probabilities, 0 < alpha < power < 1");
+    constexpr double rounding = 1e-6;  // of a weight
+    const double needed = noncentrality(int(recheck.combinations.size()), alpha, power);
+    Eigen::VectorXd smallest(Eigen::Index(recheck.terms.size()));
+    for (Eigen::Index j = 0; j < smallest.size(); ++j) {
+        double by_prior = 0.0;  // noncentrality by the square of a change in units of its prior
+        for (const ChangeCombination& sum : recheck.combinations)
+            if (const double weight = sum.weight[std::size_t(j)]; std::abs(weight) > rounding)
+                by_prior += std::pow(weight / sum.standard_uncertainty, 2);
+        smallest[j] = recheck.terms[std::size_t(j)].prior * std::sqrt(needed / by_prior);
+    }
+    return smallest;
+}
+
 std::string name(ChangeKind kind) {
     switch (kind) {
         case ChangeKind::scale: return "scale";
@@ -94,7 +110,7 @@ Recheck recheck(const Calibration& baseline, const Measurement& measurement, con
     Prediction changed(problem, changing);
     changed.solve();
 
-    Recheck result{0.0, 0, 1.0, 0.0, 0, 1.0, changing.changes(), {}, {}, with_change(changing, changed)};
+    Recheck result{0.0, 0, 1.0, 0.0, 0, 1.0, changing.changes(), {}, {}, {}, with_change(changing, changed)};
     result.chi_square = told.estimate.cwiseAbs2().dot(told.information);
     result.degrees_of_freedom = int(count - told.first);
     if (result.degrees_of_freedom > 0)
@@ -110,6 +126,7 @@ Recheck recheck(const Calibration& baseline, const Measurement& measurement, con
     Eigen::VectorXd prior(count);
     for (Eigen::Index j = 0; j < count; ++j) prior[j] = changing.changes()[std::size_t(j)].prior;
     result.covariance = prior.asDiagonal() * inverse.block(begin, begin, count, count) * prior.asDiagonal();
+    result.shape = changing.root().rightCols(count) * prior.cwiseInverse().asDiagonal();
     const Eigen::MatrixXd strong = told.direction.rightCols(count - told.first);
     for (Eigen::Index j = 0; j < count; ++j) {
         ChangeTerm& term = result.terms[std::size_t(j)];

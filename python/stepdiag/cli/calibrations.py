@@ -338,9 +338,16 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     metavar="FILE",
     help="Calibration to write: the baseline with the change and their joint covariance, netCDF (.nc) or CSV.",
 )
+@json_option
 @click.pass_context
 def recheck(
-    context: click.Context, baseline: Path, scenario: Path, run: Path, alpha: float, update: OutputFile | None
+    context: click.Context,
+    baseline: Path,
+    scenario: Path,
+    run: Path,
+    alpha: float,
+    update: OutputFile | None,
+    as_json: bool,
 ) -> None:
     """Test with a short RUN whether the machine has changed since the calibration BASELINE (netCDF).
 
@@ -377,13 +384,20 @@ def recheck(
         volume = volume_errors(judged.updated, ranking=False)
     if target is not None:
         write_calibration(judged.updated, target, provenance=provenance_of(known, run))
-    for line in recheck_report(judged, volume):
-        say(line)
-    for warning in fit_warnings(baseline, before.fit):
-        tell("warning", warning)
+    warnings = fit_warnings(baseline, before.fit)
     if not judged.is_explained:
-        tell("warning", f"{run}: no change of low order explains these readings: evaluate them to see why")
+        warnings.append(f"{run}: no change of low order explains these readings: evaluate them to see why")
     elif judged.has_changed:
-        tell("warning", f"{baseline}: the machine has changed since: do not use it as it is")
+        warnings.append(f"{baseline}: the machine has changed since: do not use it as it is")
+    if as_json:
+        from stepdiag.objects.recheck import recheck_object
+        from stepdiag.objects.writer import json_text
+
+        click.echo(json_text(recheck_object(judged, volume, (baseline, run, target), warnings)))
+    else:
+        for line in recheck_report(judged, volume):
+            say(line)
+    for warning in warnings:
+        tell("warning", warning)
     if judged.has_changed or not judged.is_explained or before.fit == "rejected":
         context.exit(NOT_TO_BE_TRUSTED)

@@ -19,6 +19,7 @@ OBJECTS: Final = {
     "evaluation": ("stepdiag.objects.evaluation", "EvaluationObject"),
     "observation": ("stepdiag.objects.observation", "ObservationObject"),
     "positions": ("stepdiag.objects.positions", "PositionsObject"),
+    "recheck": ("stepdiag.objects.recheck", "RecheckObject"),
     "report": ("stepdiag.objects.report", "ReportObject"),
     "verification": ("stepdiag.objects.verification", "VerificationObject"),
     "volume": ("stepdiag.objects.volume", "VolumeObject"),

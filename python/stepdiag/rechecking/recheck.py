@@ -2,17 +2,30 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from stepdiag import _core
 from stepdiag._core import Calibration, Measurement, Recheck
 from stepdiag.calibration.volume import errors_at_points, volume_grid
+from stepdiag.rechecking.verification import with_stated_between_nodes
 from stepdiag.scenario.description import Scenario, adjustment_options, reduced_run
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.known import Known
+from stepdiag.units import MICROMETRE, MICRORADIAN
 
-GRID = 5  # positions an axis, of the low-order changes in the volume
+FloatArray = npt.NDArray[np.float64]
+
+GRID: Final = 5  # positions an axis, of the low-order changes in the volume
+# Native values of a change in the unit of reports.
+CHANGE_UNITS: Final = {
+    "scale": ("µm/m", 1e-6),
+    "bow": ("µm", MICROMETRE),
+    "slope": ("µrad", MICRORADIAN),
+    "squareness": ("µrad", MICRORADIAN),
+}
 
 
 def recheck_scenario(baseline: Calibration, scenario: Scenario | Known, measurement: Measurement) -> Recheck:
@@ -31,7 +44,7 @@ def recheck_scenario(baseline: Calibration, scenario: Scenario | Known, measurem
     """
     known = scenario.known
     return _core.recheck(
-        baseline,
+        with_stated_between_nodes(baseline, known),
         reduced_run(known, measurement),
         known.plan,
         of_run(known.heads),
@@ -72,22 +85,14 @@ class Judged:
     def hidden(self) -> float:
         """What a change that the readings do not tell may move the tool by, mm: twice the standard
         deviation of the functional point at the worst point of the volume, with the priors."""
-        baseline = self.baseline
-        labels = baseline.covariance_labels
-        basis = np.zeros((len(labels), len(self.recheck.terms)))
-        for k, term in enumerate(self.recheck.terms):
-            travel = baseline.volume["XYZ".index(term.parameter[2])] if term.kind != "squareness" else 1.0
-            for row, (parameter, position) in enumerate(labels):
-                if parameter != term.parameter:
-                    continue
-                share = 0.0 if position is None else position / travel
-                basis[row, k] = {
-                    "scale": share * travel,
-                    "bow": 4.0 * share * (1.0 - share),
-                    "slope": share,
-                    "squareness": 1.0,
-                }[term.kind]
-        changed = _core.with_covariance(baseline, basis @ self.recheck.covariance @ basis.T)
-        points = errors_at_points(changed, volume_grid(np.stack([np.zeros(3), baseline.volume]), GRID))
-        assert points.error_uncertainty is not None
-        return 2.0 * float(np.sqrt((points.error_uncertainty**2).sum(axis=1)).max())
+        shape = self.recheck.shape
+        return 2.0 * farthest_move(self.baseline, shape @ self.recheck.covariance @ shape.T)
+
+
+def farthest_move(baseline: Calibration, covariance: FloatArray) -> float:
+    """Standard deviation of the functional point where it is largest in the volume, mm, by a covariance (n, n) of the
+    calibration's entries."""
+    changed = _core.with_covariance(baseline, covariance)
+    points = errors_at_points(changed, volume_grid(np.stack([np.zeros(3), baseline.volume]), GRID))
+    assert points.error_uncertainty is not None
+    return float(np.sqrt((points.error_uncertainty**2).sum(axis=1)).max())

@@ -32,7 +32,7 @@ def verify_scenario(calibration: Calibration, scenario: Scenario | Known, measur
     """
     known = scenario.known
     return _core.verify(
-        calibration,
+        with_stated_between_nodes(calibration, known),
         reduced_run(known, measurement),
         known.plan,
         of_run(known.heads),
@@ -40,6 +40,12 @@ def verify_scenario(calibration: Calibration, scenario: Scenario | Known, measur
         known.tool,
         adjustment_options(known),
     )
+
+
+def with_stated_between_nodes(calibration: Calibration, known: Known) -> Calibration:
+    """With the scenario's uncertainty of what lies between the nodes, where the calibration states none."""
+    stated = known.between_nodes
+    return calibration.with_between_nodes(stated) if calibration.between_nodes is None else calibration
 
 
 def check_other_run(calibration: Calibration, run: Path) -> None:

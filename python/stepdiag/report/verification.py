@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from stepdiag._core import ChangeCombination, ChangeTerm, Measurement, Verification
 from stepdiag.calibration.volume import VolumeErrors
-from stepdiag.rechecking.recheck import Judged
+from stepdiag.rechecking.recheck import CHANGE_UNITS, Judged
 from stepdiag.report.text_columns import text_columns
 from stepdiag.units import MICROMETRE, MICRORADIAN
 
@@ -58,13 +58,6 @@ def _worst(verification: Verification, measurement: Measurement) -> str:
 
 TOLD = 0.9  # of a change that readings tell alone
 UNTOLD = 0.1
-# Native values of a change in the unit of reports.
-CHANGE_UNITS = {
-    "scale": ("µm/m", 1e-6),
-    "bow": ("µm", MICROMETRE),
-    "slope": ("µrad", MICRORADIAN),
-    "squareness": ("µrad", MICRORADIAN),
-}
 SHARE = 0.2  # of a sum, below which a term is not named
 MOSTLY = 0.5  # of a sum, that has to be of changes told together
 

@@ -56,17 +56,18 @@ class Scenario(Displayed):
         return make_heads(self.known.described_heads, self.truth.pose_errors, self.path)
 
 
-def simulate_scenario(scenario: Scenario) -> _core.Measurement:
-    """The run that a scenario describes."""
-    machine, heads = scenario.machine(), scenario.actual_heads()
+def simulate_scenario(scenario: Scenario, errors: _core.ErrorMap | None = None) -> _core.Measurement:
+    """The run that a scenario describes; with `errors`, that of a machine with these."""
+    known, heads = scenario.known, scenario.actual_heads()
+    machine = scenario.machine() if errors is None else _core.Machine(known.chain, errors, known.tool)
     with located(str(scenario.path)):
         run = _core.simulate(
             machine,
-            scenario.known.plan,
+            known.plan,
             of_run(heads),
             simulation_options(scenario),
         )
-    return only(_with_air(run, scenario), scenario.known.signals)
+    return only(_with_air(run, scenario), known.signals)
 
 
 def air_of(scenario: Scenario) -> dict[str, float]:

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <limits>
 
 #include "stepdiag/evaluation/least_squares.hpp"
 
@@ -33,6 +34,15 @@ TEST(FitTest, ProbabilitiesAreThoseOfTheTables) {
     EXPECT_EQ(stepdiag::fit_of_noise(23.3, 10), stepdiag::Fit::doubtful);
     EXPECT_EQ(stepdiag::fit_of_noise(1.4, 10), stepdiag::Fit::doubtful);  // 99.9 % are above 1.479
     EXPECT_EQ(stepdiag::fit_of_noise(90.1, 10), stepdiag::Fit::rejected);
+}
+
+// SciPy's ncx2, solved for the noncentrality.
+TEST(FitTest, NoncentralityIsThatOfTheNoncentralDistribution) {
+    EXPECT_NEAR(stepdiag::noncentrality(1, 0.001, 0.95), 24.3579792825, 1e-7);
+    EXPECT_NEAR(stepdiag::noncentrality(6, 0.001, 0.95), 34.9192884454, 1e-7);
+    EXPECT_NEAR(stepdiag::noncentrality(21, 0.001, 0.95), 49.5931035576, 1e-7);
+    EXPECT_NEAR(stepdiag::noncentrality(3, 0.05, 0.8), 10.9025632901, 1e-7);
+    EXPECT_EQ(stepdiag::noncentrality(0, 0.05, 0.8), std::numeric_limits<double>::infinity());
 }
 
 TEST(FitTest, SharesAddUpAcrossBlocks) {

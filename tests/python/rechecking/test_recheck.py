@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from json_objects import printed
 from refusal import refused
 
 import stepdiag as sd
@@ -84,6 +85,21 @@ def test_change_is_found_attributed_and_taken_over(folder: Path, capsys: pytest.
     # It is a calibration like any other.
     assert main(["verify", "updated.nc", "short.toml", "same.csv"]) == 3
     assert main(["volume", "updated.nc"]) == 0
+
+
+def test_object_has_what_the_report_has(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["calibration.nc", "short.toml", "hit.csv", "--update", "updated.nc"]
+    result = printed("recheck", capsys, "recheck", *words, status=3)
+    baseline, run = sd.read_calibration("calibration.nc"), sd.read_measurement("hit.csv")
+    found = sd.recheck_scenario(baseline, sd.read_scenario("short.toml"), run)
+    assert (result["changed"], result["explained"], result["updated"]) == (True, True, "updated.nc")
+    assert result["chi_square"] == found.chi_square
+    by_name = {term.parameter: term for term in found.terms}
+    assert result["squarenesses"][0]["value_urad"] == 1e6 * by_name["C0Y"].value
+    assert {one["parameter"] for key in ("scales", "bows", "slopes", "squarenesses") for one in result[key]} == {
+        *by_name
+    }
+    assert len(result["sums"]) == found.degrees_of_freedom
 
 
 def test_what_priors_rule_out_is_no_change(folder: Path) -> None:

@@ -188,3 +188,15 @@ def test_calibration_without_angles_is_refused_by_name(files: Path) -> None:
         sd.read_measurement("new.csv"),
         names="does not determine EAX",
     )
+
+
+def test_points_between_nodes_need_a_stated_uncertainty(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Else the ripple of a screw would count as a change."""
+    Path("between.toml").write_text(TESTED.replace("steps = 3", "steps = 4"))
+    assert main(["simulate", "between.toml", "-o", "between.csv"]) == 0
+    capsys.readouterr()
+    assert main(["verify", "calibration.nc", "between.toml", "between.csv"]) == 2
+    assert "lie between its nodes, and it states no uncertainty" in capsys.readouterr().err
+    stated = Path("between.toml").read_text().replace("[uncertainty]", "[uncertainty]\nbetween_nodes_um = 2.0")
+    Path("between.toml").write_text(stated)
+    assert main(["verify", "calibration.nc", "between.toml", "between.csv"]) == 0

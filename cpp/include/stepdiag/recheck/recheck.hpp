@@ -61,6 +61,7 @@ struct Recheck {
     std::vector<ChangeTerm> terms;
     std::vector<ChangeCombination> combinations;  // the best told first
     Eigen::MatrixXd covariance;                   // of the terms, with their priors
+    Eigen::MatrixXd shape;                        // entry of the calibration x term: by a change of 1
     // The calibration with the change, and the covariance of both together. Its method names the date of the
     // calibration, and it has none of its own; fit and provenance are those of the calibration.
     Calibration updated;
@@ -71,5 +72,11 @@ struct Recheck {
 Recheck recheck(const Calibration& baseline, const Measurement& measurement, const Plan& plan, const Chain& chain,
                 const Eigen::Vector3d& tool, const HeadCalibrations& heads, const AdjustmentOptions& options = {},
                 const ChangePriors& priors = {});
+
+// By term, in the unit of its prior: the smallest change, of this term alone, that such readings show with a probability
+// of `power` where an unchanged machine is said to have changed with the probability `alpha`; infinite where they tell
+// nothing of it. It depends on the plan, the head and the uncertainties of the readings, hardly on what was read, so that
+// simulated readings tell it of a plan. Throws InvalidArgument unless 0 < alpha < power < 1.
+Eigen::VectorXd smallest_changes_seen(const Recheck& recheck, double alpha = 0.001, double power = 0.95);
 
 }  // namespace stepdiag
