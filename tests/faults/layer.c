@@ -48,7 +48,7 @@ static int is_our_file(int file) {
     const ssize_t length = readlink(link, path, sizeof path - 1);
     if (length <= 0) return 0;
     path[length] = 0;
-    return is_ours(path) || strcmp(path, folder) == 0;
+    return path[0] == '/' && (is_ours(path) || strcmp(path, folder) == 0);  // else a pipe or a socket
 }
 
 /* Whether this call has to fail. Of a write that is the last call, half arrives. */

@@ -4,10 +4,13 @@ labelled_tables.py, netcdf_read.py and docs/files.md describe their contents.
 """
 
 import hashlib
+import mmap
 import os
+import secrets
 import struct
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +21,15 @@ import xarray as xr
 from xarray.backends import NetCDF4DataStore
 
 from stepdiag._core import InvalidArgument, __version__
-from stepdiag.interruption import uninterrupted
-from stepdiag.io.whole_files import read_bytes, whole_file
+from stepdiag.interruption import at_end, uninterrupted
+from stepdiag.io.whole_files import check_output, read_bytes, write_whole
 
 # A file may declare this much, plus a hundred times its size: compression is limited.
 _FREE_SIZE = 64 * 2**20
 _LARGEST_COMPRESSION = 100
 
 _ROOM = 2**19  # bytes of a file beside its values, at most
+_IN_MEMORY = Path("/dev/shm")
 _CHECKSUM = "sha256"
 _OF_OTHERS = ("history",)  # attributes that other programs add to, as their conventions want
 _FILL = netCDF4.default_fillvals["f8"]  # netCDF's mark of values never written
@@ -49,15 +53,41 @@ def write_dataset(dataset: xr.Dataset, path: Path, attributes: dict[str, Any]) -
         if variable.dtype.kind == "f" and not np.isnan(variable.values).any():
             variable.encoding["_FillValue"] = None
     dataset.attrs[_CHECKSUM] = _checksum(dataset)
-    with whole_file(path) as temporary:
-        # The C libraries may crash where a disk gets full, so room is made before; they take it from the start.
-        with open(temporary, "r+b") as file:
-            os.posix_fallocate(file.fileno(), 0, dataset.nbytes + _ROOM)
+    check_output(path)
+    try:
+        content = _packed(dataset, path)
+    except (OSError, RuntimeError) as error:  # RuntimeError: of the C libraries
+        raise InvalidArgument(f"{path}: cannot be written: {_one_line(error)}") from None
+    write_whole(path, content)
+
+
+def _packed(dataset: xr.Dataset, path: Path) -> memoryview:
+    """The content of a file, made in memory if there is room, else beside `path`: where a disk fails, the C libraries
+    crash."""
+    with uninterrupted(), ExitStack() as stack:  # an exception inside of the libraries leaves their locks taken
         try:
-            with uninterrupted():  # an exception inside of them leaves the libraries' locks taken
-                dataset.to_netcdf(temporary, mode="w", engine="netcdf4", format="NETCDF4")
-        except RuntimeError as error:  # raised by the C libraries
-            raise InvalidArgument(f"{path}: cannot be written: {error}") from None
+            scratch, handle = stack.enter_context(_scratch(_IN_MEMORY, dataset.nbytes + _ROOM))
+        except OSError:
+            scratch, handle = stack.enter_context(_scratch(path.parent, dataset.nbytes + _ROOM))
+        file = netCDF4.Dataset(scratch, "w", format="NETCDF4")  # not with memory=, which forgets the variables' order
+        scratch.unlink()
+        dataset.dump_to_store(NetCDF4DataStore(file))  # type: ignore[no-untyped-call]
+        file.close()
+        return memoryview(mmap.mmap(handle, 0, access=mmap.ACCESS_READ))
+
+
+@contextmanager
+def _scratch(folder: Path, size: int) -> Iterator[tuple[Path, int]]:
+    """A file of so many bytes and its descriptor. Raises OSError if there is no room."""
+    path = folder / f"stepdiag.{secrets.token_hex(8)}"
+    with at_end(partial(path.unlink, missing_ok=True)):
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        try:
+            os.posix_fallocate(handle, 0, size)
+            yield path, handle
+        finally:
+            path.unlink(missing_ok=True)
+            os.close(handle)
 
 
 @contextmanager

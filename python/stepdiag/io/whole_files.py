@@ -73,10 +73,10 @@ def check_input(path: Path) -> None:
         raise InvalidArgument(f"{path}: expected a file, got a device")
 
 
-def write_whole(path: Path, content: str | bytes) -> None:
+def write_whole(path: Path, content: str | bytes | memoryview) -> None:
     """Write a file: `path` is either the old or the complete new one, on disk when this returns."""
-    with whole_file(path) as temporary:
-        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+    with _whole_file(path) as handle:
+        _write_all(handle, content)
 
 
 def write_set(files: Mapping[Path, str]) -> None:
@@ -85,16 +85,16 @@ def write_set(files: Mapping[Path, str]) -> None:
     Only what ends the process between two renames leaves old ones beside new ones: not Ctrl-C."""
     with uninterrupted(), ExitStack() as stack:
         for path, text in files.items():
-            temporary = stack.enter_context(whole_file(path))
-            with open(temporary, "wb") as file:
-                file.write(text.encode())
-                file.flush()
-                os.fsync(file.fileno())
+            handle = stack.enter_context(_whole_file(path))
+            _write_all(handle, text)
+            os.fsync(handle)
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path`, which replaces it when the block ends without an error."""
+def _whole_file(path: Path) -> Iterator[int]:
+    """The descriptor of a temporary file beside `path`, which replaces it when the block ends without an error.
+
+    Nothing opens the temporary file by its name: an interruption that has just removed it would find it again."""
     check_output(path)
     target = Path(os.path.realpath(path))  # keeps a symbolic link
     # A name of its own, not mkstemp's: Ctrl-C may come between the making of the file and its return.
@@ -104,7 +104,7 @@ def whole_file(path: Path) -> Iterator[Path]:
         try:
             with uninterrupted():
                 handle = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
-            yield temporary
+            yield handle
             with uninterrupted():
                 os.fchmod(handle, target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~_umask())
                 os.fsync(handle)
@@ -118,6 +118,12 @@ def whole_file(path: Path) -> Iterator[Path]:
         finally:
             if handle >= 0:
                 os.close(handle)
+
+
+def _write_all(handle: int, content: str | bytes | memoryview) -> None:
+    rest = memoryview(content.encode() if isinstance(content, str) else content)
+    while rest:
+        rest = rest[os.write(handle, rest) :]
 
 
 def _remove(path: Path) -> None:
@@ -135,7 +141,7 @@ def write_by_core(path: str | os.PathLike[str], write: Callable[[str | os.PathLi
         for temporary in target.parent.glob(f"{glob.escape(target.name)}.{os.getpid()}-*"):  # open_temporary()
             _remove(temporary)
 
-    with at_end(remove):
+    with at_end(remove), uninterrupted():
         write(path)
         if target.is_file():
             sync_folder(target.parent)

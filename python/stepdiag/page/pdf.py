@@ -10,7 +10,7 @@ from typing import Final
 
 from stepdiag._core import InvalidArgument
 from stepdiag.interruption import at_end, kill_descendants
-from stepdiag.io.whole_files import whole_file
+from stepdiag.io.whole_files import write_whole
 
 BROWSERS: Final = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 LONGEST: Final = 120  # seconds; a page takes a few
@@ -33,11 +33,7 @@ def find_browser() -> str:
 def write_pdf(page: str, path: Path) -> None:
     """Print a page into a file. Raises InvalidArgument if there is no Chromium, or it fails."""
     browser = find_browser()
-    with (
-        tempfile.TemporaryDirectory(prefix="stepdiag-") as folder,
-        at_end(partial(_abandon, folder)),
-        whole_file(path) as written,
-    ):
+    with tempfile.TemporaryDirectory(prefix="stepdiag-") as folder, at_end(partial(_abandon, folder)):
         source, printed = Path(folder) / "report.html", Path(folder) / "report.pdf"
         source.write_text(page, encoding="utf-8")
         command = [
@@ -61,7 +57,7 @@ def write_pdf(page: str, path: Path) -> None:
         if done.returncode != 0 or not printed.is_file() or not printed.read_bytes().startswith(b"%PDF-"):
             said = (done.stderr.strip().splitlines() or ["it wrote nothing"])[-1]
             raise InvalidArgument(f"{path}: {browser} could not print it: {said}")
-        shutil.copyfile(printed, written)
+        write_whole(path, printed.read_bytes())
 
 
 def _abandon(folder: str) -> None:

@@ -39,7 +39,7 @@ CHILD = "child = subprocess.Popen(['sleep', '600']); said(child.pid); child.wait
 READING = "import stepdiag.scenario.description as d; d.read_scenario = stop"
 EVALUATING = "import stepdiag.uncertainty.run as r; r.evaluate_uncertainty = stop"
 WRITING = "import os; os.fsync = stop"
-NETCDF = "import xarray; xarray.Dataset.to_netcdf = stop"
+NETCDF = "import xarray; xarray.Dataset.dump_to_store = stop"
 SIMULATE = ["simulate", "scenario.toml", "--overwrite", "-o"]
 
 

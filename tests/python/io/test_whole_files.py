@@ -13,7 +13,7 @@ from small_scenario import SCENARIO
 import stepdiag as sd
 from stepdiag import InvalidArgument
 from stepdiag.cli import main
-from stepdiag.io import whole_files
+from stepdiag.io import netcdf, whole_files
 
 # The command stops where its temporary file is on the disk, and says so.
 STOPPED = """
@@ -118,3 +118,15 @@ def test_the_folder_is_synced_after_the_renaming(scenario: Path, name: str, monk
     monkeypatch.setattr(whole_files, "sync_folder", sync)
     assert main(["simulate", "scenario.toml", "-o", name]) == 0
     assert synced == [(scenario.parent, [name, "scenario.toml"])]
+
+
+@pytest.mark.parametrize("folder", ["/dev/shm", "/no/such/folder"])
+def test_netcdf_is_made_elsewhere_and_leaves_nothing_there(
+    scenario: Path, folder: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The libraries do not write to the disk of the output, where they could crash, unless there is no room."""
+    monkeypatch.setattr(netcdf, "_IN_MEMORY", Path(folder))
+    assert main(["simulate", "scenario.toml", "-o", "run.nc"]) == 0
+    assert sorted(contents(scenario.parent)) == ["run.nc", "scenario.toml"]
+    assert len(sd.read_measurement(scenario.with_name("run.nc")).line) == 70
+    assert not list(Path("/dev/shm").glob("stepdiag.*"))
