@@ -48,9 +48,7 @@ void check_complete(const Calibration& calibration) {
 
 }  // namespace
 
-Baseline::Baseline(Calibration calibration) : calibration_(std::move(calibration)) {
-    check(calibration_);
-    check_complete(calibration_);
+void Baseline::find_root() {
     int entry = 0;
     for (int i = 0; i < function_count; ++i) {
         first_entry_[i] = entry;
@@ -69,6 +67,8 @@ Baseline::Baseline(Calibration calibration) : calibration_(std::move(calibration
     root_.setZero(entry, rank + Eigen::Index(open.size()));
     root_.leftCols(rank) =
         parts.eigenvectors().rightCols(rank) * parts.eigenvalues().tail(rank).cwiseSqrt().asDiagonal();
+    for (Eigen::Index i = 0; i < entry; ++i)
+        if (calibration_.covariance(i, i) == 0.0) root_.row(i).setZero();  // exactly, as it is known
     for (std::size_t k = 0; k < open.size(); ++k) {
         const std::vector<double>& nodes = calibration_.functions[open[k]]->position;
         for (std::size_t n = 0; n < nodes.size(); ++n)
@@ -76,7 +76,10 @@ Baseline::Baseline(Calibration calibration) : calibration_(std::move(calibration
     }
 }
 
-Baseline::Baseline(Calibration calibration, const ChangePriors& priors) : Baseline(std::move(calibration)) {
+Baseline::Baseline(Calibration calibration, const ChangePriors& priors) : calibration_(std::move(calibration)) {
+    check(calibration_);
+    check_complete(calibration_);
+    find_root();
     for (const double prior : {priors.scale, priors.bow, priors.slope, priors.squareness})
         if (!(std::isfinite(prior) && prior >= 0.0))
             throw InvalidArgument("change: expected priors that are finite and at least 0");

@@ -19,9 +19,8 @@ public:
         double weight;
     };
 
-    // Throws InvalidArgument for a calibration without covariance, or one that does not determine all parameters.
-    explicit Baseline(Calibration calibration);
-    // The machine may also have changed.
+    // The machine may also have changed. Throws InvalidArgument for a calibration without covariance, for one that does
+    // not determine all parameters, and for priors that make no sense.
     Baseline(Calibration calibration, const ChangePriors& priors);
 
     const Calibration& calibration() const { return calibration_; }
@@ -34,6 +33,7 @@ public:
     const std::vector<ChangeTerm>& changes() const { return changes_; }
 
 private:
+    void find_root();
     void add_change(const ChangeTerm& change);
 
     Calibration calibration_;

@@ -15,6 +15,13 @@ double usual_prior(PriorUncertainty prior, int column) {
     return record(setup::component(column).quantity).unit == "mm" ? 1e9 : 0.1;  // mm; rad
 }
 
+Eigen::MatrixXd without_columns(const Eigen::MatrixXd& matrix, Eigen::Index begin, Eigen::Index count) {
+    const Eigen::Index after = matrix.cols() - begin - count;
+    Eigen::MatrixXd rest(matrix.rows(), begin + after);
+    rest << matrix.leftCols(begin), matrix.rightCols(after);
+    return rest;
+}
+
 constexpr int most_steps = 30;
 constexpr double settled = 1e-8;  // decrease of the square sum, by reading
 
@@ -156,22 +163,27 @@ double Prediction::objective(const SetupRows& rows) {
     return rows.residual.squaredNorm() + rows.value.cwiseAbs2().dot(rows.weight);
 }
 
-// Each set-up by itself, at the calibration's values: from there the steps of all are few.
+// Each set-up by itself, at the calibration's values: from there the steps of all are few. Readings count as much as
+// the calibration and a change leave them certain; else a set-up would go far to explain what is the machine's.
 void Prediction::settle_setups() {
     for (SetupRows& rows : setups_) {
         linearise(rows, z_, true);
+        const Eigen::VectorXd weight = (1.0 + rows.by_baseline.rowwise().squaredNorm().array()).inverse();
+        const auto sum = [&] {
+            return rows.residual.cwiseAbs2().dot(weight) + rows.value.cwiseAbs2().dot(rows.weight);
+        };
         for (int i = 0; i < most_steps; ++i) {
-            Eigen::MatrixXd matrix = rows.by_setup.transpose() * rows.by_setup;
+            Eigen::MatrixXd matrix = rows.by_setup.transpose() * weight.asDiagonal() * rows.by_setup;
             matrix.diagonal() += rows.weight;
-            const Eigen::VectorXd change =
-                matrix.ldlt().solve(rows.by_setup.transpose() * rows.residual - rows.weight.cwiseProduct(rows.value));
-            const double before = objective(rows);
+            const Eigen::VectorXd change = matrix.ldlt().solve(
+                rows.by_setup.transpose() * weight.cwiseProduct(rows.residual) - rows.weight.cwiseProduct(rows.value));
+            const double before = sum();
             const Eigen::VectorXd value = rows.value;
             const double decrease = before - descend(
                                                  [&](double share) {
                                                      rows.value = value + share * change;
                                                      linearise(rows, z_, false);
-                                                     return objective(rows);
+                                                     return sum();
                                                  },
                                                  before);
             if (decrease < settled * double(rows.readings.size())) break;
@@ -197,20 +209,12 @@ void Prediction::assemble() {
         gradient_ += rows.by_baseline.transpose() * rows.residual - rows.transfer.transpose() * rows.gradient;
     }
     matrix_.triangularView<Eigen::StrictlyUpper>() = matrix_.transpose();
-    Eigen::MatrixXd active = matrix_;
-    for (const Eigen::Index j : held_) {
-        active.row(j).setZero();
-        active.col(j).setZero();
-        active(j, j) = 1.0;
-    }
-    factor_.compute(active);
+    factor_.compute(matrix_);
 }
 
 double Prediction::step() {
     assemble();
-    Eigen::VectorXd gradient = gradient_;
-    for (const Eigen::Index j : held_) gradient[j] = 0.0;
-    const Eigen::VectorXd z = z_, change = factor_.solve(gradient);
+    const Eigen::VectorXd z = z_, change = factor_.solve(gradient_);
     std::vector<Eigen::VectorXd> values, changes;
     for (const SetupRows& rows : setups_) {
         values.push_back(rows.value);
@@ -230,10 +234,7 @@ double Prediction::step() {
     return before - after;
 }
 
-void Prediction::solve(bool changed) {
-    const auto changes = Eigen::Index(baseline_.changes().size());
-    if (!changed)
-        for (Eigen::Index j = 0; j < changes; ++j) held_.push_back(baseline_.root().cols() - changes + j);
+void Prediction::solve() {
     settle_setups();
     const double enough = settled * double(sigma_.size());
     double decrease = std::numeric_limits<double>::infinity();
@@ -242,12 +243,35 @@ void Prediction::solve(bool changed) {
         throw InvalidArgument("readings: no machine near the calibration gives them; evaluate the run to see why");
     assemble();
     for (SetupRows& rows : setups_) {
-        Eigen::MatrixXd transfer = rows.transfer;
-        for (const Eigen::Index j : held_) transfer.col(j).setZero();
-        rows.spread = factor_.matrixL().solve(transfer.transpose());
+        rows.spread = factor_.matrixL().solve(rows.transfer.transpose());
         linearise(rows, Eigen::VectorXd::Zero(z_.size()), false);
         stated_residual_.push_back(rows.residual);
         linearise(rows, z_, false);
+    }
+}
+
+void Prediction::drop_changes() {
+    const auto changes = Eigen::Index(baseline_.changes().size());
+    const Eigen::Index begin = baseline_.root().cols() - changes;
+    const Eigen::VectorXd dropped = z_.segment(begin, changes);
+    const Eigen::MatrixXd rest = without_columns(matrix_.transpose(), begin, changes).transpose();  // of the rows
+    matrix_ = without_columns(rest, begin, changes);
+    factor_.compute(matrix_);
+    // As the changes go from what was found to 0.
+    gradient_ = without_columns(gradient_.transpose(), begin, changes).transpose();
+    const Eigen::VectorXd step = factor_.solve(gradient_ + rest.middleCols(begin, changes) * dropped);
+    Eigen::VectorXd whole(z_.size());
+    whole << step.head(begin), -dropped, step.tail(step.size() - begin);
+    z_ = without_columns((z_ + whole).transpose(), begin, changes).transpose();
+    for (std::size_t k = 0; k < setups_.size(); ++k) {
+        SetupRows& rows = setups_[k];
+        const Eigen::VectorXd change = rows.factor.solve(rows.gradient) - rows.transfer * whole;
+        rows.residual -= rows.by_baseline * whole + rows.by_setup * change;
+        rows.value += change;
+        rows.by_baseline = without_columns(rows.by_baseline, begin, changes);
+        rows.transfer = without_columns(rows.transfer, begin, changes);
+        rows.spread = factor_.matrixL().solve(rows.transfer.transpose());
+        stated_residual_[k] = rows.residual + rows.by_baseline * z_;
     }
 }
 

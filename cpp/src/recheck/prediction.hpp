@@ -18,8 +18,10 @@ public:
     Prediction(const AdjustmentProblem& problem, const Baseline& baseline);
 
     // Gauss-Newton to the minimum of e^T e + z^T z + priors of s. Throws InvalidArgument where it is not reached.
-    // `changed` false: the changes of the baseline are held at 0.
-    void solve(bool changed = true);
+    void solve();
+    // After solve(): the estimate without the changes of the baseline, linear from there. What a changed machine reads
+    // would take set-ups that must explain it far away from where anything is linear.
+    void drop_changes();
     double chi_square() const;
     int degrees_of_freedom() const;
 
@@ -35,12 +37,10 @@ public:
     // Of readings of one set-up. After solve().
     Deviation deviation(const std::vector<Term>& sum) const;
 
-    // After solve(): z, and the inverse of its covariance; of all columns, held ones too. The root's columns come
-    // first, those of the changes last.
+    // After solve(): z, and the inverse of its covariance. The root's columns come first, those of the changes last of
+    // them.
     const Eigen::VectorXd& values() const { return z_; }
     const Eigen::MatrixXd& information() const { return matrix_; }
-    // Half of the square sum's derivative by z, downwards: 0 but for what is held.
-    const Eigen::VectorXd& gradient() const { return gradient_; }
 
 private:
     struct SetupRows {
@@ -72,9 +72,8 @@ private:
     std::vector<SetupRows> setups_;
     Eigen::VectorXd z_;
     Eigen::MatrixXd matrix_;
-    Eigen::VectorXd gradient_;
-    Eigen::LLT<Eigen::MatrixXd> factor_;            // of what is not held
-    std::vector<Eigen::Index> held_;                // of z
+    Eigen::VectorXd gradient_;                      // half of the square sum's derivative by z, downwards
+    Eigen::LLT<Eigen::MatrixXd> factor_;            // of matrix_
     std::vector<Eigen::VectorXd> stated_residual_;  // by set-up: at z = 0, s^
 };
 

@@ -20,7 +20,7 @@ struct Told {
     Eigen::Index first;           // from here on they tell more than the priors
 };
 
-// From the normal equations where the changes are held at 0.
+// By the normal equations at the estimate with priors, which draw it towards 0 along each direction.
 Told told_of_changes(const Prediction& prediction, Eigen::Index begin, Eigen::Index count) {
     const Eigen::MatrixXd& matrix = prediction.information();
     const Eigen::Index size = matrix.rows(), after = size - begin - count;
@@ -33,12 +33,11 @@ Told told_of_changes(const Prediction& prediction, Eigen::Index begin, Eigen::In
                                         Eigen::MatrixXd::Identity(count, count) -
                                         coupling.transpose() * others.llt().solve(coupling);
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(information);
-    // At the minimum over everything else their part of the gradient is 0.
-    const Eigen::VectorXd gradient = parts.eigenvectors().transpose() * prediction.gradient().segment(begin, count);
+    const Eigen::VectorXd drawn = parts.eigenvectors().transpose() * prediction.values().segment(begin, count);
     Told told{parts.eigenvalues(), parts.eigenvectors(), Eigen::VectorXd::Zero(count), count};
     for (Eigen::Index k = count; k-- > 0 && told.information[k] >= 1.0;) {
         told.first = k;
-        told.estimate[k] = gradient[k] / told.information[k];
+        told.estimate[k] = drawn[k] * (1.0 + told.information[k]) / told.information[k];
     }
     return told;
 }
@@ -104,11 +103,9 @@ Recheck recheck(const Calibration& baseline, const Measurement& measurement, con
     const auto count = Eigen::Index(changing.changes().size());
     const Eigen::Index begin = changing.root().cols() - count;
 
-    Prediction unchanged(problem, changing);
-    unchanged.solve(false);
-    const Told told = told_of_changes(unchanged, begin, count);
     Prediction changed(problem, changing);
     changed.solve();
+    const Told told = told_of_changes(changed, begin, count);
 
     Recheck result{0.0, 0, 1.0, 0.0, 0, 1.0, changing.changes(), {}, {}, {}, with_change(changing, changed)};
     result.chi_square = told.estimate.cwiseAbs2().dot(told.information);

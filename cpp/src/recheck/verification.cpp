@@ -13,6 +13,9 @@
 namespace stepdiag {
 namespace {
 
+// Within which set-ups are found, whether or not the machine is as the calibration says: ten times what is usual.
+constexpr ChangePriors largest_change{300e-6, 50e-3, 300e-6, 500e-6};
+
 // The first and the last point of each pass that have a distance.
 std::vector<LineDeviation> line_deviations(const Measurement& measurement, const AdjustmentProblem& problem,
                                            const Prediction& prediction) {
@@ -65,11 +68,12 @@ Verification verify(const Calibration& calibration, const Measurement& measureme
                     const Chain& chain, const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                     const AdjustmentOptions& options) {
     check_same_machine(calibration, plan, chain, tool, options);
-    const Baseline baseline(calibration);
+    const Baseline baseline(calibration, largest_change);
     const AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine(options));
     if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
     Prediction prediction(problem, baseline);
     prediction.solve();
+    prediction.drop_changes();
 
     Verification result{{},
                         line_deviations(measurement, problem, prediction),

@@ -80,6 +80,7 @@ INPUTS = {
     *{("compare", "a"), ("compare", "b"), ("positions", "file")},
     *{("verify", name) for name in ("calibration", "scenario", "run")},
     *{("recheck", name) for name in ("baseline", "scenario", "run")},
+    ("plan", "baseline"),
     *{("export", "calibration"), ("volume", "calibration")},
     *{("check", "files"), ("head show", "name"), ("head check", "name"), ("head sensitivity", "name")},
     *{("plot", "files"), ("plot", "truth"), ("plot", "scenario"), ("acquire", "temperatures")},

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rechecked
 from json_objects import printed
 from refusal import refused
 
@@ -144,3 +145,17 @@ def test_what_cannot_be_rechecked_is_refused(folder: Path, capsys: pytest.Captur
     )
     baseline, run = sd.read_calibration("calibration.nc"), sd.read_measurement("same.csv")
     refused(sd.recheck_scenario, baseline, sd.read_scenario("none.toml"), run, names="one kind of change")
+
+
+@pytest.mark.parametrize("seed", [14, 36, 54])
+def test_machine_that_has_changed_in_all_ways_is_told_as_such(seed: int) -> None:
+    """Set-ups are free in much, and must not be taken for the change of the machine."""
+    drawn, baseline, rng = rechecked.calibrated(1_000_000 + seed, 4)
+    plan = rechecked.short_plan(drawn, seed, 4)
+    machine = rechecked.changed_machine(drawn, rechecked.random_change(rng))
+    run = rechecked.read_again(drawn, machine, plan, rng)
+    given = (baseline, run, plan, drawn.head, sd.Chain(drawn.chain), machine.tool)
+    found = sd.recheck(*given, options=rechecked.options(drawn))
+    assert found.probability < 1e-12
+    assert found.fit_probability > 1e-6
+    assert sd.verify(*given, options=rechecked.options(drawn)).probability < 1e-12

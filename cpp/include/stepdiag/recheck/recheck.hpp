@@ -73,10 +73,10 @@ Recheck recheck(const Calibration& baseline, const Measurement& measurement, con
                 const Eigen::Vector3d& tool, const HeadCalibrations& heads, const AdjustmentOptions& options = {},
                 const ChangePriors& priors = {});
 
-// By term, in the unit of its prior: the smallest change, of this term alone, that such readings show with a probability
-// of `power` where an unchanged machine is said to have changed with the probability `alpha`; infinite where they tell
-// nothing of it. It depends on the plan, the head and the uncertainties of the readings, hardly on what was read, so that
-// simulated readings tell it of a plan. Throws InvalidArgument unless 0 < alpha < power < 1.
+// By term, in the unit of its prior: the smallest change, of this term alone, that such readings show with a
+// probability of `power` where an unchanged machine is said to have changed with the probability `alpha`; infinite
+// where they tell nothing of it. It depends on the plan, the head and the uncertainties of the readings, hardly on what
+// was read, so that simulated readings tell it of a plan. Throws InvalidArgument unless 0 < alpha < power < 1.
 Eigen::VectorXd smallest_changes_seen(const Recheck& recheck, double alpha = 0.001, double power = 0.95);
 
 }  // namespace stepdiag
