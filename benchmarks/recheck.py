@@ -78,11 +78,16 @@ def chi_square(deviation: np.ndarray, covariance: np.ndarray) -> tuple[float, in
     return float((parts[kept] ** 2 / values[kept]).sum()), int(kept.sum())
 
 
-def changed(seed: int, steps: int) -> tuple[list[float], list[float], list[float], float, int]:
+def updated_unchanged(seed: int, steps: int) -> tuple[list[float], list[float], list[float], float, int]:
+    """As changed(), of a machine that has not changed."""
+    return changed(seed, steps, size=0.0)
+
+
+def changed(seed: int, steps: int, size: float = 1.0) -> tuple[list[float], list[float], list[float], float, int]:
     """Deviations of the terms by their uncertainty; mean squares by family of baseline and update; chi-square."""
     drawn, baseline, rng = calibrated(1_000_000 + seed, steps)
     plan = short_plan(drawn, seed, steps)
-    change = random_change(rng)
+    change = random_change(rng, size)
     machine = changed_machine(drawn, change)
     run = read_again(drawn, machine, plan, rng)
     found = sd.recheck(baseline, run, plan, drawn.head, sd.Chain(drawn.chain), machine.tool, options=options(drawn))
@@ -96,8 +101,11 @@ def changed(seed: int, steps: int) -> tuple[list[float], list[float], list[float
     return normalised, squares[0], squares[1], *chi_square(deviation, found.updated.covariance)
 
 
+OF_A_MACHINE = {one.__name__: one for one in (unchanged, changed, updated_unchanged)}
+
+
 def of_chunk(function: str, steps: int, seeds: range) -> list[tuple]:
-    return [{"unchanged": unchanged, "changed": changed}[function](seed, steps) for seed in seeds]
+    return [OF_A_MACHINE[function](seed, steps) for seed in seeds]
 
 
 def everything(function: str, count: int, steps: int, workers: int) -> list[tuple]:
@@ -114,6 +122,16 @@ def share_is(name: str, share: float, expected: float, count: int) -> bool:
     good = abs(share - expected) <= scatter
     print(f"  {name:44}{100 * share:8.3f} %, expected {100 * expected:.3g} %{'' if good else '   <-- off'}", flush=True)
     return bool(good)
+
+
+def print_deviations(found: list[tuple]) -> list[bool]:
+    """Root mean squares by family; whether that of the updated calibration is no larger."""
+    before = np.sqrt(np.mean([one[1] for one in found], axis=0))
+    after = np.sqrt(np.mean([one[2] for one in found], axis=0))
+    for kind, old, new in zip(KINDS, before, after, strict=True):
+        (a, unit), b = report_value(NATIVE_UNIT[kind], old), report_value(NATIVE_UNIT[kind], new)[0]
+        print(f"  rms deviation, {kind:14}{a:8.2f} {unit} by the baseline, {b:6.2f} {unit} by the updated one")
+    return [bool(new <= old) for old, new in zip(before, after, strict=True)]
 
 
 def main() -> int:
@@ -147,16 +165,12 @@ def main() -> int:
         of_kind = [kind_of(name) == parameters for name in (*FUNCTIONS, *SQUARENESSES)]
         good.append(share_is(f"changes: {kind} covered by 95 %", float(np.mean(within[:, of_kind])), 0.95, len(found)))
     good.append(share_is("changes: all covered by 95 %", float(np.mean(within)), 0.95, len(found)))
-    before = np.sqrt(np.mean([one[1] for one in found], axis=0))
-    after = np.sqrt(np.mean([one[2] for one in found], axis=0))
-    for kind, old, new in zip(KINDS, before, after, strict=True):
-        (a, unit), b = report_value(NATIVE_UNIT[kind], old), report_value(NATIVE_UNIT[kind], new)[0]
-        print(f"  rms deviation, {kind:14}{a:8.2f} {unit} by the baseline, {b:6.2f} {unit} by the updated one")
-        good.append(bool(new <= old))
+    good += print_deviations(found)
     squares, freedom = np.array([one[3] for one in found]), np.array([one[4] for one in found])
     ratio, scatter = squares.sum() / freedom.sum(), np.sqrt(2.0 / freedom.sum())
     print(f"  chi-square of the updated by its freedom {ratio:.5f}, expected 1 within {4 * scatter:.5f}")
     good.append(abs(ratio - 1.0) <= 4.0 * scatter)
+    print_deviations(everything("updated_unchanged", given.changed // 4, given.steps, given.workers))
     print("\nas expected" if all(good) else "\nnot as expected")
     return 0 if all(good) else 1
 

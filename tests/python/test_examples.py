@@ -44,6 +44,15 @@ def test_method_page_has_the_tables_of_the_examples() -> None:
     assert by_steps.split("mirror that they take:\n")[1] in page
 
 
+def test_page_on_rechecks_has_the_month_of_the_example(tmp_path: Path) -> None:
+    page = (EXAMPLES.parent / "docs" / "verify.md").read_text(encoding="utf-8")
+    assert output_of(EXAMPLES / "month_of_a_machine.py", tmp_path) in page
+    days = ["plan", tmp_path / "day1.toml", "--recheck", tmp_path / "day0.nc", "--minutes", "10"]
+    taken = next(line for line in output_of("-m", "stepdiag", *days).splitlines() if line.startswith("    * "))
+    cells = taken.split()[-6:-2]
+    assert all(cell in page for cell in cells)
+
+
 def test_own_measurement_goes_from_files_to_a_table(tmp_path: Path) -> None:
     scenario = EXAMPLES / "scenario.toml"
     sd.simulate_scenario(sd.read_scenario(scenario)).write(tmp_path / "run.csv")

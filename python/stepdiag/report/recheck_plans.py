@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from stepdiag.io.csv_text import csv_text
 from stepdiag.planning.recheck_plans import BEYOND, POWER, Power, choose, front
 from stepdiag.rechecking.recheck import CHANGE_UNITS
+from stepdiag.report.plan_by_time import LINES
 from stepdiag.report.text_columns import text_columns
 from stepdiag.units import MICROMETRE
 
@@ -28,7 +29,8 @@ def recheck_plan_rows(found: Sequence[Power], minutes: float, limit: float, alph
         changes = [_change(kind, one.worst(kind)) for kind in CHANGE_UNITS]
         unseen = f"{len(one.unseen(limit)) or '-'}"
         hidden = f"{one.hidden / MICROMETRE:.1f}"
-        rows.append([marked, c.description, f"{c.steps}", f"{c.repeats}", *changes, unseen, hidden])
+        lines = ", ".join(f"{n} {LINES[name]}" for name, n in c.counts.items() if n)
+        rows.append([marked, lines, f"{c.steps}", f"{c.repeats}", *changes, unseen, hidden])
     table = list(text_columns(rows, left=(1,)))
     in_time = sum(one.minutes <= minutes for one in plans)
     if in_time < len(plans):
