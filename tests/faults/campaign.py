@@ -1,8 +1,10 @@
 """The campaign of faults; `./run faults` calls it.
 
 A command is killed, runs out of room, fails or is interrupted at each of its calls that change a file, and interrupted
-at random times; files of every kind are damaged. Afterwards every file must be the old one or the whole new one. Prints
-a table; ends with 1 if anything was lost, crashed or hung.
+at random times. So is an acquisition, which then goes on. Instruments and clients of acquisitions are hostile. Files of
+every kind are damaged. Afterwards every file must be the old one or the whole new one, every reading must be there,
+and what was refused must have one line that says why. Prints a table; ends with 1 if anything was lost, crashed or
+hung.
 """
 
 import argparse
@@ -21,10 +23,14 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from processes import Outcome
 
 HERE = Path(__file__).resolve().parent
-NOBODY = 65534
 COUNT, KILL, FAIL, INTERRUPT, RUN_FULL = range(5)
 KINDS = {
     "killed at a call": (KILL, 0),
@@ -34,11 +40,16 @@ KINDS = {
     "a call refused (EACCES)": (FAIL, errno.EACCES),
     "Ctrl-C at a call": (INTERRUPT, 0),
 }
-AT_RANDOM, READ_ONLY, DAMAGED = "Ctrl-C at random", "read-only folder", "damaged file"
+AT_RANDOM, READ_ONLY = "Ctrl-C at random", "read-only folder"
+ACQUISITION = "acquisition stopped"
+INSTRUMENT, CLIENT, DAMAGED = "hostile instrument", "hostile client", "damaged file"
+EVERY_KIND = (*KINDS, AT_RANDOM, READ_ONLY, ACQUISITION, INSTRUMENT, CLIENT, DAMAGED)
 MOST_CALLS = 40  # of a command; of more these many are chosen
 INTERRUPTS = 12  # of each command at random times
+CLIENTS = 5  # of each behaviour
 DAMAGES = 1200  # of each kind of file
 BATCH = 100  # damaged files read by one process
+SHORT = 12  # in the short form: one of so many acquisitions and batches of files, two of so many cases of a command
 TEMPORARY = re.compile(r".+\.([0-9a-f]{16}|[0-9]+-[0-9]+)")
 LONGEST_END = 5.0  # s, for an interrupted command on a loaded computer
 
@@ -50,11 +61,11 @@ class Case:
     over_old: bool = False
     call: int = 0
     seconds: float = 0.0
-    name: str = ""  # of the damaged file
+    name: str = ""  # of the damaged file, of the fault or of the behaviour
 
 
 class Campaign:
-    """Prepared inputs, and what undisturbed commands make of them."""
+    """Prepared inputs; `prepare` learns what undisturbed commands make of them."""
 
     def __init__(self, folder: Path) -> None:
         import commands
@@ -67,19 +78,21 @@ class Campaign:
         self.layer.fault_arm.argtypes = [ctypes.c_char_p, ctypes.c_int, ctypes.c_long, ctypes.c_int]
         self.make_inputs()
         self.calls: dict[tuple[int, bool], int] = {}
-        self.seconds: list[float] = []
-        self.new: list[dict[str, bytes]] = []
-        self.old: list[dict[str, bytes]] = []
-        for number in range(len(self.commands)):
-            self.old.append(self.undisturbed(number, "older", {})[0])
-            new, calls, seconds = self.undisturbed(number, "inputs", {})
-            again, calls_over, _ = self.undisturbed(number, "inputs", self.old[number])
-            self.new.append(new)
-            self.seconds.append(seconds)
-            self.calls[number, False] = calls
-            if again:
-                assert again == new, f"{self.commands[number].arguments}: another result beside an old one"
-                self.calls[number, True] = calls_over
+        self.seconds: dict[int, float] = {}
+        self.new: dict[int, dict[str, bytes]] = {}
+        self.old: dict[int, dict[str, bytes]] = {}
+
+    def prepare(self, number: int, worker: int) -> None:
+        """Run a command undisturbed: alone, beside an old result, and with the inputs of the old one."""
+        self.old[number] = self.undisturbed(number, "older", {}, worker)[0]
+        new, calls, seconds = self.undisturbed(number, "inputs", {}, worker)
+        again, calls_over, _ = self.undisturbed(number, "inputs", self.old[number], worker)
+        self.new[number] = new
+        self.seconds[number] = seconds
+        self.calls[number, False] = calls
+        if again:
+            assert again == new, f"{self.commands[number].arguments}: another result beside an old one"
+            self.calls[number, True] = calls_over
 
     def make_inputs(self) -> None:
         from commands import make_inputs
@@ -123,11 +136,13 @@ class Campaign:
             (case / path).write_bytes(content)
         return case
 
-    def undisturbed(self, number: int, inputs: str, old: dict[str, bytes]) -> tuple[dict[str, bytes], int, float]:
+    def undisturbed(
+        self, number: int, inputs: str, old: dict[str, bytes], worker: int
+    ) -> tuple[dict[str, bytes], int, float]:
         """What it writes, its calls and its time; nothing if it refuses to replace an old one."""
         from processes import in_child
 
-        case = self.place("undisturbed", inputs, old)
+        case = self.place(f"case-{worker}", inputs, old)
         done = in_child(self.work(number, case, COUNT, -1, 0), case.with_suffix(".said"))
         if done.status == 2 and old:
             return {}, 0, 0.0
@@ -144,23 +159,33 @@ class Campaign:
         }
 
     # --- cases ------------------------------------------------------------------------------------------------------
-    def cases(self) -> Iterator[Case]:
-        chance = random.Random(1)
-        for (number, over_old), count in self.calls.items():
+    def of_command(self, number: int) -> Iterator[Case]:
+        chance = random.Random(number)
+        for over_old in (False, True):
+            count = self.calls.get((number, over_old), 0)
             calls = sorted(chance.sample(range(count), min(count, MOST_CALLS)))
             yield from (Case(kind, number, over_old, call) for kind in KINDS for call in calls)
-            if not over_old:
-                yield Case(READ_ONLY, number)
-                longest = 1.1 * self.seconds[number]
-                yield from (Case(AT_RANDOM, number, False, 0, chance.uniform(0, longest)) for _ in range(INTERRUPTS))
+        yield Case(READ_ONLY, number)
+        longest = 1.1 * self.seconds[number]
+        yield from (Case(AT_RANDOM, number, seconds=chance.uniform(0.003, longest)) for _ in range(INTERRUPTS))
+
+    def others(self, short: bool) -> Iterator[Case]:
+        import hostile
         from damage import READERS
 
+        calls = 1 + self.acquisition(0, COUNT, 0, 0)[1]
+        yield from (Case(ACQUISITION, call=call, name=kind) for kind in KINDS for call in range(calls))
+        self.instruments = list(hostile.instruments(short))
+        yield from (Case(INSTRUMENT, call=k) for k in range(len(self.instruments)))
+        yield from (Case(CLIENT, call=k, name=name) for name in hostile.CLIENTS for k in range(1 if short else CLIENTS))
         yield from (Case(DAMAGED, name=name, call=k) for name in READERS for k in range(0, DAMAGES, BATCH))
 
     def run(self, case: Case, worker: int) -> list[tuple[str, str]]:
         """(verdict, what happened) of each try of a case."""
         if case.kind == DAMAGED:
             return self.damaged(case, worker)
+        if case.kind in (ACQUISITION, INSTRUMENT, CLIENT):
+            return [self.of_acquisition(case, worker)]
         from processes import in_child
 
         old = self.old[case.command] if case.over_old else {}
@@ -177,9 +202,9 @@ class Campaign:
             outcome = in_child(self.work(case.command, place, kind, case.call, number), said)
         found = self.written(place)
         verdict = self.verdict(case, outcome, old, found)
-        if verdict.startswith("lost") or (outcome.status in (0, 3, 130)):
-            return [(verdict, f"{case} {outcome.status} {outcome.said[-400:]}")]
-        return [(self.continued(case, place, found, verdict), f"{case}")]
+        if verdict.startswith("lost") or outcome.status in (0, 3):
+            return [(verdict, f"{self.shown(case)} {outcome.status} {outcome.said[:700]}")]
+        return [(self.continued(case, place, found, verdict), self.shown(case))]
 
     def verdict(self, case: Case, outcome: "object", old: dict[str, bytes], found: dict[str, bytes]) -> str:
         from processes import Outcome
@@ -253,27 +278,61 @@ class Campaign:
                 return f"lost: a mixed set passes check: {checked.status}"
         return verdict
 
+    def shown(self, case: Case) -> str:
+        return f"{case}, stepdiag {self.commands[case.command].arguments}"
+
     def read_only(self, case: Case, place: Path, said: Path) -> tuple[str, str]:
-        from processes import in_child
+        from processes import give_up_privileges, in_child
 
         work = self.work(case.command, place, COUNT, -1, 0)
 
         def unprivileged() -> int:
-            if os.geteuid() == 0:
-                os.setgroups([])
-                os.setgid(NOBODY)
-                os.setuid(NOBODY)
-            os.environ["HOME"] = "/nonexistent"
+            give_up_privileges()
             return work()
 
         place.chmod(0o555)
-        said.touch()
-        said.chmod(0o666)
         outcome = in_child(unprivileged, said)
         place.chmod(0o755)
         found = self.written(place)
         sound = outcome.status == 2 and outcome.is_one_line and not found
-        return "refused" if sound else f"lost: {sorted(found)}", f"{case} {outcome.status} {outcome.said[-300:]}"
+        what = f"{self.shown(case)} {outcome.status} {outcome.said[-300:]}"
+        return "refused" if sound else f"lost: {sorted(found)}", what
+
+    def of_acquisition(self, case: Case, worker: int) -> tuple[str, str]:
+        import hostile
+
+        place = self.folder / f"acquired-{worker}"
+        shutil.rmtree(place, ignore_errors=True)
+        if case.kind == INSTRUMENT:
+            return hostile.with_instrument(place, *self.instruments[case.call])
+        if case.kind == CLIENT:
+            return hostile.with_client(place, case.name, case.call)
+        kind, number = KINDS[case.name]
+        outcome, _ = self.acquisition(worker, kind, case.call, number)
+        wrong = hostile.continued(place, outcome, kind == INTERRUPT)
+        verdict = f"lost: {wrong}" if wrong else "refused" if outcome.status == 2 else "recovered"
+        return verdict, f"{case} {outcome.status} {outcome.said[-300:]}"
+
+    def acquisition(self, worker: int, kind: int, call: int, number: int) -> tuple["Outcome", int]:
+        """An acquisition with this fault, and its calls if it came to its end."""
+        import hostile
+        from processes import in_child
+
+        place = self.folder / f"acquired-{worker}"
+        shutil.rmtree(place, ignore_errors=True)
+        hostile.make_place(place)
+        counted = place.with_suffix(".calls")
+        with hostile.serving("program", "sound", 1) as source:
+            arm = partial(self.layer.fault_arm, str(place).encode(), kind, call, number)
+            work = hostile.acquiring(place, source, before=arm)
+
+            def counting() -> int:
+                status = work()
+                counted.write_text(str(self.layer.fault_count()))
+                return status
+
+            outcome = in_child(counting, place.with_suffix(".said"))
+        return outcome, int(counted.read_text()) if outcome.status == 0 else 0
 
     def damaged(self, case: Case, worker: int) -> list[tuple[str, str]]:
         from damage import try_one
@@ -304,8 +363,6 @@ class Campaign:
 
 def prepare_originals(campaign: Campaign) -> None:
     """Whole files of every kind that is damaged."""
-    import openpyxl
-
     folder = campaign.folder / "originals"
     folder.mkdir()
     inputs = campaign.folder / "inputs"
@@ -316,77 +373,105 @@ def prepare_originals(campaign: Campaign) -> None:
         ("calibration.nc", "calibration.nc"),
         ("map.csv", "map.csv"),
         ("scenario.toml", "scenario.toml"),
+        ("sheet.csv", "sheet.csv"),
+        ("sheet.xlsx", "sheet.xlsx"),
     ):
         shutil.copyfile(inputs / source, folder / name)
     from stepdiag.head.description import find_shipped_head
 
     shutil.copyfile(find_shipped_head("beam_and_psd"), folder / "head.toml")
-    rows = [line.split(",") for line in (inputs / "run.csv").read_text().splitlines() if not line.startswith("#")]
-    (folder / "sheet.csv").write_text("\n".join(";".join(row).replace(".", ",") for row in rows))
-    book = openpyxl.Workbook()
-    for k, row in enumerate(rows):
-        book.active.append(row if k == 0 else [row[0], *(float(value) if value else None for value in row[1:])])
-    book.save(folder / "sheet.xlsx")
 
 
-def part(campaign: Campaign, cases: list[Case], worker: int, results: Path) -> None:
+def part(campaign: Campaign, worker: int, arguments: argparse.Namespace, results: Path) -> None:
+    """The cases of one process: those of its commands, and its share of the others."""
+    chance = random.Random(worker)
     with results.open("w") as file:
-        for case in cases:
+
+        def note(kind: str, verdict: str, what: str) -> None:
+            file.write(json.dumps([kind, verdict, what]) + "\n")
+            file.flush()
+
+        cases = [case for k, case in enumerate(campaign.others(arguments.short)) if k % arguments.jobs == worker]
+        if arguments.short:
+            cases = [case for case in cases if case.kind in (INSTRUMENT, CLIENT) or chance.random() < 1 / SHORT]
+        numbers = range(0, len(campaign.commands), 3 if arguments.short else 1)
+        for number in numbers[worker :: arguments.jobs]:
+            if arguments.command and arguments.command not in campaign.commands[number].arguments:
+                continue
+            try:
+                campaign.prepare(number, worker)
+            except Exception as error:
+                note(AT_RANDOM, f"lost: the campaign itself: {error!r}", campaign.commands[number].arguments)
+                continue
+            own = list(campaign.of_command(number))
+            cases += chance.sample(own, max(1, len(own) // (SHORT // 2))) if arguments.short else own
+        chosen = [case for case in cases if arguments.kind in (None, case.kind)]
+        chance.shuffle(chosen)
+        for case in chosen:
             try:
                 found = campaign.run(case, worker)
             except Exception as error:
                 found = [(f"lost: the campaign itself: {error!r}", str(case))]
             for verdict, what in found:
-                file.write(json.dumps([case.kind, verdict, what]) + "\n")
+                note(case.kind, verdict, what)
 
 
 def table(found: list[tuple[str, str, str]]) -> list[str]:
-    kinds = [*KINDS, AT_RANDOM, READ_ONLY, DAMAGED]
     counts = Counter((kind, verdict.split(":")[0]) for kind, verdict, _ in found)
     columns = ("refused", "recovered", "lost")
     lines = [f"{'kind':<26}{'tried':>8}" + "".join(f"{column:>11}" for column in columns)]
-    for kind in (*kinds, None):
+    for kind in (*EVERY_KIND, None):
         row = [sum(n for (k, v), n in counts.items() if (kind is None or k == kind) and v == c) for c in columns]
         lines.append(f"{kind or 'all':<26}{sum(row):>8}" + "".join(f"{count:>11}" for count in row))
     return lines
 
 
+def results_in(folder: Path) -> list[tuple[str, str, str]]:
+    lines = [line for path in folder.glob("results-*.jsonl") for line in path.read_text().splitlines(keepends=True)]
+    return [tuple(json.loads(line)) for line in lines if line.endswith("\n")]
+
+
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--short", action="store_true", help="a twentieth of the cases")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--kind", help="only this kind")
+    parser = argparse.ArgumentParser(prog="./run faults", description=__doc__)
+    parser.add_argument("--short", action="store_true", help="a third of the commands, a few of the cases")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
+    parser.add_argument("--kind", choices=EVERY_KIND, help="only this kind")
+    parser.add_argument("--command", help="only commands with this text")
     arguments = parser.parse_args()
     start = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="stepdiag-faults-") as name:
         folder = Path(name)
-        folder.chmod(0o755)
         campaign = Campaign(folder)
         prepare_originals(campaign)
-        cases = [case for case in campaign.cases() if arguments.kind in (None, case.kind)]
-        if arguments.short:
-            cases = random.Random(2).sample(cases, max(1, len(cases) // 20))
-        random.Random(3).shuffle(cases)
-        workers = []
+        print(f"{time.monotonic() - start:.0f} s: inputs are made", file=sys.stderr, flush=True)
+        workers = set()
         for worker in range(arguments.jobs):
             child = os.fork()
             if child == 0:
-                part(campaign, cases[worker :: arguments.jobs], worker, folder / f"results-{worker}")
+                part(campaign, worker, arguments, folder / f"results-{worker}.jsonl")
                 os._exit(0)
-            workers.append(child)
-        for child in workers:
-            os.waitpid(child, 0)
-        found = [
-            (kind, verdict, what)
-            for worker in range(arguments.jobs)
-            for kind, verdict, what in map(json.loads, (folder / f"results-{worker}").read_text().splitlines())
-        ]
-    lost = [(kind, verdict, what) for kind, verdict, what in found if verdict.startswith("lost")]
-    for kind, verdict, what in lost:
+            workers.add(child)
+        told = time.monotonic()
+        crashed = False
+        while workers:
+            time.sleep(0.2)
+            for child in list(workers):
+                ended, status = os.waitpid(child, os.WNOHANG)
+                if ended:
+                    workers.remove(child)
+                    crashed |= status != 0
+            if time.monotonic() > told + 30.0:
+                told = time.monotonic()
+                found = results_in(folder)
+                lost = sum(verdict.startswith("lost") for _, verdict, _ in found)
+                print(f"{told - start:.0f} s: {len(found)} tried, {lost} lost", file=sys.stderr, flush=True)
+        found = results_in(folder)
+    lost_ones = [each for each in found if each[1].startswith("lost")]
+    for kind, verdict, what in lost_ones:
         print(f"{kind}: {verdict}\n  {what}")
     print("\n".join(table(found)))
-    print(f"{time.monotonic() - start:.0f} s")
-    return 1 if lost or not found else 0
+    print(f"{time.monotonic() - start:.0f} s, {arguments.jobs} processes")
+    return 1 if lost_ones or crashed or not found else 0
 
 
 if __name__ == "__main__":

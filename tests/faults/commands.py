@@ -1,6 +1,7 @@
 """The commands of the campaign, in a folder with their inputs, and what each of them writes there."""
 
 import os
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,25 +52,56 @@ COMMANDS = (
     Command("uncertainty scenario.toml -o out.csv", ("out.csv",)),
     Command("uncertainty scenario.toml -m enhanced -n 4000 -o out.nc", ("out.nc",), "--resume", ("out.nc.checkpoint",)),
     Command("study study.toml -o out.nc", ("out.nc",), "--resume", ("out.nc.cells",)),
+    Command("recheck calibration.nc again.toml again.csv --update out.nc", ("out.nc",)),
+    Command("recheck calibration.nc again.toml again.csv --update out.csv", ("out.csv",)),
+    Command("import sheet.csv --overwrite -o out.csv", ("out.csv",)),
+    Command("import sheet.xlsx --overwrite -o out.nc", ("out.nc",)),
+    Command("plan planned.toml -o out.csv", ("out.csv",)),
+    Command("acquire --from-raw out.raw.jsonl -o out.csv", ("out.csv",)),
     Command("init -o new", ("new",)),
     Command("head show beam_and_psd -o out.svg", ("out.svg",)),
 )
 
 
+PLANNED = '[plan_by_time]\nsteps = [5]\nrepeats = [1]\nline_sets = [["ppp", "npp", "p00"]]\n'
+
+
 def make_inputs(folder: Path, scenario: str, main: Callable[[list[str]], int]) -> int:
-    """Scenario, run, calibration, error map and study."""
+    """Scenarios, runs, a raw file, sheets, calibrations, error map and study."""
+    import openpyxl
+
+    import stepdiag
+
     folder.mkdir(parents=True)
     (folder / "scenario.toml").write_text(scenario)
+    (folder / "again.toml").write_text(scenario.replace("steps = 5", "steps = 1").replace("seed = 3", "seed = 4"))
+    (folder / "planned.toml").write_text(scenario + PLANNED)
     (folder / "study.toml").write_text(STUDY)
     os.chdir(folder)
     for line in (
         "simulate scenario.toml -o run.csv",
         "simulate scenario.toml -o run.nc",
+        "simulate again.toml -o again.csv",
         "evaluate scenario.toml run.csv -o calibration.csv",
         "evaluate scenario.toml run.csv -o calibration.nc",
     ):
         assert main(line.split()) in (0, 3), line
-    import stepdiag
-
     stepdiag.read_scenario("scenario.toml").machine().errors.write("map.csv")
+    rows = [line.split(",") for line in Path("run.csv").read_text().splitlines() if not line.startswith("#")]
+    Path("sheet.csv").write_text("\n".join(";".join(row).replace(".", ",") for row in rows))
+    book = openpyxl.Workbook()
+    for k, row in enumerate(rows):
+        book.active.append(row if k == 0 else [row[0], *(float(value) if value else None for value in row[1:])])
+    book.save("sheet.xlsx")
+    from hostile import acquiring, make_place, serving
+    from processes import in_child
+
+    make_place(folder / "acquired")
+    with serving("program", "sound", 1) as source:
+        done = in_child(acquiring(folder / "acquired", source), folder / "acquired.said")
+    assert done.status == 0, done
+    (folder / "acquired" / "out.raw.jsonl").rename("out.raw.jsonl")
+    shutil.rmtree("acquired")
+    for ending in ("said", "told"):
+        Path(f"acquired.{ending}").unlink()
     return 0

@@ -7,15 +7,18 @@ its reading, and the places where an acquisition began or was resumed (raw_recor
 import fcntl
 import os
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Final, Self
 
 from stepdiag._core import InvalidArgument
 from stepdiag.acquisition.instrument import Number
 from stepdiag.acquisition.raw_records import Again, Header, RawReading, Record, Value, parse_record
 from stepdiag.io.whole_files import check_output, read_bytes, reason, sync_folder
+
+_BEGINNING: Final = b'{"record":"header"'
 
 
 @dataclass(frozen=True)
@@ -61,16 +64,24 @@ class RawFile:
 
     @classmethod
     def create(cls, path: Path, header: Header) -> Self:
-        """Create a file. Raises InvalidArgument if it exists."""
+        """Create a file. Raises InvalidArgument if it exists and is begun."""
         check_new(path)
         try:
-            handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | os.O_CLOEXEC, 0o666)
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
         except OSError as error:
             raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
         file = cls(path, handle)
         file._lock()
-        file.append([header])
-        sync_folder(path.parent)
+        try:
+            check_new(path)  # another process may have begun it
+            os.ftruncate(handle, 0)
+            file.append([header])
+            sync_folder(path.parent)
+        except BaseException as error:
+            file.close()
+            if isinstance(error, OSError):
+                raise InvalidArgument(f"{path}: cannot be written: {reason(error)}") from None
+            raise
         return file
 
     @classmethod
@@ -85,6 +96,8 @@ class RawFile:
         file = cls(path, handle)
         file._lock()
         try:
+            if not is_begun(path):
+                raise InvalidArgument(f"{path}: nothing was read yet: begin without `resume`")
             content = read_raw(path)
             if content.torn_bytes:
                 os.ftruncate(handle, content.sound_bytes)
@@ -103,7 +116,8 @@ class RawFile:
                 data = data[os.write(self._handle, data) :]
             os.fsync(self._handle)
         except OSError as error:
-            os.ftruncate(self._handle, before)  # a full disk must not leave half a line
+            with suppress(OSError):
+                os.ftruncate(self._handle, before)  # a full disk must not leave half a line
             raise InvalidArgument(f"{self.path}: cannot be written: {reason(error)}") from None
 
     def close(self) -> None:
@@ -125,12 +139,20 @@ class RawFile:
             raise InvalidArgument(f"{self.path}: another acquisition is writing it") from None
 
 
-def check_new(path: Path) -> None:
-    """Raise InvalidArgument if a raw file cannot be created at `path`.
+def is_begun(path: Path) -> bool:
+    """Whether there is more than the beginning of a header: a power cut or a full disk may come at the first line."""
+    if not path.exists() or (path.is_file() and path.stat().st_size == 0):
+        return False
+    content = read_bytes(path)
+    return b"\n" in content or not _BEGINNING.startswith(content[: len(_BEGINNING)])
 
-    Existing files are never replaced."""
+
+def check_new(path: Path) -> None:
+    """Raise InvalidArgument if a raw file cannot be begun at `path`.
+
+    Existing files are never replaced, unless they are not begun."""
     check_output(path)
-    if path.exists() or path.is_symlink():
+    if path.is_symlink() or is_begun(path):
         raise InvalidArgument(
             f"{path}: exists already: `resume` continues it, another `output` (or `raw`) begins a new one"
         )

@@ -196,6 +196,7 @@ def acquire(scenario: Path | None, output: OutputFile, from_raw: Path | None, **
 
 def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
     from stepdiag.acquisition.acquire import acquire, raw_path
+    from stepdiag.acquisition.raw_file import is_begun
     from stepdiag.scenario.description import read_scenario
 
     described = read_scenario(scenario)
@@ -208,7 +209,7 @@ def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
     trigger = _trigger(given["trigger"])
 
     def continuation() -> str | None:
-        return f"{raw.path} has the readings so far: repeat the command with --resume" if raw.path.exists() else None
+        return f"{raw.path} has the readings so far: repeat the command with --resume" if is_begun(raw.path) else None
 
     with at_end(continuation), unwinding():
         result = acquire(

@@ -94,6 +94,8 @@ def _pages(path: Path, page: str | None) -> list[tuple[str, Rows]]:
     try:
         with CalamineWorkbook.from_path(str(path)) as book:
             names = book.sheet_names
+            if not names:
+                raise InvalidArgument(f"{path}: the workbook has no sheets; it may be damaged")
             if page is not None and page not in names:
                 raise InvalidArgument(f'{path}: has no sheet "{page}"; sheets: {", ".join(names)}')
             return [

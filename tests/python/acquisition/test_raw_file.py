@@ -98,3 +98,25 @@ def test_raw_files_begin_only_where_nothing_is(tmp_path: Path, name: str) -> Non
         RawFile.create(tmp_path / name, HEADER)
     with pytest.raises(InvalidArgument, match=name):
         RawFile.resume(tmp_path / name)
+
+
+@pytest.mark.parametrize("torn", [b"", b'{"record":"hea', b'{"record":"header","format":"stepdiag raw'])
+def test_raw_file_without_its_header_is_begun_anew(tmp_path: Path, torn: bytes) -> None:
+    """A power cut or a full disk came before the first reading: nothing is lost, and nobody has to delete it."""
+    path = tmp_path / "run.raw.jsonl"
+    path.write_bytes(torn)
+    with pytest.raises(InvalidArgument, match="nothing was read yet: begin without `resume`"):
+        RawFile.resume(path)
+    with RawFile.create(path, HEADER):
+        pass
+    assert read_raw(path).header == HEADER
+    with pytest.raises(InvalidArgument, match="exists already"):
+        RawFile.create(path, HEADER)
+
+
+def test_other_text_without_a_line_end_is_not_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "run.raw.jsonl"
+    path.write_bytes(b"my notes")
+    with pytest.raises(InvalidArgument, match="exists already"):
+        RawFile.create(path, HEADER)
+    assert path.read_bytes() == b"my notes"

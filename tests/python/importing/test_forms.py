@@ -18,6 +18,7 @@ from small_scenario import SCENARIO
 
 import stepdiag as sd
 from stepdiag.cli import main
+from stepdiag.importing.run import import_files
 
 TRUTH = """\
 line,point,x_mm,y_mm,z_mm,distance_mm,alpha_urad,beta_urad,u_distance_um,time_s,temperature_c,air_pressure_hpa,run
@@ -493,3 +494,13 @@ def test_exchanged_scenario_and_run(folder: Path, capsys: pytest.CaptureFixture[
     assert "truth.csv: expected a scenario, got a measurement: are the files in the wrong order?" in said
     assert main(["evaluate", "scenario.toml", "scenario.toml", "-o", "c.csv"]) == 2
     assert "scenario.toml: expected a measurement, got a TOML file" in capsys.readouterr().err
+
+
+def test_workbook_without_sheets_is_refused(tmp_path: Path) -> None:
+    book = openpyxl.Workbook()
+    book.save(tmp_path / "whole.xlsx")
+    with zipfile.ZipFile(tmp_path / "whole.xlsx") as whole, zipfile.ZipFile(tmp_path / "run.xlsx", "w") as damaged:
+        for name in whole.namelist():
+            damaged.writestr(name, whole.read(name).replace(b"<sheet ", b"<shoot "))
+    with pytest.raises(sd.InvalidArgument, match=r"run\.xlsx: the workbook has no sheets"):
+        import_files([tmp_path / "run.xlsx"])
