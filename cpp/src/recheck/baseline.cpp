@@ -1,6 +1,6 @@
 #include "recheck/baseline.hpp"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -48,38 +48,17 @@ void check_complete(const Calibration& calibration) {
 
 }  // namespace
 
-void Baseline::find_root() {
+Baseline::Baseline(Calibration calibration, const ChangePriors& priors, const Positions& read)
+    : calibration_(std::move(calibration)) {
+    check(calibration_);
+    check_complete(calibration_);
     int entry = 0;
     for (int i = 0; i < function_count; ++i) {
         first_entry_[i] = entry;
         entry += int(calibration_.functions[i]->position.size());
     }
     for (int s = 0; s < squareness_count; ++s) first_entry_[function_count + s] = entry++;
-
-    // A covariance may be singular: functions are 0 at home, and the frame takes three straightnesses to 0 at the end.
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(calibration_.covariance);
-    constexpr double rounding = 1e-14;  // of eigenvalues against the largest
-    const double smallest = rounding * parts.eigenvalues().maxCoeff();
-    const Eigen::Index rank = (parts.eigenvalues().array() > smallest).count();
-    std::vector<int> open;
-    for (int i = 0; i < function_count; ++i)
-        if (!calibration_.functions[i]->slope_determined) open.push_back(i);
-    root_.setZero(entry, rank + Eigen::Index(open.size()));
-    root_.leftCols(rank) =
-        parts.eigenvectors().rightCols(rank) * parts.eigenvalues().tail(rank).cwiseSqrt().asDiagonal();
-    for (Eigen::Index i = 0; i < entry; ++i)
-        if (calibration_.covariance(i, i) == 0.0) root_.row(i).setZero();  // exactly, as it is known
-    for (std::size_t k = 0; k < open.size(); ++k) {
-        const std::vector<double>& nodes = calibration_.functions[open[k]]->position;
-        for (std::size_t n = 0; n < nodes.size(); ++n)
-            root_(first_entry_[open[k]] + int(n), rank + Eigen::Index(k)) = usual_slope * nodes[n];
-    }
-}
-
-Baseline::Baseline(Calibration calibration, const ChangePriors& priors) : calibration_(std::move(calibration)) {
-    check(calibration_);
-    check_complete(calibration_);
-    find_root();
+    find_root(read_entries(read));
     for (const double prior : {priors.scale, priors.bow, priors.slope, priors.squareness})
         if (!(std::isfinite(prior) && prior >= 0.0))
             throw InvalidArgument("change: expected priors that are finite and at least 0");
@@ -94,6 +73,61 @@ Baseline::Baseline(Calibration calibration, const ChangePriors& priors) : calibr
     }
     for (const Squareness s : all_squarenesses) add(name(s), ChangeKind::squareness, priors.squareness);
     if (changes_.empty()) throw InvalidArgument("change: expected a prior above 0 for one kind of change at least");
+}
+
+// Those with an uncertainty: functions are 0 at home, and the frame takes three straightnesses to 0 at the end.
+std::vector<int> Baseline::read_entries(const Positions& read) const {
+    std::vector<bool> is_read(std::size_t(calibration_.covariance.rows()), false);
+    for (int i = 0; i < function_count; ++i)
+        for (const double position : read[index(FunctionId::at(i).axis)]) {
+            const Interval at = find(calibration_.functions[i]->position, position);
+            is_read[std::size_t(first_entry_[i]) + at.node] = true;
+            if (at.share > 0.0) is_read[std::size_t(first_entry_[i]) + at.node + 1] = true;
+        }
+    for (int s = 0; s < squareness_count; ++s) is_read[std::size_t(first_entry_[function_count + s])] = true;
+    std::vector<int> entries;
+    for (int k = 0; k < int(is_read.size()); ++k)
+        if (is_read[std::size_t(k)] && calibration_.covariance(k, k) > 0.0) entries.push_back(k);
+    return entries;
+}
+
+// With the correlations of what is read, P^T L D L^T P: their root, and for all others the part that goes with them.
+void Baseline::find_root(const std::vector<int>& entries) {
+    const Eigen::MatrixXd& covariance = calibration_.covariance;
+    const auto count = Eigen::Index(entries.size()), all = covariance.rows();
+    Eigen::MatrixXd columns(all, count);
+    for (Eigen::Index j = 0; j < count; ++j) {
+        const int entry = entries[std::size_t(j)];
+        columns.col(j) = covariance.col(entry) / std::sqrt(covariance(entry, entry));
+    }
+    Eigen::MatrixXd correlations(count, count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+        const int entry = entries[std::size_t(i)];
+        correlations.row(i) = columns.row(entry) / std::sqrt(covariance(entry, entry));
+    }
+    const Eigen::LDLT<Eigen::MatrixXd> factor(correlations);
+    Eigen::MatrixXd shares = factor.transpositionsP() * columns.transpose();
+    factor.matrixL().solveInPlace(shares);
+    constexpr double rounding = 1e-12;  // of a correlation of 1: what depends on others altogether
+    std::vector<int> open;
+    for (int i = 0; i < function_count; ++i)
+        if (!calibration_.functions[i]->slope_determined) open.push_back(i);
+    root_.setZero(all, count + Eigen::Index(open.size()));
+    own_columns_ = 0;
+    for (Eigen::Index k = 0; k < count; ++k)
+        if (const double pivot = factor.vectorD()[k]; pivot > rounding)
+            root_.col(own_columns_++) = shares.row(k).transpose() / std::sqrt(pivot);
+    for (std::size_t k = 0; k < open.size(); ++k) {
+        const std::vector<double>& nodes = calibration_.functions[open[k]]->position;
+        for (std::size_t n = 0; n < nodes.size(); ++n)
+            root_(first_entry_[open[k]] + int(n), own_columns_ + Eigen::Index(k)) = usual_slope * nodes[n];
+    }
+    root_.conservativeResize(Eigen::NoChange, own_columns_ + Eigen::Index(open.size()));
+}
+
+Eigen::MatrixXd Baseline::rest_covariance() const {
+    const auto own = root_.leftCols(own_columns_);
+    return calibration_.covariance - own * own.transpose();
 }
 
 void Baseline::add_change(const ChangeTerm& change) {

@@ -38,6 +38,13 @@ double descend(const At& at, double before) {
 
 }  // namespace
 
+Baseline::Positions read_positions(const AdjustmentProblem& problem) {
+    Baseline::Positions read;
+    for (const AdjustedPoint& point : problem.points())
+        for (const Axis axis : all_axes) read[index(axis)].push_back(point.place.commanded[index(axis)]);
+    return read;
+}
+
 Prediction::Prediction(const AdjustmentProblem& problem, const Baseline& baseline)
     : problem_(problem), baseline_(baseline) {
     weigh_readings();

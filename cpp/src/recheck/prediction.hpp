@@ -11,6 +11,9 @@
 
 namespace stepdiag {
 
+// Of all points with readings.
+Baseline::Positions read_positions(const AdjustmentProblem& problem);
+
 // All is in units of standard uncertainties: readings of their own, z of its prior. The normal equations are a dense
 // block of z, bordered by a small block of each set-up, which couple with it alone.
 class Prediction {

@@ -48,7 +48,7 @@ Calibration with_change(const Baseline& baseline, const Prediction& prediction) 
     const Eigen::VectorXd change = root * prediction.values().head(columns);
     const Eigen::MatrixXd inverse =
         prediction.information().llt().solve(Eigen::MatrixXd::Identity(prediction.values().size(), columns));
-    const Eigen::MatrixXd covariance = root * inverse.topRows(columns) * root.transpose();
+    const Eigen::MatrixXd covariance = baseline.rest_covariance() + root * inverse.topRows(columns) * root.transpose();
     Calibration updated = baseline.calibration();
     updated.method += (updated.date.empty() ? "" : " of " + updated.date) + ", rechecked";
     updated.date.clear();
@@ -97,9 +97,9 @@ Recheck recheck(const Calibration& baseline, const Measurement& measurement, con
                 const Eigen::Vector3d& tool, const HeadCalibrations& heads, const AdjustmentOptions& options,
                 const ChangePriors& priors) {
     check_same_machine(baseline, plan, chain, tool, options);
-    const Baseline changing(baseline, priors);
     const AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine(options));
     if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
+    const Baseline changing(baseline, priors, read_positions(problem));
     const auto count = Eigen::Index(changing.changes().size());
     const Eigen::Index begin = changing.root().cols() - count;
 

@@ -68,9 +68,9 @@ Verification verify(const Calibration& calibration, const Measurement& measureme
                     const Chain& chain, const Eigen::Vector3d& tool, const HeadCalibrations& heads,
                     const AdjustmentOptions& options) {
     check_same_machine(calibration, plan, chain, tool, options);
-    const Baseline baseline(calibration, largest_change);
     const AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine(options));
     if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
+    const Baseline baseline(calibration, largest_change, read_positions(problem));
     Prediction prediction(problem, baseline);
     prediction.solve();
     prediction.drop_changes();

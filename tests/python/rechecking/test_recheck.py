@@ -96,7 +96,7 @@ def test_object_has_what_the_report_has(folder: Path, capsys: pytest.CaptureFixt
     assert (result["changed"], result["explained"], result["updated"]) == (True, True, "updated.nc")
     assert result["chi_square"] == found.chi_square
     by_name = {term.parameter: term for term in found.terms}
-    assert result["squarenesses"][0]["value_urad"] == 1e6 * by_name["C0Y"].value
+    assert result["squarenesses"][0]["value_urad"] == pytest.approx(1e6 * by_name["C0Y"].value)
     assert {one["parameter"] for key in ("scales", "bows", "slopes", "squarenesses") for one in result[key]} == {
         *by_name
     }
