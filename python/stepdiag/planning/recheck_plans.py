@@ -53,7 +53,7 @@ class Power:
     seconds: float
     terms: Sequence[ChangeTerm] = ()
     smallest: Sequence[float] = ()
-    gains: Sequence[float] = ()
+    gains: tuple[float, ...] = ()
     hidden: float = math.inf
     trouble: str = ""
 
@@ -147,9 +147,12 @@ def powers(
 ) -> list[Power]:
     """Of all candidates, the fastest first. `progress` is told how many of how many are done."""
     everything = candidates(scenario, baseline, minutes)
-    result = []
+    result: list[Power] = []
+    gains: tuple[float, ...] | None = None
     for done, (seconds, candidate) in enumerate(everything, 1):
-        result.append(power_of(scenario, baseline, candidate, seconds, alpha=alpha))
+        one = power_of(scenario, baseline, candidate, seconds, alpha=alpha, gains=gains)
+        gains = one.gains or gains
+        result.append(one)
         if progress is not None:
             progress(done, len(everything))
     if all(one.trouble for one in result):
@@ -158,9 +161,16 @@ def powers(
 
 
 def power_of(
-    scenario: Scenario, baseline: Calibration, candidate: Candidate, seconds: float, *, alpha: float = ALPHA
+    scenario: Scenario,
+    baseline: Calibration,
+    candidate: Candidate,
+    seconds: float,
+    *,
+    alpha: float = ALPHA,
+    gains: tuple[float, ...] | None = None,
 ) -> Power:
-    """By readings without noise of a machine as the baseline has it."""
+    """By readings without noise of a machine as the baseline has it. `gains`: those of another plan, which are the
+    same."""
     planned = not_measured(
         scenario.known,
         {
@@ -177,7 +187,8 @@ def power_of(
     except InvalidArgument as error:
         return Power(candidate, seconds, trouble=str(error))
     smallest = found.smallest_changes_seen(alpha=alpha, power=POWER)
-    gains = tuple(farthest_move(baseline, np.outer(shape, shape)) for shape in found.shape.T)
+    if gains is None:
+        gains = tuple(farthest_move(baseline, np.outer(shape, shape)) for shape in found.shape.T)
     hidden = Judged(found, baseline, alpha).hidden
     return Power(candidate, seconds, found.terms, tuple(map(float, smallest)), gains, hidden)
 
