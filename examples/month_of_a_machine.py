@@ -3,7 +3,7 @@
 python examples/month_of_a_machine.py [FOLDER]
 
 On day 0 the machine is calibrated; on the other days it is rechecked by four body diagonals in five steps, about six
-minutes. Each time the laser is set up anew, the scales have another temperature, and each sensor is off by 0.1 K
+minutes. Each time the laser is set up anew, the scales have another temperature, and their sensor is off by 0.1 K
 (standard deviation). A recheck that says "changed" becomes the baseline of the next ones. With FOLDER, scenarios,
 readings and calibrations stay there.
 """
