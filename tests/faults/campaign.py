@@ -49,7 +49,7 @@ INTERRUPTS = 12  # of each command at random times
 CLIENTS = 5  # of each behaviour
 DAMAGES = 1200  # of each kind of file
 BATCH = 100  # damaged files read by one process
-SHORT = 12  # in the short form: one of so many acquisitions and batches of files, two of so many cases of a command
+SHORT = 12  # in the short form: two of so many cases of a command, half of one of acquisitions and batches of files
 TEMPORARY = re.compile(r".+\.([0-9a-f]{16}|[0-9]+-[0-9]+)")
 LONGEST_END = 5.0  # s, for an interrupted command on a loaded computer
 
@@ -393,7 +393,7 @@ def part(campaign: Campaign, worker: int, arguments: argparse.Namespace, results
 
         cases = [case for k, case in enumerate(campaign.others(arguments.short)) if k % arguments.jobs == worker]
         if arguments.short:
-            cases = [case for case in cases if case.kind in (INSTRUMENT, CLIENT) or chance.random() < 1 / SHORT]
+            cases = [case for case in cases if case.kind in (INSTRUMENT, CLIENT) or chance.random() < 0.5 / SHORT]
         numbers = range(0, len(campaign.commands), 3 if arguments.short else 1)
         for number in numbers[worker :: arguments.jobs]:
             if arguments.command and arguments.command not in campaign.commands[number].arguments:

@@ -35,7 +35,10 @@ layout = "{layout}"
 """
 BEAMS = 'multi_beam"\nbeam_offsets_mm = [[15.0, 0.0], [-7.5, 13.0], [-7.5, -13.0]]\n#"'
 POINTS = 4
-QUICK = "--timeout 0.4 --settle-count 2 --average 1 --interval-ms 0 --settle-timeout 0.5 --retries 1 --wait-timeout 15 --start never"
+QUICK = (
+    "--timeout 0.4 --settle-count 2 --average 1 --interval-ms 0 --settle-timeout 0.5 --retries 1 --wait-timeout 15 "
+    "--start never"
+)
 MUTATIONS = {"program": 150, "ids3010": 100, "lines": 0}
 LONGEST_SAID = 1500  # bytes of standard error
 LONGEST_TOLD = 100  # lines of standard output
@@ -46,9 +49,9 @@ FEW_FILES = 40  # that may be open beside the 60 connections of "many"
 def instruments(short: bool) -> Iterator[tuple[str, str, int]]:
     """Protocol, behaviour, seed."""
     for protocol, behaviours in (("program", LINES), ("lines", LINES), ("ids3010", IDS3010)):
-        chosen = [b for b in behaviours if b != "silent"][:: 4 if short else 1]
+        chosen = [b for b in behaviours if b != "silent"][:: 5 if short else 1]
         yield from ((protocol, behaviour, 1) for behaviour in (chosen if short else behaviours))
-        yield from ((protocol, MUTATED, seed) for seed in range(MUTATIONS[protocol] // (20 if short else 1)))
+        yield from ((protocol, MUTATED, seed) for seed in range(MUTATIONS[protocol] // (50 if short else 1)))
 
 
 @contextmanager
