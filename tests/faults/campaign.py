@@ -40,12 +40,13 @@ KINDS = {
     "a call refused (EACCES)": (FAIL, errno.EACCES),
     "Ctrl-C at a call": (INTERRUPT, 0),
 }
+OVER_OLD = ("killed at a call", "disk full from a call on")  # also tried where an old result stands
 AT_RANDOM, READ_ONLY = "Ctrl-C at random", "read-only folder"
 ACQUISITION = "acquisition stopped"
 INSTRUMENT, CLIENT, DAMAGED = "hostile instrument", "hostile client", "damaged file"
 EVERY_KIND = (*KINDS, AT_RANDOM, READ_ONLY, ACQUISITION, INSTRUMENT, CLIENT, DAMAGED)
 MOST_CALLS = 40  # of a command; of more these many are chosen
-INTERRUPTS = 12  # of each command at random times
+INTERRUPTS = 6  # of each command at random times
 CLIENTS = 5  # of each behaviour
 DAMAGES = 1200  # of each kind of file
 BATCH = 100  # damaged files read by one process
@@ -69,7 +70,7 @@ class Campaign:
 
     def __init__(self, folder: Path) -> None:
         import commands
-        from warm import warm
+        from warm import warm, warm_up
 
         warm()
         self.folder, self.commands = folder, commands.COMMANDS
@@ -77,6 +78,7 @@ class Campaign:
         self.layer.fault_count.restype = ctypes.c_long
         self.layer.fault_arm.argtypes = [ctypes.c_char_p, ctypes.c_int, ctypes.c_long, ctypes.c_int]
         self.make_inputs()
+        warm_up(folder / "inputs")
         self.calls: dict[tuple[int, bool], int] = {}
         self.seconds: dict[int, float] = {}
         self.new: dict[int, dict[str, bytes]] = {}
@@ -164,7 +166,8 @@ class Campaign:
         for over_old in (False, True):
             count = self.calls.get((number, over_old), 0)
             calls = sorted(chance.sample(range(count), min(count, MOST_CALLS)))
-            yield from (Case(kind, number, over_old, call) for kind in KINDS for call in calls)
+            kinds = OVER_OLD if over_old else KINDS
+            yield from (Case(kind, number, over_old, call) for kind in kinds for call in calls)
         yield Case(READ_ONLY, number)
         longest = 1.1 * self.seconds[number]
         yield from (Case(AT_RANDOM, number, seconds=chance.uniform(0.003, longest)) for _ in range(INTERRUPTS))
