@@ -29,7 +29,7 @@ void fault_arm(const char* path, int what, long call, int number) {
 long fault_count(void) { return count; }
 long fault_failed(void) { return failed; }
 
-static int is_ours(const char* path) {
+static __attribute__((noinline)) int is_ours(const char* path) {
     char whole[8192];
     if (!folder[0] || !path) return 0;
     if (path[0] != '/') {
@@ -41,14 +41,20 @@ static int is_ours(const char* path) {
     return strncmp(path, folder, strlen(folder)) == 0 && path[strlen(folder)] == '/';
 }
 
-static int is_our_file(int file) {
+static __attribute__((noinline)) int has_our_name(int file) {
     char link[64], path[4096];
-    if (!folder[0]) return 0;
     snprintf(link, sizeof link, "/proc/self/fd/%d", file);
     const ssize_t length = readlink(link, path, sizeof path - 1);
     if (length <= 0) return 0;
     path[length] = 0;
-    return path[0] == '/' && (is_ours(path) || strcmp(path, folder) == 0);  // else a pipe or a socket
+    return path[0] == '/' && (is_ours(path) || strcmp(path, folder) == 0);
+}
+
+/* Python's handlers of signals write to a socket, on faulthandler's small stack: nothing large may be on it. */
+static int is_our_file(int file) {
+    struct stat status;
+    if (!folder[0] || fstat(file, &status) != 0 || !(S_ISREG(status.st_mode) || S_ISDIR(status.st_mode))) return 0;
+    return has_our_name(file);
 }
 
 /* Whether this call has to fail. Of a write that is the last call, half arrives. */
