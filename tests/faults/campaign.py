@@ -217,12 +217,13 @@ class Campaign:
             return "lost: hung"
         if outcome.crashed:
             return f"lost: crashed with {outcome.status}"
+        if outcome.interrupted and outcome.status == 70 and "in interruptible" in outcome.said and not found:
+            return "recovered"  # it came in the child before the program had begun
         new, command = self.new[case.command], self.commands[case.command]
         killed = outcome.status == -signal.SIGKILL
         interrupted = case.kind in (AT_RANDOM, "Ctrl-C at a call")
-        if interrupted and outcome.seconds > LONGEST_END + (
-            0 if case.kind == AT_RANDOM else self.seconds[case.command]
-        ):
+        patience = LONGEST_END + (0.0 if outcome.interrupted else 3.0 * self.seconds[case.command])
+        if interrupted and outcome.seconds > patience and outcome.status != 0:
             return f"lost: took {outcome.seconds:.1f} s to end"
         torn, mixed = [], set()
         for name, content in found.items():

@@ -20,7 +20,8 @@ class Outcome:
     status: int  # negative: the signal that ended it
     said: str  # standard error
     hung: bool
-    seconds: float
+    seconds: float  # after the interruption, if there was one
+    interrupted: bool = False
 
     @property
     def crashed(self) -> bool:
@@ -58,14 +59,14 @@ def in_child(
             sys.stderr.flush()
             os._exit(status)
     watch = os.pidfd_open(child)
-    hung = False
+    hung = sent = False
     with selectors.DefaultSelector() as selector:
         selector.register(watch, selectors.EVENT_READ)
         os.close(begins)
         os.read(begun, 1)  # its end: the child is there
         os.close(begun)
         if interrupt is not None and not selector.select(interrupt):
-            start = time.monotonic()
+            start, sent = time.monotonic(), True
             os.kill(child, signal.SIGINT)
         if not selector.select(patience):
             hung = True
@@ -73,7 +74,7 @@ def in_child(
     os.close(watch)
     _, code = os.waitpid(child, 0)
     said = errors.read_text(errors="replace") if errors.exists() else ""
-    return Outcome(os.waitstatus_to_exitcode(code), said, hung, time.monotonic() - start)
+    return Outcome(os.waitstatus_to_exitcode(code), said, hung, time.monotonic() - start, sent)
 
 
 def give_up_privileges() -> None:
