@@ -71,6 +71,17 @@ std::pair<int, std::string> open_temporary(const std::string& target) {
     }
 }
 
+// So that the name of a new file survives a power cut.
+bool sync_folder(const std::filesystem::path& folder) {
+    const int handle = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (handle < 0) return errno == EACCES;                       // a folder that may be written but not read
+    const bool synced = ::fsync(handle) == 0 || errno == EINVAL;  // a file system that has nothing to sync
+    const int error = errno;
+    ::close(handle);
+    errno = error;
+    return synced;
+}
+
 // Parses a whole number with an optional sign. Large values are clamped: as decimal exponents they give 0 or infinity.
 std::optional<int> parse_exponent(std::string_view text) {
     constexpr int limit = 100'000;
@@ -146,16 +157,22 @@ void write_text_file(const std::string& path, std::string_view text) {
         if (file < 0 || ::close(file) != 0 || !written) fail("cannot be written");
         return;
     }
+    // Renaming would replace it all the same; so would root, who may write everything: it is the mode that counts.
+    if (exists && ((status.st_mode & 0222) == 0 || ::access(path.c_str(), W_OK) != 0))
+        throw InvalidArgument(path +
+                              ": cannot be written: the file is read-only; make it writable, or name another file");
     const std::string target = linked_file(path);
     const auto [file, temporary] = open_temporary(target);
     if (file < 0) fail("cannot be written");
     const bool written =
         write_all(file, text) && (!exists || ::fchmod(file, status.st_mode & 07777) == 0) && ::fsync(file) == 0;
-    if (::close(file) == 0 && written && ::rename(temporary.c_str(), target.c_str()) == 0) return;
-    const int error = errno;
-    ::unlink(temporary.c_str());
-    errno = error;
-    fail("cannot be written");
+    if (::close(file) != 0 || !written || ::rename(temporary.c_str(), target.c_str()) != 0) {
+        const int error = errno;
+        ::unlink(temporary.c_str());
+        errno = error;
+        fail("cannot be written");
+    }
+    if (!sync_folder(std::filesystem::path(target).parent_path())) fail("cannot be written");
 }
 
 CsvFile parse_csv(std::string_view text, const std::string& file_name) {

@@ -134,7 +134,6 @@ def write_by_core(path: str | os.PathLike[str], write: Callable[[str | os.PathLi
     """Let the core write a file, by the rules of this module. It takes pipes and devices, too.
 
     Raises InvalidArgument."""
-    check_not_read_only(Path(path))
     target = Path(os.path.realpath(path))
 
     def remove() -> None:
@@ -143,8 +142,6 @@ def write_by_core(path: str | os.PathLike[str], write: Callable[[str | os.PathLi
 
     with at_end(remove), uninterrupted():
         write(path)
-        if target.is_file():
-            sync_folder(target.parent)
 
 
 def sync_folder(folder: Path) -> None:
@@ -173,12 +170,12 @@ def check_output(path: Path) -> None:
     if mode is not None and not stat.S_ISREG(mode):
         what = "a folder" if stat.S_ISDIR(mode) else "not a regular file"
         raise InvalidArgument(f"{path}: cannot be written: it is {what}")
-    check_not_read_only(path)
+    _check_not_read_only(path)
     if not os.access(folder, os.W_OK):
         raise InvalidArgument(f"{path}: cannot be written: no permission to write in {folder}")
 
 
-def check_not_read_only(path: Path) -> None:
+def _check_not_read_only(path: Path) -> None:
     """Raise InvalidArgument for a file that was made read-only: renaming would replace it all the same.
 
     So would root, who may write everything: it is the mode that counts."""

@@ -179,6 +179,19 @@ TEST(TextFile, ModeOfAnExistingFileIsKeptAndANewOneHasThatOfAnyNewFile) {
     fs::remove_all(folder);
 }
 
+TEST(TextFile, ReadOnlyFileIsNotReplaced) {
+    namespace fs = std::filesystem;
+    const fs::path folder = fs::temp_directory_path() / "stepdiag_text_file_read_only_test";
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+    const std::string path = (folder / "a.csv").string();
+    stepdiag::write_text_file(path, "first");
+    fs::permissions(path, fs::perms::owner_read);
+    expect_refused([&] { stepdiag::write_text_file(path, "second"); }, "the file is read-only");
+    EXPECT_EQ(stepdiag::read_text_file(path), "first");
+    fs::remove_all(folder);
+}
+
 TEST(TextFile, FileBehindALinkIsWrittenEvenWhereItIsNotThereYet) {
     namespace fs = std::filesystem;
     const fs::path folder = fs::temp_directory_path() / "stepdiag_text_file_link_test";
