@@ -217,7 +217,8 @@ class Campaign:
             return "lost: hung"
         if outcome.crashed:
             return f"lost: crashed with {outcome.status}"
-        if outcome.interrupted and outcome.status == 70 and "in interruptible" in outcome.said and not found:
+        has_begun = "stepdiag/cli" in outcome.said and "in interruptible" not in outcome.said
+        if outcome.interrupted and outcome.status == 70 and not has_begun and not found:
             return "recovered"  # it came in the child before the program had begun
         new, command = self.new[case.command], self.commands[case.command]
         killed = outcome.status == -signal.SIGKILL
