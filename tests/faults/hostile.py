@@ -39,6 +39,7 @@ QUICK = (
     "--timeout 0.4 --settle-count 2 --average 1 --interval-ms 0 --settle-timeout 0.5 --retries 1 --wait-timeout 15 "
     "--start never"
 )
+PATIENT = ("--timeout", "10", "--settle-timeout", "10")  # where the instrument is sound and the computer busy
 MUTATIONS = {"program": 150, "ids3010": 100, "lines": 0}
 LONGEST_SAID = 1500  # bytes of standard error
 LONGEST_TOLD = 100  # lines of standard output
@@ -133,9 +134,11 @@ def unsound_end(outcome: Outcome, place: Path) -> str:
 def with_instrument(place: Path, protocol: str, behaviour: str, seed: int) -> tuple[str, str]:
     make_place(place, BEAMS if protocol == "ids3010" else "ideal")
     with serving(protocol, behaviour, seed) as source:
-        outcome = in_child(acquiring(place, source), place.with_suffix(".said"))
+        is_sound = behaviour in ("sound", "other order")
+        work = acquiring(place, source, *(PATIENT if is_sound else ()))
+        outcome = in_child(work, place.with_suffix(".said"))
     wrong = unsound_end(outcome, place) or unsound_files(place)
-    if behaviour in ("sound", "other order") and outcome.status != 0:
+    if is_sound and outcome.status != 0:
         wrong = wrong or "a sound instrument was refused"
     if protocol != "ids3010" and behaviour in ENDLESS and outcome.status != 2:  # repeated replies are dropped
         wrong = wrong or "was taken for an instrument"
@@ -218,7 +221,7 @@ def with_client(place: Path, behaviour: str, seed: int) -> tuple[str, str]:
     ]
     with serving("program", "sound", seed) as source:
         trigger = f"tcp://127.0.0.1:{port}"
-        work = acquiring(place, source, "--trigger", trigger, before=before)
+        work = acquiring(place, source, "--trigger", trigger, *PATIENT, before=before)
         outcome = in_child(work, place.with_suffix(".said"))
     ends = [os.waitstatus_to_exitcode(os.waitpid(client, 0)[1]) for client in clients]
     wrong = unsound_end(outcome, place) or unsound_files(place)
@@ -250,7 +253,7 @@ def continued(place: Path, outcome: Outcome, interrupted: bool) -> str:
     if outcome.status != 0:
         with serving("program", "sound", 1) as source:
             more = ["--resume"] if begun else []
-            again = in_child(acquiring(place, source, *more), place.with_suffix(".said"))
+            again = in_child(acquiring(place, source, *more, *PATIENT), place.with_suffix(".said"))
         if again.status != 0:
             return f"does not go on: {again.status} {again.said[-300:]!r}"
     if not raw.read_bytes().startswith(before[: before.rfind(b"\n") + 1]):
