@@ -27,7 +27,9 @@ void add_sensor_effects(const std::vector<Eigen::VectorXd>& effects, const Adjus
                         const CalibratedForms& forms, const Observability& observability, Adjustment& result) {
     Calibration& calibration = result.calibration;
     for (const Eigen::VectorXd& effect : effects) {
-        const auto add = [](double& uncertainty, double more) { uncertainty = std::hypot(uncertainty, more); };
+        const auto add = [](double& uncertainty, double more) {
+            uncertainty = std::sqrt(uncertainty * uncertainty + more * more);
+        };
         for (int i = 0; i < function_count; ++i) {
             if (!forms.functions[i]) continue;
             auto& reversal = calibration.reversal[i];

@@ -67,7 +67,8 @@ void Prediction::weigh_readings() {
         for (int r = point.first_reading; r < point.end_reading; ++r) {
             const AdjustedReading& reading = problem_.readings()[r];
             const bool is_distance = problem_.channel_name(reading).front() == 'd';
-            sigma_[r] = std::hypot(reading.standard_uncertainty, at_nodes || !is_distance ? 0.0 : *between);
+            const double more = at_nodes || !is_distance ? 0.0 : *between;
+            sigma_[r] = std::sqrt(reading.standard_uncertainty * reading.standard_uncertainty + more * more);
         }
     }
 }
