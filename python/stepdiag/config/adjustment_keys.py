@@ -53,15 +53,16 @@ class AdjustmentKeys(Section):
 
 
 class AdjustmentSection(AdjustmentKeys):
-    """What the adjustment takes each unknown of the set-up for. Other methods use nothing of it.
+    """Priors of the set-up unknowns of the adjustment. Other methods do not use this section.
 
-    That is "free", "fixed" at 0, or a number: the standard uncertainty with which it is known to be 0. (Lateral
-    offset, roll and gain act on tilts only; "free" is for them 1 m, 1 rad and 1.)
+    Each value is "free", "fixed" at 0, or a number: the standard uncertainty with which the unknown is known to be 0.
+    (Lateral offset, roll and gain act on tilts only; for them "free" means 1 m, 1 rad and 1.)
     `[adjustment.LINE]` replaces, for one line, the keys it names. Scale lines take `reflector_urad` and `laser_urad`
-    from a table of their own only: by default their mirror is free, and their laser stands along the axis to 500 (never
-    "free"). Tilts tell the difference of both; what they leave open acts by its square, as an error of the distances by
-    their travel, which is in the uncertainties. So it does on single axes, on faces, where distances alone are read and
-    where beams have constants; there an angle that is "free" counts as known to 2000."""
+    from a table of their own only: by default their mirror is free, and their laser is along the axis to 500 (never
+    "free"). Tilts determine the difference of both. What they leave open acts by its square, as an error of the
+    distances proportional to the travel, which is part of the uncertainties. The same applies to single axes and faces,
+    where distances alone are read, and where beams have constants; an angle that is "free" there counts as known to
+    2000."""
 
     angles: Literal["free", "fixed"] = key(
         '"free" or "fixed"', "Rotations of the machine's axes; fixed: it has none.", "free"
@@ -117,11 +118,11 @@ class AdjustmentSection(AdjustmentKeys):
 
 
 class SmoothnessSection(Section):
-    """How smooth the adjustment takes the machine's errors for: the standard deviation with which second differences of
-    neighbouring nodes are known to be 0.
+    """Smoothness of the errors in the adjustment: the standard deviation with which second differences of neighbouring
+    nodes are known to be 0.
 
-    Without this section nothing is smoothed. It is for axes whose errors are known to be smooth over a step, and it
-    trades an error of fine pitch for noise; docs/method.md shows what it does to both."""
+    Without this section nothing is smoothed. Use it for axes whose errors are known to be smooth over a step. It
+    reduces noise and hides errors of fine pitch; docs/method.md shows both effects."""
 
     translation_um: Amplitude = key(AMPLITUDE, "Of positioning errors and straightnesses; 0: not smoothed.", 0.0, 0.5)
     rotation_urad: Amplitude = key(AMPLITUDE, "Of angular errors; 0: not smoothed.", 0.0, 1.0)

@@ -1,6 +1,6 @@
 """Markdown made from the keys of our TOML files, for docs/scenario.md and docs/head.md.
 
-`python -m stepdiag.config.key_reference scenario` prints the tables of the first, with `head` those of the second."""
+`python -m stepdiag.config.key_reference scenario` prints the lists of the first, with `head` those of the second."""
 
 import sys
 import textwrap
@@ -22,17 +22,17 @@ class Part:
     required: bool
 
 
-def key_table(root: type[Section]) -> str:
+def key_list(root: type[Section]) -> str:
     """Every section and key of a file, in Markdown."""
     lines = []
     if keys(root):
-        lines += [*_table(root, keys(root)), ""]
+        lines += [*_list(root, keys(root)), ""]
     for part in sections(root):
         optional = "" if part.required else " (optional)"
         heading = f"## `[{part.title}]`{optional}"
         if is_alternative(part.model):
             heading = f"### `{part.model.tag} = {show(tag_value(part.model))}` in `[{part.title}]`"
-        lines += [heading, "", *_table(part.model, keys(part.model)), ""]
+        lines += [heading, "", *_list(part.model, keys(part.model)), ""]
     return "\n".join(lines)
 
 
@@ -88,17 +88,22 @@ def show_full(value: object) -> str:
     return show(value, longest=10_000)
 
 
-def _table(section: type[Section], rows: list[tuple[str, FieldInfo]]) -> Iterator[str]:
-    yield from (paragraphs(section), "")
-    yield "| Key | Expected | Default | Meaning |\n|---|---|---|---|"
+def _list(section: type[Section], rows: list[tuple[str, FieldInfo]]) -> Iterator[str]:
+    yield from ("\n\n".join(_wrapped(text) for text in paragraphs(section).split("\n\n")), "")
     for name, field in rows:
-        yield f"| `{name}` | {expectation(field)} | {_default(field)} | {field.description} |"
+        item = f"- `{name}`: {field.description} Expected: {expectation(field)}. {_default(field)}"
+        yield _wrapped(item.rstrip(), below="  ")
+
+
+def _wrapped(text: str, below: str = "") -> str:
+    """In lines of 100 columns, with `below` before all but the first."""
+    return textwrap.fill(text, 100, subsequent_indent=below, break_long_words=False, break_on_hyphens=False)
 
 
 def _default(field: FieldInfo) -> str:
     if field.is_required():
-        return "**required**"
-    return "-" if field.default is None else f"`{show_full(field.default)}`"
+        return "**Required.**"
+    return "" if field.default is None else f"Default: `{show_full(field.default)}`."
 
 
 if __name__ == "__main__":
@@ -106,4 +111,4 @@ if __name__ == "__main__":
     from stepdiag.config.scenario_keys import ScenarioKeys
 
     roots: dict[str, type[Section]] = {"scenario": ScenarioKeys, "head": HeadFile}
-    print(key_table(roots[sys.argv[1]]))
+    print(key_list(roots[sys.argv[1]]))

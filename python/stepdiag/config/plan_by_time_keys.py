@@ -18,7 +18,7 @@ _duration = "a time of at least 0"
 
 
 class PlanByTimeSection(Section):
-    """How long moving and measuring take, for `plan` and `nc`, and the plans from which `plan` chooses.
+    """Times of moves and readings, for `plan` and `nc`, and the plans from which `plan` chooses.
 
     Head, order, backward runs, uncertainties and unknowns of all plans are those of the scenario."""
 

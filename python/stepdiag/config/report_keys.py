@@ -14,7 +14,7 @@ _words = f"a text of 1 to {LONGEST} characters"
 
 
 class ReportSection(Section):
-    """What the header of a report says (`stepdiag report -o report.html`). No evaluation reads it."""
+    """Header of a report (`stepdiag report -o report.html`). No evaluation reads it."""
 
     customer: Words | None = key(_words, "Who receives the report.", None, "Example Ltd, Aachen")
     machine: Words | None = key(_words, "Maker and type of the machine.", None, "VMC 800")

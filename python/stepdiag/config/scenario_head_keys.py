@@ -26,7 +26,7 @@ from stepdiag.config.key_types import (
 
 
 class PoseErrorKeys(Section):
-    """How a component of the described head stands out of its place, along the head's axes. Used by `simulate` only."""
+    """Pose error of a component of the described head, along the axes of the head. Used by `simulate` only."""
 
     shift_mm: Triple = key(THREE_LENGTHS, "Shift along the head's x, y, z.", (0.0, 0.0, 0.0))
     rotation_urad: AngleTriple = key(
@@ -123,7 +123,7 @@ DESCRIPTION_KEYS: Final = ("reading_model", "pose_errors")
 
 
 class LineKeys(Section):
-    """What is particular to one line, such as `[line.ppp]`."""
+    """Keys of one line, such as `[line.ppp]`."""
 
     head: Annotated[str, Field(min_length=1)] = key(
         "the name of a head", "The `[head.NAME]` that measures it.", example="left"
@@ -157,7 +157,7 @@ class AirKeys(Section):
 
 
 class AssumedAirKeys(AirKeys):
-    """The air that readings are reduced with, where the instrument takes it to be another.
+    """The air with which readings are reduced, if the instrument assumes another air.
 
     Keys that are not named are as in `[environment]`. By default the true air."""
 
@@ -177,10 +177,10 @@ class KnownEnvironmentKeys(Section):
 class EnvironmentSection(KnownEnvironmentKeys, AirKeys):
     """The air around machine and head, constant over a run: a `refractive_index`, or the state of the air.
 
-    Without any key: air of 20 °C before a described head, an index of 1 before one by its layout; but with a key in
-    `[environment.assumed]` air of 20 °C before every head.
+    Without any key, the air is that of 20 °C for a described head, and the index is 1 for a head given by its layout. With
+    a key in `[environment.assumed]`, the air is that of 20 °C for every head.
 
-    Used by `simulate` only, but for `readings`, and for the assumed air with `constant_index`. The equations hold for
+    Used by `simulate` only, except `readings`, and the assumed air with `constant_index`. The equations hold for
     wavelengths of 300 to 1700 nm."""
 
     assumed: AssumedAirKeys | None = None

@@ -119,7 +119,7 @@ class MachineSection(MachineErrorsKeys, KnownMachineKeys):
 
 
 class PlanSection(Section):
-    """What the machine is told to do."""
+    """The commanded measurement: lines, steps and order."""
 
     lines: tuple[str, ...] = key(
         'a list of lines such as "ppp" (three of p, n, 0)',
@@ -172,7 +172,7 @@ class PlanSection(Section):
 
 
 class MisalignmentKeys(Section):
-    """How head and mirror are out of true on a line."""
+    """Misalignment of head and mirror on a line."""
 
     reflector_urad: AnglePair = key(ANGLES, "Tilt (a, b) of the mirror about local x and y.", (0.0, 0.0))
     laser_urad: AnglePair = key(
@@ -202,7 +202,7 @@ class MisalignmentKeys(Section):
 
 
 class MisalignmentSection(MisalignmentKeys):
-    """How head and mirror are out of true, for all of `plan.lines`. Used by `simulate` only.
+    """Misalignment of head and mirror, for all of `plan.lines`. Used by `simulate` only.
 
     `[misalignment.LINE]` replaces, for one line, the keys it names. Scale lines are aligned unless named."""
 
@@ -225,7 +225,7 @@ class NoiseSection(NoiseKeys):
 
 
 class PlausibleSection(Section):
-    """What a machine can be. An evaluation whose result lies beyond these limits, by more than three times its standard
+    """Limits of plausible errors. An evaluation whose result exceeds these limits, by more than three times its standard
     uncertainty, ends with an error: the readings are in another unit, of another volume or of another plan."""
 
     positioning_um_per_m: Positive = key(
@@ -236,8 +236,8 @@ class PlausibleSection(Section):
 
 
 class ChangeSection(Section):
-    """How far the machine may have changed since its calibration: standard uncertainties with which a change is known
-    to be 0, for `stepdiag recheck`. 0: it cannot change like that. The defaults are those of wear, a collision, another
+    """Possible changes of the machine since its calibration, for `stepdiag recheck`: standard uncertainties with which a
+    change is known to be 0. With 0 this change is impossible. The defaults are typical for wear, a collision, another
     temperature and re-levelling."""
 
     scale_um_per_m: Amplitude = key(AMPLITUDE, "Of the scale of each axis.", 30.0, 30.0)

@@ -46,7 +46,7 @@ class SetupUncertaintyKeys(Section):
 
 
 class ComponentUncertaintyKeys(Section):
-    """How uncertain the place of a component of the described head is, along the head's axes; of all lines together."""
+    """Uncertainty of the pose of a component of the described head, along the axes of the head; common to all lines."""
 
     shift_um: Spread | None = _uncertain("Shift along the head's x, y, z, each.", 10.0)
     rotation_urad: Spread | None = _uncertain("Rotation about x, y, z through the component's own origin, each.", 50.0)
@@ -102,22 +102,22 @@ def _is_row(row: Any, length: int) -> bool:
 
 
 class UncertaintySection(SetupUncertaintyKeys):
-    """What is uncertain, and how it is distributed: docs/uncertainty.md. Nothing that is not named is, but for noise.
+    """Uncertain inputs and their distributions: docs/uncertainty.md. Except for noise, only named inputs are uncertain.
 
     A number is the standard deviation of a normal distribution around 0. Others are tables: {distribution = "normal",
     standard = 3.0}, {distribution = "rectangular", half_width = 3.0}, likewise "triangular" and "arcsine",
     {distribution = "t", scale = 1.0, degrees_of_freedom = 5}, and {distribution = "curvilinear_trapezoid", half_width =
     3.0, edge = 0.5}: a rectangle whose limits are known to ± edge. They may have an expectation and, for effective
-    degrees of freedom, degrees_of_freedom of their standard uncertainty. All of it is deviations from what the other
-    sections say, in the unit of the key.
+    degrees of freedom, degrees_of_freedom of their standard uncertainty. All values are deviations from what the other
+    sections state, in the unit of the key.
 
-    `distance_um`, `tilt_urad` and `spot_um` are all that an evaluation uses of it: their standard uncertainties are its
+    An evaluation uses only `distance_um`, `tilt_urad` and `spot_um`: their standard uncertainties are its
     weights. By default they are the positive standard deviations of `[noise]`, else 0.1 µm, 1 µrad and 1 µm; each key
-    by itself. Columns u_... of a measurement file come before these.
+    by itself. Columns u_... of a measurement file take precedence over these.
 
-    Keys of a set-up, from `reflector_urad` to `drift_um_per_h`, hold for each of `plan.lines` by itself;
+    Keys of a set-up, from `reflector_urad` to `drift_um_per_h`, apply to each of `plan.lines` separately;
     `[uncertainty.LINE]` replaces, for one line, the keys it names. Scale lines have those of their own tables only, and
-    `scale_um` and `scale_ppm`. Where a key has several components, each has the distribution, and a draw of its own."""
+    `scale_um` and `scale_ppm`. If a key has several components, each has this distribution and is drawn separately."""
 
     distance_um: PositiveSpread | None = _noise("Noise of distances (also d1, d2, ...), each reading by itself.", 0.1)
     tilt_urad: PositiveSpread | None = _noise("Noise of the tilts.", 1.0)

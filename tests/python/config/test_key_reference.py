@@ -4,7 +4,7 @@ import pytest
 from places import DOCS
 
 from stepdiag.config.head_keys import HeadFile
-from stepdiag.config.key_reference import key_table, keys, sections
+from stepdiag.config.key_reference import key_list, keys, sections
 from stepdiag.config.key_types import Section
 from stepdiag.config.scenario_keys import ScenarioKeys
 from stepdiag.config.scenario_template import template
@@ -18,7 +18,7 @@ OTHERS += ("refractive_index", "beam_constants_um", "beam_offsets_um")
 @pytest.mark.parametrize(("page", "root"), [("scenario.md", ScenarioKeys), ("head.md", HeadFile)])
 def test_reference_page_is_what_the_keys_say(page: str, root: type[Section]) -> None:
     said = (DOCS / page).read_text(encoding="utf-8")
-    assert key_table(root).strip() in said, "the page is older than the keys: it says how it is made"
+    assert key_list(root).strip() in said, "the page is older than the keys: it says how it is made"
 
 
 @pytest.mark.parametrize("root", [ScenarioKeys, HeadFile])
