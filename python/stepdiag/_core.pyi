@@ -799,7 +799,9 @@ class LateralEffect:
     def size(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
 class ReplayMismatch(RuntimeError):
-    pass
+    """
+    A replayed pose differs from its trace, because another face is in the path of the beam; it names the pose.
+    """
 class BeamSegment:
     """
     A straight piece of a beam's way, in the sensor frame, mm.

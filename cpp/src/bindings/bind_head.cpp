@@ -495,7 +495,8 @@ std::map<std::string, std::optional<double>> read_head(const Head& head, double 
 }  // namespace
 
 static void bind_traced_head(py::module_& m) {
-    py::register_exception<ReplayMismatch>(m, "ReplayMismatch", PyExc_RuntimeError);
+    py::register_exception<ReplayMismatch>(m, "ReplayMismatch", PyExc_RuntimeError).attr("__doc__") =
+        "A replayed pose differs from its trace, because another face is in the path of the beam; it names the pose.";
     py::class_<BeamSegment>(m, "BeamSegment", "A straight piece of a beam's way, in the sensor frame, mm.")
         .def_readonly("beam", &BeamSegment::beam)
         .def_readonly("parent", &BeamSegment::parent, "Index of the segment it comes from; -1: the source.")
