@@ -32,10 +32,10 @@ def test_units_of_keys_and_reports_are_of_the_quantity() -> None:
 
 
 def test_method_page_says_what_the_table_says() -> None:
-    page = (DOCS / "method.md").read_text(encoding="utf-8")
+    page = " ".join((DOCS / "method.md").read_text(encoding="utf-8").split())
     for quantity in ADJUSTED:
         unit = unit_of(quantity.key)
         known = f"known to {quantity.prior / unit.native:,g} {unit.name}".rstrip()
         default = {math.inf: "free", 0.0: "fixed at 0"}.get(quantity.prior, known)
         where = f"layout `{quantity.layout}`: " if quantity.layout else ""
-        assert f"| `{quantity.key}` | {where}{quantity.meaning} | {default}" in page
+        assert f"- `{quantity.key}`: {where}{quantity.meaning}. Default: {default}" in page

@@ -53,5 +53,5 @@ def test_page_says_what_the_program_says(number: int) -> None:
 
 
 def test_page_lists_every_entry() -> None:
-    rows = re.findall(r"^\| ([a-z ]+) \|", PAGE, re.MULTILINE)
+    rows = re.findall(r"^- \*\*([a-z ]+)\*\*", PAGE, re.MULTILINE)
     assert rows == [*(mistake.name for mistake in CATALOGUE), "disturbed"]
