@@ -5,26 +5,12 @@ Imports inside the commands keep the other commands fast.
 
 import io
 import sys
+from importlib import import_module
+from typing import Final
 
 import click
 
 from stepdiag._core import InvalidArgument, ReplayMismatch, __version__
-from stepdiag.cli.acquire import acquire, twin
-from stepdiag.cli.calibrations import compare, recheck, report, verify
-from stepdiag.cli.evaluate import evaluate, observe
-from stepdiag.cli.export import export
-from stepdiag.cli.files import check, init
-from stepdiag.cli.head import head
-from stepdiag.cli.importing import import_
-from stepdiag.cli.nc import nc
-from stepdiag.cli.options import InOrder, tell
-from stepdiag.cli.plan import plan
-from stepdiag.cli.plot import plot
-from stepdiag.cli.positions import positions
-from stepdiag.cli.simulate import demo, simulate
-from stepdiag.cli.study import study
-from stepdiag.cli.uncertainty import uncertainty
-from stepdiag.cli.volume import volume
 from stepdiag.memory import NotEnoughMemory
 
 EPILOG = """\b
@@ -38,47 +24,64 @@ For your own measurement fill in machine/measurement.csv and evaluate it instead
 To see what a plan can determine before you measure: stepdiag observe machine/scenario.toml
 """
 
-# In the order in which a new user needs them.
-COMMANDS = {
-    demo: "Simulate and evaluate the machine of the method's paper.",
-    init: "Start with your own machine: a scenario and a sheet of points.",
-    observe: "Report what a plan and a head can determine, before measuring.",
-    plan: "Choose the plan for the available time.",
-    uncertainty: "Report how uncertain a calibration would be.",
-    study: "Report the uncertainty over a grid of scenarios.",
-    nc: "Write the measuring program for a controller.",
-    acquire: "Record readings from an instrument.",
-    twin: "Simulate the instrument.",
-    import_: "Read a measurement from a spreadsheet.",
-    simulate: "Simulate the run of a scenario.",
-    evaluate: "Calibrate the machine from a run.",
-    plot: "Draw a calibration, a measurement and other files.",
-    report: "Summarise a calibration.",
-    volume: "Report the error of the tool in the volume, and whether it is within a limit.",
-    verify: "Test a calibration with readings from which it was not made.",
-    recheck: "Test whether the machine has changed since its calibration.",
-    compare: "Compare two calibrations.",
-    positions: "Evaluate or predict positioning tests (ISO 230-2, 230-6).",
-    export: "Write a calibration for a controller.",
-    check: "Check files, and whether a scenario and a run belong together.",
-    head: "Draw and check descriptions of laser heads.",
+# In the order in which a new user needs them. Name -> module, and what the list of commands says.
+COMMANDS: Final = {
+    "demo": ("simulate", "Simulate and evaluate the machine of the method's paper."),
+    "init": ("files", "Start with your own machine: a scenario and a sheet of points."),
+    "observe": ("evaluate", "Report what a plan and a head can determine, before measuring."),
+    "plan": ("plan", "Choose the plan for the available time."),
+    "uncertainty": ("uncertainty", "Report how uncertain a calibration would be."),
+    "study": ("study", "Report the uncertainty over a grid of scenarios."),
+    "nc": ("nc", "Write the measuring program for a controller."),
+    "acquire": ("acquire", "Record readings from an instrument."),
+    "twin": ("acquire", "Simulate the instrument."),
+    "import": ("importing", "Read a measurement from a spreadsheet."),
+    "simulate": ("simulate", "Simulate the run of a scenario."),
+    "evaluate": ("evaluate", "Calibrate the machine from a run."),
+    "plot": ("plot", "Draw a calibration, a measurement and other files."),
+    "report": ("calibrations", "Summarise a calibration."),
+    "volume": ("volume", "Report the error of the tool in the volume, and whether it is within a limit."),
+    "verify": ("calibrations", "Test a calibration with readings from which it was not made."),
+    "recheck": ("calibrations", "Test whether the machine has changed since its calibration."),
+    "compare": ("calibrations", "Compare two calibrations."),
+    "positions": ("positions", "Evaluate or predict positioning tests (ISO 230-2, 230-6)."),
+    "export": ("export", "Write a calibration for a controller."),
+    "check": ("files", "Check files, and whether a scenario and a run belong together."),
+    "head": ("head", "Draw and check descriptions of laser heads."),
 }
 
 
+class Commands(click.Group):
+    """Imports a command when it is used: their list, and the other commands, do not wait for it."""
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+        if name not in COMMANDS:
+            return None
+        module, short_help = COMMANDS[name]
+        commands = vars(import_module(f"stepdiag.cli.{module}"))
+        command: click.Command = commands.get(name) or commands[f"{name}_"]  # import is a word of Python
+        command.short_help = short_help
+        return command
+
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, short_help) for name, (_, short_help) in COMMANDS.items()])
+
+
 @click.group(
-    cls=InOrder, epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+    cls=Commands, epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
 )
 @click.version_option(__version__, message="stepdiag %(version)s")
 def cli() -> None:
     """Calibrate three-axis machine tools by the laser step-diagonal method."""
 
 
-for command, short_help in COMMANDS.items():
-    command.short_help = short_help
-    cli.add_command(command)
-
-
 def _complain(message: str) -> None:
+    from stepdiag.cli.options import tell
+
     tell("error", message)
 
 

@@ -255,25 +255,25 @@ class KnownKeys(Section):
     head: KnownHeadKeys
     line: dict[str, LineKeys] = tables("LINE")
     temperature: KnownTemperatureKeys | None = None
-    environment: KnownEnvironmentKeys = KnownEnvironmentKeys()
-    noise: NoiseKeys = NoiseKeys()
-    uncertainty: UncertaintySection = UncertaintySection()
-    adjustment: AdjustmentSection = AdjustmentSection()
-    smoothness: SmoothnessSection = SmoothnessSection()
-    plausible: PlausibleSection = PlausibleSection()
-    change: ChangeSection = ChangeSection()
-    plan_by_time: PlanByTimeSection = PlanByTimeSection()
-    report: ReportSection = ReportSection()
+    environment: KnownEnvironmentKeys = KnownEnvironmentKeys.model_construct()
+    noise: NoiseKeys = NoiseKeys.model_construct()
+    uncertainty: UncertaintySection = UncertaintySection.model_construct()
+    adjustment: AdjustmentSection = AdjustmentSection.model_construct()
+    smoothness: SmoothnessSection = SmoothnessSection.model_construct()
+    plausible: PlausibleSection = PlausibleSection.model_construct()
+    change: ChangeSection = ChangeSection.model_construct()
+    plan_by_time: PlanByTimeSection = PlanByTimeSection.model_construct()
+    report: ReportSection = ReportSection.model_construct()
 
 
 class TruthKeys(Section):
     """What a run is simulated with beside what is known; by default nothing is wrong with machine, head and air."""
 
-    machine: MachineErrorsKeys = MachineErrorsKeys()
-    noise: NoiseSection = NoiseSection()
-    misalignment: MisalignmentSection = MisalignmentSection()
+    machine: MachineErrorsKeys = MachineErrorsKeys.model_construct()
+    noise: NoiseSection = NoiseSection.model_construct()
+    misalignment: MisalignmentSection = MisalignmentSection.model_construct()
     temperature: TrueTemperatureKeys | None = None
-    environment: EnvironmentSection = EnvironmentSection()
+    environment: EnvironmentSection = EnvironmentSection.model_construct()
 
 
 class ScenarioKeys(TruthKeys, KnownKeys):
@@ -282,8 +282,8 @@ class ScenarioKeys(TruthKeys, KnownKeys):
     machine: MachineSection
     head: HeadSection
     temperature: TemperatureSection | None = None
-    environment: EnvironmentSection = EnvironmentSection()
-    noise: NoiseSection = NoiseSection()
+    environment: EnvironmentSection = EnvironmentSection.model_construct()
+    noise: NoiseSection = NoiseSection.model_construct()
 
 
 # Sections that may hold tables of the user's own names, and where these are kept.

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Final, TypeVar
 
-from pydantic import ValidationError
+from pydantic import ValidationError, create_model
 
 from stepdiag._core import InvalidArgument
 from stepdiag.config.key_errors import explain
@@ -35,9 +35,19 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
 def check_keys(content: Mapping[str, Any], root: type[Keys], file: str) -> Keys:
     """The keys of a whole file. Raises InvalidArgument naming the first that is wrong."""
     try:
-        return root.model_validate(_tuples(content))
+        given = _given(root, content).model_validate(_tuples(content))
     except ValidationError as error:
         raise explain(error, content, file, root) from None
+    return root.model_construct(given.model_fields_set, **dict(given))
+
+
+def _given(root: type[Section], content: Mapping[str, Any]) -> type[Section]:
+    """`root` without the sections that a file leaves out: to build their validators takes longer than all checks."""
+    fields = root.model_fields.items()
+    given: dict[str, Any] = {
+        name: (key.annotation, key) for name, key in fields if name in content or key.is_required()
+    }
+    return create_model(root.__name__, __base__=Section, **given)
 
 
 def _too_deep(content: dict[str, Any]) -> bool:

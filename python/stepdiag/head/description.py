@@ -127,12 +127,6 @@ def parse_head_keys(text: str, path: str | PathLike[str] = "head.toml") -> HeadF
     return keys
 
 
-def components(design: _core.HeadDesign) -> list[str]:
-    """Names of the components that can have pose errors."""
-    parts: list[_core.HeadBody | _core.HeadBeam | _core.SpotSensor] = [*design.bodies, *design.beams, *design.sensors]
-    return [part.name for part in parts]
-
-
 def _check_names(keys: HeadFile, file: str) -> None:
     taken: dict[str, str] = {}
     for kind, named in (("beam", keys.beam), ("body", keys.body), ("sensor", keys.sensor)):

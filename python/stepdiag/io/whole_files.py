@@ -2,7 +2,6 @@
 
 import glob
 import os
-import secrets
 import stat
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -98,7 +97,7 @@ def _whole_file(path: Path) -> Iterator[int]:
     check_output(path)
     target = Path(os.path.realpath(path))  # keeps a symbolic link
     # A name of its own, not mkstemp's: Ctrl-C may come between the making of the file and its return.
-    temporary = target.with_name(f"{target.name}.{secrets.token_hex(8)}")
+    temporary = target.with_name(f"{target.name}.{os.urandom(8).hex()}")
     handle = -1
     with at_end(partial(_remove, temporary)):
         try:

@@ -12,10 +12,9 @@ import math
 import os
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -28,6 +27,9 @@ from stepdiag.scenario.description import Scenario, adjust_scenario, adjustment_
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import check_points
+
+if TYPE_CHECKING:
+    from concurrent.futures import ThreadPoolExecutor
 
 CLEAR: Final = 60.0  # least gain in chi-square
 ALTERNATIVE: Final = 25.0  # what is less behind the best may be it, as of faults
@@ -416,7 +418,9 @@ def _some_runs(copy: Copy, ways: Sequence[Way]) -> Copy:
     return replace(copy, run=of_rows(copy.run, np.flatnonzero(np.isin(copy.run.run, list(chosen)))))
 
 
-def _pool() -> ThreadPoolExecutor:
+def _pool() -> "ThreadPoolExecutor":
+    from concurrent.futures import ThreadPoolExecutor  # slow; most runs need no search
+
     return ThreadPoolExecutor(min(2, os.cpu_count() or 1), initializer=partial(np.seterr, all="ignore"))
 
 

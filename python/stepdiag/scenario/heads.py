@@ -35,6 +35,15 @@ class DescribedHead:
     keys: NominalHeadKeys
     design: _core.HeadDesign | None = field(compare=False)  # what the description in `keys` says
 
+    @property
+    def components(self) -> list[str]:
+        """Names of the components that can have pose errors; a layout has none."""
+        if self.design is None:
+            return []
+        parts: list[_core.HeadBody | _core.HeadBeam | _core.SpotSensor]
+        parts = [*self.design.bodies, *self.design.beams, *self.design.sensors]
+        return [part.name for part in parts]
+
     def make(self, pose_errors: PoseErrors) -> _core.Head:
         keys = self.keys
         if self.design is not None:
@@ -170,18 +179,18 @@ def _described(keys: HeadKeys, place: str, path: Path) -> DescribedHead:
     if keys.description is None:
         return DescribedHead(place, nominal, None)
     # Here, because the keys of bodies take a sixth of a command's time that most scenarios do not need.
-    from stepdiag.head.description import components, find_head, read_head_design
+    from stepdiag.head.description import find_head, read_head_design
 
     with located(f"{where}.description"):
         design = read_head_design(find_head(keys.description, path.parent))
-    known = components(design)
+    head = DescribedHead(place, nominal, design)
     for name in keys.pose_errors:
-        if name not in known:
+        if name not in head.components:
             raise InvalidArgument(
                 f"{where}.pose_errors.{name}: no component of the head {show(design.name)}; "
-                f"expected one of {', '.join(known)}"
+                f"expected one of {', '.join(head.components)}"
             )
-    return DescribedHead(place, nominal, design)
+    return head
 
 
 def _check_layout(keys: HeadKeys, where: str) -> None:

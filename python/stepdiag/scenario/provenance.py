@@ -71,6 +71,8 @@ def _sha256(path: Path) -> str:
 
 def _chosen(name: str, section: Section) -> Iterator[str]:
     """The keys of a section that differ from the defaults, as TOML with dotted names."""
+    if not section.model_fields_set:
+        return
     given = section.model_dump(exclude_defaults=True)
     tables = given.pop("by_line", {})
     for place, keys in [(name, given), *((f"{name}.{line}", tables[line]) for line in sorted(tables))]:

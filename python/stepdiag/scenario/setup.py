@@ -26,7 +26,7 @@ def misalignments(
         own = section.by_line.get(line)
         if line in plan.scale_lines and own is None:
             continue
-        shared = MisalignmentKeys() if line in plan.scale_lines else section
+        shared = MisalignmentKeys.model_construct() if line in plan.scale_lines else section
         values = shared.model_dump(exclude={BY_LINE}) | (own.model_dump(exclude_unset=True) if own else {})
         place = f"misalignment.{line}" if own and own.beam_constants_um is not None else "misalignment"
         _check_beam_constants(values["beam_constants_um"], heads[line], f"{path}: {place}")

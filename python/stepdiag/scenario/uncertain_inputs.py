@@ -14,7 +14,6 @@ from stepdiag.config.key_errors import show, suggest
 from stepdiag.config.scenario_keys import KnownKeys
 from stepdiag.config.toml_text import located
 from stepdiag.config.uncertainty_keys import ComponentUncertaintyKeys, SetupUncertaintyKeys, UncertaintySection
-from stepdiag.head.description import components
 from stepdiag.scenario.heads import DescribedHead
 from stepdiag.scenario.setup import KEY_OF_READING, weights
 from stepdiag.units import MICROMETRE, Unit, unit_of
@@ -80,7 +79,7 @@ def _check_fit(
 def _of_lines(keys: KnownKeys, head: _core.Head) -> Iterator[_core.UncertainInput]:
     shared = keys.uncertainty
     for line in [*keys.plan.lines, *keys.plan.scale_lines]:
-        own = shared.by_line.get(line, SetupUncertaintyKeys())
+        own = shared.by_line.get(line, SetupUncertaintyKeys.model_construct())
         for name in SetupUncertaintyKeys.model_fields:
             of_all = (name in OF_SCALE_LINES) == (line in keys.plan.scale_lines)
             stated = getattr(own, name) or (getattr(shared, name) if of_all else None)
@@ -90,10 +89,9 @@ def _of_lines(keys: KnownKeys, head: _core.Head) -> Iterator[_core.UncertainInpu
 def _of_components(
     section: UncertaintySection, described: Mapping[str, DescribedHead], head: _core.Head, place: str
 ) -> Iterator[_core.UncertainInput]:
-    designs = {head.place: head.design for head in described.values() if head.design is not None}
-    known = list(dict.fromkeys(name for design in designs.values() for name in components(design)))
+    known = list(dict.fromkeys(name for one in described.values() for name in one.components))
     for part, own in section.head.items():
-        if not designs:
+        if not known:
             raise InvalidArgument(f"{place}.head.{part}: goes with a described head; a layout has no components")
         if part not in known:
             raise InvalidArgument(f"{place}.head.{part}: no component of the head; {suggest(part, known)}")
