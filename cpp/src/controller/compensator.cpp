@@ -21,12 +21,13 @@ constexpr double edge_slack = 1e-6;  // mm
 
 std::array<double, 3> array(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-// Number of steps of answer_command after which the residual of the inverse, initially |e|, is below iteration_bound
-// for any table.
+// Number of steps of answer_command after which the residual of the inverse is below iteration_bound for any table. The
+// first step is as long as the estimate of e, which exceeds the bound of |e| by a hundredth at most, and 1.1 times
+// that.
 int largest_step_count(double error, double contraction) {
     const double factor = contraction * (2.0 + contraction);
-    int count = 0;
-    for (double left = error; left > iteration_bound; left *= factor) ++count;
+    int count = 1;
+    for (double left = 2.2 * error; left > iteration_bound; left *= factor) ++count;
     return count;
 }
 
@@ -76,6 +77,10 @@ std::unique_ptr<CompensatorTables> make_tables(const ParameterTable& table, cons
         throw InvalidArgument(name + ": expected errors that change by less than " +
                               std::to_string(steepest_contraction) + " mm/mm, got up to " +
                               std::to_string(bounds.contraction) + "; are the values in um and urad?");
+    // A step is longer than its residual by the factor 1.1 at most.
+    const double last_step = std::min(iteration_bound / (bounds.bend + bounds.contraction * bounds.contraction),
+                                      0.9 * AxisPlace::slack),
+                 uncapped = std::max(options.largest_correction - AxisPlace::slack, 0.0);
     const Box volume = {{0.0, 0.0, 0.0}, {edges.x(), edges.y(), edges.z()}};
     return std::unique_ptr<CompensatorTables>(new CompensatorTables{
         model,
@@ -83,6 +88,7 @@ std::unique_ptr<CompensatorTables> make_tables(const ParameterTable& table, cons
         answers_for(own, are_fused_answers_known(), true),
         scales,
         read(options.origin.data()),
+        volume,
         volume.grown(options.margin),
         Box{}.grown(farthest_position),
         volume.grown(edge_slack),
@@ -93,6 +99,8 @@ std::unique_ptr<CompensatorTables> make_tables(const ParameterTable& table, cons
         options.largest_correction * options.largest_correction,
         options.largest_tool * options.largest_tool,
         largest_step_count(std::min(bounds.error, options.largest_correction), bounds.contraction),
+        last_step * last_step,
+        uncapped * uncapped,
         array(edges),
         array(tool),
         stepdiag::fingerprint(own, edges, tool, table, expansion_of(table, name)),

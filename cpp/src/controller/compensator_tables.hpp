@@ -60,12 +60,15 @@ struct CompensatorTables {
     Answers answers, answers_at_temperature;
     ScaleRange scales;
     Vector3 origin;
+    Box within;                     // the volume; positions in it are their own nearest point and have status 0
     Box known;                      // the model is evaluated here; positions outside use the nearest point
     Box everywhere;                 // range of valid positions
     Box inside, inside_of_results;  // the volume with its tolerance, for requested positions and for results
     Outside outside;
     double margin, largest_correction, largest_correction2, largest_tool2;
-    int step_count;
+    int step_count;     // of the inverse
+    double last_step2;  // square of the largest residual from which a step within a cell meets iteration_bound, mm^2
+    double uncapped2;   // square of a correction that is shorter than largest_correction by the length of such a step
     std::array<double, 3> volume, tool;
     std::uint64_t fingerprint;
     std::string fit;
@@ -89,10 +92,15 @@ struct CompensatorTables {
             outside == Outside::refuse || (outside == Outside::linear && !inside.grown(margin).holds(p));
         return refused ? compensation_outside | compensation_refused : unsigned(compensation_outside);
     }
-    // Status of a requested tool position, or of an axis position. Most are inside, so this test comes first.
-    STEPDIAG_INLINED unsigned status(const Vector3& p, const Vector3& tool_offset) const noexcept {
-        if (inside.holds(p) && dot(tool_offset, tool_offset) <= largest_tool2) return 0;
-        return is_usable(p, tool_offset) ? status_outside(p, inside) : unsigned(compensation_refused);
+    // Whether a position in the volume is requested, for a tool of the permitted length. Such a position is its own
+    // nearest point, and its status is 0. Most are, so this test comes first.
+    STEPDIAG_INLINED bool is_usual(const Vector3& p, const Vector3& tool_offset) const noexcept {  // never NaN
+        return within.holds(p) && dot(tool_offset, tool_offset) <= largest_tool2;
+    }
+    // Status of any requested tool position, or of an axis position.
+    unsigned status(const Vector3& p, const Vector3& tool_offset) const noexcept {
+        if (!is_usable(p, tool_offset)) return compensation_refused;
+        return inside.holds(p) ? 0 : status_outside(p, inside);
     }
 };
 
@@ -100,44 +108,58 @@ template <class Order, class Scales>
 STEPDIAG_INLINED unsigned answer_error(Order order, const Scales& scales, const CompensatorTables& t,
                                        const double* position, const double* tool, double* error,
                                        double* orientation) noexcept {
-    const Vector3 asked = read(position), offset = read(tool), p = asked - t.origin;
-    const unsigned status = t.status(p, offset);
-    if (status & compensation_refused) {
-        write({0.0, 0.0, 0.0}, error);
-        if (orientation) write({0.0, 0.0, 0.0}, orientation);
-        return status;
+    const Vector3 offset = read(tool);
+    Vector3 p = read(position) - t.origin;
+    unsigned status = 0;
+    if (!t.is_usual(p, offset)) {
+        status = t.status(p, offset);
+        if (status & compensation_refused) {
+            write({0.0, 0.0, 0.0}, error);
+            if (orientation) write({0.0, 0.0, 0.0}, orientation);
+            return status;
+        }
+        p = t.known.nearest(p);
     }
-    const Vector3 nearest = t.known.nearest(p);
-    const ErrorModel::Cell cell = t.model.cell(nearest);
-    const Vector3 e = t.model.error(order, scales, nearest, offset, cell);
+    const ErrorModel::Cell cell = t.model.cell(p);
+    const Vector3 e = t.model.error(order, scales, p, offset, cell);
     write(e, error);
-    if (orientation) write(t.model.orientation(order, nearest, cell), orientation);
+    if (orientation) write(t.model.orientation(order, p, cell), orientation);
     return dot(e, e) > t.largest_correction2 ? status | compensation_capped : status;
 }
 
 // The correction k with k + e(p + k) = 0, by Newton's method with the constant slope S of the target:
-//   r <- k + e(p + k),   k <- k - (r - S r)
-// The errors at two positions differ by at most q times their distance, and |S| <= q. Each step therefore reduces the
-// residual to at most (2 q + q^2) |r|, for any number of nodes between the positions. Within one cell of the table it
-// is at most q^2 |r|, so two steps suffice. The residual r is the error of the subsequent forward.
+//   k <- k - (r - S r),   r <- k + e(p + k)
+// It begins with k = 0 and the estimate of e(p) for r. The errors at two positions differ by at most q times their
+// distance, and |S| <= q. Each further step therefore reduces the residual to at most (2 q + q^2) |r|, for any number
+// of nodes between the positions, and to (b + q^2) |r| in the cell of the target, where slopes differ from S by at most
+// b. The residual r is the error of the subsequent forward. It is computed, except after a step in that cell from a
+// residual so small that this bound suffices: usually the second.
 template <class Order, class Scales>
 STEPDIAG_INLINED unsigned answer_command(Order order, const Scales& scales, const CompensatorTables& t,
                                          const double* target, const double* tool, double* command) noexcept {
     const Vector3 asked = read(target), offset = read(tool), p = asked - t.origin;
-    const unsigned status = t.status(p, offset);
-    if (status & compensation_refused) return write(asked, command), status;
-    Vector3 nearest = t.known.nearest(p);
-    ErrorModel::Cell cell = t.model.cell(nearest);
-    const Matrix3 slope = t.model.slope(order, scales, nearest, offset, cell);
-    unsigned capped = 0;
-    Vector3 k = {0.0, 0.0, 0.0}, r = t.capped(t.model.error(order, scales, nearest, offset, cell), capped);
-    for (int step = 0; step < t.step_count && dot(r, r) > iteration_bound * iteration_bound; ++step) {
-        k = k - (r - slope * r);
-        nearest = t.known.nearest(p + k);
-        if (!cell.holds(nearest)) cell = t.model.cell(nearest);
-        capped = 0;
-        r = k + t.capped(t.model.error(order, scales, nearest, offset, cell), capped);
+    Vector3 nearest = p;
+    unsigned status = 0;
+    if (!t.is_usual(p, offset)) {
+        status = t.status(p, offset);
+        if (status & compensation_refused) return write(asked, command), status;
+        nearest = t.known.nearest(p);
     }
+    const ErrorModel::Cell cell = t.model.cell(nearest);
+    const auto [estimate, slope] = t.model.estimate(order, scales, nearest, offset, cell);
+    unsigned capped = 0;
+    Vector3 k = {0.0, 0.0, 0.0}, r = t.capped(estimate, capped);
+    bool is_in_cell = false;
+    int steps_left = t.step_count;
+    do {
+        const double residual2 = dot(r, r);
+        k = k - (r - slope * r);
+        if (is_in_cell && residual2 <= t.last_step2 && dot(k, k) <= t.uncapped2) break;
+        is_in_cell = cell.holds(p + k);
+        const Vector3 at = is_in_cell ? p + k : t.known.nearest(p + k);
+        capped = 0;
+        r = k + t.capped(t.model.error(order, scales, at, offset, is_in_cell ? cell : t.model.cell(at)), capped);
+    } while (--steps_left > 0 && dot(r, r) > iteration_bound * iteration_bound);
     write(asked + k, command);
     return status | capped;
 }

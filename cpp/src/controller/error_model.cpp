@@ -19,12 +19,13 @@ struct Extremes {
 // The largest length of a linear piece is at one of its ends.
 Extremes extremes(const AxisTable& table, double lowest, double highest) {
     Extremes most;
-    for (const AxisInterval& interval : table)
-        for (const double end : {std::max(interval.lower, lowest), std::min(interval.upper, highest)}) {
-            most.delta = std::max(most.delta, norm(interval.at(end).delta));
-            most.theta = std::max(most.theta, norm(interval.at(end).theta));
-            most.delta_slope = std::max(most.delta_slope, norm(interval.delta_slope()));
-            most.theta_slope = std::max(most.theta_slope, norm(interval.theta_slope()));
+    for (std::size_t i = 0; i < table.size(); ++i)
+        for (const double end :
+             {i == 0 ? lowest : *table[i].start, i + 1 == table.size() ? highest : table[i].start[1]}) {
+            most.delta = std::max(most.delta, norm(table[i].at(end).delta));
+            most.theta = std::max(most.theta, norm(table[i].at(end).theta));
+            most.delta_slope = std::max(most.delta_slope, norm(table[i].delta_slope()));
+            most.theta_slope = std::max(most.theta_slope, norm(table[i].theta_slope()));
         }
     return most;
 }
@@ -51,6 +52,9 @@ ErrorModel::ErrorModel(const Chain& chain, const ErrorMap& errors, const std::ar
 // (|d Exp(theta)/dp| <= |theta'|). The root of the sum of squares of these three columns is a bound of the matrix
 // de/dp. Because e is continuous, it also bounds the difference of the errors at two positions.
 // The expansion of a scale adds rate (p - f) to delta_a and rate to delta_a'.
+// `slope` has column a to first order. What it leaves out is, with the sum T of all |theta|, at most
+//   T |delta_a'| + |theta_a'| (2 T reach_a + |e|) + T^2
+// and over a distance s within a cell the column changes by at most (|theta_a'| + sum |theta'|) s.
 ErrorModel::Bounds ErrorModel::bounds(double largest_tool, const ExpandedScales& scales) const {
     const std::array<double, 3> rate = {scales.rate.x, scales.rate.y, scales.rate.z},
                                 fixed = {scales.fixed_point.x, scales.fixed_point.y, scales.fixed_point.z};
@@ -61,7 +65,8 @@ ErrorModel::Bounds ErrorModel::bounds(double largest_tool, const ExpandedScales&
         most[axis].delta += rate[axis] * std::max(std::abs(lowest - fixed[axis]), std::abs(highest - fixed[axis]));
         most[axis].delta_slope += rate[axis];
     }
-    double reach = largest_tool, error = 0.0, squares = 0.0;
+    double reach = largest_tool, error = 0.0, turned = 0.0, turned_slope = 0.0;
+    std::array<double, 3> reach_of, slope = {};
     for (int rank = 2; rank >= 0; --rank) {
         const int axis = order_[rank];
         if (!(most[axis].theta <= largest_angle))
@@ -69,13 +74,23 @@ ErrorModel::Bounds ErrorModel::bounds(double largest_tool, const ExpandedScales&
                                   std::to_string(largest_angle) + " rad, got " + std::to_string(most[axis].theta));
         const double farther = reach + volume_[axis] + margin_ + most[axis].delta;
         const bool workpiece = carries_workpiece(rank);
-        double slope = most[axis].delta_slope + most[axis].theta_slope * (workpiece ? farther : reach);
-        for (int before = 0; before < rank + workpiece; ++before) slope += most[order_[before]].theta;
-        error += most[axis].delta + most[axis].theta * (workpiece ? farther : reach);
-        squares += slope * slope;
+        reach_of[axis] = workpiece ? farther : reach;
+        for (int before = 0; before < rank + workpiece; ++before) slope[axis] += most[order_[before]].theta;
+        slope[axis] += most[axis].delta_slope + most[axis].theta_slope * reach_of[axis];
+        error += most[axis].delta + most[axis].theta * reach_of[axis];
+        turned += most[axis].theta;
+        turned_slope += most[axis].theta_slope;
         reach = farther;
     }
-    return {error, std::sqrt(squares)};
+    double slope2 = 0.0, bend2 = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double left_out = turned * (most[axis].delta_slope + 2.0 * most[axis].theta_slope * reach_of[axis]) +
+                                most[axis].theta_slope * error + turned * turned;
+        const double change = 2.0 * turned_slope * 3.0 * error;
+        slope2 += slope[axis] * slope[axis];
+        bend2 += (left_out + change) * (left_out + change);
+    }
+    return {error, std::sqrt(slope2), std::sqrt(bend2)};
 }
 
 }  // namespace stepdiag

@@ -20,10 +20,9 @@ inline constexpr double largest_angle = 2e-3;
 //   (Exp theta - I) v = sin|theta|/|theta| theta x (v + tan(|theta|/2)/|theta| theta x v)
 // Both factors are truncated series. The error is at most |theta|^5 |v| / 120: 3e-16 |v| at the largest angle, 1e-12 mm
 // at 4 m.
-STEPDIAG_INLINED Vector3 add_turn(const Vector3& d, const Vector3& theta, const Vector3& v) noexcept {
-    const double angle2 = dot(theta, theta);
-    const Vector3 sine = (1.0 - angle2 * (1.0 / 6.0)) * theta, tangent = (0.5 + angle2 * (1.0 / 24.0)) * theta;
-    return add_cross(d, sine, add_cross(v, tangent, v));
+// `sine` is the first factor; the second, 1/2 + |theta|^2 / 24, is 3/4 - sine / 4.
+STEPDIAG_INLINED Vector3 add_turn(const Vector3& d, const Vector3& theta, double sine, const Vector3& v) noexcept {
+    return add_cross(d, sine * theta, add_cross(v, (0.75 - 0.25 * sine) * theta, v));
 }
 
 struct Quaternion {
@@ -82,16 +81,16 @@ public:
 
     // The intervals of the three axes for a position.
     struct Cell {
-        const AxisInterval *x, *y, *z;
+        AxisPlace x, y, z;
 
-        bool holds(const Vector3& p) const noexcept { return x->holds(p.x) && y->holds(p.y) && z->holds(p.z); }
+        bool holds(const Vector3& p) const noexcept { return x.holds(p.x) && y.holds(p.y) && z.holds(p.z); }
         template <int axis>
-        const AxisInterval& at() const noexcept {
-            return axis == 0 ? *x : axis == 1 ? *y : *z;
+        const AxisPlace& at() const noexcept {
+            return axis == 0 ? x : axis == 1 ? y : z;
         }
     };
     STEPDIAG_INLINED Cell cell(const Vector3& p) const noexcept {
-        return {&tables_[0].find(p.x), &tables_[1].find(p.y), &tables_[2].find(p.z)};
+        return {tables_[0].find(p.x), tables_[1].find(p.y), tables_[2].find(p.z)};
     }
 
     template <int first, int second, int third, class Scales>
@@ -103,32 +102,34 @@ public:
         return d;
     }
 
-    // Derivative of the error with respect to the position, to first order in the errors. Column a is
+    // Error to second order in the errors, and its derivative with respect to the position to first order. Column a is
     //   delta_a' + theta_a' x lever_a + (sum of the thetas that rotate the direction of a) x e_a
+    struct Estimate {
+        Vector3 error;
+        Matrix3 slope;
+    };
     template <int first, int second, int third, class Scales>
-    STEPDIAG_INLINED Matrix3 slope(AxisOrder<first, second, third>, const Scales& scales, const Vector3& p,
-                                   const Vector3& tool, const Cell& cell) const noexcept {
+    STEPDIAG_INLINED Estimate estimate(AxisOrder<first, second, third>, const Scales& scales, const Vector3& p,
+                                       const Vector3& tool, const Cell& cell) const noexcept {
         Matrix3 slope;
         const Vector3 theta1 = cell.at<first>().at(p.at<first>()).theta;
         const Vector3 theta2 = theta1 + cell.at<second>().at(p.at<second>()).theta;
-        Vector3 lever = tool;
         slope.column<first>() = carries_workpiece(0) ? cross_unit<first>(theta1) : Vector3{0.0, 0.0, 0.0};
         slope.column<second>() = cross_unit<second>(carries_workpiece(1) ? theta2 : theta1);
         slope.column<third>() =
             cross_unit<third>(carries_workpiece(2) ? theta2 + cell.at<third>().at(p.at<third>()).theta : theta2);
-        add_slope<third>(2, scales, p, cell, lever, slope);
-        add_slope<second>(1, scales, p, cell, lever, slope);
-        add_slope<first>(0, scales, p, cell, lever, slope);
-        return slope;
+        Vector3 lever = tool, error1 = {0.0, 0.0, 0.0}, error2 = {0.0, 0.0, 0.0};
+        estimate<third>(2, scales, p, cell, lever, error1, error2, slope);
+        estimate<second>(1, scales, p, cell, lever, error1, error2, slope);
+        estimate<first>(0, scales, p, cell, lever, error1, error2, slope);
+        return {error1 + error2, slope};
     }
 
     // Rotation vector of the tool, from the product of the axes' rotations, rad.
     template <int first, int second, int third>
     STEPDIAG_INLINED Vector3 orientation(AxisOrder<first, second, third>, const Vector3& p,
                                          const Cell& cell) const noexcept {
-        const auto turn = [](const AxisInterval& interval, double position) {
-            return rotation(interval.at(position).theta);
-        };
+        const auto turn = [](const AxisPlace& place, double position) { return rotation(place.at(position).theta); };
         return rotation_vector(turn(cell.at<first>(), p.at<first>()) * turn(cell.at<second>(), p.at<second>()) *
                                turn(cell.at<third>(), p.at<third>()));
     }
@@ -138,6 +139,7 @@ public:
     struct Bounds {
         double error;        // |e| <= error, mm
         double contraction;  // |e(p) - e(q)| <= contraction |p - q|, and |slope| <= contraction
+        double bend;         // |de/dp - slope| <= bend within a cell, for positions up to 3 |e| from that of the slope
     };
     Bounds bounds(double largest_tool, const ExpandedScales& scales) const;
 
@@ -148,43 +150,50 @@ private:
     template <int axis, class Scales>
     STEPDIAG_INLINED Vector3 start(const Scales& scales, const Vector3& p, const Cell& cell,
                                    Vector3& lever) const noexcept {
-        const AxisInterval& interval = cell.at<axis>();
+        const AxisPlace& place = cell.at<axis>();
         const double position = p.at<axis>();
-        const auto [of_table, theta] = interval.at(position);
+        const auto [of_table, theta, sine] = place.at(position);
         const Vector3 delta = scales.template expanded<axis>(of_table, position);
         if (carries_workpiece(2)) {
             lever.at<axis>() += position;
-            return add_turn(delta, theta, lever + delta);
+            return add_turn(delta, theta, sine, lever + delta);
         }
-        const Vector3 d = add_turn(delta, theta, lever);
+        const Vector3 d = add_turn(delta, theta, sine, lever);
         lever.at<axis>() += position;
         return d;
     }
     template <int axis, class Scales>
     STEPDIAG_INLINED void move(int rank, const Scales& scales, const Vector3& p, const Cell& cell, Vector3& lever,
                                Vector3& d) const noexcept {
-        const AxisInterval& interval = cell.at<axis>();
+        const AxisPlace& place = cell.at<axis>();
         const double position = p.at<axis>();
-        const auto [of_table, theta] = interval.at(position);
+        const auto [of_table, theta, sine] = place.at(position);
         const Vector3 delta = scales.template expanded<axis>(of_table, position);
         if (carries_workpiece(rank)) {
             lever.at<axis>() += position;
             d = d + delta;
-            d = add_turn(d, theta, lever + d);
+            d = add_turn(d, theta, sine, lever + d);
         } else {
-            d = add_turn(d + delta, theta, lever + d);
+            d = add_turn(d + delta, theta, sine, lever + d);
             lever.at<axis>() += position;
         }
     }
 
+    // Adds one axis to the terms of first and of second order, and to its column of the slope.
     template <int axis, class Scales>
-    STEPDIAG_INLINED void add_slope(int rank, const Scales& scales, const Vector3& p, const Cell& cell, Vector3& lever,
-                                    Matrix3& slope) const noexcept {
-        const AxisInterval& interval = cell.at<axis>();
-        if (carries_workpiece(rank)) lever.at<axis>() += p.at<axis>();
-        const Vector3 delta_slope = scales.template expanded_slope<axis>(interval.delta_slope());
-        slope.column<axis>() = add_cross(slope.column<axis>() + delta_slope, interval.theta_slope(), lever);
-        if (!carries_workpiece(rank)) lever.at<axis>() += p.at<axis>();
+    STEPDIAG_INLINED void estimate(int rank, const Scales& scales, const Vector3& p, const Cell& cell, Vector3& lever,
+                                   Vector3& error1, Vector3& error2, Matrix3& slope) const noexcept {
+        const AxisPlace& place = cell.at<axis>();
+        const double position = p.at<axis>();
+        const auto [of_table, theta, sine] = place.at(position);
+        const Vector3 delta = scales.template expanded<axis>(of_table, position);
+        if (carries_workpiece(rank)) lever.at<axis>() += position;
+        const Vector3 turned = cross(theta, lever), moved = error1 + delta;
+        error2 = add_cross(error2, theta, (carries_workpiece(rank) ? moved : error1) + 0.5 * turned);
+        error1 = moved + turned;
+        const Vector3 delta_slope = scales.template expanded_slope<axis>(place.delta_slope());
+        slope.column<axis>() = add_cross(slope.column<axis>() + delta_slope, place.theta_slope(), lever);
+        if (!carries_workpiece(rank)) lever.at<axis>() += position;
     }
 
     std::array<AxisTable, 3> tables_;  // X, Y, Z
