@@ -60,7 +60,7 @@ public:
             for (Eigen::Index lane = 0; lane < lanes; ++lane)
                 for (int c = 0; c < values_per_reading; ++c) {
                     const RawEffect& effect = effects_[begin + lane];
-                    readings.values[effect.place + c].lane[lane] = effect.by_channel[c];
+                    readings.values[effect.place + c].numbers()[lane] = effect.by_channel[c];
                 }
             map_(readings, values.data(), lane_group);
             gain.middleCols(begin, lanes) = values.topRows(lanes).transpose();
@@ -82,7 +82,7 @@ private:
         void evaluate(const double* readings, std::size_t lanes, double* values, std::size_t stride) override {
             for (std::size_t lane = 0; lane < lanes; lane += lane_group) {
                 const SimdReduction::Lost lost =
-                    batch_.reduction_.reduce(readings + lane, lanes, readings_.values.front().lane);
+                    batch_.reduction_.reduce(readings + lane, lanes, readings_.values.front().numbers());
                 batch_.map_(readings_, values + lane, stride);
                 for (std::size_t k = 0; k < lane_group; ++k)
                     for (std::size_t output = 0; lost[k] && output < batch_.entries.size(); ++output)

@@ -39,7 +39,7 @@ STEPDIAG_INLINE Words low_product(Words a, Words b) {
 STEPDIAG_INLINE Vector to_unit(Words word) {
     const hn::RebindToSigned<WordTag> integers;
     const Vector number = hn::ConvertTo(Tag(), hn::BitCast(integers, hn::ShiftRight<11>(word)));
-    return hn::Mul(hn::Add(number, hn::Set(Tag(), 0.5)), hn::Set(Tag(), 0x1p-53));
+    return hn::MulAdd(number, hn::Set(Tag(), 0x1p-53), hn::Set(Tag(), 0x1p-54));
 }
 
 // The keys of the ten rounds of Philox4x32, from the seed.

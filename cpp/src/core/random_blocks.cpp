@@ -16,15 +16,18 @@ STEPDIAG_INLINE void fill(const RandomBlocks& lanes, std::size_t items, double* 
     const std::size_t width = hn::Lanes(words);
     const RoundKeys keys(lanes.seed);
     const Words ramp = hn::Iota(words, 0);
-    for (std::size_t item = 0; item < items; ++item, out += 2 * lanes.lanes)
-        for (std::size_t lane = 0; lane < lanes.lanes; lane += 2 * width) {
-            const auto samples = [&](std::size_t first)
-                                     HWY_ATTR { return hn::Add(hn::Set(words, lanes.first_sample + first), ramp); };
-            const TwoPairs pair = numbers(keys, lanes.stream, WordPair{samples(lane), samples(lane + width)},
-                                          std::uint32_t(lanes.first_item + item), lanes.draw);
-            store(pair.first, out + lane);
-            store(pair.second, out + lanes.lanes + lane);
+    for (std::size_t lane = 0; lane < lanes.lanes; lane += 2 * width) {
+        const auto samples = [&](std::size_t first)
+                                 HWY_ATTR { return hn::Add(hn::Set(words, lanes.first_sample + first), ramp); };
+        const WordPair sample = {samples(lane), samples(lane + width)};
+        for (std::size_t item = 0; item < items; ++item) {
+            const TwoPairs pair =
+                numbers(keys, lanes.stream, sample, std::uint32_t(lanes.first_item + item), lanes.draw);
+            double* const to = out + 2 * item * lanes.lanes + lane;
+            store(pair.first, to);
+            store(pair.second, to + lanes.lanes);
         }
+    }
 }
 
 void fill_uniform_lanes(const RandomBlocks& lanes, std::size_t items, double* out) {

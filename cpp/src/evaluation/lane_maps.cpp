@@ -43,7 +43,7 @@ LaneMap determined_part(std::shared_ptr<const Map> map, const Plan& plan, Apply 
         std::vector<LaneRow> parameters;
         apply(*map, readings, parameters);
         for (std::size_t i = 0; i < rows.size(); ++i)
-            std::copy_n(parameters[rows[i]].lane, lane_group, values + i * stride);
+            std::copy_n(parameters[rows[i]].numbers(), lane_group, values + i * stride);
     };
 }
 

@@ -26,6 +26,12 @@ std::size_t distance_bin(double distance) {
     return std::size_t(std::min(distance / distance_width, double(distance_bins)));
 }
 
+// Asks for the counts of an output while those of another one are counted.
+void prefetch(const std::uint16_t* counts, const OutputBins& output) {
+    constexpr std::size_t line = 64 / sizeof(std::uint16_t);
+    for (std::size_t bin = 0; bin < output.bins; bin += line) __builtin_prefetch(counts + output.offset + bin, 1);
+}
+
 // Lower triangle of the sum over samples of (y - mean)(y - mean)^T. Rows of `values` are outputs, `stride` apart. Takes
 // m^2 / 2 multiplications per sample for m outputs.
 Eigen::MatrixXd outer_products(const double* values, std::size_t stride, std::size_t samples,
@@ -146,6 +152,7 @@ void LeafWorker::count(std::uint64_t leaf, Counts& counts) const {
     for (std::size_t i = 0; i < sums_.size(); ++i) {
         std::uint16_t* bins = recent.data() + bins_.by_output[i].offset;
         const std::uint16_t* indices = indices_.data() + i * leaf_samples;
+        if (i + 1 < sums_.size()) prefetch(recent.data(), bins_.by_output[i + 1]);
         for (std::size_t s = 0; s < samples_; ++s) ++bins[indices[s]];
         // + 0.0 changes -0.0 to 0.0, so that the bits do not depend on the order
         double& lowest = counts.lowest[Eigen::Index(i)];
