@@ -191,11 +191,14 @@ std::optional<HeadPaths> record_paths(const RunModel& model, const Head& head) {
     const TracedHead traced = traced_at(model, head, mirror, expectations);
     const std::vector<MirrorPose> mirrors = outermost(model, *pass, expectations);
     paths.gap = traced.optics(0).fixed.self_intersection_gap();
+    std::vector<bool> moves(component_names(*head.design).size(), false);
+    for (const MovedComponent& part : paths.moved) moves[std::size_t(part.component)] = true;
     int channel = 0;
     for (const int beam : signal_order(*head.design)) {
         std::optional<BeamPath> path = record_path(traced, mirrors, beam);
         if (!path || !is_bright_enough(*head.design, *path)) return std::nullopt;
         path->channel = channel++;
+        path->plates = plates_of(*path, moves, paths.gap);
         paths.beams.push_back(std::move(*path));
     }
     if (!is_clear(model, head, mirror, traced, paths.beams)) return std::nullopt;

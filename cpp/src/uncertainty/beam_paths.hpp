@@ -9,6 +9,7 @@
 
 #include "head/recorded_route.hpp"
 #include "stepdiag/head/nominal_head.hpp"
+#include "uncertainty/plates.hpp"
 #include "uncertainty/run_model.hpp"
 
 namespace stepdiag {
@@ -37,6 +38,15 @@ struct BeamPath {
     std::vector<Outline> outlines;
     std::vector<int> component;  // of each face
     int source_component, detector_component;
+    std::optional<Plates> plates = {};
+
+    // Whether light meets this face by itself: it is neither the mirror nor among the plates.
+    bool is_alone(std::size_t encounter) const {
+        return encounter < mirror_at || encounter > mirror_at + (plates ? plates->faces : 0);
+    }
+    Unfolding unfolding(std::size_t encounter) const {
+        return plates && encounter > mirror_at ? plates->unfolding : Unfolding();
+    }
 };
 
 struct HeadPaths {

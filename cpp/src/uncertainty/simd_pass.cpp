@@ -87,6 +87,33 @@ STEPDIAG_INLINE void through(const std::vector<SimdFace>& faces, std::size_t lan
     }
 }
 
+// Plates in air, for light that comes down from the mirror.
+STEPDIAG_INLINE void through(const Plates& plates, Pair air, Pair gap, Light<Pair>& light) {
+    Pair(&p)[3] = light.point;
+    const Pair down = negative(light.direction[2]);
+    const auto check = [&] HWY_ATTR {
+        for (int k = 0; k < 2; ++k)
+            light.followed = both(light.followed, magnitude(p[k] - all(plates.centre[k])) <= all(plates.half_size[k]));
+    };
+    check();
+    light.followed = both(light.followed, both(down > all(0.0), p[2] - all(plates.first) > gap));
+    Pair air_thickness = p[2] - all(plates.last), sideways = all(0.0);
+    for (const Plates::Glass& glass : plates.glasses) {
+        // With mu = n_air/n and `down` the cosine in air, that in the glass is sqrt(1 - mu^2 + mu^2 down^2).
+        const Pair mu = air * all(1.0 / glass.index), cosine = mu * down;
+        const Pair length = all(glass.thickness) / root(mul_add(cosine, cosine, sub_mul(mu, mu, all(1.0))));
+        sideways = mul_add(length, mu, sideways);
+        light.optical_length = mul_add(length, all(glass.index), light.optical_length);
+        air_thickness = air_thickness - all(glass.thickness);
+    }
+    const Pair in_air = air_thickness / down;
+    sideways = sideways + in_air;
+    for (int k = 0; k < 2; ++k) p[k] = mul_add(sideways, light.direction[k], p[k]);
+    p[2] = all(plates.last);
+    light.optical_length = mul_add(in_air, air, light.optical_length);
+    check();
+}
+
 // Lanes that are turned farther than the series of a rotation reach are not followed.
 STEPDIAG_INLINE void keep_small(const Vector3<Pair>& turn, MaskPair& followed) {
     followed = both(followed, dot(turn, turn) <= all(largest_angle2));
@@ -99,10 +126,9 @@ STEPDIAG_INLINE void place_mirror(const SimdPass& pass, std::size_t row, std::si
     const ToolPose& pose = pass.poses[row];
     Vector3<Pair> normal = broadcast9<Pair>(pose.rotation) * at3(setup.mirror_normal, lane);
     Vector3<Pair> point = broadcast3<Pair>(pose.position);
-    if (pass.displaced) {
-        const SimdRow* const by = pass.displaced + 6 * row;
-        point = point + at3(by, lane);
-        const Vector3<Pair> turn = at3(by + 3, lane);
+    if (pass.displaced) point = point + at3(pass.displaced + 3 * row, lane);
+    if (pass.turned) {
+        const Vector3<Pair> turn = at3(pass.turned + 3 * row, lane);
         keep_small(turn, followed);
         normal = rotate(turn, normal);
     }
@@ -171,6 +197,7 @@ void trace(const SimdPass& pass, const Outline& outline, const std::vector<SimdB
                 mirror.air = at(*beam.air, lane);
                 mirror.inverse_air = all(1.0);  // nobody asks for the reduced length
                 meet(met, mirror, gap, light);
+                if (beam.plates) through(*beam.plates, mirror.air, gap, light);
                 through(beam.back, lane, gap, light);
                 detect(beam, lane, light,
                        pass.readings + (row * pass.channels + std::size_t(beam.channel)) * lane_group);

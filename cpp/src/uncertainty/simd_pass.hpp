@@ -9,6 +9,7 @@
 #include "stepdiag/core/random_blocks.hpp"
 #include "stepdiag/measurement/head_layout.hpp"
 #include "stepdiag/optics/replay.hpp"
+#include "uncertainty/plates.hpp"
 
 namespace stepdiag {
 
@@ -52,7 +53,8 @@ struct SimdFace {
 enum class SimdDetector { interferometer, spot };
 
 struct SimdBeam {
-    std::vector<SimdFace> out, back;  // before and after the mirror; the last one is the detector's
+    std::vector<SimdFace> out, back;  // before the mirror, and after the mirror and `plates`; at last the detector's
+    const Plates* plates = nullptr;   // first behind the mirror; none: all faces are in `back`
     const SimdRow* source;            // origin, direction
     const SimdRow* air;               // index
     SimdDetector detector;
@@ -72,7 +74,8 @@ struct ToolPose {
 // What is common to both ways of reading a pass.
 struct SimdPass {
     const ToolPose* poses;
-    const SimdRow* displaced = nullptr;  // six rows a pose: shift, rotation vector; none: the same poses in all lanes
+    const SimdRow* displaced = nullptr;  // three rows a pose; none: the same poses in all lanes
+    const SimdRow* turned = nullptr;     // rotation vectors, the same way
     std::size_t rows;
     const SimdSetup* setup;
     std::size_t channels;

@@ -82,7 +82,8 @@ SimdSampler::Scratch::Scratch(const SimdSampler& run) {
         set_up_pass(run.lines_[l].frame, fields[l].data(), setups[l], followed);
         closed_beams[l].resize(2 * run.heads_[run.lines_[l].head].head->beam_offsets.size());
     }
-    if (model.moves_poses()) displaced.resize(6 * model.rows.size());
+    if (model.moves_poses()) displaced.resize(3 * model.rows.size());
+    if (model.has(NoiseQuantity::orientation)) turned.resize(3 * model.rows.size());
     if (run.reads_excess_) excess.resize(model.rows.size());
     numbers.resize(model.rows.size() + model.rows.size() % 2);
 }
@@ -100,34 +101,27 @@ void SimdSampler::fill_fields(const Fields& fields, const double* deviations, st
 void SimdSampler::displace(std::optional<std::uint64_t> first_sample, Scratch& scratch) const {
     const bool of_scales = model_.has_uncertain_scales();
     for (std::size_t r = 0; r < model_.rows.size(); ++r)
-        for (std::size_t k = 0; k < 6; ++k)
-            for (std::size_t lane = 0; lane < lane_group; ++lane) {
-                double& to = scratch.displaced[6 * r + k].value[lane] = 0.0;
-                if (k >= 3) continue;
-                const auto shared = [&](int field) { return scratch.shared[field + k].value[lane]; };
-                const double time = double(r) * model_.seconds;
-                to = shared(shared_field::machine_drift) * time;
-                if (of_scales)
-                    to += model_.moved_by_scale(
-                        model_.rows[r], int(k), shared(shared_field::expansion),
-                        shared(shared_field::scale_temperature) + time * shared(shared_field::scale_ramp));
-            }
+        for (int k = 0; k < 3; ++k) {
+            const double time = double(r) * model_.seconds;
+            const auto shared = [&](int field) { return scratch.shared[std::size_t(field + k)].value; };
+            const double* const drift = shared(shared_field::machine_drift);
+            double* const to = scratch.displaced[3 * r + std::size_t(k)].value;
+            for (std::size_t lane = 0; lane < lane_group; ++lane) to[lane] = drift[lane] * time;
+            for (std::size_t lane = 0; of_scales && lane < lane_group; ++lane)
+                to[lane] += model_.moved_by_scale(
+                    model_.rows[r], k, shared(shared_field::expansion)[lane],
+                    shared(shared_field::scale_temperature)[lane] + time * shared(shared_field::scale_ramp)[lane]);
+        }
+    std::fill(scratch.turned.begin(), scratch.turned.end(), SimdRow{});
     if (!first_sample) return;
     const auto& noise = model_.run.inputs.noise;
     for (std::size_t e = 0; e < noise.size(); ++e) {
-        const bool walks = noise[e].quantity == NoiseQuantity::machine_walk;
-        const bool turns = noise[e].quantity == NoiseQuantity::orientation;
-        if (!walks && !turns && noise[e].quantity != NoiseQuantity::position) continue;
-        model_.draws.noise(e, *first_sample, lane_group, 0, model_.rows.size(), scratch.numbers[0].value);
-        const std::size_t number = std::size_t(noise[e].component) + (turns ? 3 : 0);
-        SimdRow walked{};
-        for (std::size_t r = 0; r < model_.rows.size(); ++r)
-            for (std::size_t lane = 0; lane < lane_group; ++lane) {
-                double value = scratch.numbers[r].value[lane];
-                if (walks && r == 0) continue;
-                if (walks) value = walked.value[lane] += value * std::sqrt(model_.seconds);
-                scratch.displaced[6 * r + number].value[lane] += value;
-            }
+        const NoiseQuantity quantity = noise[e].quantity;
+        const std::size_t number = std::size_t(noise[e].component);
+        if (quantity == NoiseQuantity::orientation)
+            add_draws(e, *first_sample, scratch, {scratch.turned[number].value}, 3 * lane_group);
+        if (quantity == NoiseQuantity::position || quantity == NoiseQuantity::machine_walk)
+            add_draws(e, *first_sample, scratch, {scratch.displaced[number].value}, 3 * lane_group);
     }
 }
 
@@ -177,11 +171,17 @@ void SimdSampler::trace(const double* deviations, std::optional<std::uint64_t> f
         const Line& line = lines_[l];
         const HeadPaths& paths = heads_[line.head];
         const Scratch::HeadRows& head = scratch.heads[line.head];
-        SimdPass lanes{&poses_[first], nullptr,
-                       pass.rows(),    &scratch.setups[l],
-                       channels,       readings + first * channels * lane_group,
-                       nullptr,        followed};
-        if (!scratch.displaced.empty()) lanes.displaced = &scratch.displaced[6 * first];
+        SimdPass lanes{&poses_[first],
+                       nullptr,
+                       nullptr,
+                       pass.rows(),
+                       &scratch.setups[l],
+                       channels,
+                       readings + first * channels * lane_group,
+                       nullptr,
+                       followed};
+        if (!scratch.displaced.empty()) lanes.displaced = &scratch.displaced[3 * first];
+        if (!scratch.turned.empty()) lanes.turned = &scratch.turned[3 * first];
         if (reads_excess_) lanes.excess = &scratch.excess[first];
         if (head.beams.empty())
             define_pass(lanes, {paths.head->layout, head.index_ratio, head.psd_distance, scratch.closed_beams[l].data(),
@@ -191,37 +191,49 @@ void SimdSampler::trace(const double* deviations, std::optional<std::uint64_t> f
     }
 }
 
-void SimdSampler::add_noise(std::uint64_t first_sample, Scratch& scratch, double* readings) const {
-    constexpr std::size_t rows_at_a_time = 32;  // so that numbers and readings are still in the nearest cache
-    const auto& noise = model_.run.inputs.noise;
-    const std::size_t rows = model_.rows.size(), channels = model_.channels.size(), stride = channels * lane_group;
+void SimdSampler::add_draws(std::size_t entry, std::uint64_t first_sample, Scratch& scratch,
+                            const std::vector<double*>& to, std::size_t stride) const {
+    constexpr std::size_t rows_at_a_time = 32;  // so that numbers and what they change are still in the nearest cache
+    const ReadingNoise& noise = model_.run.inputs.noise[entry];
+    const bool of_head = noise.quantity == NoiseQuantity::head_walk;
+    const bool walks = of_head || noise.quantity == NoiseQuantity::machine_walk;
+    const bool is_normal = noise.distribution.kind == DistributionKind::normal;
     double* const numbers = scratch.numbers[0].value;
-    for (std::size_t e = 0; e < noise.size(); ++e) {
-        const bool walks = noise[e].quantity == NoiseQuantity::head_walk;
-        const bool of_channel = noise[e].quantity == NoiseQuantity::channel;
-        if (!walks && !of_channel && noise[e].quantity != NoiseQuantity::common) continue;
-        const bool is_normal = noise[e].distribution.kind == DistributionKind::normal;
-        SimdRow walked{};
-        for (std::size_t first = 0; first < rows; first += rows_at_a_time) {
-            const std::size_t count = std::min(rows_at_a_time, rows - first);
-            if (is_normal) model_.draws.standard_noise(e, first_sample, lane_group, first, count, numbers);
-            else model_.draws.noise(e, first_sample, lane_group, first, count, numbers);
-            double spread = is_normal ? noise[e].distribution.spread : 1.0;
-            double expectation = is_normal ? noise[e].distribution.expectation : 0.0;
-            if (walks) {
-                for (std::size_t r = 0; r < count; ++r)
-                    for (std::size_t lane = 0; lane < lane_group; ++lane) {
-                        double& number = numbers[r * lane_group + lane];
-                        if (elapsed_[first + r] == 0.0) walked.value[lane] = number = 0.0;
-                        else number = walked.value[lane] += (expectation + spread * number) * std::sqrt(model_.seconds);
-                    }
-                spread = 1.0, expectation = 0.0;
+    SimdRow walked{};
+    for (std::size_t first = 0; first < model_.rows.size(); first += rows_at_a_time) {
+        const std::size_t count = std::min(rows_at_a_time, model_.rows.size() - first);
+        if (is_normal) model_.draws.standard_noise(entry, first_sample, lane_group, first, count, numbers);
+        else model_.draws.noise(entry, first_sample, lane_group, first, count, numbers);
+        double spread = is_normal ? noise.distribution.spread : 1.0;
+        double expectation = is_normal ? noise.distribution.expectation : 0.0;
+        if (walks) {
+            for (std::size_t r = 0; r < count; ++r) {
+                const bool starts = of_head ? elapsed_[first + r] == 0.0 : first + r == 0;
+                for (std::size_t lane = 0; lane < lane_group; ++lane) {
+                    double& number = numbers[r * lane_group + lane];
+                    if (starts) walked.value[lane] = number = 0.0;
+                    else number = walked.value[lane] += (expectation + spread * number) * std::sqrt(model_.seconds);
+                }
             }
-            for (std::size_t c = 0; c < channels; ++c)
-                if (of_channel ? model_.channels[c] == noise[e].channel : bool(is_distance_[c]))
-                    add_noise_to_pass(numbers, count, spread, expectation, readings + first * stride + c * lane_group,
-                                      stride);
+            spread = 1.0, expectation = 0.0;
         }
+        for (double* const each : to)
+            add_noise_to_pass(numbers, count, spread, expectation, each + first * stride, stride);
+    }
+}
+
+void SimdSampler::add_noise(std::uint64_t first_sample, Scratch& scratch, double* readings) const {
+    const auto& noise = model_.run.inputs.noise;
+    const std::size_t channels = model_.channels.size();
+    for (std::size_t e = 0; e < noise.size(); ++e) {
+        const bool of_channel = noise[e].quantity == NoiseQuantity::channel;
+        if (!of_channel && noise[e].quantity != NoiseQuantity::common && noise[e].quantity != NoiseQuantity::head_walk)
+            continue;
+        std::vector<double*> to;
+        for (std::size_t c = 0; c < channels; ++c)
+            if (of_channel ? model_.channels[c] == noise[e].channel : bool(is_distance_[c]))
+                to.push_back(readings + c * lane_group);
+        add_draws(e, first_sample, scratch, to, channels * lane_group);
     }
 }
 
@@ -297,12 +309,14 @@ void SimdSampler::prepare_head(const HeadPaths& paths, Scratch::HeadRows& to) co
         const Eigen::Vector3d &origin = path.source.origin, &direction = path.source.direction;
         const double source[6] = {origin[0], origin[1], origin[2], direction[0], direction[1], direction[2]};
         fill(source, 6, const_cast<SimdRow*>(beam.source));
-        const auto detector = detector_numbers(path.detector, paths.nominal, !light.interferometer);
+        const Placement place = path.unfolding(path.route.encounters.size()).of(path.detector);
+        const auto detector = detector_numbers(place, paths.nominal, !light.interferometer);
+        beam.plates = path.plates ? &*path.plates : nullptr;
         fill(detector.data(), detector.size(), const_cast<SimdRow*>(beam.detector_rows));
         for (std::size_t e = 0; e < path.route.encounters.size(); ++e) {
-            if (e == path.mirror_at) continue;
+            if (!path.is_alone(e)) continue;
             const RecordedEncounter& met = path.route.encounters[e];
-            const FaceFrame& frame = path.frames[std::size_t(met.face)];
+            const FaceFrame frame = path.unfolding(e).of(path.frames[std::size_t(met.face)]);
             SimdFace face{met.event,
                           met.index_before != met.index_after,
                           &path.outlines[std::size_t(met.face)],
@@ -369,17 +383,19 @@ void SimdSampler::move_parts(const HeadPaths& paths, const double* deviations, S
                 SimdBeam& beam = to.beams[b];
                 std::size_t e = 0;
                 const auto move = [&](const SimdFace& face) {
-                    if (e == path.mirror_at) ++e;
+                    while (!path.is_alone(e)) ++e;
+                    const Unfolding unfolding = path.unfolding(e);
                     const int number = path.route.encounters[e++].face;
                     if (path.component[std::size_t(number)] != part.component) return;
-                    const FaceFrame& frame = path.frames[std::size_t(number)];
-                    const RowMajor before = RowMajor::Map(frame.rotation.data());
-                    const RowMajor rotation = before * turn.transpose();
-                    const Eigen::Vector3d translation = Eigen::Vector3d::Map(frame.translation.data()) +
-                                                        before * part.expected.position - rotation * place.position;
+                    FaceFrame frame = path.frames[std::size_t(number)];
+                    const RowMajor before = RowMajor::Map(frame.rotation.data()), rotation = before * turn.transpose();
+                    RowMajor::Map(frame.rotation.data()) = rotation;
+                    Eigen::Vector3d::Map(frame.translation.data()) +=
+                        before * part.expected.position - rotation * place.position;
+                    frame = unfolding.of(frame);
                     SimdRow* const rows = const_cast<SimdRow*>(face.plane_rows);
-                    for (int k = 0; k < 9; ++k) rows[k].value[lane] = rotation.data()[k];
-                    for (int k = 0; k < 3; ++k) rows[9 + k].value[lane] = translation[k];
+                    for (int k = 0; k < 9; ++k) rows[k].value[lane] = frame.rotation[k];
+                    for (int k = 0; k < 3; ++k) rows[9 + k].value[lane] = frame.translation[k];
                 };
                 for (const SimdFace& face : beam.out) move(face);
                 for (const SimdFace& face : beam.back) move(face);
@@ -389,7 +405,8 @@ void SimdSampler::move_parts(const HeadPaths& paths, const double* deviations, S
                         const_cast<SimdRow*>(beam.source)[3 + k].value[lane] = place.rotation(k, 2);
                     }
                 if (path.detector_component == part.component) {
-                    const auto numbers = detector_numbers(place, paths.nominal, beam.detector == SimdDetector::spot);
+                    const auto numbers = detector_numbers(path.unfolding(path.route.encounters.size()).of(place),
+                                                          paths.nominal, beam.detector == SimdDetector::spot);
                     for (std::size_t k = 0; k < numbers.size(); ++k)
                         const_cast<SimdRow*>(beam.detector_rows)[k].value[lane] = numbers[k];
                 }

@@ -36,7 +36,7 @@ public:
         std::vector<SimdSetup> setups;
         std::vector<std::vector<SimdRow>> closed_beams;  // by line, gain included
         std::vector<SimdRow> shared;
-        std::vector<SimdRow> displaced;
+        std::vector<SimdRow> displaced, turned;
         std::vector<SimdRow> excess;
         std::vector<SimdRow> numbers;  // drawn
     };
@@ -64,6 +64,9 @@ private:
     void move_parts(const HeadPaths& paths, const double* deviations, Scratch::HeadRows& to) const;
     void fill_fields(const Fields& fields, const double* deviations, std::vector<SimdRow>& to) const;
     void displace(std::optional<std::uint64_t> first_sample, Scratch& scratch) const;
+    // Draws a noise once for all rows and adds its numbers to rows `stride` apart, from each of `to` on.
+    void add_draws(std::size_t entry, std::uint64_t first_sample, Scratch& scratch, const std::vector<double*>& to,
+                   std::size_t stride) const;
     void correct(const RunPass& pass, const SimdPass& lanes, const Scratch& scratch) const;
 
     const RunModel& model_;
