@@ -4,9 +4,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from places import EXAMPLES
 
 import stepdiag as sd
+from stepdiag.scenario.truth import errors_of
 
 
 def output_of(*arguments: str | Path) -> str:
@@ -57,6 +59,20 @@ def test_own_measurement_goes_from_files_to_a_table(tmp_path: Path) -> None:
     scenario = EXAMPLES / "scenario.toml"
     sd.simulate_scenario(sd.read_scenario(scenario)).write(tmp_path / "run.csv")
     assert output_of(EXAMPLES / "own_measurement.py", scenario, tmp_path / "run.csv").startswith("EXX at x = 400 mm")
+
+
+@pytest.mark.parametrize(("rotation", "verdict"), [(2.0, "accepted"), (30.0, "rejected")])
+def test_small_machine_of_figure_2_needs_no_tilts_while_its_angles_are_small(rotation: float, verdict: str) -> None:
+    text = (EXAMPLES / "paper_figure2.toml").read_text(encoding="utf-8")
+    assert "rotation_urad = 2.0" in text
+    scenario = sd.parse_scenario(text.replace("rotation_urad = 2.0", f"rotation_urad = {rotation}"))
+    assert list(scenario.known.plan.volume) == [260.0, 420.0, 160.0]
+    found = sd.adjust_scenario(scenario, sd.simulate_scenario(scenario))
+    assert found.verdict.fit == verdict
+    if verdict == "accepted":
+        worst = sd.largest_deviations(found.calibration, errors_of(scenario.truth, scenario.known))
+        # Six times the largest standard uncertainty, 0.5 um: angles of 2 urad on arms of 0.4 m add 0.8 um.
+        assert max(abs(worst[kind].value) for kind in ("positioning", "straightness")) < 3e-3
 
 
 def test_import_brings_nothing_heavy() -> None:

@@ -13,7 +13,7 @@ import stepdiag as sd
 from stepdiag.cli import main
 from stepdiag.head.description import find_head, shipped_heads
 
-HEADS = ("beam_and_psd", "three_beams")
+HEADS = ("beam_and_camera", "beam_and_psd", "three_beams")
 
 
 def run(*arguments: str) -> int:
@@ -215,8 +215,8 @@ def test_sensitivity_knows_what_a_sensor_shift_does(capsys: pytest.CaptureFixtur
 def test_check_knows_a_head_from_a_scenario(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("check", *(str(find_head(name)) for name in HEADS)) == 0
     said = capsys.readouterr().out.splitlines()
-    assert [line.split(": ")[1] for line in said] == ["head", "head"]
-    assert said[1].endswith("three beams, layout multi_beam, 1 bodies, 3 beams, 0 sensors")
+    assert [line.split(": ")[1] for line in said] == ["head"] * len(HEADS)
+    assert said[-1].endswith("three beams, layout multi_beam, 1 bodies, 3 beams, 0 sensors")
 
 
 def test_init_with_a_head_makes_a_copy_to_edit() -> None:
@@ -245,7 +245,7 @@ def test_replay_that_differs_from_its_trace_is_told_in_one_line(
 
 MISTAKES: list[tuple[list[str], str]] = [
     (["head", "show", "beam_and_psd"], "Missing option '-o'"),
-    (["head", "show", "four_beams", "-o", "h.png"], 'expected the name of a shipped head (beam_and_psd, three_beams) or the path of a TOML file, got "four_beams"'),
+    (["head", "show", "four_beams", "-o", "h.png"], 'expected the name of a shipped head (beam_and_camera, beam_and_psd, three_beams) or the path of a TOML file, got "four_beams"'),
     (["head", "show", "no.toml", "-o", "h.png"], "no.toml: cannot be read"),
     (["head", "show", "three_beams", "-o", "h.jpg"], "h.jpg: expected a name that ends in .png, .svg or .pdf"),
     (["head", "show", "three_beams", "-o", "no/h.png"], "the folder no does not exist"),

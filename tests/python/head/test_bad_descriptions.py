@@ -164,7 +164,7 @@ PPP = '[line.ppp]\nhead = "left"'
 MALFORMED_IN_SCENARIO = {
     "layout and description": (put(DESCRIBED, "[misalignment]", 'layout = "psd"\n[misalignment]'), "head: expected layout or description, got both"),
     "neither of them": (put(SCENARIO, 'layout = "ideal"', ""), 'head.layout: missing; expected "ideal", "psd" or "multi_beam", or a description'),
-    "unknown shipped head": (put(DESCRIBED, '"beam_and_psd"', '"four_beams"'), 'head.description: expected the name of a shipped head (beam_and_psd, three_beams) or the path of a TOML file, got "four_beams"'),
+    "unknown shipped head": (put(DESCRIBED, '"beam_and_psd"', '"four_beams"'), 'head.description: expected the name of a shipped head (beam_and_camera, beam_and_psd, three_beams) or the path of a TOML file, got "four_beams"'),
     "description that is not there": (put(DESCRIBED, '"beam_and_psd"', '"no.toml"'), "head.description: no.toml: cannot be read"),
     "key of a layout": (put(DESCRIBED, "[misalignment]", "psd_distance_mm = 3.0\n[misalignment]"), "head.psd_distance_mm: goes with a layout; a description has its own"),
     "key of a description": (put(SCENARIO, "[misalignment]", 'reading_model = "chief_ray"\n[misalignment]'), "head.reading_model: goes with a description"),
