@@ -43,6 +43,8 @@ COMMANDS = (
     Command("export calibration.csv --to linuxcnc-comp -o comp --accept-rejected --incomplete", ("comp",)),
     Command("export calibration.csv --to isg -o out.csv --accept-rejected --incomplete", ("out.csv",)),
     Command("export calibration.csv --to csv-grid -o out.csv --accept-rejected --incomplete", ("out.csv",)),
+    Command("export calibration.csv --to squareness -o out.csv --accept-rejected --incomplete", ("out.csv",)),
+    Command("export calibration.csv --to matrix -o out.hal --accept-rejected --incomplete", ("out.hal",)),
     Command("plot calibration.csv -o out.svg", ("out.svg",)),
     Command("plot run.csv -o out.png", ("out.png",)),
     Command("report calibration.csv -o out.html", ("out.html",)),

@@ -38,7 +38,7 @@ BELOW: dict[str, set[str]] = {
     "linuxcnc": set(),
     "figures": {"planning"},
     "report": {"figures", "acquisition", "positions"},
-    "objects": {"report"},
+    "objects": {"report", "export"},
     "page": {"objects"},
     "demo": {"report", "program", "export", "linuxcnc", "twin"},
     "cli": {"demo", "page", "progress", "importing"},

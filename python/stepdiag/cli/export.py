@@ -5,14 +5,33 @@ from typing import Any
 
 import click
 
-from stepdiag.cli.options import PATH, Writes, tell, tell_fit
+from stepdiag.cli.options import PATH, Writes, fit_warnings, json_option, tell, tell_fit
 from stepdiag.cli.terminal import say
-from stepdiag.io.outputs import COMP_FILE, COMP_LINES, GRID, ISG_TABLE, KINEMATICS_TABLE, OutputFile, claim_folder
+from stepdiag.io.outputs import (
+    COMP_FILE,
+    COMP_LINES,
+    GRID,
+    HAL_LINES,
+    ISG_TABLE,
+    KINEMATICS_TABLE,
+    POSITION_ERROR,
+    SQUARENESS_TABLE,
+    OutputFile,
+    claim_folder,
+)
 from stepdiag.progress import Progress
 
 # Those of stepdiag.export.write.FORMATS, which is slow to import; a test compares them.
-FORMATS = ("linuxcnc-comp", "linuxcnc-kins", "isg", "csv-grid")
-KINDS = {"linuxcnc-kins": KINEMATICS_TABLE, "isg": ISG_TABLE, "csv-grid": GRID}
+KINDS = {
+    "linuxcnc-kins": KINEMATICS_TABLE,
+    "isg": ISG_TABLE,
+    "csv-grid": GRID,
+    "squareness": SQUARENESS_TABLE,
+    "matrix": HAL_LINES,
+    "calibxyzkins": HAL_LINES,
+    "position-error": POSITION_ERROR,
+}
+FORMATS = ("linuxcnc-comp", *KINDS)
 FOLDER = {"compensation.ini": COMP_LINES} | {f"joint{n}.comp": COMP_FILE for n in range(3)}  # linuxcnc-comp
 MM = "<X Y Z>"
 
@@ -21,7 +40,9 @@ MM = "<X Y Z>"
     epilog="\b\nExamples:\n"
     "  stepdiag export calibration.csv --to linuxcnc-kins -o machine.csv\n"
     "  stepdiag export calibration.csv --to linuxcnc-comp --at 400 300 250 -o comp\n"
-    "  stepdiag export calibration.csv --to csv-grid --step 25 -o grid.csv"
+    "  stepdiag export calibration.csv --to csv-grid --step 25 -o grid.csv\n"
+    "  stepdiag export calibration.csv --to matrix -o matrix.hal\n"
+    "  stepdiag export calibration.csv --to position-error --axis Y --depends-on X -o sag.csv"
 )
 @click.argument("calibration", type=PATH)
 @click.option("--to", "to", required=True, type=click.Choice(FORMATS), help="Format.")
@@ -31,7 +52,7 @@ MM = "<X Y Z>"
     required=True,
     type=Writes(*KINDS.values()),
     metavar="OUT",
-    help="File to write (.csv); for linuxcnc-comp a folder.",
+    help="File to write (.csv; .hal for matrix and calibxyzkins); for linuxcnc-comp a folder.",
 )
 @click.option("--tool", type=float, nargs=3, metavar=MM, help="Tool offset, mm.  [default: the calibration's]")
 @click.option(
@@ -41,21 +62,23 @@ MM = "<X Y Z>"
 @click.option(
     "--approach",
     type=click.Choice(("mean", "positive", "negative")),
-    help="Direction of approach to compensate if the tables have two (not linuxcnc-comp).  [default: mean]",
+    help="Direction of approach to compensate if the tables have two (not linuxcnc-comp, squareness).  [default: mean]",
 )
 @click.option(
     "--at",
     type=float,
     nargs=3,
     metavar=MM,
-    help="Point on the corrected lines, mm from home (linuxcnc-comp).  [default: centre of the volume]",
+    help="Point on the corrected lines, mm from home (linuxcnc-comp, position-error).  [default: centre of the volume]",
 )
 @click.option(
     "--rows",
     type=int,
     metavar="N",
-    help="Largest number of rows in a table (linuxcnc-comp, isg).  [default: 256, 5000]",
+    help="Largest number of rows in a table (linuxcnc-comp, isg, position-error).  [default: 256, 5000, every node]",
 )
+@click.option("--axis", type=click.Choice(tuple("XYZ")), help="The axis that is in error (position-error).")
+@click.option("--depends-on", type=click.Choice(tuple("XYZ")), help="The axis on whose position it depends, or itself.")
 @click.option(
     "--squareness",
     type=click.Choice(("straightness", "parameters")),
@@ -67,8 +90,11 @@ MM = "<X Y Z>"
 @click.option("--step", type=float, metavar="MM", help="Largest spacing of the grid, instead of --nodes (csv-grid).")
 @click.option("--accept-rejected", is_flag=True, help="Export a calibration even if its fit was rejected.")
 @click.option("--orientation", is_flag=True, default=None, help="Also write the rotations of the tool (csv-grid).")
+@json_option
 @click.pass_context
-def export(context: click.Context, /, calibration: Path, to: str, output: OutputFile, **options: Any) -> None:
+def export(
+    context: click.Context, /, calibration: Path, to: str, output: OutputFile, as_json: bool, **options: Any
+) -> None:
     """Write a CALIBRATION (CSV or netCDF) for a controller.
 
     \b
@@ -76,13 +102,18 @@ def export(context: click.Context, /, calibration: Path, to: str, output: Output
     linuxcnc-comp  a COMP_FILE for each joint, and the INI lines: positioning errors along three lines
     isg            volumetric compensation of ISG-CNC and TwinCAT CNC; written from the manual, not tried
     csv-grid       error vectors on a grid
+    squareness     the three squareness angles
+    matrix         the best 3x3 matrix, as HAL lines of LinuxCNC's matrixkins
+    calibxyzkins   the best linear and quadratic terms, as HAL lines of calibxyzkins (GTEC-UDC)
+    position-error rows of position and error of one axis along another (or itself)
 
-    Reports the sign convention, the reference point, the loss by resampling and what is not
-    compensated. Refuses a calibration that does not determine all that the format needs, unless
-    --incomplete is given. An error map is accepted as well; parameters that it lacks are 0.
+    Reports the sign convention, the reference point, the loss by resampling, what of the 21 errors
+    is left out, and for formats that leave out some, what that leaves in the volume. Refuses a
+    calibration that does not determine all that the format needs, unless --incomplete is
+    given. An error map is accepted as well; parameters that it lacks are 0.
     """
     from stepdiag.export.common import ExportOptions
-    from stepdiag.export.write import check_fit, export_calibration, read_what_is_exported
+    from stepdiag.export.write import check_fit, read_what_is_exported, write_export
     from stepdiag.io.whole_files import check_input
 
     if to in KINDS:
@@ -93,10 +124,15 @@ def export(context: click.Context, /, calibration: Path, to: str, output: Output
     read = read_what_is_exported(calibration)
     check_fit(read, f"{calibration}", options["accept_rejected"])
     with Progress("export"):
-        lines = export_calibration(read, to, path, ExportOptions(**options))
-    for line in lines:
+        done = write_export(read, to, path, ExportOptions(**options))
+    if as_json:
+        from stepdiag.objects.export import export_object
+        from stepdiag.objects.writer import json_text
+
+        click.echo(json_text(export_object(done, read, to, calibration, fit_warnings(calibration, read.fit))))
+    for line in done.told:
         if line.startswith("warning: "):
             tell("warning", line.removeprefix("warning: "))
-        else:
+        elif not as_json:
             say(line)
     tell_fit(context, calibration, read.fit)

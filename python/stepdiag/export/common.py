@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
@@ -16,7 +15,7 @@ FloatArray = npt.NDArray[np.float64]
 Triple = tuple[float, float, float]
 Approach = Literal["mean", "positive", "negative"]
 APPROACHES: Final[tuple[Approach, ...]] = ("mean", "positive", "negative")
-
+APPROACH_WORDS: Final[Mapping[Approach, str]] = {"mean": "mean of both", "positive": "+", "negative": "-"}
 
 SAME_NODE: Final = 1e-6  # mm: closer nodes count as one; tables have nine digits after the point
 
@@ -31,21 +30,15 @@ class ExportOptions:
     origin: Triple | None = None  # home in the controller's coordinates, mm; None: 0 0 0
     incomplete: bool = False  # export undetermined values as 0
     approach: Approach | None = None  # direction to export if there are two; None: mean
-    at: Triple | None = None  # linuxcnc-comp: point on corrected lines, mm from home; None: centre
-    rows: int | None = None  # linuxcnc-comp, isg: largest number of rows in a table
+    at: Triple | None = None  # linuxcnc-comp, position-error: point on corrected lines, mm from home; None: centre
+    rows: int | None = None  # linuxcnc-comp, position-error, isg: largest number of rows in a table
+    axis: str | None = None  # position-error: X, Y or Z, the axis whose error is exported
+    depends_on: str | None = None  # position-error: X, Y or Z, the axis on whose position it depends
     nodes: tuple[int, int, int] | None = None  # csv-grid: points along X, Y, Z
     step: float | None = None  # csv-grid: largest spacing, mm
     orientation: bool | None = None  # csv-grid: export rotations as well
     squareness: Literal["straightness", "parameters"] | None = None  # isg: where to put it
     accept_rejected: bool = False  # export a calibration with a rejected fit
-
-
-@dataclass(frozen=True)
-class Export:
-    """Contents of files by path, and notes for the user."""
-
-    files: Mapping[Path, str]
-    report: Sequence[str]
 
 
 def require(calibration: Calibration, names: Sequence[str], options: ExportOptions) -> list[str]:
@@ -103,6 +96,14 @@ def tool_of(calibration: Calibration, options: ExportOptions) -> FloatArray:
 def origin_of(options: ExportOptions) -> FloatArray:
     """Home in the controller's coordinates, mm."""
     return np.array(options.origin or (0.0, 0.0, 0.0), dtype=float)
+
+
+def line_point(calibration: Calibration, options: ExportOptions) -> FloatArray:
+    """The point on the corrected lines, mm from home. Raises InvalidArgument outside of the volume."""
+    at = calibration.volume / 2.0 if options.at is None else np.array(options.at, dtype=float)
+    if np.any((at < 0.0) | (at > calibration.volume)):
+        raise InvalidArgument(f"`at`: expected a point of the volume {words(calibration.volume)} mm, got {words(at)}")
+    return at
 
 
 def compensated_map(calibration: Calibration, approach: Approach) -> ErrorMap:

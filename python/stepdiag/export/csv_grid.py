@@ -16,7 +16,6 @@ from stepdiag._core import Calibration, InvalidArgument, Machine
 from stepdiag.calibration.finding_text import fit_row
 from stepdiag.calibration.temperature_text import temperature_text
 from stepdiag.export.common import (
-    Export,
     ExportOptions,
     FloatArray,
     common_nodes,
@@ -30,6 +29,7 @@ from stepdiag.export.common import (
     tool_of,
     words,
 )
+from stepdiag.export.result import Export, coverage_of
 from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 
@@ -73,7 +73,8 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
     }
     text = csv_text(_header(bool(options.orientation)), [], leading) + "".join(_rows(axes, origin, values))
     report = _report(leading, axes, error, loss, place, missing)
-    return Export({output: text}, [fit_row(calibration), temperature_row(calibration), *report])
+    said = [fit_row(calibration), temperature_row(calibration), *report]
+    return Export({output: text}, said, coverage_of(calibration, [*FUNCTIONS, *SQUARENESSES]))
 
 
 def _axes(volume: FloatArray, options: ExportOptions) -> list[FloatArray]:

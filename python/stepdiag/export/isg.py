@@ -23,7 +23,7 @@ import numpy as np
 from stepdiag._core import Calibration, Chain, ErrorMap, InvalidArgument, Machine
 from stepdiag.calibration.finding_text import fit_row, provenance_rows
 from stepdiag.export.common import (
-    Export,
+    APPROACH_WORDS,
     ExportOptions,
     FloatArray,
     common_nodes,
@@ -38,6 +38,7 @@ from stepdiag.export.common import (
     words,
 )
 from stepdiag.export.fewest_nodes import best_subset
+from stepdiag.export.result import Export, coverage_of
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
 
 UNTRIED: Final = "written from the manual (ISG FCT-C26, Beckhoff TF5280), not tried on a controller"
@@ -68,7 +69,6 @@ def isg(calibration: Calibration, output: Path, options: ExportOptions) -> Expor
     loss = _largest_loss(exact, Machine(tool_side, ErrorMap(functions, squareness), tool), tables, origin)
 
     records = sum(len(x) for x, _ in tables.values()) + bool(squareness) + 1
-    kind = {"mean": "mean of both", "positive": "+", "negative": "-"}[approach]
     angles = ", ".join(f"{name} = {angle * 1e6:.6g} µrad" for name, angle in errors.squareness.items())
     where = "as parameters" if apart else "in the straightnesses: EXY - C0Y y, EXZ + B0Z z, EYZ - A0Z z"
     lines = [
@@ -77,7 +77,7 @@ def isg(calibration: Calibration, output: Path, options: ExportOptions) -> Expor
         *provenance_rows(calibration),
         UNTRIED,
         f"chain {calibration.chain}, volume {words(calibration.volume)} mm, home at {words(origin)} mm in the "
-        f"controller's coordinates, direction of approach {kind}",
+        f"controller's coordinates, direction of approach {APPROACH_WORDS[approach]}",
         "sign: errors, actual - commanded of the tool relative to the workpiece (ISO 230-1); if the machine gets "
         "worse, set negate XYZ",
         f"straightness: of the functional point, tool offset {words(tool)} mm, other axes at 0 (every axis taken as "
@@ -89,7 +89,8 @@ def isg(calibration: Calibration, output: Path, options: ExportOptions) -> Expor
         f"start-up list: vol_comp[0].max_records {records} or more",
         *missing,
     ]
-    return Export({output: _text(lines, tables, squareness, tool)}, lines)
+    text = _text(lines, tables, squareness, tool)
+    return Export({output: text}, lines, coverage_of(calibration, [*FUNCTIONS, *SQUARENESSES]))
 
 
 Table = tuple[FloatArray, dict[str, FloatArray]]

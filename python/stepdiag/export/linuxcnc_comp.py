@@ -22,26 +22,31 @@ import numpy as np
 from stepdiag._core import Calibration, InvalidArgument, Machine
 from stepdiag.calibration.finding_text import fit_row, provenance_rows
 from stepdiag.export.common import (
-    Export,
     ExportOptions,
     FloatArray,
     common_nodes,
     in_ascii,
     inside,
+    line_point,
     origin_of,
     require,
-    spread,
     temperature_row,
     tool_of,
     words,
 )
 from stepdiag.export.fewest_nodes import best_subset
+from stepdiag.export.left_in_volume import left_in_volume, what_is_left
+from stepdiag.export.result import Export, coverage_of
 from stepdiag.io.comp_set import fingerprint_rows
 from stepdiag.parameters import AXES
 
 # EMCMOT_COMP_SIZE; LinuxCNC 2.9 reports an error for more rows, and starts without the rest.
 MOST_ROWS: Final = 256
 COMPANION: Final = "compensation.ini"
+LEFT_OUT: Final = (
+    "left out: straightness, squareness, and what the angles do away from the lines; a COMP_FILE cannot correct these, "
+    "stepdiagkins (--to linuxcnc-kins) does"
+)
 
 
 def linuxcnc_comp(calibration: Calibration, output: Path, options: ExportOptions) -> Export:
@@ -49,10 +54,7 @@ def linuxcnc_comp(calibration: Calibration, output: Path, options: ExportOptions
     rows = MOST_ROWS if options.rows is None else options.rows
     if not 2 <= rows <= MOST_ROWS:
         raise InvalidArgument(f"`rows`: expected 2 to {MOST_ROWS}, as LinuxCNC takes, got {rows}")
-    at = calibration.volume / 2.0 if options.at is None else np.array(options.at, dtype=float)
-    outside = (at < 0.0) | (at > calibration.volume)
-    if np.any(outside):
-        raise InvalidArgument(f"`at`: expected a point of the volume {words(calibration.volume)} mm, got {words(at)}")
+    at = line_point(calibration, options)
     tool = tool_of(calibration, options)
     missing = require(calibration, _needed(), options)
     machine = Machine(calibration.chain, calibration.to_error_map(), tool)
@@ -60,10 +62,19 @@ def linuxcnc_comp(calibration: Calibration, output: Path, options: ExportOptions
 
     head = list(_what_the_files_are(calibration, at, tool, origin_of(options), missing))
     losses = [joint.sentence() for joint in joints]
-    left = list(_what_is_left(machine, calibration.volume, joints))
+
+    def motors(commanded: FloatArray, direction: int) -> FloatArray:
+        trims = [joint.trim(commanded[:, n], direction) for n, joint in enumerate(joints)]
+        return commanded + np.column_stack(trims)
+
+    left = left_in_volume(calibration, tool, motors)
+    said = [*what_is_left(calibration, left), LEFT_OUT]
     files = {output / f"joint{n}.comp": joint.text(float(origin_of(options)[n])) for n, joint in enumerate(joints)}
-    files[output / COMPANION] = _companion([*head, *losses, *left], {path.name: text for path, text in files.items()})
-    return Export(files, [*head, *losses, *left, f"note: paste the lines of {output / COMPANION} into the INI file"])
+    files[output / COMPANION] = _companion([*head, *losses, *said], {path.name: text for path, text in files.items()})
+    positioning = [f"E{axis}{axis}" for axis in AXES]
+    coverage = coverage_of(calibration, positioning, [name for name in _needed() if name not in positioning])
+    paste = f"note: paste the lines of {output / COMPANION} into the INI file"
+    return Export(files, [*head, *losses, *said, paste], coverage, left)
 
 
 def _needed() -> list[str]:
@@ -143,36 +154,6 @@ def _what_the_files_are(
         "sign: actual = where the axis comes to when sent to nominal; LinuxCNC subtracts actual - nominal",
         *missing,
     ]
-
-
-def _what_is_left(machine: Machine, volume: FloatArray, joints: list[JointTable]) -> list[str]:
-    """Largest errors in the volume with and without compensation, on a grid, in both directions."""
-    axes = [spread(joint.nodes, 21) for joint in joints]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    before, after = [], []
-    for direction, sign in enumerate("+-"):
-        motor = grid + np.column_stack([joint.trim(grid[:, n], direction) for n, joint in enumerate(joints)])
-        before.append(machine.error(grid, 3 * sign))
-        after.append(motor + machine.error(motor, 3 * sign) - grid)
-    b, a = (np.concatenate(errors) * 1e3 for errors in (before, after))
-    without, with_them = (f"{np.max(np.linalg.norm(errors, axis=1)):.4g}" for errors in (b, a))
-    worse = (
-        f"warning: these files make the machine worse: the largest error in the volume is {without} µm "
-        f"without them and {with_them} µm with them"
-    )
-    return [
-        *([worse] if float(with_them) > float(without) else []),
-        f"largest error in the volume without compensation {_largest(b)}, with it {_largest(a)}",
-        "what is left: straightness, squareness, and what the angles do away from the lines; a COMP_FILE cannot "
-        "correct these, stepdiagkins (--to linuxcnc-kins) does",
-    ]
-
-
-def _largest(errors: FloatArray) -> str:
-    components = ", ".join(
-        f"{axis} {value:.4g}" for axis, value in zip(AXES, np.max(np.abs(errors), axis=0), strict=True)
-    )
-    return f"{np.max(np.linalg.norm(errors, axis=1)):.4g} µm ({components})"
 
 
 def _companion(sentences: list[str], tables: Mapping[str, str]) -> str:

@@ -12,7 +12,6 @@ import numpy as np
 from stepdiag._core import Calibration, Compensator
 from stepdiag.calibration.finding_text import fit_row
 from stepdiag.export.common import (
-    Export,
     ExportOptions,
     FloatArray,
     origin_of,
@@ -21,6 +20,7 @@ from stepdiag.export.common import (
     tool_of,
     words,
 )
+from stepdiag.export.result import Export, coverage_of
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 
 
@@ -65,7 +65,7 @@ def linuxcnc_kins(calibration: Calibration, output: Path, options: ExportOptions
         )
     if " " in str(output.absolute()):
         lines.append("note: KINEMATICS takes no space in a path: move the table to where there is none")
-    return Export({output: _csv_text(table)}, lines)
+    return Export({output: _csv_text(table)}, lines, coverage_of(calibration, [*FUNCTIONS, *SQUARENESSES]))
 
 
 def _csv_text(calibration: Calibration) -> str:

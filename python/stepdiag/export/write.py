@@ -14,11 +14,14 @@ import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, read_error_map
 from stepdiag.calibration.finding_text import MEANING, check_angles
-from stepdiag.export.common import Export, ExportOptions, tool_of
+from stepdiag.export.common import ExportOptions, tool_of
 from stepdiag.export.csv_grid import csv_grid
 from stepdiag.export.isg import isg
 from stepdiag.export.linuxcnc_comp import linuxcnc_comp
 from stepdiag.export.linuxcnc_kins import linuxcnc_kins
+from stepdiag.export.polynomial import calibxyzkins, matrix, squareness
+from stepdiag.export.position_error import position_error
+from stepdiag.export.result import Export
 from stepdiag.io.data_files import is_netcdf, read_calibration
 from stepdiag.io.whole_files import check_output, make_folder, write_set
 from stepdiag.parameters import AXES, FUNCTIONS, SQUARENESSES
@@ -29,6 +32,10 @@ FORMATS: Final[Mapping[str, tuple[str, ...]]] = {
     "linuxcnc-kins": ("approach",),
     "isg": ("approach", "rows", "squareness"),
     "csv-grid": ("approach", "nodes", "step", "orientation"),
+    "squareness": (),
+    "matrix": ("approach",),
+    "calibxyzkins": ("approach",),
+    "position-error": ("approach", "axis", "depends_on", "at", "rows"),
 }
 
 
@@ -86,7 +93,8 @@ def export_calibration(
 
     Args:
         calibration: the calibration to export.
-        to: format: "linuxcnc-kins", "linuxcnc-comp", "isg" or "csv-grid" (docs/exports.md).
+        to: format, one of FORMATS (docs/exports.md): "linuxcnc-kins", "linuxcnc-comp", "isg", "csv-grid",
+            "squareness", "matrix", "calibxyzkins" or "position-error".
         output: the file to write; for linuxcnc-comp a folder, which is created.
         options: see ExportOptions; None: the defaults.
 
@@ -95,17 +103,31 @@ def export_calibration(
             a required value (unless `incomplete`), its fit was rejected (unless `accept_rejected`),
             or the format cannot represent it.
     """
-    export = _prepare(calibration, to, output, options or ExportOptions())
+    return write_export(calibration, to, output, options or ExportOptions()).told
+
+
+def write_export(calibration: Calibration, to: str, output: Path, options: ExportOptions) -> Export:
+    """Write as `export_calibration` does, and return also what is compensated and what is left."""
+    export = _prepare(calibration, to, output, options)
     if to == "linuxcnc-comp":
         make_folder(output)
     for path in export.files:
         check_output(path)
     write_set(export.files)
-    return [*export.report, *(f"wrote {path}" for path in export.files)]
+    return export
 
 
 def _prepare(calibration: Calibration, to: str, output: Path, options: ExportOptions) -> Export:
-    formats = {"linuxcnc-comp": linuxcnc_comp, "linuxcnc-kins": linuxcnc_kins, "isg": isg, "csv-grid": csv_grid}
+    formats = {
+        "linuxcnc-comp": linuxcnc_comp,
+        "linuxcnc-kins": linuxcnc_kins,
+        "isg": isg,
+        "csv-grid": csv_grid,
+        "squareness": squareness,
+        "matrix": matrix,
+        "calibxyzkins": calibxyzkins,
+        "position-error": position_error,
+    }
     if to not in formats:
         raise InvalidArgument(f"`to`: expected one of {', '.join(formats)}, got {to!r}")
     taken = {"tool", "origin", "incomplete", "accept_rejected", *FORMATS[to]}

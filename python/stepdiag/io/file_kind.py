@@ -24,6 +24,8 @@ _FORMATS: Final = {
     "uncertainty": "uncertainty result",
     "study": "study result",
     "error grid": "error grid",
+    "squareness": "squareness table",
+    "position error": "position error table",
 }
 _NUMBER: Final = r"[-+]?[\d.]+(?:e[-+]?\d+)?"
 # Other kinds, by a pattern for the beginning of the file.
@@ -35,6 +37,7 @@ _BEGINNINGS: Final = {
     "PDF document": "%PDF-",
     "measuring program": r"(?i:%\n)?\((?i:measuring program)\b",
     "ISG table": "// stepdiag export --to isg\n",
+    "file of HAL lines": "# stepdiag export --to (?:matrix|calibxyzkins)\n",
     "compensation.ini": "# stepdiag export --to linuxcnc-comp\n",
     "COMP_FILE": rf"(?:{_NUMBER} {_NUMBER} {_NUMBER}\n)+\Z",
     "study cells": r"(?s:.*\n)?[0-9a-f]{64} \{|\s*[0-9a-f]{1,64} ?\Z",  # also a torn first line

@@ -17,6 +17,7 @@ OBJECTS: Final = {
     "check": ("stepdiag.objects.check", "CheckObject"),
     "comparison": ("stepdiag.objects.comparison", "ComparisonObject"),
     "evaluation": ("stepdiag.objects.evaluation", "EvaluationObject"),
+    "export": ("stepdiag.objects.export", "ExportObject"),
     "observation": ("stepdiag.objects.observation", "ObservationObject"),
     "positions": ("stepdiag.objects.positions", "PositionsObject"),
     "recheck": ("stepdiag.objects.recheck", "RecheckObject"),

@@ -66,6 +66,10 @@ FILES: dict[tuple[str, str], list[tuple[list[str], tuple[str, ...]]]] = {
         (["calibration.csv", "--to", "linuxcnc-kins", "-o", OUT], (".csv",)),
         (["calibration.csv", "--to", "isg", "-o", OUT], (".csv",)),
         (["calibration.csv", "--to", "csv-grid", "--nodes", "2", "2", "2", "-o", OUT], (".csv",)),
+        (["calibration.csv", "--to", "squareness", "-o", OUT], (".csv",)),
+        (["calibration.csv", "--to", "matrix", "-o", OUT], (".hal",)),
+        (["calibration.csv", "--to", "calibxyzkins", "-o", OUT], (".hal",)),
+        (["calibration.csv", "--to", "position-error", "--axis", "Y", "--depends-on", "X", "-o", OUT], (".csv",)),
     ],
     ("head show", "output"): [(["three_beams.toml", "-o", OUT], (".png", ".svg", ".pdf"))],
 }

@@ -17,7 +17,18 @@ from stepdiag.cli import export as cli_export
 from stepdiag.cli import main
 from stepdiag.export.write import FORMATS
 
-OUTPUT = {"linuxcnc-comp": "comp", "linuxcnc-kins": "kins.csv", "isg": "isg.csv", "csv-grid": "grid.csv"}
+OUTPUT = {
+    "linuxcnc-comp": "comp",
+    "linuxcnc-kins": "kins.csv",
+    "isg": "isg.csv",
+    "csv-grid": "grid.csv",
+    "squareness": "squareness.csv",
+    "matrix": "matrix.hal",
+    "calibxyzkins": "calibxyzkins.hal",
+    "position-error": "error.csv",
+}
+# What these tests take for the axes that position-error needs.
+POSITIONING = {axis: {"axis": axis, "depends_on": axis} for axis in "XZ"}
 
 
 @pytest.fixture
@@ -25,6 +36,10 @@ def calibration_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     sd.write_calibration(random_calibration(5), "calibration.csv")
     return tmp_path / "calibration.csv"
+
+
+def axes_of(to: str) -> list[str]:
+    return ["--axis", "X", "--depends-on", "X"] if to == "position-error" else []
 
 
 def test_the_command_knows_the_formats_of_the_library() -> None:
@@ -35,11 +50,11 @@ def test_the_command_knows_the_formats_of_the_library() -> None:
 def test_every_format_tells_chain_sign_and_loss(
     calibration_file: Path, to: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["export", "calibration.csv", "--to", to, "-o", OUTPUT[to]]) == 0
+    assert main(["export", "calibration.csv", "--to", to, "-o", OUTPUT[to], *axes_of(to)]) == 0
     said = capsys.readouterr().out
     for words in ("chain [w X' b Y Z t]", "sign: ", f"wrote {OUTPUT[to]}"):
         assert words in said
-    assert any(words in said for words in ("loses at most", "loss: ", "deviates", "differs"))
+    assert any(words in said for words in ("loses at most", "loss: ", "deviates", "differs", "left out: "))
 
 
 @pytest.mark.parametrize(
@@ -60,14 +75,15 @@ def test_every_export_says_for_which_temperature_it_is(
 ) -> None:
     """In a comment of the file, in ASCII; a COMP_FILE takes none, and the INI lines beside it have it."""
     calibration = sd.Calibration(**parts_of(random_calibration(5)), **temperature)
-    report = export(calibration, to, tmp_path / OUTPUT[to])
+    report = export(calibration, to, tmp_path / OUTPUT[to], **POSITIONING["X"] if to == "position-error" else {})
     assert any(line.startswith("temperature: ") and said in line for line in report)
     folder = tmp_path / OUTPUT[to]
     lines = (folder / "compensation.ini" if folder.is_dir() else folder).read_text("utf-8").splitlines()
     if to == "linuxcnc-kins":  # a calibration file, with the keys of one
         assert not in_table or f"# {in_table}" in lines
         return
-    comment, separator = ("//", ": ") if to == "isg" else ("#", "=" if to == "csv-grid" else ": ")
+    table = OUTPUT[to].endswith(".csv") and to != "isg"
+    comment, separator = ("//", ": ") if to == "isg" else ("#", "=" if table else ": ")
     (line,) = [line for line in lines if line.startswith(f"{comment} temperature{separator}")]
     assert said.replace("°C", "degC") in line
     assert line.isascii()
@@ -79,7 +95,7 @@ def test_netcdf_and_csv_are_exported_alike(calibration_file: Path, to: str) -> N
     sd.write_calibration(calibration, "calibration.nc")
     texts = []
     for name in ("calibration.csv", "calibration.nc"):
-        assert main(["export", name, "--to", to, "-o", OUTPUT[to]]) == 0
+        assert main(["export", name, "--to", to, "-o", OUTPUT[to], *axes_of(to)]) == 0
         file = Path(OUTPUT[to]) / "joint1.comp" if to == "linuxcnc-comp" else Path(OUTPUT[to])
         texts.append(file.read_text())
     assert texts[0] == texts[1]
@@ -96,34 +112,39 @@ def test_netcdf_and_csv_are_exported_alike(calibration_file: Path, to: str) -> N
         ("step", 5.0),
         ("orientation", True),
         ("squareness", "parameters"),
+        ("axis", "X"),
+        ("depends_on", "Y"),
     ],
 )
 def test_an_option_of_another_format_is_refused(tmp_path: Path, to: str, option: str, value: Any) -> None:
     calibration, path = random_calibration(5), tmp_path / "out"
+    needed = POSITIONING["X"] if to == "position-error" else {}
     if option in FORMATS[to]:
-        assert export(calibration, to, path, **{option: value})
+        assert export(calibration, to, path, **needed | {option: value})
     else:
         refused(export, calibration, to, path, names=f"`{option}`", **{option: value})
         assert not path.exists()
 
 
-@pytest.mark.parametrize("to", FORMATS)
+@pytest.mark.parametrize("to", [to for to in FORMATS if to != "squareness"])
 def test_a_scale_that_is_not_determined_is_no_scale_of_0(tmp_path: Path, to: str) -> None:
     plan = sd.Plan(SMALL_VOLUME, DIAGONALS, 5)  # no scale lines
     calibration = calibrate(1, plan=plan)
     assert "EXX" in calibration.undetermined_slopes
-    refused(export, calibration, to, tmp_path / "out", names="EXX (slope)")
-    report = export(calibration, to, tmp_path / "out", incomplete=True)
+    needed = POSITIONING["X"] if to == "position-error" else {}
+    refused(export, calibration, to, tmp_path / "out", names="EXX (slope)", **needed)
+    report = export(calibration, to, tmp_path / "out", incomplete=True, **needed)
     assert any("NOT COMPENSATED" in line and "EXX (slope)" in line for line in report)
 
 
-@pytest.mark.parametrize("to", FORMATS)
+@pytest.mark.parametrize("to", [to for to in FORMATS if to != "squareness"])
 def test_a_table_that_ends_before_the_volume_does_is_said_to_hold_its_end(tmp_path: Path, to: str) -> None:
     errors = random_calibration(5).to_error_map()
     position, value = errors.functions["EZZ"]
     short = {"EZZ": (position[1:-1], value[1:-1])}
     calibration = calibration_of(sd.ErrorMap(errors.functions | short, errors.squareness))
-    report = "\n".join(export(calibration, to, tmp_path / "out"))
+    needed = POSITIONING["Z"] if to == "position-error" else {}
+    report = "\n".join(export(calibration, to, tmp_path / "out", **needed))
     assert f"EZZ below {position[1]:g} mm, EZZ above {position[-2]:g} mm" in report
 
 
@@ -158,6 +179,9 @@ def test_what_an_error_map_lacks_is_0(
         (["calibration.csv", "--to", "csv-grid", "-o", "x.csv", "--origin", "inf", "2", "3"], "--origin"),
         (["calibration.csv", "--to", "linuxcnc-comp", "-o", "calibration.csv"], "calibration.csv"),
         (["calibration.csv", "--to", "linuxcnc-comp", "-o", "x", "--at", "900", "0", "0"], "--at"),
+        (["calibration.csv", "--to", "position-error", "-o", "x.csv", "--axis", "X"], "--depends-on"),
+        (["calibration.csv", "--to", "position-error", "-o", "x.csv", "--axis", "A", "--depends-on", "X"], "--axis"),
+        (["calibration.csv", "--to", "matrix", "-o", "x.csv"], "x.csv: expected a name that ends in .hal"),
         (["calibration.csv", "--to", "csv-grid", "-o", "x.csv", "--nodes", "2", "2", "2", "--step", "1"], "--step"),
     ],
 )
@@ -227,7 +251,7 @@ def test_a_machine_without_errors_needs_no_correction(tmp_path: Path) -> None:
     functions = {f"E{c}{a}": ([0.0, edge], [0.0, 0.0]) for a, edge in edges for c in "XYZABC"}
     calibration = calibration_of(sd.ErrorMap(functions, dict.fromkeys(("C0Y", "B0Z", "A0Z"), 0.0)))
     for to in FORMATS:
-        assert export(calibration, to, tmp_path / OUTPUT[to])
+        assert export(calibration, to, tmp_path / OUTPUT[to], **POSITIONING["X"] if to == "position-error" else {})
     assert np.all(np.genfromtxt(tmp_path / "comp/joint0.comp")[:, 1] == [0.0, 80.0])
 
 

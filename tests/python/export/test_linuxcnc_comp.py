@@ -29,7 +29,7 @@ def one_error(name: str, position: list[float], value: list[float]) -> sd.ErrorM
     functions: dict[str, tuple[list[float], list[float]]] = {
         f"E{component}{axis}": ([0.0], [0.0]) for axis in "XYZ" for component in "XYZABC"
     }
-    return sd.ErrorMap(functions | {name: (position, value)})
+    return sd.ErrorMap(functions | {name: (position, value)}, dict.fromkeys(("C0Y", "B0Z", "A0Z"), 0.0))
 
 
 def joints(folder: Path) -> list[CompFile]:

@@ -12,7 +12,7 @@ from jsonschema import Draft202012Validator
 from stepdiag.objects.schemas import OBJECTS, schema_text
 
 SCHEMAS = Path(__file__).parents[3] / "docs" / "json"
-UNITS = ("um", "mm", "urad", "ppm", "um_per_h", "um_per_k", "um_per_m", "um_per_m_k", "c", "minutes")
+UNITS = ("um", "mm", "urad", "ppm", "um_per_h", "um_per_k", "um_per_m", "um_per_m_k", "per_mm", "c", "minutes")
 # Numbers that have no unit.
 OF_UNIT_ONE = {
     "alpha",
@@ -22,6 +22,7 @@ OF_UNIT_ONE = {
     "chi_square_probability",
     "fit_chi_square",
     "fit_probability",
+    "linear",  # mm of mm
     "limit",
     "normalised",
     "probability",
