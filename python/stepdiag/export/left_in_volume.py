@@ -93,11 +93,11 @@ def volume_grid_of(errors: ErrorMap, volume: FloatArray, fewest: int = 2) -> tup
 
 def _trapezoidal(positions: FloatArray) -> FloatArray:
     half = 0.5 * np.diff(positions) / (positions[-1] - positions[0])
-    return np.append(half, 0.0) + np.append(0.0, half)
+    return np.asarray(np.append(half, 0.0) + np.append(0.0, half))
 
 
 def _left(machine: Machine, commanded: FloatArray, motors: FloatArray, approach: str) -> FloatArray:
-    return motors + machine.error(motors, approach) - commanded
+    return np.asarray(motors + machine.error(motors, approach) - commanded)
 
 
 def _size(errors: Sequence[FloatArray], weights: FloatArray) -> ErrorSize:

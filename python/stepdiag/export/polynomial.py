@@ -42,6 +42,8 @@ SQUARENESS_FORMAT: Final = "stepdiag squareness 1"
 TOLERANCE: Final = 1e-9  # mm
 # A fit at two nodes of an axis could not tell a slope from a parabola.
 FITTED_POSITIONS: Final = 11
+# matrixkins makes its parameters when motmod asks for the kind of kinematics.
+AFTER_MOTMOD: Final = "INI file: [HAL] HALFILE = this file, after the file that loads motmod"
 ARC_SECOND: Final = np.pi / 180.0 / 3600.0
 # Squareness -> its two axes, and the sign with which it makes their angle larger than 90 degrees.
 BETWEEN: Final = {"C0Y": ("XY", 1.0), "B0Z": ("XZ", -1.0), "A0Z": ("YZ", 1.0)}
@@ -72,7 +74,8 @@ class Polynomial:
 def squareness(calibration: Calibration, output: Path, options: ExportOptions) -> Export:
     """The three squarenesses, CSV, in two conventions of sign: those of the tables, and the fitted ones."""
     missing = require(calibration, SQUARENESSES, options)
-    angles = {name: calibration.squareness[name][0] for name in SQUARENESSES if name in calibration.squareness}
+    known = calibration.squareness
+    angles: dict[str, float] = {name: known[name][0] for name in SQUARENESSES if name in known}
     left = _left_by(calibration, options, angles)
     fitted = _fitted_angles(calibration, options) if left is not None else {}
     with_fitted = _left_by(calibration, options, fitted) if fitted else None
@@ -129,7 +132,7 @@ def matrix(calibration: Calibration, output: Path, options: ExportOptions) -> Ex
     """HAL lines for matrixkins, with the matrix and its inverse in comments."""
     fitted, missing = _fitted(calibration, options, powers=1)
     tool, origin = tool_of(calibration, options), origin_of(options)
-    inverse = np.linalg.inv(fitted.linear)
+    inverse = np.asarray(np.linalg.inv(fitted.linear), dtype=np.float64)
     left = left_in_volume(calibration, tool, fitted.from_home(origin))
     moved = inverse @ origin - origin
     lines = [
@@ -148,7 +151,7 @@ def matrix(calibration: Calibration, output: Path, options: ExportOptions) -> Ex
         "rotation with a changing lever arm",
         *what_is_left(calibration, left),
     ]
-    comments = ["INI file: [KINS] KINEMATICS = matrixkins; joints 0 1 2 = X Y Z; the matrix has no unit"]
+    comments = ["INI file: [KINS] KINEMATICS = matrixkins; joints 0 1 2 = X Y Z; the matrix has no unit", AFTER_MOTMOD]
     comments += [f"I + A, row {axis}: {_numbers(row)}" for axis, row in zip(AXES, fitted.linear, strict=True)]
     comments += [f"C, row {axis}: {_numbers(row)}" for axis, row in zip(AXES, inverse, strict=True)]
     text = _hal("matrix", calibration, [*lines, *comments], _set("matrixkins.C_{}{}", inverse))
@@ -176,6 +179,7 @@ def calibxyzkins(calibration: Calibration, output: Path, options: ExportOptions)
         "module: https://github.com/GTEC-UDC/linuxcnc_gantry_robot; its code of July 2025 (commit 44b1355) still calls "
         "the names below calibxzkins.*",
         "INI file: [KINS] KINEMATICS = calibxyzkins coordinates=XYZ, [TRAJ] LINEAR_UNITS = mm",
+        AFTER_MOTMOD,
         f"tol: the default of 0.001 mm would leave errors below 1 um as they are; here {TOLERANCE:g} mm",
     ]
     text = _hal(
