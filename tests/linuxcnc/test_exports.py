@@ -6,15 +6,19 @@ calibration.
 
 from __future__ import annotations
 
+import json
+import tempfile
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 from exported import CHAINS, TOOL, VOLUME, calibration_of, export, machine_of, points_in, random_calibration
+from simple_exports import settings
 
 import stepdiag as sd
-from stepdiag.linuxcnc.session import LinuxcncError, LinuxcncSession
+from stepdiag.linuxcnc.session import PYTHON, LinuxcncError, LinuxcncSession
 
 AT = (31.0, 12.0, 44.0)
 # What an exact inverse at the rows leaves between them: an error of 24 µm, slopes that change by 8 mm/m.
@@ -157,3 +161,40 @@ def test_one_direction_of_a_table_with_two_is_in_force(tmp_path: Path) -> None:
     with LinuxcncSession(table=tmp_path / "table.csv", chain=CHAINS[1], options={"approach": "negative"}) as session:
         motor = motors(session, points.tolist())
     assert np.max(np.abs(motor + machine_of(calibration).error(motor, "---") - points)) < 1e-9
+
+
+# A component with the parameters of a kinematics module that Debian does not have. It tells what they are set to.
+STAND_IN = """
+import hal, json, os, sys, time
+module, names = sys.argv[1], sys.argv[2:]
+component = hal.component(module)
+for name in names:
+    component.newparam(name, hal.HAL_FLOAT, hal.HAL_RW)
+component.ready()
+while True:
+    with open(module + ".new", "w") as file:
+        json.dump({module + "." + name: component[name] for name in names}, file)
+    os.replace(module + ".new", module + ".json")
+    time.sleep(0.02)
+"""
+
+
+@pytest.mark.parametrize("to", ["matrix", "calibxyzkins"])
+def test_hal_lines_set_what_they_say(tmp_path: Path, to: str) -> None:
+    """To the last bit, with the comments of the file before them; a line that LinuxCNC refuses would end the start."""
+    export(random_calibration(3), to, tmp_path / "lines.hal", origin=(5.0, -6.0, 7.0))
+    expected = settings(tmp_path / "lines.hal")
+    module = {"matrix": "matrixkins"}.get(to, to)
+    names = [name.removeprefix(f"{module}.") for name in expected]
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o755)  # LinuxCNC's process may be another user's
+        stand_in = Path(folder) / "stand_in.py"
+        stand_in.write_text(STAND_IN)
+        load = f"loadusr -Wn {module} {PYTHON} {stand_in} {module} {' '.join(names)}"
+        with LinuxcncSession(hal=[load, *(tmp_path / "lines.hal").read_text().splitlines()]) as session:
+            for _ in range(500):
+                found = json.loads((session.folder / f"{module}.json").read_text())
+                if found == expected:
+                    break
+                time.sleep(0.02)
+    assert found == expected
