@@ -32,14 +32,15 @@ ScalarSampler::ScalarSampler(const RunModel& model) : model_(model) {
         for (const double share : {model.run.simulation.verified_share, trace_all}) {
             ReadingConditions conditions = model.run.simulation.conditions_of(head);
             conditions.replay.verified_share = share;
-            auto& traced = traced_[{&head, share}];
+            auto& traced = traced_[share][&head];
             if (!traced) traced = std::make_shared<TracedReader>(head, pass.place.mirror, conditions);
         }
     }
 }
 
 std::vector<Displacement> ScalarSampler::displacements(const Eigen::VectorXd& deviations,
-                                                       std::optional<std::uint64_t> sample, std::size_t rows) const {
+                                                       std::optional<std::uint64_t> sample) const {
+    const std::size_t rows = model_.rows.size();
     std::vector<Displacement> displaced(rows);
     const std::vector<double> shared = model_.shared.with(deviations);
     const Eigen::Vector3d drift(shared[shared_field::machine_drift], shared[shared_field::machine_drift + 1],
@@ -74,16 +75,18 @@ std::vector<Displacement> ScalarSampler::displacements(const Eigen::VectorXd& de
 
 Eigen::MatrixXd ScalarSampler::read(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample,
                                     const RunPass& pass, const std::vector<std::size_t>& rows,
-                                    const std::vector<Displacement>& displaced, double verified_share) const {
+                                    const std::vector<Displacement>& displaced, double verified_share,
+                                    Readers& readers) const {
     const std::vector<double> numbers = model_.lines[pass.planned.line_index].with(deviations);
     const std::vector<double> shared = model_.shared.with(deviations);
     const Head& nominal = *pass.place.head;
     const std::uint64_t seed = sample ? model_.draws.sensor_seed(*sample) : 0;
     const ReadingConditions conditions{
         model_.environment(nominal, shared), model_.assumed(nominal), {verified_share, seed}, seed};
-    const auto traced = traced_.find({&nominal, verified_share});
+    auto& traced = readers[&nominal];
     const PassReader reader(model_.head(nominal, shared, deviations), pass.place, misalignment_of(numbers), conditions,
-                            traced == traced_.end() ? nullptr : traced->second);
+                            traced);
+    traced = reader.traced();
     std::vector<Pose> poses;
     std::vector<double> elapsed;
     for (const std::size_t row : rows) {
@@ -119,20 +122,32 @@ Eigen::MatrixXd ScalarSampler::read(const Eigen::VectorXd& deviations, std::opti
     return readings;
 }
 
-Eigen::MatrixXd ScalarSampler::trace(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample,
-                                     const RunPass& pass, const std::vector<std::size_t>& rows) const {
-    return read(deviations, sample, pass, rows, displacements(deviations, sample, rows.back() + 1), trace_all);
+ScalarSampler::Readers ScalarSampler::readers(double verified_share) const {
+    const auto same_in_all = traced_.find(verified_share);
+    return same_in_all == traced_.end() ? Readers() : same_in_all->second;
+}
+
+Eigen::MatrixXd ScalarSampler::trace(const Eigen::VectorXd& deviations, std::uint64_t sample,
+                                     const std::vector<std::size_t>& rows) const {
+    Eigen::MatrixXd all(Eigen::Index(rows.size()), Eigen::Index(model_.channels.size()));
+    const std::vector<Displacement> displaced = displacements(deviations, sample);
+    Readers of_sample = readers(trace_all);
+    for (std::size_t v = 0; v < rows.size(); ++v)
+        all.row(Eigen::Index(v)) =
+            read(deviations, sample, model_.passes[v], {rows[v]}, displaced, trace_all, of_sample);
+    return all;
 }
 
 Eigen::VectorXd ScalarSampler::readings(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample) const {
     const std::size_t channels = model_.channels.size();
     Eigen::VectorXd all(model_.rows.size() * channels);
-    const std::vector<Displacement> displaced = displacements(deviations, sample, model_.rows.size());
+    const std::vector<Displacement> displaced = displacements(deviations, sample);
+    const double share = model_.run.simulation.verified_share;
+    Readers of_sample = readers(share);
     for (const RunPass& pass : model_.passes) {
         std::vector<std::size_t> rows(pass.rows());
         std::iota(rows.begin(), rows.end(), pass.first_row());
-        const Eigen::MatrixXd read_here =
-            read(deviations, sample, pass, rows, displaced, model_.run.simulation.verified_share);
+        const Eigen::MatrixXd read_here = read(deviations, sample, pass, rows, displaced, share, of_sample);
         for (std::size_t k = 0; k < rows.size(); ++k)
             for (std::size_t c = 0; c < channels; ++c)
                 all[Eigen::Index(rows[k] * channels + c)] = read_here(Eigen::Index(k), Eigen::Index(c));

@@ -25,21 +25,25 @@ public:
 
     // Raw readings: [row * channels + channel], NaN where lost. Reading noise with a sample, none without.
     Eigen::VectorXd readings(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample) const;
-    // The same of some rows of one pass, without noise, each traced as a whole; a row each, NaN where lost.
-    Eigen::MatrixXd trace(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample, const RunPass& pass,
+    // The same of one row of each pass, without noise, each traced as a whole; a row each, NaN where lost.
+    Eigen::MatrixXd trace(const Eigen::VectorXd& deviations, std::uint64_t sample,
                           const std::vector<std::size_t>& rows) const;
 
 private:
-    std::vector<Displacement> displacements(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample,
-                                            std::size_t rows) const;
+    using Readers = std::map<const Head*, std::shared_ptr<const TracedReader>>;
+
+    std::vector<Displacement> displacements(const Eigen::VectorXd& deviations,
+                                            std::optional<std::uint64_t> sample) const;
+    Readers readers(double verified_share) const;  // that are the same in all samples
+    // `readers`: of the heads of this sample, as far as their optics have been put together.
     Eigen::MatrixXd read(const Eigen::VectorXd& deviations, std::optional<std::uint64_t> sample, const RunPass& pass,
                          const std::vector<std::size_t>& rows, const std::vector<Displacement>& displaced,
-                         double verified_share) const;
+                         double verified_share, Readers& readers) const;
     void add_noise(std::uint64_t sample, Eigen::VectorXd& readings) const;
 
     const RunModel& model_;
     // Of the heads that are the same in all samples, by verified share.
-    std::map<std::pair<const Head*, double>, std::shared_ptr<const TracedReader>> traced_;
+    std::map<double, Readers> traced_;
 };
 
 }  // namespace stepdiag

@@ -154,18 +154,22 @@ private:
         if (!(uniform(0) < model.run.simulation.verified_share)) return;
         ++state_.verified;
         const std::size_t channels = model.channels.size();
-        for (std::size_t v = 0; v < model.passes.size(); ++v) {
-            const RunPass& pass = model.passes[v];
-            const std::size_t row = pass.first_row() + std::size_t(uniform(std::uint32_t(v + 1)) * double(pass.rows()));
-            const Eigen::MatrixXd traced = state_.scalar.trace(deviations(lane), sample, pass, {row});
+        std::vector<std::size_t> rows;
+        for (const RunPass& pass : model.passes) {
+            const double u = uniform(std::uint32_t(rows.size() + 1));
+            rows.push_back(pass.first_row() + std::size_t(u * double(pass.rows())));
+        }
+        const Eigen::MatrixXd traced = state_.scalar.trace(deviations(lane), sample, rows);
+        for (std::size_t v = 0; v < rows.size(); ++v) {
             for (std::size_t c = 0; c < channels; ++c) {
-                const double found = readings_[row * channels + c].value[lane];
-                const double expected = traced(0, Eigen::Index(c));
+                const double found = readings_[rows[v] * channels + c].value[lane];
+                const double expected = traced(Eigen::Index(v), Eigen::Index(c));
                 if (std::abs(found - expected) <= rounding(model.channels[c], expected)) continue;
                 std::ostringstream text;
                 text.precision(17);
-                text << "virtual calibration: sample " << sample << ", line " << pass.planned.line.name() << ", row "
-                     << row << ": " << model.channels[c] << " is " << found << " by replay and " << expected
+                text << "virtual calibration: sample " << sample << ", line " << model.passes[v].planned.line.name()
+                     << ", row " << rows[v] << ": " << model.channels[c] << " is " << found << " by replay and "
+                     << expected
                      << " when traced: another face came into its way; with a verified share of 1 every pose is traced "
                         "instead";
                 throw ReplayMismatch(text.str());

@@ -58,11 +58,10 @@ TEST(Plates, WindowOfAnyGlassAndInclinationIsReadAsTheScalarSamplerReads) {
         std::size_t faces, glasses;  // of the laser's plates
     };
     const Eigen::Vector3d straight(0.0, 0.0, 0.0);
-    const std::vector<Case> cases = {
-        {"as designed", with_body(window, bk7, straight), 6, 1},
-        {"another glass", with_body(window, find_glass("F2"), straight), 6, 2},
-        {"window turned about its normal", with_body(window, bk7, {0.0, 0.0, 0.1}), 0, 0},
-        {"inclined splitter", with_body(splitter, bk7, {1e-3, 0.0, 0.0}), 2, 1}};
+    const std::vector<Case> cases = {{"as designed", with_body(window, bk7, straight), 6, 1},
+                                     {"another glass", with_body(window, find_glass("F2"), straight), 6, 2},
+                                     {"window turned about its normal", with_body(window, bk7, {0.0, 0.0, 0.1}), 0, 0},
+                                     {"inclined splitter", with_body(splitter, bk7, {1e-3, 0.0, 0.0}), 2, 1}};
     for (const Case& each : cases) {
         VirtualRun run = run_with(each.design);
         run.simulation.environment = Environment{Air{}};
