@@ -153,10 +153,8 @@ STEPDIAG_INLINE TwoPairs cos_sin_of_turns(Pair v) {
     return {{a.cosine, b.cosine}, {a.sine, b.sine}};
 }
 
-// normal_pair, by Box and Muller.
-STEPDIAG_INLINE TwoPairs normal_lanes(const RoundKeys& keys, RandomStream stream, WordPair sample, std::uint32_t item,
-                                      std::uint16_t draw) {
-    const TwoPairs uniform = uniform_lanes(keys, stream, sample, item, draw);
+// normal_pair of a uniform_pair, by Box and Muller.
+STEPDIAG_INLINE TwoPairs normal_lanes(const TwoPairs& uniform) {
     const Pair radius = root(minus_two_log(uniform.first));
     const TwoPairs turned = cos_sin_of_turns(uniform.second);
     return {radius * turned.first, radius * turned.second};

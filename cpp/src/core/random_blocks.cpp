@@ -10,8 +10,7 @@ HWY_BEFORE_NAMESPACE();
 namespace stepdiag {
 namespace HWY_NAMESPACE {
 
-template <class Numbers>
-STEPDIAG_INLINE void fill(const RandomBlocks& lanes, std::size_t items, double* out, Numbers numbers) {
+void fill_uniform_lanes(const RandomBlocks& lanes, std::size_t items, double* out) {
     const WordTag words;
     const std::size_t width = hn::Lanes(words);
     const RoundKeys keys(lanes.seed);
@@ -22,7 +21,7 @@ STEPDIAG_INLINE void fill(const RandomBlocks& lanes, std::size_t items, double* 
         const WordPair sample = {samples(lane), samples(lane + width)};
         for (std::size_t item = 0; item < items; ++item) {
             const TwoPairs pair =
-                numbers(keys, lanes.stream, sample, std::uint32_t(lanes.first_item + item), lanes.draw);
+                uniform_lanes(keys, lanes.stream, sample, std::uint32_t(lanes.first_item + item), lanes.draw);
             double* const to = out + 2 * item * lanes.lanes + lane;
             store(pair.first, to);
             store(pair.second, to + lanes.lanes);
@@ -30,12 +29,16 @@ STEPDIAG_INLINE void fill(const RandomBlocks& lanes, std::size_t items, double* 
     }
 }
 
-void fill_uniform_lanes(const RandomBlocks& lanes, std::size_t items, double* out) {
-    fill(lanes, items, out, [](const auto&... block) HWY_ATTR { return uniform_lanes(block...); });
-}
-
+// In two steps, so that the processor has several numbers of each at once in work.
 void fill_normal_lanes(const RandomBlocks& lanes, std::size_t items, double* out) {
-    fill(lanes, items, out, [](const auto&... block) HWY_ATTR { return normal_lanes(block...); });
+    fill_uniform_lanes(lanes, items, out);
+    for (double* first = out; first < out + 2 * items * lanes.lanes; first += 2 * lanes.lanes)
+        for (std::size_t lane = 0; lane < lanes.lanes; lane += 2 * hn::Lanes(Tag())) {
+            double* const second = first + lanes.lanes;
+            const TwoPairs pair = normal_lanes({load(first + lane), load(second + lane)});
+            store(pair.first, first + lane);
+            store(pair.second, second + lane);
+        }
 }
 
 }  // namespace HWY_NAMESPACE
