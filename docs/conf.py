@@ -19,7 +19,6 @@ version = release
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
-    "sphinx.ext.napoleon",
     "sphinx_copybutton",
     "sphinx_design",
     # of this folder
@@ -42,6 +41,7 @@ nb_merge_streams = True
 # --- Python ---
 autodoc_default_options = {"members": True, "undoc-members": True}
 autodoc_member_order = "groupwise"
+autoclass_content = "both"
 autodoc_typehints_format = "short"
 autodoc_docstring_signature = False  # public_names takes them from the stub
 default_role = "code"  # docstrings have `names` in single backticks
@@ -68,11 +68,13 @@ html_theme_options = {
 SHOWN_AS = {"../benchmarks/peers/README.md": "peers.md", "../CHANGELOG.md": "changes.md"}
 
 
-def link_shown_pages(app: Sphinx, docname: str, source: list[str]) -> None:
+def adapt_links(app: Sphinx, docname: str, source: list[str]) -> None:
     for path, page in SHOWN_AS.items():
         source[0] = source[0].replace(f"]({path}", f"]({page}")
+    # A link that is named after its file gets the title of the page.
+    source[0] = re.sub(r"\[`?([\w/-]+\.md)`?\]\((\1[^)]*)\)", r"[](\2)", source[0])
 
 
 def setup(app: Sphinx) -> None:
     app.add_lexer("csv", TextLexer)  # Pygments has none
-    app.connect("source-read", link_shown_pages)
+    app.connect("source-read", adapt_links)

@@ -14,6 +14,7 @@ from typing import Any
 from docutils import nodes
 from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
+from sphinx.ext.napoleon import Config, GoogleDocstring
 from sphinx.pycode import ModuleAnalyzer
 
 import stepdiag
@@ -26,7 +27,8 @@ SHORT = {
     r"str \| os\.PathLike\[str\]": "path",
     r"\b(typing|numpy\.typing|numpy|collections\.abc|matplotlib\.figure|xarray|stepdiag\.io\.displays)\.": "",
 }
-PYBIND_SIGNATURE = re.compile(r"\w*\(.*\)( -> .*)?$")
+PYBIND_SIGNATURE = re.compile(r"\w*\((self: |arg0: |\*).*\) -> .*$|[a-z_]+\(.*\) -> .*$")
+NAPOLEON = Config()
 FIELD = re.compile(r"^(    \w+: [^#\n]+?)  # (?=\S)", re.M)
 
 
@@ -73,13 +75,16 @@ def signature_of(app: Sphinx, what: str, name: str, *_: Any) -> tuple[str, str] 
 
 
 def docstring_of(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
-    """Docstrings are plain text with `names`: bars and stars are no markup. pybind11's signatures are left out."""
-    lines[:] = [re.sub(r"[|*]", r"\\\g<0>", line) for line in lines]
-    found = stub().get(name.removeprefix("stepdiag."))
-    if lines and (found or what == "class") and PYBIND_SIGNATURE.match(lines[0]):
-        del lines[0]
+    """Docstrings are plain text with `names`, and sections as Google writes them: bars and stars are no markup.
+
+    pybind11's signatures are left out.
+    """
+    lines[:] = [line for line in lines if not PYBIND_SIGNATURE.match(line)]
     if lines and lines[0] == "Overloaded function.":
-        lines[:] = [re.sub(r"^\d+\. (\w+\(.*?[,)]).*", r"``\1 ...``", line) for line in lines[2:]]
+        lines[:] = [re.sub(r"^\d+\. (\w+\(.*?[,)]).*", r"`\1 ...`", line) for line in lines[2:]]
+    text = re.sub(r"[|*]", r"\\\g<0>", "\n".join(lines))
+    # Of a property Google's form is "type: description", which is not ours.
+    lines[:] = text.splitlines() if what == "property" else GoogleDocstring(text, NAPOLEON).lines()
 
 
 def fields_described(analyzer: type[ModuleAnalyzer]) -> None:
@@ -105,6 +110,6 @@ def resolve(app: Sphinx, env: Any, node: pending_xref, contnode: nodes.Element) 
 def setup(app: Sphinx) -> dict[str, bool]:
     fields_described(ModuleAnalyzer)
     app.connect("autodoc-process-signature", signature_of)
-    app.connect("autodoc-process-docstring", docstring_of, priority=400)  # before napoleon makes markup
+    app.connect("autodoc-process-docstring", docstring_of)
     app.connect("missing-reference", resolve)
     return {"parallel_read_safe": True}
