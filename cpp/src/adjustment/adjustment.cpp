@@ -125,7 +125,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     result.setup = setup_estimates(problem, known, x, inverse);
     result.expansion = expansion_estimates(problem, x, inverse);
     result.machine_drift = drift_estimates(problem, x, inverse);
-    result.residuals = reading_residuals(solver.equations(), inverse);
+    result.residuals = reading_residuals(solver.equations(), solution->reading_variances());
     std::stable_sort(result.residuals.begin(), result.residuals.end(),
                      [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
     result.combinations = known_combinations(observability, x, inverse);
@@ -144,8 +144,8 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
         result.verdict.reasons.push_back(reason);
     }
     const double noise = std::sqrt(std::max(1.0, result.variance_factor()));
-    result.unseen = unseen_faults(solver, inverse, forms, noise);
-    if (options.reliability) result.reliability = reliability(solver, inverse, forms, noise);
+    result.unseen = unseen_faults(*solution, faults.tests(*solution), forms, noise);
+    if (options.reliability) result.reliability = reliability(*solution, forms, noise);
     if (options.scale_uncertainty) scale_uncertainties(result);
     add_sensor_effects(sensor_effects(solver), problem, forms, observability, result);
     state_temperature(measurement, options.expansion, result.calibration);

@@ -177,11 +177,10 @@ int degrees_of_freedom(const GaussNewton& solver) {
     return count;
 }
 
-std::vector<ReadingResidual> reading_residuals(const NormalEquations& equations, const BorderedBand& inverse) {
+std::vector<ReadingResidual> reading_residuals(const NormalEquations& equations, const Eigen::VectorXd& variances) {
     const AdjustmentProblem& problem = equations.problem();
     std::vector<ReadingResidual> residuals;
     residuals.reserve(problem.readings().size());
-    const Eigen::VectorXd variances = equations.reading_variances(inverse);
     for (std::size_t r = 0; r < problem.readings().size(); ++r) {
         const AdjustedReading& reading = problem.readings()[r];
         const double share = variances[r], weighted = equations.residuals()[r];

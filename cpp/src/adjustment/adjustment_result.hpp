@@ -34,6 +34,6 @@ std::vector<DriftEstimate> drift_estimates(const AdjustmentProblem& problem, con
 // Of readings, priors and smoothness over unknowns.
 int degrees_of_freedom(const GaussNewton& solver);
 // Of all readings in the problem's order, at the last linearisation.
-std::vector<ReadingResidual> reading_residuals(const NormalEquations& equations, const BorderedBand& inverse);
+std::vector<ReadingResidual> reading_residuals(const NormalEquations& equations, const Eigen::VectorXd& variances);
 
 }  // namespace stepdiag

@@ -25,6 +25,12 @@ double LinearForm::value(const Eigen::VectorXd& x) const {
     return value;
 }
 
+BorderedFactor::OfSides LinearForm::values(const BorderedFactor::Sides& x) const {
+    BorderedFactor::OfSides values = BorderedFactor::OfSides::Zero();
+    for (int i = 0; i < size; ++i) values += coefficient[i] * x.row(unknown[i]);
+    return values;
+}
+
 double LinearForm::variance(const BorderedBand& inverse) const {
     double variance = 0.0;
     for (int i = 0; i < size; ++i)

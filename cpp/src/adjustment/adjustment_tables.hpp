@@ -22,6 +22,7 @@ struct LinearForm {
     void add(int index, double factor);  // nothing for no_unknown
     void subtract(const LinearForm& other);
     double value(const Eigen::VectorXd& x) const;
+    BorderedFactor::OfSides values(const BorderedFactor::Sides& x) const;
     double variance(const BorderedBand& inverse) const;
 };
 

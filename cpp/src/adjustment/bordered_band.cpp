@@ -262,104 +262,156 @@ void BorderedFactor::factorize_corner() {
         held_.push_back(int(six) * l_.blocks() + order_[k] + (order_[k] < l_.first_leaf_ ? 0 : l_.leaf_unknowns()));
 }
 
-// L^-1 of a right side: its band in place, what belongs to the border returned.
-VectorXd BorderedFactor::divide(double* x, double* border_part) const {
-    const Index border = l_.border_;
-    for (int column = 0; column < l_.blocks(); ++column) {
-        const auto l = l_.block(column, column);
-        double* own = x + six * column;
-        for (int i = 0; i < six; ++i) {
-            for (int k = 0; k < i; ++k) own[i] -= l(i, k) * own[k];
-            own[i] = l(i, i) == 0.0 ? 0.0 : own[i] * l(i, i);
-        }
-        subtract_columns(six * (l_.reach(column) - column), l_.view(column + 1, column), own, own + six);
-        subtract_columns(border, l_.border_view(column), own, border_part);
+namespace {
+
+// Y -= A X and X -= A^T Y for six rows X of `Count` right sides beside each other.
+template <int Count>
+void subtract_columns_beside(Index rows, ConstMatrixView a, const double* x, double* y) {
+    if constexpr (Count == 1) subtract_columns(rows, a, x, y);
+    else subtract_product(Count, round_up(rows, six), six, {x, Count}, {a.from, 1, a.step}, {y, Count});
+}
+
+template <int Count>
+void subtract_sums_beside(Index rows, ConstMatrixView a, const double* y, double* x) {
+    if constexpr (Count == 1) subtract_sums(rows, a, y, x);
+    else subtract_product(Count, six, rows, {y, Count}, {a.from, a.step, 1}, {x, Count});
+}
+
+}  // namespace
+
+// Right sides without their leaves. Both parts are followed by zeros for as many rows as kernels go beyond them.
+template <int Count>
+struct BorderedFactor::Split {
+    Beside<Count> band_rows, border_rows;
+    Index before;  // rows of the border before the leaves
+
+    Split(const BorderedBand& l, const double* from)
+        : band_rows(six * l.blocks() + lanes, Count), border_rows(l.border_ + lanes, Count), before(l.first_leaf_) {
+        const Eigen::Map<const Beside<Count>> all(from, l.size(), Count);
+        band() = all.topRows(band().rows());
+        border().topRows(before) = all.middleRows(band().rows(), before);
+        border().bottomRows(l.border_ - before) = all.bottomRows(l.border_ - before);
+        band_rows.bottomRows(lanes).setZero();
+        border_rows.bottomRows(lanes).setZero();
     }
-    VectorXd determined(corner_rank_);
-    for (int i = 0; i < corner_rank_; ++i) determined[i] = border_part[order_[i]];
+    void copy_to(double* to, Index size) {
+        Eigen::Map<Beside<Count>> all(to, size, Count);
+        all.topRows(band().rows()) = band();
+        all.middleRows(band().rows(), before) = border().topRows(before);
+        all.bottomRows(border().rows() - before) = border().bottomRows(border().rows() - before);
+    }
+    auto band() { return band_rows.topRows(band_rows.rows() - lanes); }
+    auto border() { return border_rows.topRows(border_rows.rows() - lanes); }
+};
+
+// L^-1 of right sides: their band in place, what belongs to the border returned.
+template <int Count>
+BorderedFactor::Beside<Count> BorderedFactor::divide(Split<Count>& x) const {
+    double* own = x.band_rows.data();
+    for (int column = 0; column < l_.blocks(); ++column, own += six * Count) {
+        if constexpr (Count == 1) {
+            const auto l = l_.block(column, column);
+            for (int i = 0; i < six; ++i) {
+                for (int k = 0; k < i; ++k) own[i] -= l(i, k) * own[k];
+                own[i] = l(i, i) == 0.0 ? 0.0 : own[i] * l(i, i);
+            }
+        } else {
+            divide_by_transpose(Count, l_.view(column, column), {own, Count});
+        }
+        subtract_columns_beside<Count>(six * (l_.reach(column) - column), l_.view(column + 1, column), own,
+                                       own + six * Count);
+        subtract_columns_beside<Count>(l_.border_, l_.border_view(column), own, x.border_rows.data());
+    }
+    Beside<Count> determined(corner_rank_, Count);
+    for (int i = 0; i < corner_rank_; ++i) determined.row(i) = x.border().row(order_[i]);
     corner_factor().triangularView<Eigen::Lower>().solveInPlace(determined);
     return determined;
 }
 
-// L^-1 of what belongs to a leaf, in place, its part taken off the rest; its square sum.
-double BorderedFactor::divide_leaf(int leaf, double* own, double* band, double* border) const {
+// L^-1 of what belongs to a leaf, in place, its part taken off the rest; its square sums.
+template <int Count>
+Eigen::Matrix<double, 1, Count> BorderedFactor::divide_leaf(int leaf, double* own_numbers, Split<Count>& x) const {
     const int size = l_.leaf_size(leaf), start = l_.leaf_start(leaf);
     const auto l = l_.leaf(leaf);
     const int* order = leaf_order_.data() + start;
-    double square = 0.0;
+    Eigen::Map<Beside<Count>> own(own_numbers, size, Count);
+    Eigen::Matrix<double, 1, Count> square = Eigen::Matrix<double, 1, Count>::Zero();
     for (int k = 0; k < size; ++k) {
         const int column = order[k];
-        own[column] = l(column, column) == 0.0 ? 0.0 : own[column] * l(column, column);
-        if (own[column] == 0.0) continue;
-        square += own[column] * own[column];
-        for (int i = k + 1; i < size; ++i) own[order[i]] -= l(order[i], column) * own[column];
+        own.row(column) *= l(column, column);
+        if (own.row(column).isZero(0.0)) continue;
+        square += own.row(column).cwiseAbs2();
+        for (int i = k + 1; i < size; ++i) own.row(order[i]) -= l(order[i], column) * own.row(column);
         const double* w = l_.leaf_column(start + column);
-        Eigen::Map<VectorXd>(band, six * l_.blocks()) -= own[column] * Eigen::Map<const VectorXd>(w, six * l_.blocks());
-        Eigen::Map<VectorXd>(border, l_.border_) -=
-            own[column] * Eigen::Map<const VectorXd>(w + l_.leaf_border_, l_.border_);
+        x.band().noalias() -= Eigen::Map<const VectorXd>(w, six * l_.blocks()) * own.row(column);
+        x.border().noalias() -= Eigen::Map<const VectorXd>(w + l_.leaf_border_, l_.border_) * own.row(column);
     }
     return square;
 }
 
-double BorderedFactor::inverse_square(const VectorXd& v, int only_leaf) const {
-    const Index unknowns = six * l_.blocks(), border = l_.border_, before = l_.first_leaf_;
-    AlignedNumbers band(unknowns + lanes), rest(border);
-    std::copy_n(v.data(), unknowns, band.data());
-    std::copy_n(v.data() + unknowns, before, rest.data());
-    std::copy_n(v.data() + v.size() - (border - before), border - before, rest.data() + before);
-    double of_leaves = 0.0;
+template <int Count>
+Eigen::Matrix<double, 1, Count> BorderedFactor::inverse_squares_beside(const double* v, int only_leaf) const {
+    Split<Count> x(l_, v);
+    Eigen::Matrix<double, 1, Count> squares = Eigen::Matrix<double, 1, Count>::Zero();
     const int first = only_leaf == every_leaf ? 0 : only_leaf;
     const int end = only_leaf == every_leaf ? l_.leaves() : only_leaf + 1;
     for (int leaf = first; leaf < std::min(end, l_.leaves()); ++leaf) {
-        VectorXd own = v.segment(l_.first_leaf_unknown() + l_.leaf_start(leaf), l_.leaf_size(leaf));
-        of_leaves += divide_leaf(leaf, own.data(), band.data(), rest.data());
+        const double* from = v + Count * (l_.first_leaf_unknown() + l_.leaf_start(leaf));
+        Beside<Count> own = Eigen::Map<const Beside<Count>>(from, l_.leaf_size(leaf), Count);
+        squares += divide_leaf<Count>(leaf, own.data(), x);
     }
-    const VectorXd determined = divide(band.data(), rest.data());
-    return of_leaves + determined.squaredNorm() + Eigen::Map<const VectorXd>(band.data(), unknowns).squaredNorm();
+    squares += divide(x).colwise().squaredNorm();
+    return squares + x.band().colwise().squaredNorm();
 }
 
-void BorderedFactor::solve(Eigen::Ref<VectorXd> right_hand_side) const {
-    const Index unknowns = six * l_.blocks(), border = l_.border_, before = l_.first_leaf_;
-    AlignedNumbers band(unknowns + lanes), rest(border);
-    double* x = band.data();
-    Eigen::Map<VectorXd> y(rest.data(), border);
-    std::copy_n(right_hand_side.data(), unknowns, x);
-    y.head(before) = right_hand_side.segment(unknowns, before);
-    y.tail(border - before) = right_hand_side.tail(border - before);
-    double* of_leaves = right_hand_side.data() + l_.first_leaf_unknown();
-    for (int leaf = 0; leaf < l_.leaves(); ++leaf) divide_leaf(leaf, of_leaves + l_.leaf_start(leaf), x, y.data());
-    VectorXd determined = divide(x, y.data());
+double BorderedFactor::inverse_square(const VectorXd& v, int only_leaf) const {
+    return inverse_squares_beside<1>(v.data(), only_leaf)[0];
+}
+
+BorderedFactor::OfSides BorderedFactor::inverse_squares(const Sides& v, int only_leaf) const {
+    return inverse_squares_beside<sides>(v.data(), only_leaf);
+}
+
+void BorderedFactor::solve(Eigen::Ref<VectorXd> right_hand_side) const { solve_beside<1>(right_hand_side.data()); }
+
+void BorderedFactor::solve(Sides& right_hand_sides) const { solve_beside<sides>(right_hand_sides.data()); }
+
+template <int Count>
+void BorderedFactor::solve_beside(double* right_hand_sides) const {
+    Split<Count> x(l_, right_hand_sides);
+    double* of_leaves = right_hand_sides + Count * l_.first_leaf_unknown();
+    for (int leaf = 0; leaf < l_.leaves(); ++leaf) divide_leaf<Count>(leaf, of_leaves + Count * l_.leaf_start(leaf), x);
+    Beside<Count> determined = divide(x);
     corner_factor().transpose().triangularView<Eigen::Upper>().solveInPlace(determined);
-    y.setZero();
-    for (int i = 0; i < corner_rank_; ++i) y[order_[i]] = determined[i];
+    x.border().setZero();
+    for (int i = 0; i < corner_rank_; ++i) x.border().row(order_[i]) = determined.row(i);
 
     for (int column = l_.blocks() - 1; column >= 0; --column) {
         const auto l = l_.block(column, column);
-        double* own = x + six * column;
-        subtract_sums(six * (l_.reach(column) - column), l_.view(column + 1, column), own + six, own);
-        subtract_sums(border, l_.border_view(column), y.data(), own);
+        double* own_numbers = x.band_rows.data() + six * Count * column;
+        subtract_sums_beside<Count>(six * (l_.reach(column) - column), l_.view(column + 1, column),
+                                    own_numbers + six * Count, own_numbers);
+        subtract_sums_beside<Count>(l_.border_, l_.border_view(column), x.border_rows.data(), own_numbers);
+        Eigen::Map<Eigen::Matrix<double, six, Count, Count == 1 ? Eigen::ColMajor : Eigen::RowMajor>> own(own_numbers);
         for (int i = six - 1; i >= 0; --i) {
-            for (int k = i + 1; k < six; ++k) own[i] -= l(k, i) * own[k];
-            own[i] *= l(i, i);
+            for (int k = i + 1; k < six; ++k) own.row(i) -= l(k, i) * own.row(k);
+            own.row(i) *= l(i, i);
         }
     }
-    const Eigen::Map<const VectorXd> of_band(x, unknowns);
     for (int leaf = 0; leaf < l_.leaves(); ++leaf) {
         const auto l = l_.leaf(leaf);
         const int start = l_.leaf_start(leaf), *order = leaf_order_.data() + start;
-        double* own = of_leaves + start;
+        Eigen::Map<Beside<Count>> own(of_leaves + Count * start, l_.leaf_size(leaf), Count);
         for (int k = l_.leaf_size(leaf) - 1; k >= 0; --k) {
             const int column = order[k];
             const double* w = l_.leaf_column(start + column);
-            own[column] -= Eigen::Map<const VectorXd>(w, unknowns).dot(of_band) +
-                           Eigen::Map<const VectorXd>(w + l_.leaf_border_, border).dot(y);
-            for (int i = k + 1; i < l_.leaf_size(leaf); ++i) own[column] -= l(order[i], column) * own[order[i]];
-            own[column] *= l(column, column);
+            own.row(column) -= Eigen::Map<const Eigen::RowVectorXd>(w, six * l_.blocks()) * x.band() +
+                               Eigen::Map<const Eigen::RowVectorXd>(w + l_.leaf_border_, l_.border_) * x.border();
+            for (int i = k + 1; i < l_.leaf_size(leaf); ++i) own.row(column) -= l(order[i], column) * own.row(order[i]);
+            own.row(column) *= l(column, column);
         }
     }
-    std::copy_n(x, unknowns, right_hand_side.data());
-    right_hand_side.segment(unknowns, before) = y.head(before);
-    right_hand_side.tail(border - before) = y.tail(border - before);
+    x.copy_to(right_hand_sides, l_.size());
 }
 
 BorderedBand BorderedFactor::selected_inverse() const {

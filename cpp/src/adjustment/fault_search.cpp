@@ -18,6 +18,7 @@ constexpr double large_gain = 1000.0;   // where second order may tell
 constexpr double credible = largest_noise_factor * largest_noise_factor;  // variance factor; above it is rejected
 constexpr double twin = 0.99;  // correlation of what shows the same in all other readings
 constexpr std::size_t most_exact = 20;
+constexpr int few_solutions = 300;        // of slips
 constexpr std::size_t most_members = 40;  // which are near enough to what is behind them
 
 // Two-sided, squared: 28 for a probability of 1.2e-7.
@@ -31,8 +32,8 @@ double noise(double square_sum, int freedom) { return freedom > 0 ? std::max(1.0
 struct FaultSearch::Tested {
     std::unique_ptr<FaultHypotheses> hypotheses;
     std::unique_ptr<FaultTests> tests;
-    double square_sum;
-    int freedom;
+    double square_sum = 0.0;
+    int freedom = 0;
     SolutionPointer at = nullptr;  // kept for the tests, where nobody else does
 
     double noise_beside(double gain) const { return noise(square_sum - gain, freedom - 1); }
@@ -76,6 +77,7 @@ FaultSearch::SolutionPointer FaultSearch::run() {
     if (!solution) return nullptr;
     const bool corrected = corrects && correct(solution);
     if (corrected && found_.empty()) return solution;
+    last_.reset();
     if (corrects && !corrected && plain) {
         // It is not a few readings that do not fit: all stay, and chi-square tells.
         found_.clear();
@@ -142,19 +144,29 @@ FaultSearch::Tested FaultSearch::test(Solution& solution, const Eigen::VectorXd&
     Tested tested{std::make_unique<FaultHypotheses>(solution.problem()), nullptr,
                   equations.square_sum(residuals, x + dx), solution.degrees_of_freedom()};
     const auto make = [&](int most_solutions) {
-        tested.tests = std::make_unique<FaultTests>(equations, solution.solver().factor(), solution.inverse(),
+        tested.tests = std::make_unique<FaultTests>(equations, solution.solver().factor(), solution.reading_variances(),
                                                     *tested.hypotheses, residuals, most_solutions);
     };
     // A sound run needs no more than to be known as one.
-    constexpr int few = 150;
     constexpr double near_limit = 0.7;
-    make(few);
+    make(few_solutions);
     for (const FaultScore& score : tested.tests->scores())
         if (score.gain >= near_limit * limit_ * tested.noise_beside(score.gain)) {
             make(FaultTests::usual_most_solutions);
             break;
         }
     return tested;
+}
+
+FaultTests& FaultSearch::tests(Solution& solution) {
+    const bool solved_again = options_.smoothness && options_.smoothness->cross_validated;
+    if (!last_ || solved_again) {
+        auto hypotheses = std::make_unique<FaultHypotheses>(solution.problem());
+        auto tests = std::make_unique<FaultTests>(solution.solver().equations(), solution.solver().factor(),
+                                                  solution.reading_variances(), *hypotheses, few_solutions);
+        last_ = std::make_shared<Tested>(Tested{std::move(hypotheses), std::move(tests)});
+    }
+    return *last_->tests;
 }
 
 std::optional<FaultSearch::Candidate> FaultSearch::worst(const Tested& tested) const {
@@ -275,7 +287,8 @@ bool FaultSearch::correct(SolutionPointer& solution) {
 bool FaultSearch::find_more(SolutionPointer& solution) {
     for (int step = 0; step < 4 * most_; ++step) {
         explain_by_fewer(solution);
-        const Tested tested = test(*solution, solution->x());
+        last_ = std::make_shared<Tested>(test(*solution, solution->x()));
+        const Tested& tested = *last_;
         const auto next = worst(tested);
         // A scatter that nobody believes and no fault explains: then the many that were found explain nothing either.
         constexpr std::size_t few = 5;

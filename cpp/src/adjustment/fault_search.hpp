@@ -35,6 +35,9 @@ public:
     std::vector<FaultClass> classes(const Solution& solution, const CalibratedForms& forms,
                                     const Measurement& measurement) const;
 
+    // At the adjustment that came out, as it is now. Of most slips the uncertainty is interpolated, some 20 % at worst.
+    FaultTests& tests(Solution& solution);
+
 private:
     struct Candidate {
         FaultHypothesis hypothesis;
@@ -92,7 +95,8 @@ private:
     double limit_;
     int most_;
     std::vector<Found> found_;
-    std::optional<Found> left_;  // what was found and nothing was done about
+    std::optional<Found> left_;     // what was found and nothing was done about
+    std::shared_ptr<Tested> last_;  // of a run without faults
 };
 
 }  // namespace stepdiag

@@ -37,24 +37,29 @@ FaultScore::FaultScore(double s, double q) : standard_uncertainty(1.0 / std::sqr
     gain = s * size;
 }
 
-FaultScore score_of(const ReadingPattern& pattern, const NormalEquations& equations, const BorderedFactor& factor,
-                    double least_share) {
+std::vector<FaultScore> scores_of(const std::vector<const ReadingPattern*>& patterns, const NormalEquations& equations,
+                                  const BorderedFactor& factor, double least_share) {
     const AdjustmentProblem& problem = equations.problem();
-    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(problem.size());  // J^T c
-    double s = 0.0, square = 0.0;
-    for (std::size_t k = 0; k < pattern.readings.size(); ++k) {
-        const int r = pattern.readings[k];
-        const double c = pattern.share[k] / problem.readings()[r].standard_uncertainty;
-        s += c * equations.residuals()[r];
-        square += c * c;
-        const NormalEquations::Row row = equations.row(r);
-        for (int i = 0; i < row.size; ++i)
-            if (row.unknown[i] != no_unknown) gradient[row.unknown[i]] += c * row.derivative[i];
+    std::vector<FaultScore> scores;
+    while (scores.size() < patterns.size()) {
+        const int count = int(std::min<std::size_t>(BorderedFactor::sides, patterns.size() - scores.size()));
+        BorderedFactor::Sides gradients = BorderedFactor::Sides::Zero(problem.size(), BorderedFactor::sides);  // J^T c
+        BorderedFactor::OfSides s = BorderedFactor::OfSides::Zero(), square = s;
+        for (int side = 0; side < count; ++side) {
+            const ReadingPattern& pattern = *patterns[scores.size() + std::size_t(side)];
+            for (std::size_t k = 0; k < pattern.readings.size(); ++k) {
+                const int r = pattern.readings[k];
+                const double c = pattern.share[k] / problem.readings()[r].standard_uncertainty;
+                s[side] += c * equations.residuals()[r];
+                square[side] += c * c;
+                equations.row(r).add_to(gradients.col(side), c);
+            }
+        }
+        const BorderedFactor::OfSides q = square - factor.inverse_squares(gradients);
+        for (int side = 0; side < count; ++side)
+            scores.emplace_back(s[side], q[side] > least_share * square[side] ? q[side] : 0.0);
     }
-    Eigen::VectorXd effect = gradient;
-    factor.solve(effect);
-    const double q = square - gradient.dot(effect);
-    return {s, q > least_share * square ? q : 0.0};
+    return scores;
 }
 
 std::string name(FaultKind kind) {
@@ -126,7 +131,7 @@ bool FaultHypotheses::differs_from_slip(const FaultHypothesis& reading) const {
     return as_slip(reading) && is_tilt_[reading.sequence];
 }
 
-FaultTests::FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const BorderedBand& inverse,
+FaultTests::FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const Eigen::VectorXd& variances,
                        const FaultHypotheses& hypotheses, const Eigen::VectorXd& residuals, int most_solutions)
     : equations_(&equations), factor_(&factor), hypotheses_(&hypotheses), residuals_(residuals) {
     const std::vector<AdjustedReading>& readings = equations.problem().readings();
@@ -135,21 +140,45 @@ FaultTests::FaultTests(const NormalEquations& equations, const BorderedFactor& f
         if (readings[r].used()) weight_[r] = 1.0 / readings[r].standard_uncertainty;
 
     const std::vector<FaultHypothesis>& all = hypotheses.all();
-    const Eigen::VectorXd variance = equations.reading_variances(inverse);
     c_r_c_.resize(all.size());
     scores_.resize(all.size());
     exact_.assign(all.size(), false);
-    zeros_.setZero(equations.problem().size());
+    sum_readings();
     for (std::size_t h = 0; h < all.size(); ++h) {
         if (all[h].kind != FaultKind::reading) continue;
         const int r = *hypotheses.readings(all[h]).begin();
-        const double share = 1.0 - variance[r];
+        const double share = 1.0 - variances[r];
         set(int(h), share < controlled_share ? 0.0 : weight_[r] * weight_[r] * share);
         exact_[h] = true;
     }
+    std::vector<int> factors;
     for (std::size_t h = 0; h < all.size(); ++h)
-        if (all[h].kind == FaultKind::factor) refine(int(h));
+        if (all[h].kind == FaultKind::factor) factors.push_back(int(h));
+    refine(factors);
     test_slips(most_solutions);
+}
+
+void FaultTests::sum_readings() {
+    const std::vector<FaultHypothesis>& all = hypotheses_->all();
+    std::vector<std::vector<std::array<double, 2>>> from;  // of a sequence's readings from each place to its end
+    for (const ReadingSequence& sequence : hypotheses_->sequences()) {
+        auto& sums = from.emplace_back(sequence.readings.size() + 1, std::array<double, 2>{});
+        for (std::size_t i = sequence.readings.size(); i-- > 0;) {
+            const int r = sequence.readings[i];
+            sums[i] = {sums[i + 1][0] + weight_[r] * weight_[r], sums[i + 1][1] + weight_[r] * residuals_[r]};
+        }
+    }
+    for (const FaultHypothesis& h : all) {
+        std::array<double, 2> sums{};
+        if (h.kind == FaultKind::slip) sums = from[h.sequence][h.first];
+        else
+            for (const int r : hypotheses_->readings(h)) {
+                sums[0] += std::pow(weight(h, r), 2);
+                sums[1] += weight(h, r) * residuals_[r];
+            }
+        square_.push_back(sums[0]);
+        product_.push_back(sums[1]);
+    }
 }
 
 void FaultTests::test_slips(int most_solutions) {
@@ -165,13 +194,16 @@ void FaultTests::test_slips(int most_solutions) {
         ++count;
     }
     const int step = std::max(1, (count + most_solutions - 1) / std::max(1, most_solutions));
+    std::vector<int> computed;
+    for (const auto& [place, slips] : alike) {
+        for (std::size_t i = 0; i < slips.size(); i += std::size_t(step)) computed.push_back(slips[i]);
+        computed.push_back(slips.back());
+    }
+    refine(computed);
     std::vector<std::pair<double, int>> likely;  // minus gain: the largest comes first
     for (const auto& [place, slips] : alike)
-        for (int i = 0, next, last = int(slips.size()) - 1; i <= last; i = next) {
-            next = i == last ? last + 1 : std::min(i + step, last);
-            refine(slips[i]);
-            if (i == last) break;
-            refine(slips[next]);
+        for (int i = 0, next, last = int(slips.size()) - 1; i < last; i = next) {
+            next = std::min(i + step, last);
             for (int k = i + 1; k < next; ++k) {
                 const double part = double(k - i) / double(next - i);
                 set(slips[k], (1.0 - part) * c_r_c_[slips[i]] + part * c_r_c_[slips[next]]);
@@ -180,48 +212,57 @@ void FaultTests::test_slips(int most_solutions) {
         }
     std::sort(likely.begin(), likely.end());
     if (int(likely.size()) > most_solutions) likely.resize(std::size_t(most_solutions));
-    for (const auto& [gain, h] : likely) refine(h);
+    computed.clear();
+    for (const auto& [gain, h] : likely) computed.push_back(h);
+    refine(computed);
 }
 
-void FaultTests::refine(int hypothesis) {
-    if (exact_[hypothesis]) return;
-    const double all = square(hypothesis);
-    const FaultHypothesis& h = hypotheses_->all()[hypothesis];
-    add_gradient(h, zeros_);
-    const bool has_leaves = equations_->problem().leaves().size.size() > 0;
-    const int leaf = has_leaves ? hypotheses_->sequences()[h.sequence].setup : BorderedFactor::every_leaf;
-    const double q = all - factor_->inverse_square(zeros_, leaf);
-    for (const int r : hypotheses_->readings(h)) {
-        const NormalEquations::Row row = equations_->row(r);
-        for (int i = 0; i < row.size; ++i)
-            if (row.unknown[i] != no_unknown) zeros_[row.unknown[i]] = 0.0;
+void FaultTests::refine(const std::vector<int>& hypotheses) {
+    std::vector<int> list;
+    for (const int h : hypotheses) {
+        if (!exact_[h]) list.push_back(h);
+        exact_[h] = true;
     }
-    set(hypothesis, q < controlled_share * all ? 0.0 : q);
-    exact_[hypothesis] = true;
+    for (std::size_t first = 0; first < list.size(); first += BorderedFactor::sides) {
+        const int* some = list.data() + first;
+        const int count = int(std::min<std::size_t>(BorderedFactor::sides, list.size() - first));
+        const BorderedFactor::OfSides squares =
+            factor_->inverse_squares(gradients(some, count), common_leaf(some, count));
+        for (int k = 0; k < count; ++k) {
+            const double all = square(some[k]), q = all - squares[k];
+            set(some[k], q < controlled_share * all ? 0.0 : q);
+        }
+    }
+}
+
+int FaultTests::common_leaf(const int* hypotheses, int count) const {
+    if (equations_->problem().leaves().size.empty()) return BorderedFactor::every_leaf;
+    const auto set_up = [&](int h) { return hypotheses_->sequences()[hypotheses_->all()[h].sequence].setup; };
+    const bool common =
+        std::all_of(hypotheses, hypotheses + count, [&](int h) { return set_up(h) == set_up(hypotheses[0]); });
+    return common ? set_up(hypotheses[0]) : BorderedFactor::every_leaf;
 }
 
 void FaultTests::set(int hypothesis, double c_r_c) {
     c_r_c_[hypothesis] = c_r_c;
-    const FaultHypothesis& h = hypotheses_->all()[hypothesis];
-    double sum = 0.0;
-    for (const int r : hypotheses_->readings(h)) sum += weight(h, r) * residuals_[r];
-    scores_[hypothesis] = FaultScore(sum, c_r_c);
+    scores_[hypothesis] = FaultScore(product_[hypothesis], c_r_c);
 }
 
-double FaultTests::square(int hypothesis) const {
-    const FaultHypothesis& h = hypotheses_->all()[hypothesis];
-    double sum = 0.0;
-    for (const int r : hypotheses_->readings(h)) sum += std::pow(weight(h, r), 2);
-    return sum;
+void FaultTests::add_gradient(const FaultHypothesis& hypothesis, NormalEquations::Side gradient) const {
+    for (const int r : hypotheses_->readings(hypothesis))
+        if (weight_[r] > 0.0) equations_->row(r).add_to(gradient, weight(hypothesis, r));
 }
 
-void FaultTests::add_gradient(const FaultHypothesis& hypothesis, Eigen::VectorXd& gradient) const {
-    for (const int r : hypotheses_->readings(hypothesis)) {
-        if (weight_[r] == 0.0) continue;
-        const NormalEquations::Row row = equations_->row(r);
-        for (int i = 0; i < row.size; ++i)
-            if (row.unknown[i] != no_unknown) gradient[row.unknown[i]] += weight(hypothesis, r) * row.derivative[i];
-    }
+BorderedFactor::Sides FaultTests::gradients(const int* hypotheses, int count) const {
+    BorderedFactor::Sides gradients = BorderedFactor::Sides::Zero(equations_->problem().size(), BorderedFactor::sides);
+    for (int k = 0; k < count; ++k) add_gradient(hypotheses_->all()[hypotheses[k]], gradients.col(k));
+    return gradients;
+}
+
+BorderedFactor::Sides FaultTests::effects(const int* hypotheses, int count) const {
+    BorderedFactor::Sides effects = gradients(hypotheses, count);
+    factor_->solve(effects);
+    return effects;
 }
 
 Eigen::VectorXd FaultTests::effect(const FaultHypothesis& hypothesis) const {

@@ -82,10 +82,10 @@ struct FaultScore {
     FaultScore(double s, double q);  // s = c.w and q; 0 where nothing controls it
 };
 
-// Of any fault, at the equations' last linearisation, with the factor there: one solution. Below this share of c.c, q
-// is what rounding and second order leave.
-FaultScore score_of(const ReadingPattern& pattern, const NormalEquations& equations, const BorderedFactor& factor,
-                    double least_share);
+// Of any faults, at the equations' last linearisation, with the factor there: half a solution each. Below this share of
+// c.c, q is what rounding and second order leave.
+std::vector<FaultScore> scores_of(const std::vector<const ReadingPattern*>& patterns, const NormalEquations& equations,
+                                  const BorderedFactor& factor, double least_share);
 
 // Of readings scores cost nothing, because the inverse is there; of slips a solution each. Where a run has more slips
 // than `most_solutions`, q is computed at evenly spaced ones of each sequence and interpolated between them, for each
@@ -96,23 +96,27 @@ public:
     static constexpr double significant = 28.0;  // gain in chi-square
     static constexpr int usual_most_solutions = 1000;
 
-    // At the equations' last linearisation. `factor` and `inverse`: of N there. All must outlive this.
-    FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const BorderedBand& inverse,
+    // At the equations' last linearisation. `factor`: of N there; `variances`: of the readings, from its inverse. The
+    // equations, the factor and the hypotheses must outlive this.
+    FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const Eigen::VectorXd& variances,
                const FaultHypotheses& hypotheses, int most_solutions = usual_most_solutions)
-        : FaultTests(equations, factor, inverse, hypotheses, equations.residuals(), most_solutions) {}
+        : FaultTests(equations, factor, variances, hypotheses, equations.residuals(), most_solutions) {}
     // The same somewhere else than at the minimum. `residuals`: weighted, at the minimum of that linear problem.
-    FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const BorderedBand& inverse,
+    FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const Eigen::VectorXd& variances,
                const FaultHypotheses& hypotheses, const Eigen::VectorXd& residuals,
                int most_solutions = usual_most_solutions);
 
     const FaultHypotheses& hypotheses() const { return *hypotheses_; }
     const std::vector<FaultScore>& scores() const { return scores_; }  // by hypothesis
-    void refine(int hypothesis);                                       // to the exact score, where it is not that
+    // To the exact score, where they are not that.
+    void refine(const std::vector<int>& hypotheses);
 
-    double square(int hypothesis) const;  // c.c
+    double square(int hypothesis) const { return square_[hypothesis]; }  // c.c
     // What a fault of size 1 that is not accounted for does to all unknowns: N^-1 J^T c.
     Eigen::VectorXd effect(const FaultHypothesis& hypothesis) const;
     Eigen::VectorXd effect(int hypothesis) const { return effect(hypotheses_->all()[hypothesis]); }
+    // Of up to BorderedFactor::sides hypotheses, beside each other; all others are 0.
+    BorderedFactor::Sides effects(const int* hypotheses, int count) const;
     // Of one hypothesis with each, from one solution; 0 where nothing controls one of the two. (Where q of the other
     // one is interpolated, this is as good as that.)
     std::vector<double> correlations(int hypothesis) const { return correlations(hypothesis, effect(hypothesis)); }
@@ -123,7 +127,10 @@ private:
     double weight(const FaultHypothesis& hypothesis, int reading) const {  // element of c
         return weight_[reading] * hypotheses_->share(hypothesis, reading);
     }
-    void add_gradient(const FaultHypothesis& hypothesis, Eigen::VectorXd& gradient) const;  // J^T c
+    void add_gradient(const FaultHypothesis& hypothesis, NormalEquations::Side gradient) const;  // J^T c
+    BorderedFactor::Sides gradients(const int* hypotheses, int count) const;
+    int common_leaf(const int* hypotheses, int count) const;
+    void sum_readings();
     double controlled(int hypothesis, const Eigen::VectorXd& effect) const;
     void test_slips(int most_solutions);
     void set(int hypothesis, double c_r_c);
@@ -132,11 +139,11 @@ private:
     const BorderedFactor* factor_;
     const FaultHypotheses* hypotheses_;
     Eigen::VectorXd residuals_;
-    Eigen::VectorXd weight_;     // by reading: 1/u, 0 where it is left out
-    std::vector<double> c_r_c_;  // q, by hypothesis; 0 where nothing controls it
+    Eigen::VectorXd weight_;                // by reading: 1/u, 0 where it is left out
+    std::vector<double> square_, product_;  // c.c and c.w, by hypothesis
+    std::vector<double> c_r_c_;             // q, by hypothesis; 0 where nothing controls it
     std::vector<FaultScore> scores_;
     std::vector<bool> exact_;
-    Eigen::VectorXd zeros_;  // by unknown: for refine, which leaves them so
 };
 
 }  // namespace stepdiag

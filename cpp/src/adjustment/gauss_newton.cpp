@@ -9,8 +9,9 @@
 namespace stepdiag {
 namespace {
 
-// A step that changes angles by less (rad, and lengths by less of a metre) leaves the factor as good as new.
-constexpr double factor_holds = 3e-11;
+// Where angles have changed by less (rad, and lengths by less of a metre) since the factor was made, it serves: for
+// steps, which with it still shrink by a factor of 1e4 or so, and for uncertainties, to 1e-6 of them.
+constexpr double steps_hold = 1e-7, uncertainties_hold = 3e-10;
 }  // namespace
 
 GaussNewton::GaussNewton(const AdjustmentProblem& problem, const std::array<double, function_count>& smoothness)
@@ -62,7 +63,7 @@ void GaussNewton::refresh(const Eigen::VectorXd& x) {
     double change = 0.0;
     for (int j = 0; j < x.size(); ++j)
         change = std::max(change, std::abs(x[j] - factorized_at_[j]) * equations_.problem().change_scale()[j]);
-    if (change > factor_holds) factorize(x);
+    if (change > uncertainties_hold) factorize(x);
     else equations_.linearise(x);
 }
 
@@ -106,7 +107,7 @@ std::optional<int> GaussNewton::try_solve(Eigen::VectorXd& x, int most_steps) {
     fresh_ = false;
     damping_ = 0.0;
     for (int count = 1; count <= most_steps; ++count) {
-        if (change > factor_holds) factorize(x);
+        if (change > steps_hold) factorize(x);
         else if (count > 1) equations_.linearise(x);
         if (!equations_.residuals().allFinite()) break;
         const Step step = this->step(x);

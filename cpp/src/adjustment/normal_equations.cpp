@@ -37,6 +37,18 @@ double NormalEquations::Row::product(const Eigen::VectorXd& v) const {
     return sum;
 }
 
+BorderedFactor::OfSides NormalEquations::Row::products(const BorderedFactor::Sides& v) const {
+    BorderedFactor::OfSides sums = BorderedFactor::OfSides::Zero();
+    for (int i = 0; i < size; ++i)
+        if (unknown[i] != no_unknown) sums += derivative[i] * v.row(unknown[i]);
+    return sums;
+}
+
+void NormalEquations::Row::add_to(Side v, double times) const {
+    for (int i = 0; i < size; ++i)
+        if (unknown[i] != no_unknown) v[unknown[i]] += times * derivative[i];
+}
+
 NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&problem) {
     for (const LineSetup& setup : problem.setups()) models_.push_back(setup.model);
     std::size_t weights = 0;
@@ -78,7 +90,7 @@ NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&p
         }
     }
     first_unknown_.push_back(int(unknowns_.size()));
-    derivatives_.assign(weights, 0.0);
+    derivatives_.assign(weights + widest_vector, 0.0);  // vectors reach beyond the last one
     for (const auto& [place, derivative] : of_faults) derivatives_[place] = derivative;
     residuals_.setZero(Eigen::Index(problem.readings().size()));
     if (problem.moves_axes()) by_shift_.resize(problem.readings().size());
@@ -304,50 +316,37 @@ void NormalEquations::add_curvature(const Eigen::VectorXd& x, BorderedBand& matr
 void NormalEquations::assemble_point(const AdjustedPoint& point, int number, BorderedBand& matrix) const {
     const int* unknown = unknowns_.data() + first_unknown_[number];
     const int size = first_unknown_[number + 1] - first_unknown_[number];
-    const int readings = point.end_reading - point.first_reading;
-    using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    const Eigen::Map<const Rows> rows(derivatives_.data() + first_weight_[point.first_reading], readings, size);
-    thread_local Rows square;  // its lower triangle
-    square.setZero(size, size);
-    for (int r = 0; r < readings; ++r) {
-        if (!problem_->readings()[point.first_reading + r].used()) continue;
-        const double* row = rows.row(r).data();
-        for (int i = 0; i < size; ++i) {
-            const double left = row[i];
-            double* out = square.data() + std::ptrdiff_t(i) * size;
-            for (int j = 0; j <= i; ++j) out[j] += left * row[j];
-        }
+    const auto rounded_up = [&](int step) { return (size + step - 1) / step * step; };
+    thread_local Eigen::MatrixXd square;  // -J^T J
+    square.setZero(rounded_up(widest_vector), rounded_up(BorderedBand::block_size));
+    for (int r = point.first_reading; r < point.end_reading; ++r) {
+        if (!problem_->readings()[r].used()) continue;
+        const double* row = derivatives_.data() + first_weight_[r];
+        subtract_product(size, square.cols(), 1, {row, size}, {row, 1, size}, {square.data(), square.rows()});
     }
 
     const int banded = 6 * matrix.blocks();
     std::array<int, 3> block;
     for (int a = 0; a < 3; ++a) block[a] = problem_->block_of(point.node[a]);
+    thread_local std::vector<std::pair<int, int>> of_border;  // into the point's unknowns, and into the border
+    of_border.clear();
+    for (int i = 0; i < size; ++i)
+        if (unknown[i] >= banded)
+            if (const int place = matrix.border_place(unknown[i]); place >= 0) of_border.emplace_back(i, place);
     for (int a = 0; a < 3; ++a) {
         if (block[a] == no_unknown) continue;
         for (int b = 0; b <= a; ++b) {
             if (block[b] == no_unknown) continue;
-            const auto part = square.block<6, 6>(6 * a, 6 * b);
-            if (block[b] <= block[a]) matrix.block(block[a], block[b]) += part;
-            else matrix.block(block[b], block[a]) += part.transpose();
+            const int first = block[b] <= block[a] ? a : b, second = a + b - first;
+            matrix.block(block[first], block[second]) -= square.block<6, 6>(6 * first, 6 * second);
         }
         auto border = matrix.border_rows(block[a]);
-        for (int i = 0; i < size; ++i) {
-            const int place = matrix.border_place(unknown[i]);
-            if (unknown[i] < banded || place < 0) continue;
-            auto row = border.row(place);
-            if (i > 6 * a) row += square.block<1, 6>(i, 6 * a);
-            else row += square.block<6, 1>(6 * a, i).transpose();
-        }
+        for (const auto& [i, place] : of_border)
+            for (int c = 0; c < 6; ++c) border(place, c) -= square(i, 6 * a + c);
     }
-    for (int i = 0; i < size; ++i) {
-        const int place_i = matrix.border_place(unknown[i]);
-        if (unknown[i] < banded || place_i < 0) continue;
-        for (int j = 0; j <= i; ++j) {
-            const int place_j = matrix.border_place(unknown[j]);
-            if (unknown[j] < banded || place_j < 0) continue;
-            matrix.corner()(std::max(place_i, place_j), std::min(place_i, place_j)) += square(i, j);
-        }
-    }
+    for (const auto& [i, place_i] : of_border)
+        for (const auto& [j, place_j] : of_border)
+            if (place_j <= place_i) matrix.corner()(place_i, place_j) -= square(i, j);
     for (int i = 0; i < size && matrix.leaf_unknowns() > 0; ++i) {
         const int leaf_i = matrix.leaf_place(unknown[i]);
         if (leaf_i < 0) continue;
@@ -356,8 +355,8 @@ void NormalEquations::assemble_point(const AdjustedPoint& point, int number, Bor
         for (int j = 0; j < size; ++j) {
             if (unknown[j] == no_unknown) continue;
             const int leaf_j = matrix.leaf_place(unknown[j]);
-            if (leaf_j < 0) column[matrix.leaf_row(unknown[j])] += square(std::max(i, j), std::min(i, j));
-            else if (leaf_j <= leaf_i) matrix.leaf(leaf)(leaf_i - start, leaf_j - start) += square(i, j);
+            if (leaf_j < 0) column[matrix.leaf_row(unknown[j])] -= square(i, j);
+            else if (leaf_j <= leaf_i) matrix.leaf(leaf)(leaf_i - start, leaf_j - start) -= square(i, j);
         }
     }
 }
@@ -372,9 +371,7 @@ Eigen::VectorXd NormalEquations::transposed(const Eigen::VectorXd& w, const Eige
     for (const AdjustedPoint& point : problem_->points())
         for (int r = point.first_reading; r < point.end_reading; ++r) {
             if (!problem_->readings()[r].used()) continue;
-            const Row row = this->row(point, r);
-            for (int i = 0; i < row.size; ++i)
-                if (row.unknown[i] != no_unknown) gradient[row.unknown[i]] += row.derivative[i] * w[r];
+            row(point, r).add_to(gradient, w[r]);
         }
     gradient -= prior_weight_.cwiseProduct(x);
     for (const SmoothRow& row : smooth_) {

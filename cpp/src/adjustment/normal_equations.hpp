@@ -71,6 +71,8 @@ public:
     Eigen::VectorXd image(const Eigen::VectorXd& v) const;    // J v, of all readings
     Eigen::VectorXd product(const Eigen::VectorXd& v) const;  // (J^T J + P) v
 
+    using Side =
+        Eigen::Ref<Eigen::VectorXd, 0, Eigen::InnerStride<>>;  // a vector, or a column of BorderedFactor::Sides
     // The derivative of a reading, weighted: unknowns of its point (no_unknown where there is none), and its row.
     struct Row {
         const int* unknown;
@@ -78,6 +80,8 @@ public:
         int size;
 
         double product(const Eigen::VectorXd& v) const;
+        BorderedFactor::OfSides products(const BorderedFactor::Sides& v) const;
+        void add_to(Side v, double times) const;
     };
     Row row(const AdjustedPoint& point, int reading) const;
     Row row(int reading) const { return row(problem_->points()[point_of_reading_[reading]], reading); }

@@ -44,16 +44,20 @@ std::vector<ResidualPattern> prior_scatter(const AdjustmentProblem& problem, con
         const Eigen::Index count = Eigen::Index(values.size());
         Eigen::MatrixXd m(count, count);
         double t = 0.0, squares = 0.0;
-        for (Eigen::Index i = 0; i < count; ++i) {
-            const Value& a = values[std::size_t(i)];
-            t += std::pow(x[a.unknown] / a.prior, 2);
-            squares += a.prior * a.prior;
-            Eigen::VectorXd covariance = Eigen::VectorXd::Unit(x.size(), a.unknown);
+        for (const Value& value : values) {
+            t += std::pow(x[value.unknown] / value.prior, 2);
+            squares += value.prior * value.prior;
+        }
+        for (Eigen::Index first = 0; first < count; first += BorderedFactor::sides) {
+            const Eigen::Index end = std::min<Eigen::Index>(count, first + BorderedFactor::sides);
+            BorderedFactor::Sides covariance = BorderedFactor::Sides::Zero(x.size(), BorderedFactor::sides);
+            for (Eigen::Index i = first; i < end; ++i) covariance(values[std::size_t(i)].unknown, i - first) = 1.0;
             factor.solve(covariance);
-            for (Eigen::Index j = 0; j <= i; ++j) {
-                const Value& b = values[std::size_t(j)];
-                m(j, i) = m(i, j) = (i == j ? 1.0 : 0.0) - covariance[b.unknown] / (a.prior * b.prior);
-            }
+            for (Eigen::Index i = first; i < end; ++i)
+                for (Eigen::Index j = 0; j <= i; ++j) {
+                    const Value &a = values[std::size_t(i)], &b = values[std::size_t(j)];
+                    m(j, i) = m(i, j) = (i == j ? 1.0 : 0.0) - covariance(b.unknown, i - first) / (a.prior * b.prior);
+                }
         }
         const Eigen::MatrixXd square = m * m;
         const std::array<double, 3> sums{m.trace(), square.trace(), square.cwiseProduct(m).sum()};

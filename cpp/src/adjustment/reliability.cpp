@@ -79,12 +79,12 @@ private:
 
 class Reliability {
 public:
-    Reliability(const GaussNewton& solver, const BorderedBand& inverse, const CalibratedForms& forms, double noise)
+    Reliability(Solution& solution, const CalibratedForms& forms, double noise)
         : noise_(noise),
-          problem_(solver.equations().problem()),
-          values_(calibrated_values(forms, inverse)),
+          problem_(solution.problem()),
+          values_(calibrated_values(forms, solution.inverse())),
           hypotheses_(problem_),
-          tests_(solver.equations(), solver.factor(), inverse, hypotheses_),
+          tests_(solution.solver().equations(), solution.solver().factor(), solution.reading_variances(), hypotheses_),
           effects_(tests_, values_) {}
 
     std::vector<FaultControl> look() {
@@ -106,7 +106,7 @@ public:
 
 private:
     void look_at(int h, FaultControl& control) {
-        tests_.refine(h);
+        tests_.refine({h});
         const Eigen::VectorXd effect = tests_.effect(h);
         const Eigen::VectorXd& changes = effects_.add(h, effect);
         const double u = tests_.scores()[h].standard_uncertainty;
@@ -121,13 +121,14 @@ private:
         std::vector<double> correlations = tests_.correlations(h, effect);
         double nearest = 0.0;
         bool has_twin = false;
+        std::vector<int> alike;
+        for (int k = 0; k < int(correlations.size()); ++k)
+            if (k != h && std::abs(correlations[k]) > similar) alike.push_back(k);
+        for (const int k : alike) correlations[k] /= tests_.scores()[k].standard_uncertainty;
+        tests_.refine(alike);
+        for (const int k : alike) correlations[k] *= tests_.scores()[k].standard_uncertainty;
         for (int k = 0; k < int(correlations.size()); ++k) {
             if (k == h) continue;
-            if (std::abs(correlations[k]) > similar) {
-                const double before = tests_.scores()[k].standard_uncertainty;
-                tests_.refine(k);
-                correlations[k] *= tests_.scores()[k].standard_uncertainty / before;
-            }
             if (std::abs(correlations[k]) < twin) {
                 nearest = std::max(nearest, std::abs(correlations[k]));
                 continue;
@@ -183,15 +184,15 @@ private:
 // theirs, and once more. Entries that are noted are of rows, and exact: of most slips the uncertainty is interpolated.
 class Unseen {
 public:
-    Unseen(const GaussNewton& solver, const BorderedBand& inverse, const CalibratedForms& forms, double noise)
-        : solver_(solver),
+    Unseen(Solution& solution, FaultTests& tests, const CalibratedForms& forms, double noise)
+        : solver_(solution.solver()),
           limit_(power_of_99_percent * noise),
-          values_(calibrated_values(forms, inverse)),
-          hypotheses_(solver.equations().problem()),
-          tests_(solver.equations(), solver.factor(), inverse, hypotheses_, slips_computed) {
+          values_(calibrated_values(forms, solution.inverse())),
+          hypotheses_(tests.hypotheses()),
+          tests_(tests) {
         std::map<std::pair<std::string, FaultKind>, int> number;
         for (const FaultHypothesis& h : hypotheses_.all()) {
-            const std::string channel = channel_of(solver.equations().problem(), hypotheses_, h);
+            const std::string channel = channel_of(solution.problem(), hypotheses_, h);
             const auto [place, is_new] = number.try_emplace({channel, h.kind}, int(faults_.size()));
             if (is_new) faults_.push_back({h.kind, channel});
             group_.push_back(place->second);
@@ -203,9 +204,7 @@ public:
         std::set<int> columns = first_columns();
         constexpr int rounds = 2;
         for (int round = 0; round < rounds && !columns.empty(); ++round) {
-            std::map<Place, Entry> largest;
-            for (const int v : columns) look_at_column(v, largest);
-            for (const auto& [place, entry] : largest) look_at_row(entry.hypothesis);
+            look_at_rows(rows_of({columns.begin(), columns.end()}));
             columns_seen_.merge(columns);
             columns.clear();
             for (const auto& [place, entry] : best_)
@@ -216,10 +215,11 @@ public:
     }
 
 private:
-    static constexpr int slips_computed = 100;    // of others the uncertainty is interpolated, some 20 % at worst
     static constexpr int most_uncontrolled = 20;  // of a kind, evenly spaced
     static constexpr double nothing = 1e-4;       // of a value's standard uncertainty: rounding
     using Place = std::pair<int, int>;            // kind of fault and family
+    using Sides = BorderedFactor::Sides;
+    using OfSides = BorderedFactor::OfSides;
     struct Entry {
         double effect = 0.0;
         int hypothesis = 0, value = 0;
@@ -250,95 +250,134 @@ private:
             if (!is_controlled(h)) uncontrolled_[group_[h]].push_back(h);
             else if (of_kind < 0 || uncertainty(h) > uncertainty(of_kind)) of_kind = h;
         }
-        for (int h : worst) {
-            if (h < 0) continue;
-            tests_.refine(h);
-            constexpr int strides[] = {24, 12, 6, 3, 2, 1};
-            for (const int stride : strides)
-                for (const int k : {h - stride, h + stride})
+        worst.erase(std::remove(worst.begin(), worst.end(), -1), worst.end());
+        tests_.refine(worst);
+        constexpr int strides[] = {24, 12, 6, 3, 2, 1};
+        for (const int stride : strides) {
+            std::vector<std::pair<int, int>> steps;  // into worst, and to where
+            std::vector<int> there;
+            for (int w = 0; w < int(worst.size()); ++w)
+                for (const int k : {worst[w] - stride, worst[w] + stride})
                     if (k >= 0 && k < int(group_.size()) && hypotheses_.all()[k].kind == FaultKind::slip &&
-                        group_[k] == group_[h]) {
-                        tests_.refine(k);
-                        if (is_controlled(k) && uncertainty(k) > uncertainty(h)) h = k;
+                        group_[k] == group_[worst[w]]) {
+                        steps.emplace_back(w, k);
+                        there.push_back(k);
                     }
-            look_at_row(h);
+            tests_.refine(there);
+            for (const auto& [w, k] : steps)
+                if (is_controlled(k) && uncertainty(k) > uncertainty(worst[w])) worst[w] = k;
         }
+        look_at_rows(worst);
     }
 
-    void look_at_row(int h) {
-        if (!rows_seen_.insert(h).second) return;
-        tests_.refine(h);
-        if (!is_controlled(h)) return;
-        UnseenFault& fault = faults_[group_[h]];
-        const double size = limit_ * uncertainty(h);
-        fault.size = std::max(fault.size, size);
-        const Eigen::VectorXd effect = tests_.effect(h);
-        for (int v = 0; v < int(values_.size()); ++v) {
-            const double changed = size * std::abs(values_[v].form->value(effect));
-            double& hidden = fault.*unseen_families[values_[v].family];
-            if (!(changed > hidden)) continue;
-            hidden = changed;
-            best_[{group_[h], values_[v].family}] = {changed, h, v};
-        }
-    }
-
-    // The fault of each kind with most effect on a value, if it is larger than those that are there.
-    void look_at_column(int v, std::map<Place, Entry>& largest) const {
-        const NormalEquations& equations = solver_.equations();
-        const AdjustmentProblem& problem = equations.problem();
-        Eigen::VectorXd y = Eigen::VectorXd::Zero(problem.size());
-        for (int i = 0; i < values_[v].form->size; ++i)
-            y[values_[v].form->unknown[i]] += values_[v].form->coefficient[i];
-        solver_.factor().solve(y);
-        // By reading, and from each place of a sequence to its end.
-        std::vector<std::vector<double>> of, from;
-        for (const ReadingSequence& sequence : hypotheses_.sequences()) {
-            const std::size_t count = sequence.readings.size();
-            auto& each = of.emplace_back(count, 0.0);
-            auto& sums = from.emplace_back(count + 1, 0.0);
-            for (std::size_t i = count; i-- > 0;) {
-                const int r = sequence.readings[i];
-                const AdjustedReading& reading = problem.readings()[r];
-                if (reading.used()) each[i] = equations.row(r).product(y) / reading.standard_uncertainty;
-                sums[i] = sums[i + 1] + each[i];
+    // What each of these faults, just not found, does to each value.
+    void look_at_rows(std::vector<int> rows) {
+        const auto is_seen = [&](int h) { return !rows_seen_.insert(h).second; };
+        rows.erase(std::remove_if(rows.begin(), rows.end(), is_seen), rows.end());
+        tests_.refine(rows);
+        const auto is_open = [&](int h) { return !is_controlled(h); };
+        rows.erase(std::remove_if(rows.begin(), rows.end(), is_open), rows.end());
+        for_eights(rows, [&](const int* some, int count) {
+            const Sides effects = tests_.effects(some, count);
+            OfSides size = OfSides::Zero();
+            for (int k = 0; k < count; ++k) {
+                size[k] = limit_ * uncertainty(some[k]);
+                double& largest = faults_[group_[some[k]]].size;
+                largest = std::max(largest, size[k]);
             }
-        }
+            for (int v = 0; v < int(values_.size()); ++v) {
+                const OfSides changed = values_[v].form->values(effects).cwiseAbs().cwiseProduct(size);
+                for (int k = 0; k < count; ++k) {
+                    double& hidden = faults_[group_[some[k]]].*unseen_families[values_[v].family];
+                    if (!(changed[k] > hidden)) continue;
+                    hidden = changed[k];
+                    best_[{group_[some[k]], values_[v].family}] = {changed[k], some[k], v};
+                }
+            }
+        });
+    }
+
+    // For each kind of fault and each family the fault with most effect on one of these values.
+    std::vector<int> rows_of(const std::vector<int>& columns) const {
+        constexpr int families_count = int(std::size(unseen_families));
         const auto& all = hypotheses_.all();
-        for (int h = 0; h < int(all.size()); ++h) {
-            if (!is_controlled(h)) continue;
-            const ReadingSequence& sequence = hypotheses_.sequences()[all[h].sequence];
-            double effect = (all[h].kind == FaultKind::reading ? of : from)[all[h].sequence][all[h].first];
-            if (all[h].kind == FaultKind::factor) {
-                effect = 0.0;
-                for (std::size_t i = 0; i < sequence.readings.size(); ++i)
-                    effect += hypotheses_.share(all[h], sequence.readings[i]) * of[all[h].sequence][i];
+        const NormalEquations& equations = solver_.equations();
+        std::vector<Entry> largest(faults_.size() * families_count);
+        for_eights(columns, [&](const int* some, int count) {
+            Sides y = Sides::Zero(equations.problem().size(), BorderedFactor::sides);
+            for (int k = 0; k < count; ++k)
+                for (int i = 0; i < values_[some[k]].form->size; ++i)
+                    y(values_[some[k]].form->unknown[i], k) += values_[some[k]].form->coefficient[i];
+            solver_.factor().solve(y);
+            const std::vector<OfSides> effects = effects_on(y);
+            for (int h = 0; h < int(all.size()); ++h) {
+                if (!is_controlled(h)) continue;
+                const OfSides changed = limit_ * uncertainty(h) * effects[h].cwiseAbs();
+                for (int k = 0; k < count; ++k) {
+                    Entry& entry = largest[group_[h] * families_count + values_[some[k]].family];
+                    if (changed[k] > entry.effect) entry = {changed[k], h, some[k]};
+                }
             }
-            const double changed = limit_ * uncertainty(h) * std::abs(effect);
-            Entry& entry = largest[{group_[h], values_[v].family}];
-            if (changed > entry.effect) entry = {changed, h, v};
+        });
+        std::vector<int> rows;
+        for (const Entry& entry : largest)
+            if (entry.effect > 0.0) rows.push_back(entry.hypothesis);
+        return rows;
+    }
+
+    // Of each fault of size 1, from N^-1 of the values' forms.
+    std::vector<OfSides> effects_on(const Sides& y) const {
+        const NormalEquations& equations = solver_.equations();
+        std::vector<OfSides> of(equations.problem().readings().size(), OfSides::Zero()), effects(group_.size());
+        for (int r = 0; r < int(of.size()); ++r) {
+            const AdjustedReading& reading = equations.problem().readings()[r];
+            if (reading.used()) of[r] = equations.row(r).products(y) / reading.standard_uncertainty;
         }
+        std::vector<std::vector<OfSides>> from;  // of a sequence from each place to its end
+        for (const ReadingSequence& sequence : hypotheses_.sequences()) {
+            auto& sums = from.emplace_back(sequence.readings.size() + 1, OfSides::Zero());
+            for (std::size_t i = sequence.readings.size(); i-- > 0;) sums[i] = sums[i + 1] + of[sequence.readings[i]];
+        }
+        for (int h = 0; h < int(group_.size()); ++h) {
+            const FaultHypothesis& fault = hypotheses_.all()[h];
+            effects[h] = OfSides::Zero();
+            if (fault.kind == FaultKind::slip) effects[h] = from[fault.sequence][fault.first];
+            else
+                for (const int r : hypotheses_.readings(fault)) effects[h] += hypotheses_.share(fault, r) * of[r];
+        }
+        return effects;
     }
 
     void look_at_uncontrolled() {
         for (const auto& [group, list] : uncontrolled_) {
+            std::vector<int> rows;
             const std::size_t step = (list.size() + most_uncontrolled - 1) / most_uncontrolled;
-            for (std::size_t i = 0; i < list.size(); i += step) {
-                const Eigen::VectorXd effect = tests_.effect(list[i]);
-                const double noise = 1.0 / std::sqrt(tests_.square(list[i]));
+            for (std::size_t i = 0; i < list.size(); i += step) rows.push_back(list[i]);
+            for_eights(rows, [&](const int* some, int count) {
+                const Sides effects = tests_.effects(some, count);
+                OfSides noise = OfSides::Zero();
+                for (int k = 0; k < count; ++k) noise[k] = 1.0 / std::sqrt(tests_.square(some[k]));
                 for (const CalibratedValue& value : values_) {
-                    if (!(noise * std::abs(value.form->value(effect)) > nothing * value.standard_uncertainty)) continue;
+                    const OfSides changed = value.form->values(effects).cwiseAbs().cwiseProduct(noise);
+                    if (!(changed.maxCoeff() > nothing * value.standard_uncertainty)) continue;
                     faults_[group].controlled = false;
                     faults_[group].*unseen_families[value.family] = std::numeric_limits<double>::infinity();
                 }
-            }
+            });
         }
+    }
+
+    template <class Function>
+    static void for_eights(const std::vector<int>& list, const Function& function) {
+        for (std::size_t i = 0; i < list.size(); i += BorderedFactor::sides)
+            function(list.data() + i, int(std::min<std::size_t>(BorderedFactor::sides, list.size() - i)));
     }
 
     const GaussNewton& solver_;
     double limit_;
     std::vector<CalibratedValue> values_;
-    FaultHypotheses hypotheses_;
-    FaultTests tests_;
+    const FaultHypotheses& hypotheses_;
+    FaultTests& tests_;
     std::vector<UnseenFault> faults_;
     std::vector<int> group_;  // by hypothesis, into faults_
     std::map<int, std::vector<int>> uncontrolled_;
@@ -348,14 +387,13 @@ private:
 
 }  // namespace
 
-std::vector<UnseenFault> unseen_faults(const GaussNewton& solver, const BorderedBand& inverse,
-                                       const CalibratedForms& forms, double noise) {
-    return Unseen(solver, inverse, forms, noise).look();
+std::vector<UnseenFault> unseen_faults(Solution& solution, FaultTests& tests, const CalibratedForms& forms,
+                                       double noise) {
+    return Unseen(solution, tests, forms, noise).look();
 }
 
-std::vector<FaultControl> reliability(const GaussNewton& solver, const BorderedBand& inverse,
-                                      const CalibratedForms& forms, double noise) {
-    return Reliability(solver, inverse, forms, noise).look();
+std::vector<FaultControl> reliability(Solution& solution, const CalibratedForms& forms, double noise) {
+    return Reliability(solution, forms, noise).look();
 }
 
 }  // namespace stepdiag

@@ -3,6 +3,7 @@
 
 #include "adjustment/adjustment_result.hpp"
 #include "adjustment/fault_tests.hpp"
+#include "adjustment/solution.hpp"
 
 namespace stepdiag {
 
@@ -10,11 +11,11 @@ namespace stepdiag {
 // A solution for each place, and one for each of its twins; a run that has more places than memory for the effects of
 // all (the tables of 50 steps need none of this) is looked at in evenly spaced ones. `noise`: how much larger than
 // stated all readings' noise is, by which faults must be larger to be found.
-std::vector<FaultControl> reliability(const GaussNewton& solver, const BorderedBand& inverse,
-                                      const CalibratedForms& forms, double noise = 1.0);
+std::vector<FaultControl> reliability(Solution& solution, const CalibratedForms& forms, double noise = 1.0);
 
-// What faults of each kind may do unseen: the worst places only, so that every adjustment can say it.
-std::vector<UnseenFault> unseen_faults(const GaussNewton& solver, const BorderedBand& inverse,
-                                       const CalibratedForms& forms, double noise = 1.0);
+// What faults of each kind may do unseen: the worst places only, so that every adjustment can say it. `tests`: at the
+// solution.
+std::vector<UnseenFault> unseen_faults(Solution& solution, FaultTests& tests, const CalibratedForms& forms,
+                                       double noise = 1.0);
 
 }  // namespace stepdiag

@@ -125,9 +125,11 @@ public:
 
     const std::vector<Trend>& trends() const { return trends_; }
 
-    FaultScore score(const Trend& trend) const {
+    std::vector<FaultScore> scores() const {
         constexpr double controlled = 1e-6;
-        return score_of(trend.pattern, equations_, factor_, controlled);
+        std::vector<const ReadingPattern*> patterns;
+        for (const Trend& trend : trends_) patterns.push_back(&trend.pattern);
+        return scores_of(patterns, equations_, factor_, controlled);
     }
 
 private:
@@ -204,8 +206,10 @@ std::vector<ResidualPattern> trends_of_readings(const Adjustment& adjustment, co
     const double freedom = adjustment.degrees_of_freedom - 1.0;
     std::vector<ResidualPattern> patterns;
     if (freedom < fewest_freedom) return patterns;
-    for (const Trend& trend : tests.trends()) {
-        const FaultScore score = tests.score(trend);
+    const std::vector<FaultScore> scores = tests.scores();
+    for (std::size_t t = 0; t < scores.size(); ++t) {
+        const Trend& trend = tests.trends()[t];
+        const FaultScore& score = scores[t];
         if (score.gain == 0.0) continue;
         // Where all readings scatter more than was said, it is measured against that.
         const double others = std::max(1.0, (adjustment.weighted_square_sum - score.gain) / freedom);

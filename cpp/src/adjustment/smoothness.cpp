@@ -22,7 +22,7 @@ Validation validate(GaussNewton& solver, const Eigen::VectorXd& x, const Deviati
     const NormalEquations& equations = solver.equations();
     Eigen::VectorXd dx = equations.gradient(x);
     solver.factor().solve(dx);
-    const BorderedBand inverse = solver.factor().selected_inverse();
+    const Eigen::VectorXd variances = equations.reading_variances(solver.factor().selected_inverse());
     double square_sum = 0.0, freedom = 0.0;
     int count = 0;
     for (const AdjustedPoint& point : equations.problem().points())
@@ -31,7 +31,7 @@ Validation validate(GaussNewton& solver, const Eigen::VectorXd& x, const Deviati
             square_sum += std::pow(equations.residuals()[r] - equations.row(point, r).product(dx), 2);
             ++count;
         }
-    for (const ReadingResidual& residual : reading_residuals(equations, inverse))
+    for (const ReadingResidual& residual : reading_residuals(equations, variances))
         if (residual.used()) freedom += residual.redundancy;
     if (!(freedom > 0.0)) return {0.0, 1.0, 0.0};
     // The smoothness has to fit, too: second differences as large as was said.

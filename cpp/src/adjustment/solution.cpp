@@ -13,8 +13,7 @@ Solution::Solution(AdjustmentProblem problem, const std::array<double, function_
       solver_(problem_, smoothness),
       tables_(problem_),
       observability_(solver_, tables_),
-      x_(Eigen::VectorXd::Zero(problem_.size())),
-      inverse_(solver_.equations().matrix()) {
+      x_(Eigen::VectorXd::Zero(problem_.size())) {
     solver_.assume_usual(observability_.determined());
 }
 
@@ -56,15 +55,30 @@ void Solution::solve_again() {
 }
 
 void Solution::linearise(const Eigen::VectorXd& x) {
+    if (is_looked_at_ && solver_.dependent().empty() && x == x_) return;
     if (!solver_.dependent().empty()) solver_.equations().assume_usual(observability_.determined(), x);
     if (!x.isZero(0.0)) solver_.factorize(x);
-    solver_.factor().selected_inverse(inverse_);
+    inverse_.reset();
+    reading_variances_.reset();
+    is_looked_at_ = false;
 }
 
 void Solution::look() {
     solver_.refresh(x_);
     square_sum_ = solver_.equations().square_sum(x_);
-    solver_.factor().selected_inverse(inverse_);
+    inverse_.reset();
+    reading_variances_.reset();
+    is_looked_at_ = true;
+}
+
+const BorderedBand& Solution::inverse() {
+    if (!inverse_) inverse_ = solver_.factor().selected_inverse();
+    return *inverse_;
+}
+
+const Eigen::VectorXd& Solution::reading_variances() {
+    if (!reading_variances_) reading_variances_ = solver_.equations().reading_variances(inverse());
+    return *reading_variances_;
 }
 
 int Solution::degrees_of_freedom() const { return stepdiag::degrees_of_freedom(solver_); }

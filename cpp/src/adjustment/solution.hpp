@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "adjustment/adjustment_tables.hpp"
 #include "adjustment/gauss_newton.hpp"
@@ -33,8 +34,10 @@ public:
     void solve_again();  // for another smoothness; throws InvalidArgument where it is not reached
     // Equations, factor and inverse at any x, with what is open known to be there.
     void linearise(const Eigen::VectorXd& x);
-    void look();                                              // the same at the minimum
-    const BorderedBand& inverse() const { return inverse_; }  // after one of these two
+    void look();  // the same at the minimum
+    // After one of these two: of the equations, and what the model says of each reading (NormalEquations).
+    const BorderedBand& inverse();
+    const Eigen::VectorXd& reading_variances();
 
     double square_sum() const { return square_sum_; }
     double scatter() const { return square_sum_ / double(problem_.readings().size()); }
@@ -46,7 +49,9 @@ private:
     AdjustmentTables tables_;
     Observability observability_;
     Eigen::VectorXd x_;
-    BorderedBand inverse_;
+    std::optional<BorderedBand> inverse_;
+    std::optional<Eigen::VectorXd> reading_variances_;
+    bool is_looked_at_ = false;  // the minimum, with what is open known to be where it usually is
     int iterations_ = 0;
     bool is_minimum_ = true;
     double square_sum_ = 0.0;

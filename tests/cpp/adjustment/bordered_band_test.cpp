@@ -96,6 +96,23 @@ MatrixXd kept_inverse(const MatrixXd& matrix, const std::vector<int>& held, doub
     return inverse;
 }
 
+// Right sides beside each other have the answers of each alone, but for the order of sums.
+void expect_same_beside_each_other(const BorderedFactor& factor, int size, double tolerance) {
+    BorderedFactor::Sides right(size, BorderedFactor::sides);
+    for (int k = 0; k < BorderedFactor::sides; ++k) right.col(k) = random_vector(size, 20 + k);
+    BorderedFactor::Sides x = right;
+    factor.solve(x);
+    const BorderedFactor::OfSides squares = factor.inverse_squares(right);
+    for (int k = 0; k < BorderedFactor::sides; ++k) {
+        const VectorXd side = right.col(k);
+        VectorXd alone = side;
+        factor.solve(alone);
+        const double scale = side.lpNorm<1>();
+        EXPECT_LE((x.col(k) - alone).lpNorm<Eigen::Infinity>(), tolerance * scale);
+        EXPECT_NEAR(squares[k], factor.inverse_square(side), tolerance * scale * scale);
+    }
+}
+
 void expect_dense_answers(const BorderedBand& matrix, const BorderedFactor& factor) {
     double cond;
     const MatrixXd inverse = kept_inverse(dense(matrix), factor.held(), cond);
@@ -108,6 +125,7 @@ void expect_dense_answers(const BorderedBand& matrix, const BorderedFactor& fact
     for (const int i : factor.held()) EXPECT_EQ(x[i], 0.0);
     EXPECT_NEAR(factor.inverse_square(right), right.dot(inverse * right),
                 tolerance * right.lpNorm<1>() * right.lpNorm<1>());
+    if (matrix.size() > 0) expect_same_beside_each_other(factor, matrix.size(), tolerance);
 
     const BorderedBand selected = factor.selected_inverse();
     for (int j = 0; j < matrix.blocks(); ++j) {
@@ -267,6 +285,7 @@ struct Leafy {
         for (const int i : factor.held()) EXPECT_EQ(x[i], 0.0);
         const double scale = right.lpNorm<1>() * right.lpNorm<1>();
         EXPECT_NEAR(factor.inverse_square(right), right.dot(inverse * right), tolerance * scale);
+        expect_same_beside_each_other(factor, matrix.size(), tolerance);
         for (int j = 0; j < matrix.size(); ++j)
             if (const int place = matrix.leaf_place(j); place >= 0 && matrix.leaf_of(place) != 2) right[j] = 0.0;
         EXPECT_NEAR(factor.inverse_square(right, 2), right.dot(inverse * right), tolerance * scale);

@@ -95,7 +95,8 @@ struct Solved {
         return problem;
     }
     FaultTests tests(int most_solutions = FaultTests::usual_most_solutions) const {
-        return {solver.equations(), solver.factor(), inverse, hypotheses, most_solutions};
+        return {solver.equations(), solver.factor(), solver.equations().reading_variances(inverse), hypotheses,
+                most_solutions};
     }
 
     int find(FaultKind kind, const char* line, int channel, int first) const {
