@@ -19,7 +19,11 @@ using Lanes = double[lane_group];
 
 SimdStart::SimdStart(const PreparedAdjustment& prepared, const std::vector<std::ptrdiff_t>& input,
                      const std::vector<double>& standard_uncertainty)
-    : pattern(prepared), input(input), jacobian(pattern.solver.equations()), factor(pattern.solver.factor()) {
+    : pattern(prepared),
+      input(input),
+      jacobian(pattern.solver.equations()),
+      factor(pattern.solver.factor()),
+      tilt_effects(pattern.problem, pattern.start) {
     for (const AdjustedReading& reading : pattern.problem.readings()) {
         weight.push_back(1.0 / reading.standard_uncertainty);
         value.push_back(reading.value);
@@ -38,8 +42,7 @@ SimdAdjustment::SimdAdjustment(const SimdStart& start)
       dx_(start.pattern.problem.size() + 1),
       centre_(start.pattern.problem.size()),
       s_(Eigen::Index(start.input.size())),
-      r_(Eigen::Index(start.input.size())),
-      difference_(Eigen::Index(start.input.size())) {}
+      r_(Eigen::Index(start.input.size())) {}
 
 // Values are F x, and dx = N^-1 J^T (d reading/u). Computes lane_group rows of F N^-1 J^T at a time.
 Eigen::MatrixXd simd_gain(const SimdStart& start, std::size_t readings) {
@@ -47,6 +50,7 @@ Eigen::MatrixXd simd_gain(const SimdStart& start, std::size_t readings) {
     Eigen::MatrixXd gain = Eigen::MatrixXd::Zero(Eigen::Index(forms.size()), Eigen::Index(readings));
     const Eigen::Index unknowns = start.pattern.start.size();
     SimdNumbers column(unknowns), row{Eigen::Index(start.input.size())};
+    const SimdNumbers none{Eigen::Index(start.input.size())};
     for (std::size_t first = 0; first < forms.size(); first += lane_group) {
         const std::size_t count = std::min(lane_group, forms.size() - first);
         column.fill(Eigen::VectorXd::Zero(unknowns));
@@ -54,10 +58,10 @@ Eigen::MatrixXd simd_gain(const SimdStart& start, std::size_t readings) {
             for (int k = 0; k < forms[first + lane].size; ++k)
                 column.at(forms[first + lane].unknown[k])[lane] += forms[first + lane].coefficient[k];
         start.factor.solve(column.data());
-        start.jacobian.multiply(column.data(), row.data());
+        start.jacobian.subtract_product(none.data(), column.data(), row.data());
         for (std::size_t r = 0; r < start.input.size(); ++r)
             for (std::size_t lane = 0; lane < count; ++lane)
-                gain(Eigen::Index(first + lane), start.input[r]) = start.weight[r] * row.at(Eigen::Index(r))[lane];
+                gain(Eigen::Index(first + lane), start.input[r]) = -start.weight[r] * row.at(Eigen::Index(r))[lane];
     }
     return gain;
 }
@@ -88,12 +92,25 @@ void SimdAdjustment::Progress::add(double largest) {
     if (state == goes_on && steps >= most_steps) state = failed;
 }
 
-void SimdAdjustment::begin() {
+void SimdAdjustment::begin(const double* readings, std::size_t stride) {
     x_.fill(start_.pattern.start);
     std::fill_n(x_.at(start_.pattern.problem.size()), lane_group, 0.0);
-    centre_.fill(Eigen::VectorXd::Zero(start_.pattern.start.size()));
-    s_.fill(start_.pattern.solver.equations().residuals());
     progress_.fill({});
+    for (std::size_t lane = 0; lane < lane_group; ++lane)
+        if (!has_all_readings(readings, stride, lane)) progress_[lane].state = Progress::lost;
+}
+
+// From the pattern's solution, where r differs from the pattern's residuals s by the readings only, and J0^T s = P x.
+void SimdAdjustment::first_step(const double* readings, std::size_t stride) {
+    s_.fill(start_.pattern.solver.equations().residuals());
+    for (std::size_t r = 0; r < start_.input.size(); ++r) {
+        const double* reading = readings + std::size_t(start_.input[r]) * stride;
+        for (std::size_t i = 0; i < lane_group; ++i)
+            r_.at(Eigen::Index(r))[i] = s_.at(Eigen::Index(r))[i] + start_.weight[r] * (reading[i] - start_.value[r]);
+    }
+    std::fill_n(dx_.data(), lane_group * std::size_t(start_.pattern.start.size() + 1), 0.0);
+    start_.jacobian.add_transposed_difference(r_.data(), s_.data(), dx_.data());
+    start_.factor.solve(dx_.data());
 }
 
 void SimdAdjustment::step(const double* readings, std::size_t stride) {
@@ -102,9 +119,6 @@ void SimdAdjustment::step(const double* readings, std::size_t stride) {
     model_.evaluate({x_.data(), readings, stride, s_.data(), r_.data(), dx_.data(), is_valid});
     for (std::size_t lane = 0; lane < lane_group; ++lane)
         if (!is_valid[lane] && progress_[lane].state == Progress::goes_on) progress_[lane].state = Progress::failed;
-    const std::size_t readings_count = lane_group * start_.input.size();
-    for (std::size_t i = 0; i < readings_count; ++i) difference_.data()[i] = r_.data()[i] - s_.data()[i];
-    start_.jacobian.add_transposed(difference_.data(), dx_.data());
     for (Eigen::Index j = 0; j < start_.pattern.start.size(); ++j) {
         const double prior = equations.prior_weight()[j], usual = equations.usual_weight()[j];
         if (prior == 0.0 && usual == 0.0) continue;
@@ -121,9 +135,11 @@ void SimdAdjustment::step(const double* readings, std::size_t stride) {
             if (row.unknown[k] != no_unknown)
                 for (std::size_t i = 0; i < lane_group; ++i) dx_.at(row.unknown[k])[i] -= row.coefficient[k] * value[i];
     }
+    start_.tilt_effects.divide_transposed(x_.data(), dx_.data());
+    start_.jacobian.add_transposed_difference(r_.data(), s_.data(), dx_.data());
     start_.factor.solve(dx_.data());
-    start_.jacobian.multiply(dx_.data(), difference_.data());
-    for (std::size_t i = 0; i < readings_count; ++i) s_.data()[i] = r_.data()[i] - difference_.data()[i];
+    start_.jacobian.subtract_product(r_.data(), dx_.data(), s_.data());
+    start_.tilt_effects.divide(x_.data(), dx_.data());
 }
 
 // The largest change of a value, in units of its standard uncertainty; NaN if any change is NaN.
@@ -166,14 +182,15 @@ void SimdAdjustment::recentre(std::size_t lane) {
 }
 
 void SimdAdjustment::adjust(const double* readings, std::size_t stride, double* values, std::size_t value_stride) {
-    begin();
+    begin(readings, stride);
+    centre_.fill(Eigen::VectorXd::Zero(start_.pattern.start.size()));
     const bool has_open = !start_.pattern.solver.dependent().empty();
     counts_.fill({0, false});
-    for (std::size_t lane = 0; lane < lane_group; ++lane)
-        if (!has_all_readings(readings, stride, lane)) progress_[lane].state = Progress::lost;
     const auto goes_on = [](const Progress& p) { return p.state == Progress::goes_on; };
-    while (std::any_of(progress_.begin(), progress_.end(), goes_on)) {
-        step(readings, stride);
+    first_step(readings, stride);
+    start_.jacobian.subtract_product(r_.data(), dx_.data(), s_.data());
+    for (bool is_first = true; std::any_of(progress_.begin(), progress_.end(), goes_on); is_first = false) {
+        if (!is_first) step(readings, stride);
         Lanes largest;
         find_changes(largest);
         move();
@@ -196,17 +213,8 @@ void SimdAdjustment::adjust(const double* readings, std::size_t stride, double* 
 
 void SimdAdjustment::adjust_in_one_step(const double* readings, std::size_t stride, double* values,
                                         std::size_t value_stride) {
-    x_.fill(start_.pattern.start);
-    std::fill_n(dx_.data(), lane_group * std::size_t(start_.pattern.start.size() + 1), 0.0);
-    for (std::size_t r = 0; r < start_.input.size(); ++r)
-        for (std::size_t i = 0; i < lane_group; ++i)
-            difference_.at(Eigen::Index(r))[i] =
-                start_.weight[r] * (readings[std::size_t(start_.input[r]) * stride + i] - start_.value[r]);
-    progress_.fill({});
-    for (std::size_t lane = 0; lane < lane_group; ++lane)
-        if (!has_all_readings(readings, stride, lane)) progress_[lane].state = Progress::lost;
-    start_.jacobian.add_transposed(difference_.data(), dx_.data());
-    start_.factor.solve(dx_.data());
+    begin(readings, stride);
+    first_step(readings, stride);
     move();
     put_values(values, value_stride);
 }

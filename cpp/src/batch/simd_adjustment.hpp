@@ -7,6 +7,7 @@
 #include "batch/prepared_adjustment.hpp"
 #include "batch/simd_model.hpp"
 #include "batch/simd_solver.hpp"
+#include "batch/tilt_effects.hpp"
 
 namespace stepdiag {
 
@@ -22,6 +23,7 @@ struct SimdStart {
     std::vector<double> one_over_uncertainty;  // for each value of the tables; 0 for values that are 0 by definition
     SimdJacobian jacobian;
     SimdFactor factor;
+    TiltEffects tilt_effects;
 
     SimdStart(const PreparedAdjustment& pattern, const std::vector<std::ptrdiff_t>& input,
               const std::vector<double>& standard_uncertainty);
@@ -51,7 +53,8 @@ private:
 //   s + ds = r(x) - J0 dx,   J(x)^T s + J0^T ds - P (x + dx) = 0
 //   => N0 dx = J0^T (r(x) - s) + J(x)^T s - P x,   s := r(x) - J0 dx.
 // Its fixed point is J(x)^T r(x) = P x, the solution of the adjustment. A step reduces the error by a factor of (J -
-// J0)/J0.
+// J0)/J0. J0 T(x) (tilt_effects.hpp) takes the place of J0: it is nearer to J(x), and with T^T P T = P nearly,
+//   N0 T dx = J0^T (r(x) - s) + T^-T (J(x)^T s - P x),   s := r(x) - J0 T dx.
 class SimdAdjustment {
 public:
     explicit SimdAdjustment(const SimdStart& start);
@@ -81,7 +84,8 @@ private:
 
         void add(double largest);
     };
-    void begin();
+    void begin(const double* readings, std::size_t stride);
+    void first_step(const double* readings, std::size_t stride);
     void step(const double* readings, std::size_t stride);
     void find_changes(double* largest) const;
     void find_square_sum(double* sum) const;
@@ -94,7 +98,7 @@ private:
     const SimdStart& start_;
     SimdModel model_;
     std::unique_ptr<PreparedAdjustment> in_full_;  // created on first use
-    SimdNumbers x_, dx_, centre_, s_, r_, difference_;
+    SimdNumbers x_, dx_, centre_, s_, r_;
     std::array<Progress, lane_group> progress_;
     std::array<Count, lane_group> counts_;
 };

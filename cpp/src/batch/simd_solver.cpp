@@ -19,9 +19,12 @@ STEPDIAG_INLINE std::size_t pair_lanes() { return 2 * hn::Lanes(Tag()); }
 
 template <int Rows>
 STEPDIAG_INLINE void add_transposed_bundle(const SimdJacobian::Numbers& jacobian, const SimdJacobian::Bundle& bundle,
-                                           const double* readings, double* unknowns) {
+                                           const double* readings, const double* others, double* unknowns) {
     Pair force[Rows];
-    for (int i = 0; i < Rows; ++i) force[i] = load(readings + lane_group * std::size_t(bundle.first_reading + i));
+    for (int i = 0; i < Rows; ++i) {
+        const std::size_t place = lane_group * std::size_t(bundle.first_reading + i);
+        force[i] = load(readings + place) - load(others + place);
+    }
     const double* derivative = jacobian.derivative.data() + bundle.first_derivative;
     const int* unknown = jacobian.unknown.data() + bundle.first_unknown;
     for (int k = 0; k < bundle.unknowns; ++k, derivative += Rows) {
@@ -33,34 +36,41 @@ STEPDIAG_INLINE void add_transposed_bundle(const SimdJacobian::Numbers& jacobian
 }
 
 template <int Rows>
-STEPDIAG_INLINE void multiply_bundle(const SimdJacobian::Numbers& jacobian, const SimdJacobian::Bundle& bundle,
-                                     const double* unknowns, double* readings) {
-    Pair sum[Rows];
-    for (int i = 0; i < Rows; ++i) sum[i] = all(0.0);
+STEPDIAG_INLINE void subtract_bundle(const SimdJacobian::Numbers& jacobian, const SimdJacobian::Bundle& bundle,
+                                     const double* readings, const double* unknowns, double* result) {
+    const std::size_t first = lane_group * std::size_t(bundle.first_reading);
+    Pair rest[Rows];
+    for (int i = 0; i < Rows; ++i) rest[i] = load(readings + first + lane_group * std::size_t(i));
     const double* derivative = jacobian.derivative.data() + bundle.first_derivative;
     const int* unknown = jacobian.unknown.data() + bundle.first_unknown;
     for (int k = 0; k < bundle.unknowns; ++k, derivative += Rows) {
         const Pair x = load(unknowns + lane_group * std::size_t(unknown[k]));
-        for (int i = 0; i < Rows; ++i) sum[i] = mul_add(all(derivative[i]), x, sum[i]);
+        for (int i = 0; i < Rows; ++i) rest[i] = sub_mul(all(derivative[i]), x, rest[i]);
     }
-    for (int i = 0; i < Rows; ++i) store(sum[i], readings + lane_group * std::size_t(bundle.first_reading + i));
+    for (int i = 0; i < Rows; ++i) store(rest[i], result + first + lane_group * std::size_t(i));
 }
 
-void add_transposed(const SimdJacobian::Numbers& jacobian, const double* readings, double* unknowns) {
+void add_transposed_difference(const SimdJacobian::Numbers& jacobian, const double* readings, const double* others,
+                               double* unknowns) {
     for (std::size_t lane = 0; lane < lane_group; lane += pair_lanes())
         for (const SimdJacobian::Bundle& bundle : jacobian.bundles) {
-            if (bundle.rows == 3) add_transposed_bundle<3>(jacobian, bundle, readings + lane, unknowns + lane);
-            else if (bundle.rows == 2) add_transposed_bundle<2>(jacobian, bundle, readings + lane, unknowns + lane);
-            else add_transposed_bundle<1>(jacobian, bundle, readings + lane, unknowns + lane);
+            const double *a = readings + lane, *b = others + lane;
+            double* to = unknowns + lane;
+            if (bundle.rows == 3) add_transposed_bundle<3>(jacobian, bundle, a, b, to);
+            else if (bundle.rows == 2) add_transposed_bundle<2>(jacobian, bundle, a, b, to);
+            else add_transposed_bundle<1>(jacobian, bundle, a, b, to);
         }
 }
 
-void multiply(const SimdJacobian::Numbers& jacobian, const double* unknowns, double* readings) {
+void subtract_product(const SimdJacobian::Numbers& jacobian, const double* readings, const double* unknowns,
+                      double* result) {
     for (std::size_t lane = 0; lane < lane_group; lane += pair_lanes())
         for (const SimdJacobian::Bundle& bundle : jacobian.bundles) {
-            if (bundle.rows == 3) multiply_bundle<3>(jacobian, bundle, unknowns + lane, readings + lane);
-            else if (bundle.rows == 2) multiply_bundle<2>(jacobian, bundle, unknowns + lane, readings + lane);
-            else multiply_bundle<1>(jacobian, bundle, unknowns + lane, readings + lane);
+            const double *from = readings + lane, *x = unknowns + lane;
+            double* to = result + lane;
+            if (bundle.rows == 3) subtract_bundle<3>(jacobian, bundle, from, x, to);
+            else if (bundle.rows == 2) subtract_bundle<2>(jacobian, bundle, from, x, to);
+            else subtract_bundle<1>(jacobian, bundle, from, x, to);
         }
 }
 
@@ -149,8 +159,8 @@ HWY_AFTER_NAMESPACE();
 namespace stepdiag {
 namespace {
 
-HWY_EXPORT(add_transposed);
-HWY_EXPORT(multiply);
+HWY_EXPORT(add_transposed_difference);
+HWY_EXPORT(subtract_product);
 HWY_EXPORT(solve);
 
 }  // namespace
@@ -190,12 +200,12 @@ SimdFactor::SimdFactor(const BorderedFactor& factor) {
         for (int i = 0; i < corner.rows(); ++i) numbers_.corner.push_back(i == k ? 1.0 / corner(i, k) : corner(i, k));
 }
 
-void SimdJacobian::add_transposed(const double* readings, double* unknowns) const {
-    HWY_DYNAMIC_DISPATCH(add_transposed)(numbers_, readings, unknowns);
+void SimdJacobian::add_transposed_difference(const double* readings, const double* others, double* unknowns) const {
+    HWY_DYNAMIC_DISPATCH(add_transposed_difference)(numbers_, readings, others, unknowns);
 }
 
-void SimdJacobian::multiply(const double* unknowns, double* readings) const {
-    HWY_DYNAMIC_DISPATCH(multiply)(numbers_, unknowns, readings);
+void SimdJacobian::subtract_product(const double* readings, const double* unknowns, double* result) const {
+    HWY_DYNAMIC_DISPATCH(subtract_product)(numbers_, readings, unknowns, result);
 }
 
 void SimdFactor::solve(double* right_hand_side) const { HWY_DYNAMIC_DISPATCH(solve)(numbers_, right_hand_side); }

@@ -13,8 +13,10 @@ class SimdJacobian {
 public:
     explicit SimdJacobian(const NormalEquations& equations);
 
-    void add_transposed(const double* readings, double* unknowns) const;  // unknowns += J^T readings
-    void multiply(const double* unknowns, double* readings) const;        // readings = J unknowns
+    // unknowns += J^T (readings - others)
+    void add_transposed_difference(const double* readings, const double* others, double* unknowns) const;
+    // result = readings - J unknowns
+    void subtract_product(const double* readings, const double* unknowns, double* result) const;
 
     // Up to three readings of a point, which share their unknowns.
     static constexpr int most_rows = 3;
