@@ -1,26 +1,36 @@
-# What is installed: libraries, headers, CMake package and pkg-config file. Included by CMakeLists.txt.
+# What is installed: libraries, headers, CMake package and pkg-config files. Included by CMakeLists.txt.
 set(config_dir "${CMAKE_INSTALL_LIBDIR}/cmake/stepdiag")
+set(pkg_config_dir "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
+
+# install_library(TARGET COMPONENT EXPORT): what programs need is in COMPONENT, what their build needs in COMPONENT_dev.
+function(install_library target component export)
+  install(TARGETS ${target}
+          EXPORT ${export}
+          LIBRARY COMPONENT ${component} NAMELINK_COMPONENT ${component}_dev
+          ARCHIVE COMPONENT ${component}_dev
+          INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+  install(EXPORT ${export} NAMESPACE stepdiag:: DESTINATION "${config_dir}" COMPONENT ${component}_dev)
+endfunction()
 
 # Two sets, so that who uses the controller's library alone needs nothing that the other one does.
-install(TARGETS stepdiag_controller EXPORT stepdiagControllerTargets INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
-install(EXPORT stepdiagControllerTargets NAMESPACE stepdiag:: DESTINATION "${config_dir}")
+install_library(stepdiag_controller controller stepdiagControllerTargets)
+install(DIRECTORY cpp/include/stepdiag/controller cpp/include/stepdiag/machine
+        DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/stepdiag" COMPONENT controller_dev)
+foreach(header axis error rotation units)
+  install(FILES cpp/include/stepdiag/core/${header}.hpp
+          DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/stepdiag/core" COMPONENT controller_dev)
+endforeach()
+install(DIRECTORY "${PROJECT_BINARY_DIR}/include/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" COMPONENT controller_dev)
 if(TARGET stepdiag)
-  install(TARGETS stepdiag EXPORT stepdiagTargets INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
-  install(EXPORT stepdiagTargets NAMESPACE stepdiag:: DESTINATION "${config_dir}")
-  install(DIRECTORY cpp/include/ DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
-else()
-  install(DIRECTORY cpp/include/stepdiag/controller cpp/include/stepdiag/machine
-          DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/stepdiag")
-  foreach(header axis error rotation units)
-    install(FILES cpp/include/stepdiag/core/${header}.hpp DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/stepdiag/core")
-  endforeach()
+  install_library(stepdiag library stepdiagTargets)
+  install(DIRECTORY cpp/include/ DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" COMPONENT library_dev
+          REGEX "/stepdiag/(controller|machine|core/(axis|error|rotation|units)\\.hpp)$" EXCLUDE)
 endif()
-install(DIRECTORY "${PROJECT_BINARY_DIR}/include/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
 
 configure_package_config_file(cmake/stepdiagConfig.cmake.in stepdiagConfig.cmake INSTALL_DESTINATION "${config_dir}")
-write_basic_package_version_file(stepdiagConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+write_basic_package_version_file(stepdiagConfigVersion.cmake COMPATIBILITY ${compatibility})
 install(FILES "${PROJECT_BINARY_DIR}/stepdiagConfig.cmake" "${PROJECT_BINARY_DIR}/stepdiagConfigVersion.cmake"
-              cmake/FindLibCsv.cmake cmake/FindLibMd.cmake DESTINATION "${config_dir}")
+              cmake/FindLibCsv.cmake cmake/FindLibMd.cmake DESTINATION "${config_dir}" COMPONENT controller_dev)
 
 # A C program that links the archive has to name what the archive needs; the shared library brings it along.
 set(needed_by_archive "-lcsv -lmd -lstdc++ -lm")
@@ -31,6 +41,25 @@ else()
   set(pkg_config_libs " ${needed_by_archive}")
   set(pkg_config_libs_private "")
 endif()
-file(RELATIVE_PATH prefix_from_file "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/") # the installation may be moved
-configure_file(cmake/stepdiag-controller.pc.in stepdiag-controller.pc @ONLY)
-install(FILES "${PROJECT_BINARY_DIR}/stepdiag-controller.pc" DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
+file(RELATIVE_PATH prefix_from_file "/${pkg_config_dir}" "/") # the installation may be moved
+
+# install_pkg_config(NAME COMPONENT)
+function(install_pkg_config name component)
+  configure_file(cmake/${name}.pc.in ${name}.pc @ONLY)
+  install(FILES "${PROJECT_BINARY_DIR}/${name}.pc" DESTINATION "${pkg_config_dir}" COMPONENT ${component})
+endfunction()
+install_pkg_config(stepdiag-controller controller_dev)
+if(TARGET stepdiag AND BUILD_SHARED_LIBS) # an archive needs Embree and Highway, which find_package knows
+  install_pkg_config(stepdiag library_dev)
+endif()
+
+if(STEPDIAG_LINUXCNC_MODULE)
+  install(FILES "${STEPDIAG_LINUXCNC_MODULE}" DESTINATION lib/linuxcnc/modules COMPONENT linuxcnc)
+  # The simulated machine finds the bridge beside its folder, also in a copy of both.
+  install(FILES controllers/linuxcnc/stepdiag_bridge.py DESTINATION share/stepdiag-linuxcnc COMPONENT linuxcnc)
+  install(DIRECTORY controllers/linuxcnc/simulated DESTINATION share/stepdiag-linuxcnc COMPONENT linuxcnc
+          PATTERN .gitignore EXCLUDE PATTERN "linuxcnc.var*" EXCLUDE)
+endif()
+if(STEPDIAG_DEBIAN_PACKAGES)
+  include(cmake/debian/packages.cmake)
+endif()

@@ -113,6 +113,6 @@ def test_linuxcnc_demo_says_in_one_line_what_it_lacks(tmp_path: Path) -> None:
         cwd=tmp_path, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 2
-    assert "source folder" in done.stderr
+    assert "install stepdiag's Debian package stepdiag-linuxcnc" in done.stderr
     assert done.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())

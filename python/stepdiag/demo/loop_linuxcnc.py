@@ -26,12 +26,17 @@ from stepdiag.acquisition.triggers import Context, Silent
 from stepdiag.demo.loop_cases import CHAIN, RANGE
 from stepdiag.demo.loop_job import PATIENCE, FloatArray, Job, Say
 from stepdiag.linuxcnc.processes import LinuxcncError
-from stepdiag.linuxcnc.session import LinuxcncSession
+from stepdiag.linuxcnc.session import MODULE, LinuxcncSession, lacks_module, missing_programs
 from stepdiag.program.gcode import HANDSHAKE, Writer
 from stepdiag.scenario.order_of_run import Visit, visits_of
 from stepdiag.twin.server import Twin
 
-BRIDGE: Final = Path(__file__).resolve().parents[3] / "controllers" / "linuxcnc" / "stepdiag_bridge.py"
+SOURCE_FOLDER: Final = Path(__file__).resolve().parents[3]
+# The first that exists: of the source folder, or of the Debian package stepdiag-linuxcnc.
+BRIDGES: Final = (
+    SOURCE_FOLDER / "controllers" / "linuxcnc" / "stepdiag_bridge.py",
+    Path("/usr/share/stepdiag-linuxcnc/stepdiag_bridge.py"),
+)
 # The twin is at rest when it is asked, and exact: two values that agree, and one to take.
 SETTLING: Final = Settling(count=2, limit_um=0.001, average=1, interval=0.0)
 # Faster than any machine, to wait for nothing: mm/s and mm/s^2.
@@ -47,23 +52,26 @@ class LoopError(LinuxcncError):
 
 
 class Linuxcnc:
-    """Starts LinuxCNC once for each job. Raises InvalidArgument if stepdiag was installed from a wheel."""
+    """Starts LinuxCNC once for each job. Raises InvalidArgument if something of it is not installed."""
 
     name = "LinuxCNC"
 
     def __init__(self) -> None:
-        if not BRIDGE.is_file():
+        bridges = [bridge for bridge in BRIDGES if bridge.is_file()]
+        missing = missing_programs() + [str(MODULE)] * lacks_module() + [str(BRIDGES[-1])] * (not bridges)
+        if missing:
             raise InvalidArgument(
-                "the loop in LinuxCNC needs LinuxCNC and stepdiag's source folder, which an installed package lacks: "
-                "use ./run in that folder, or `controller` calculated"
+                f"the loop in LinuxCNC lacks {', '.join(missing)}: install stepdiag's Debian package "
+                "stepdiag-linuxcnc, or use ./run in the source folder, or `controller` calculated"
             )
+        self._bridge = bridges[0]
 
     def do(self, job: Job, say: Say) -> FloatArray:
         listening = _Listening()
         try:
             # HAL's files take no path with a space.
             with Twin(job.scenario) as twin, tempfile.TemporaryDirectory(prefix="stepdiag-bridge-") as folder:
-                bridge = shutil.copy(BRIDGE, folder)
+                bridge = shutil.copy(self._bridge, folder)
                 with LinuxcncSession(**self._configuration(job, bridge, twin, listening)) as session:
                     return self._run(job, say, session, _Recorder(job, twin, listening))
         finally:

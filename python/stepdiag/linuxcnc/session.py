@@ -28,9 +28,21 @@ from stepdiag.linuxcnc.requests import LinuxcncRequests
 
 PYTHON = "/usr/bin/python3"
 PACKAGES = ("linuxcnc-uspace", "linuxcnc-uspace-dev")
+MODULE = Path("/usr/lib/linuxcnc/modules/stepdiagkins.so")  # of Debian's LinuxCNC, whose programs are in /usr/bin
 NOBODY = 65534
 
 __all__ = ["LinuxcncError", "LinuxcncSession", "linuxcnc_lock"]
+
+
+def missing_programs() -> list[str]:
+    """What of LinuxCNC is not installed."""
+    missing = [name for name in ("linuxcnc", "halrun", "rtapi_app") if shutil.which(name) is None]
+    return missing if Path(PYTHON).exists() else [*missing, PYTHON]
+
+
+def lacks_module() -> bool:
+    """Whether Debian's LinuxCNC is there without the kinematics `stepdiagkins`."""
+    return shutil.which("linuxcnc") == "/usr/bin/linuxcnc" and not MODULE.is_file()
 
 
 class LinuxcncSession(LinuxcncRequests):
@@ -92,10 +104,12 @@ class LinuxcncSession(LinuxcncRequests):
 
     # --- start and end ---
     def __enter__(self) -> Self:
-        missing = [name for name in ("linuxcnc", "halrun", "rtapi_app") if shutil.which(name) is None]
-        if missing or not Path(PYTHON).exists():
+        if missing := missing_programs():
             raise LinuxcncError(f"LinuxCNC is not installed ({', '.join(missing)} missing): "
                                 f"apt-get install {' '.join(PACKAGES)}")  # fmt: skip
+        if self._table is not None and lacks_module():
+            raise LinuxcncError(f"{MODULE} is missing: install stepdiag's Debian package stepdiag-linuxcnc, "
+                                "or use controllers/linuxcnc/install in the source folder")  # fmt: skip
         try:
             self._start()
         except BaseException:
