@@ -59,7 +59,9 @@ class Chain:
         """
     @property
     def name(self) -> str:
-        ...
+        """
+        As it is written: "[w X' b Y Z t]".
+        """
 class ErrorMap:
     """
     The 21 geometric errors as tables (ISO 230-1 names): functions in mm or rad over positions in mm, linear between nodes, end values held outside; squarenesses in rad. A missing parameter is 0. A function may have another table for positions approached in - direction; its other one then is of the + direction.
@@ -252,7 +254,9 @@ class Plan:
         """
     @property
     def check_points(self) -> CheckPoints:
-        ...
+        """
+        Returns that tell drift.
+        """
     @property
     def lines(self) -> list[str]:
         ...
@@ -266,7 +270,9 @@ class Plan:
         ...
     @property
     def scale_lines(self) -> list[str]:
-        ...
+        """
+        Single-axis lines of two points.
+        """
     @property
     def steps(self) -> int:
         ...
@@ -430,7 +436,9 @@ class HeadBody:
         ...
     @property
     def name(self) -> str:
-        ...
+        """
+        As the description has it.
+        """
     @property
     def outlines(self) -> list[numpy.typing.NDArray[numpy.float64]]:
         """
@@ -460,13 +468,19 @@ class HeadCalibration:
         ...
     @property
     def head_constants(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        What glass and way before the reference plane add to each distance, mm; readings are corrected for it.
+        """
     @property
     def psd_distance(self) -> float | None:
-        ...
+        """
+        Of the unfolded sensor behind the reference plane, mm, reduced: glass counts as t n_air/n; None without one.
+        """
     @property
     def spot_beam(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (2,) where the beam that makes the spot leaves, (u, v), mm.
+        """
 class HeadBeam:
     """
     A light source of a head, its beam along +z of its own frame. Lengths in mm, wavelength (in vacuum) in nm, rotation vector in rad.
@@ -487,19 +501,27 @@ class HeadBeam:
         ...
     @property
     def is_interferometer(self) -> bool:
-        ...
+        """
+        Otherwise it is a laser to a sensor.
+        """
     @property
     def name(self) -> str:
-        ...
+        """
+        As the description has it.
+        """
     @property
     def position(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
     @property
     def rotation(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        head_R_beam, (3, 3).
+        """
     @property
     def sensor(self) -> str:
-        ...
+        """
+        Name of the sensor it comes to; empty of an interferometer.
+        """
     @property
     def size(self) -> float:
         """
@@ -507,13 +529,19 @@ class HeadBeam:
         """
     @property
     def waist_position(self) -> float:
-        ...
+        """
+        Along the beam from its source, mm.
+        """
     @property
     def waist_radius(self) -> float:
-        ...
+        """
+        1/e^2 of power, mm
+        """
     @property
     def wavelength(self) -> float:
-        ...
+        """
+        In vacuum, nm.
+        """
 class SpotSensor:
     """
     A sensor in the x-y plane of its own frame; mm, rotation vector in rad.
@@ -534,7 +562,9 @@ class SpotSensor:
         ...
     @property
     def name(self) -> str:
-        ...
+        """
+        As the description has it.
+        """
     @property
     def position(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
@@ -543,7 +573,9 @@ class SpotSensor:
         ...
     @property
     def size(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (2,) width and height, mm
+        """
 class HeadDesign:
     """
     A laser head as drawn: bodies, beams and sensors in the head's frame.
@@ -567,7 +599,9 @@ class HeadDesign:
         ...
     @property
     def name(self) -> str:
-        ...
+        """
+        As the description has it.
+        """
     @property
     def sensors(self) -> list[SpotSensor]:
         ...
@@ -590,7 +624,9 @@ class Head:
         ...
     @property
     def aperture(self) -> float:
-        ...
+        """
+        Edge of the square that takes a beam back, mm.
+        """
     @property
     def beam_offsets(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
@@ -610,7 +646,9 @@ class Head:
         ...
     @property
     def psd_distance(self) -> float:
-        ...
+        """
+        Of the unfolded sensor behind the reference plane, mm.
+        """
     @property
     def signals(self) -> list[str]:
         """
@@ -618,7 +656,9 @@ class Head:
         """
     @property
     def standoff(self) -> float:
-        ...
+        """
+        From the beam's origin to a line's first functional point, mm.
+        """
     @property
     def wavelength(self) -> float:
         ...
@@ -641,10 +681,14 @@ class GaussianMode:
         """
     @property
     def waist_position(self) -> float:
-        ...
+        """
+        Along the beam from its source, mm.
+        """
     @property
     def waist_radius(self) -> float:
-        ...
+        """
+        1/e^2 of power, mm
+        """
     @property
     def wavelength(self) -> float:
         ...
@@ -752,7 +796,9 @@ class Camera:
         ...
     @property
     def columns(self) -> int:
-        ...
+        """
+        Pixels along x.
+        """
     @property
     def electrons(self) -> float:
         ...
@@ -767,10 +813,14 @@ class Camera:
         ...
     @property
     def rows(self) -> int:
-        ...
+        """
+        Pixels along y.
+        """
     @property
     def shot_noise(self) -> bool:
-        ...
+        """
+        Whether the light is counted in quanta.
+        """
     @property
     def threshold(self) -> float:
         ...
@@ -845,7 +895,9 @@ class BeamSegment:
         """
     @property
     def start(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (3,) mm
+        """
 class Sensitivity:
     """
     First derivatives of a head's readings by one parameter: signals (n,) in mm by its unit, and reading (3,): distance (mm), alpha and beta (rad).
@@ -856,19 +908,29 @@ class Sensitivity:
         ...
     @property
     def component(self) -> str:
-        ...
+        """
+        Its name; "mirror", "air", "all interferometers".
+        """
     @property
     def quantity(self) -> str:
-        ...
+        """
+        "shift x", ..., "rotation x", ..., "index", "temperature", "pressure", "humidity"
+        """
     @property
     def reading(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (3,) change of distance (mm), alpha and beta (rad) by unit of the quantity
+        """
     @property
     def signals(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (n,) change of the signals by unit of the quantity, mm
+        """
     @property
     def unit(self) -> str:
-        ...
+        """
+        Of the quantity: "mm", "rad", "1", "K", "Pa"
+        """
 class Misalignment:
     """
     How head and mirror are out of true on a line: reflector and laser angles (a, b) in rad, psd_zero in mm, a constant of all distances and one of each beam d1 ... dn in mm, lateral offset of the beam's origin (mm), roll of the head (rad), gain (tilts and spots read 1 + gain times themselves, beams stand at 1 + gain times their offsets), drift of the distances (mm/s).
@@ -883,10 +945,14 @@ class Misalignment:
         ...
     @property
     def beam_constants(self) -> list[float]:
-        ...
+        """
+        What d1, d2, ... read too much, mm.
+        """
     @property
     def distance_constant(self) -> float:
-        ...
+        """
+        What all distances read too much, mm.
+        """
     @property
     def drift(self) -> float:
         ...
@@ -949,10 +1015,14 @@ class ScaleTemperatures:
         ...
     @property
     def expansion(self) -> Expansion:
-        ...
+        """
+        Of the scales.
+        """
     @property
     def one_sensor(self) -> bool:
-        ...
+        """
+        Whether one sensor measures for all axes.
+        """
     @property
     def rate(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
@@ -984,7 +1054,9 @@ class SimulationOptions:
         ...
     @property
     def noise(self) -> Noise:
-        ...
+        """
+        Of the readings.
+        """
     @property
     def repeats(self) -> int:
         ...
@@ -1029,7 +1101,9 @@ class KnownExpansion:
         ...
     @property
     def one_temperature(self) -> bool:
-        ...
+        """
+        Whether one sensor measured it for all axes.
+        """
     @property
     def sensor_uncertainty(self) -> float:
         ...
@@ -1219,7 +1293,9 @@ class Calibration:
         """
     @property
     def chain(self) -> Chain:
-        ...
+        """
+        Of the machine.
+        """
     @property
     def covariance(self) -> numpy.typing.NDArray[numpy.float64] | None:
         """
@@ -1267,7 +1343,9 @@ class Calibration:
         """
     @property
     def method(self) -> str:
-        ...
+        """
+        "conventional", "enhanced" or "adjustment", perhaps with remarks.
+        """
     @property
     def negative_functions(self) -> dict[str, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]]:
         """
@@ -1305,7 +1383,9 @@ class Calibration:
         """
     @property
     def tool(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (3,) offset of the functional point, mm
+        """
     @property
     def uncertainty_scaled(self) -> float | None:
         """
@@ -1338,7 +1418,9 @@ class Calibration:
         """
     @property
     def volume(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (3,) edges, mm
+        """
 class SetupPriors:
     """
     How each unknown of a line's set-up is taken: "free", "fixed" at 0, or the standard uncertainty with which it is known to be 0 (rad, mm, 1 for gain, mm/s for drift); None: the default.
@@ -1397,7 +1479,9 @@ class AdjustmentOptions:
         ...
     @property
     def full_covariance(self) -> bool:
-        ...
+        """
+        Whether the calibration has the covariance of all its entries.
+        """
     @property
     def machine_drift(self) -> MachineDrift | None:
         ...
@@ -1436,7 +1520,9 @@ class AdjustmentOptions:
         ...
     @property
     def smoothness(self) -> Smoothness | None:
-        ...
+        """
+        None: errors of neighbouring nodes are independent.
+        """
     @property
     def uncertainty(self) -> ReadingUncertainty:
         ...
@@ -1455,7 +1541,9 @@ class SetupEstimate:
         """
     @property
     def line(self) -> str:
-        ...
+        """
+        Such as "ppp".
+        """
     @property
     def prior(self) -> float:
         """
@@ -1463,13 +1551,19 @@ class SetupEstimate:
         """
     @property
     def quantity(self) -> str:
-        ...
+        """
+        "reflector", "laser", ...
+        """
     @property
     def run(self) -> int:
-        ...
+        """
+        The first run that has this set-up.
+        """
     @property
     def standard_uncertainty(self) -> float:
-        ...
+        """
+        In the unit of the value.
+        """
     @property
     def value(self) -> float | None:
         """
@@ -1495,7 +1589,9 @@ class ExpansionEstimate:
         """
     @property
     def standard_uncertainty(self) -> float:
-        ...
+        """
+        1/K
+        """
     @property
     def stated(self) -> float:
         """
@@ -1503,7 +1599,9 @@ class ExpansionEstimate:
         """
     @property
     def value(self) -> float:
-        ...
+        """
+        1/K
+        """
 class DriftEstimate:
     """
     A rate of the machine's drift as it was found, mm/s or mm/K.
@@ -1524,10 +1622,14 @@ class DriftEstimate:
         """
     @property
     def standard_uncertainty(self) -> float:
-        ...
+        """
+        mm/s
+        """
     @property
     def value(self) -> float:
-        ...
+        """
+        mm/s
+        """
 class Outlier:
     """
     A reading that was left out.
@@ -1538,10 +1640,14 @@ class Outlier:
         ...
     @property
     def channel(self) -> str:
-        ...
+        """
+        "distance", ...
+        """
     @property
     def line(self) -> str:
-        ...
+        """
+        Such as "ppp".
+        """
     @property
     def normalised(self) -> float:
         """
@@ -1554,7 +1660,9 @@ class Outlier:
         """
     @property
     def point(self) -> int:
-        ...
+        """
+        On the line, from 0.
+        """
     @property
     def residual(self) -> float:
         """
@@ -1562,10 +1670,14 @@ class Outlier:
         """
     @property
     def row(self) -> int:
-        ...
+        """
+        Row of the measurement, from 0.
+        """
     @property
     def run(self) -> int:
-        ...
+        """
+        Of the line, from 0.
+        """
 class Fault:
     """
     A fault that explains the readings, if it is the one.
@@ -1576,7 +1688,9 @@ class Fault:
         ...
     @property
     def channel(self) -> str:
-        ...
+        """
+        "distance", ...
+        """
     @property
     def chi_square_gain(self) -> float:
         """
@@ -1589,16 +1703,24 @@ class Fault:
         """
     @property
     def line(self) -> str:
-        ...
+        """
+        Such as "ppp".
+        """
     @property
     def point(self) -> int:
-        ...
+        """
+        On the line, from 0.
+        """
     @property
     def row(self) -> int:
-        ...
+        """
+        Row of the measurement, from 0.
+        """
     @property
     def run(self) -> int:
-        ...
+        """
+        Of the line, from 0.
+        """
     @property
     def size(self) -> float:
         """
@@ -1639,7 +1761,9 @@ class FaultClass:
         """
     @property
     def told_apart(self) -> bool:
-        ...
+        """
+        Whether the readings tell which one it was.
+        """
     @property
     def treatment(self) -> str:
         """
@@ -1690,7 +1814,9 @@ class FitReason:
         """
     @property
     def limit(self) -> float:
-        ...
+        """
+        Of an uneven misfit the value of the other readings; of noise, trends and scatter what is expected.
+        """
     @property
     def line(self) -> str:
         """
@@ -1713,7 +1839,9 @@ class FitReason:
         """
     @property
     def value(self) -> float:
-        ...
+        """
+        Of a trend mm or rad.
+        """
 class Verdict:
     """
     Whether the readings of an adjustment agree with each other, with their uncertainties and with the priors. It does not see what the parameters absorb: a wrong wavelength, tool or place of b in the chain.
@@ -1729,7 +1857,9 @@ class Verdict:
         """
     @property
     def reasons(self) -> list[FitReason]:
-        ...
+        """
+        A FitReason for each; empty of an accepted fit without remarks.
+        """
 class KnownCombination:
     """
     A sum of unknowns that are not determined one by one: of slopes of positioning errors and straightnesses, or of two unknowns of one set-up.
@@ -1755,7 +1885,9 @@ class KnownCombination:
         """
     @property
     def standard_uncertainty(self) -> float:
-        ...
+        """
+        rad; of slopes mm/mm.
+        """
     @property
     def terms(self) -> list[tuple[float, str]]:
         """
@@ -1875,7 +2007,9 @@ class Adjustment:
         """
     @property
     def degrees_of_freedom(self) -> int:
-        ...
+        """
+        Readings and priors more than unknowns.
+        """
     @property
     def expansion(self) -> list[ExpansionEstimate]:
         """
@@ -1888,7 +2022,9 @@ class Adjustment:
         """
     @property
     def iterations(self) -> int:
-        ...
+        """
+        Gauss-Newton steps from zero.
+        """
     @property
     def machine_drift(self) -> list[DriftEstimate]:
         """
@@ -1919,7 +2055,9 @@ class Adjustment:
         """
     @property
     def setup(self) -> list[SetupEstimate]:
-        ...
+        """
+        A SetupEstimate for each set-up unknown.
+        """
     @property
     def smoothness(self) -> dict[str, float]:
         """
@@ -1937,13 +2075,19 @@ class Adjustment:
         """
     @property
     def variance_factor(self) -> float:
-        ...
+        """
+        weighted_square_sum/degrees_of_freedom; 1 without freedom.
+        """
     @property
     def verdict(self) -> Verdict:
-        ...
+        """
+        Whether the readings agree with each other and with the priors.
+        """
     @property
     def weighted_square_sum(self) -> float:
-        ...
+        """
+        Of residuals and priors.
+        """
 class FitQuality:
     """
     How well a run fits, and nothing else.
@@ -2072,7 +2216,9 @@ class Recheck:
         """
     @property
     def fit_degrees_of_freedom(self) -> int:
-        ...
+        """
+        Of all readings, with the change.
+        """
     @property
     def fit_probability(self) -> float:
         """
@@ -2090,7 +2236,9 @@ class Recheck:
         """
     @property
     def terms(self) -> tuple[ChangeTerm, ...]:
-        ...
+        """
+        A ChangeTerm for each way in which the machine may change.
+        """
     @property
     def updated(self) -> Calibration:
         """
@@ -2116,7 +2264,9 @@ class LineDeviation:
         """
     @property
     def line(self) -> str:
-        ...
+        """
+        Such as "ppp".
+        """
     @property
     def normalised(self) -> float:
         """
@@ -2124,7 +2274,9 @@ class LineDeviation:
         """
     @property
     def run(self) -> int:
-        ...
+        """
+        Of the line, from 0.
+        """
     @property
     def standard_uncertainty(self) -> float:
         """
@@ -2140,10 +2292,14 @@ class Verification:
         ...
     @property
     def chi_square(self) -> float:
-        ...
+        """
+        Of all deviations.
+        """
     @property
     def degrees_of_freedom(self) -> int:
-        ...
+        """
+        Of chi_square.
+        """
     @property
     def deviations(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
         """
@@ -2252,10 +2408,14 @@ class SampleModel:
         """
     @property
     def outputs(self) -> list[Output]:
-        ...
+        """
+        With name, position (mm) and unit.
+        """
     @property
     def seed(self) -> int:
-        ...
+        """
+        Of the random numbers.
+        """
     @property
     def target(self) -> str:
         """
@@ -2281,7 +2441,9 @@ class Distribution:
         ...
     @property
     def expectation(self) -> float:
-        ...
+        """
+        In the unit of the input.
+        """
     @property
     def kind(self) -> str:
         ...
@@ -2290,7 +2452,9 @@ class Distribution:
         ...
     @property
     def standard_uncertainty(self) -> float:
-        ...
+        """
+        In the unit of the input.
+        """
 class FunctionModel(SampleModel):
     """
     A model given as a function of its inputs.
@@ -2437,10 +2601,14 @@ class MonteCarloResult:
         ...
     @property
     def highest(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (outputs,) of all samples
+        """
     @property
     def joint(self) -> list[JointRegion]:
-        ...
+        """
+        A JointRegion for each group that was asked for.
+        """
     @property
     def kept(self) -> dict[int, numpy.typing.NDArray[numpy.float64]]:
         """
@@ -2453,16 +2621,24 @@ class MonteCarloResult:
         """
     @property
     def lowest(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (outputs,) of all samples
+        """
     @property
     def mean(self) -> numpy.typing.NDArray[numpy.float64]:
-        ...
+        """
+        (outputs,)
+        """
     @property
     def options(self) -> StatisticsOptions:
-        ...
+        """
+        The StatisticsOptions of the run.
+        """
     @property
     def outputs(self) -> list[Output]:
-        ...
+        """
+        With name, position (mm) and unit.
+        """
     @property
     def outside(self) -> list[int]:
         """
@@ -2475,7 +2651,9 @@ class MonteCarloResult:
         """
     @property
     def seed(self) -> int:
-        ...
+        """
+        Of the random numbers.
+        """
     @property
     def shortest(self) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -2617,13 +2795,17 @@ class UncertainInput:
         ...
     @property
     def distribution(self) -> Distribution:
-        ...
+        """
+        Of the deviation from the nominal value, mm, rad or the quantity's unit.
+        """
     @property
     def line(self) -> str:
         ...
     @property
     def name(self) -> str:
-        ...
+        """
+        With its line, component and part.
+        """
     @property
     def part(self) -> str:
         ...
@@ -2650,10 +2832,14 @@ class ReadingNoise:
         ...
     @property
     def distribution(self) -> Distribution:
-        ...
+        """
+        Of each draw, mm or rad.
+        """
     @property
     def name(self) -> str:
-        ...
+        """
+        With its line and component.
+        """
     @property
     def quantity(self) -> str:
         ...
@@ -2677,7 +2863,9 @@ class UncertainInputs:
         ...
     @property
     def noise(self) -> list[ReadingNoise]:
-        ...
+        """
+        A ReadingNoise for each.
+        """
 class DerivedOutput:
     """
     A linear combination of a calibration's entries, as an output of virtual calibrations.
@@ -2752,7 +2940,9 @@ class DiagonalErrors:
         """
     @property
     def line(self) -> str:
-        ...
+        """
+        The body diagonal: "ppp", ...
+        """
     @property
     def missing(self) -> list[str]:
         """
@@ -2831,7 +3021,9 @@ class VolumetricAccuracy:
         """
     @property
     def samples(self) -> int:
-        ...
+        """
+        Draws of the covariance.
+        """
     @property
     def standard_uncertainty(self) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -3056,7 +3248,9 @@ class Validation:
         ...
     @property
     def coverage(self) -> float:
-        ...
+        """
+        Of the intervals.
+        """
     @property
     def d_high(self) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -3074,7 +3268,9 @@ class Validation:
         """
     @property
     def digits(self) -> int:
-        ...
+        """
+        Significant digits of u that the tolerance comes from.
+        """
     @property
     def failures(self) -> int:
         """
@@ -3092,7 +3288,9 @@ class Validation:
         """
     @property
     def outputs(self) -> list[Output]:
-        ...
+        """
+        With name, position (mm) and unit.
+        """
     @property
     def reason(self) -> list[str]:
         """

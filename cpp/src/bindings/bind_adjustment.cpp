@@ -198,11 +198,13 @@ void bind_options(py::module_& m) {
         .def_readonly("one_setup_per_line", &AdjustmentOptions::one_setup_per_line)
         .def_readonly("reversal", &AdjustmentOptions::reversal)
         .def_readonly("rotations", &AdjustmentOptions::rotations)
-        .def_readonly("smoothness", &AdjustmentOptions::smoothness)
+        .def_readonly("smoothness", &AdjustmentOptions::smoothness,
+                      "None: errors of neighbouring nodes are independent.")
         .def_readonly("outlier_probability", &AdjustmentOptions::outlier_probability)
         .def_property_readonly("slips", [](const AdjustmentOptions& o) { return name(o.slips); })
         .def_readonly("scale_uncertainty", &AdjustmentOptions::scale_uncertainty)
-        .def_readonly("full_covariance", &AdjustmentOptions::full_covariance)
+        .def_readonly("full_covariance", &AdjustmentOptions::full_covariance,
+                      "Whether the calibration has the covariance of all its entries.")
         .def_readonly("plausible", &AdjustmentOptions::plausible)
         .def_readonly("expansion", &AdjustmentOptions::expansion)
         .def_readonly("machine_drift", &AdjustmentOptions::machine_drift)
@@ -212,12 +214,13 @@ void bind_options(py::module_& m) {
 
 void bind_result(py::module_& m) {
     py::class_<SetupEstimate>(m, "SetupEstimate", "One unknown of a line's set-up as it was found; rad, mm, 1, mm/s.")
-        .def_readonly("run", &SetupEstimate::run)
-        .def_readonly("line", &SetupEstimate::line)
-        .def_property_readonly("quantity", [](const SetupEstimate& e) { return name(e.quantity); })
+        .def_readonly("run", &SetupEstimate::run, "The first run that has this set-up.")
+        .def_readonly("line", &SetupEstimate::line, "Such as \"ppp\".")
+        .def_property_readonly(
+            "quantity", [](const SetupEstimate& e) { return name(e.quantity); }, "\"reflector\", \"laser\", ...")
         .def_readonly("component", &SetupEstimate::component, "0 or 1 of pairs; of beam_constants 1 for d2, ...")
         .def_readonly("value", &SetupEstimate::value, "None where it is not determined.")
-        .def_readonly("standard_uncertainty", &SetupEstimate::standard_uncertainty)
+        .def_readonly("standard_uncertainty", &SetupEstimate::standard_uncertainty, "In the unit of the value.")
         .def_readonly(
             "prior", &SetupEstimate::prior,
             "Standard uncertainty of its prior; infinite where it is free (1 m, 1 rad, 1 for a free lateral offset, "
@@ -225,23 +228,23 @@ void bind_result(py::module_& m) {
 
     py::class_<ExpansionEstimate>(m, "ExpansionEstimate", "An expansion coefficient as it was found, 1/K.")
         .def_readonly("axes", &ExpansionEstimate::axes, "That have it in common: 0, 1, 2 of X, Y, Z.")
-        .def_readonly("value", &ExpansionEstimate::value)
-        .def_readonly("standard_uncertainty", &ExpansionEstimate::standard_uncertainty)
+        .def_readonly("value", &ExpansionEstimate::value, "1/K")
+        .def_readonly("standard_uncertainty", &ExpansionEstimate::standard_uncertainty, "1/K")
         .def_readonly("stated", &ExpansionEstimate::stated, "Value of its prior.")
         .def_readonly("prior", &ExpansionEstimate::prior, "Standard uncertainty of its prior.");
 
     py::class_<DriftEstimate>(m, "DriftEstimate", "A rate of the machine's drift as it was found, mm/s or mm/K.")
         .def_readonly("axis", &DriftEstimate::axis, "0, 1, 2 of X, Y, Z.")
-        .def_readonly("value", &DriftEstimate::value)
-        .def_readonly("standard_uncertainty", &DriftEstimate::standard_uncertainty)
+        .def_readonly("value", &DriftEstimate::value, "mm/s")
+        .def_readonly("standard_uncertainty", &DriftEstimate::standard_uncertainty, "mm/s")
         .def_readonly("prior", &DriftEstimate::prior, "Standard uncertainty of its prior.");
 
     py::class_<Outlier>(m, "Outlier", "A reading that was left out.")
-        .def_readonly("row", &Outlier::row)
-        .def_readonly("run", &Outlier::run)
-        .def_readonly("line", &Outlier::line)
-        .def_readonly("point", &Outlier::point)
-        .def_readonly("channel", &Outlier::channel)
+        .def_readonly("row", &Outlier::row, "Row of the measurement, from 0.")
+        .def_readonly("run", &Outlier::run, "Of the line, from 0.")
+        .def_readonly("line", &Outlier::line, "Such as \"ppp\".")
+        .def_readonly("point", &Outlier::point, "On the line, from 0.")
+        .def_readonly("channel", &Outlier::channel, "\"distance\", ...")
         .def_readonly("residual", &Outlier::residual, "mm or rad")
         .def_readonly("normalised", &Outlier::normalised, "In its standard uncertainties.")
         .def_readonly("number", &Outlier::number, "Of its class in Adjustment.faults, from 1.");
@@ -252,11 +255,11 @@ void bind_result(py::module_& m) {
             "\"reading\", \"slip\": an offset of its channel from this reading on, or \"factor\": distances of its "
             "line "
             "too long by a part of the travel.")
-        .def_readonly("row", &Fault::row)
-        .def_readonly("run", &Fault::run)
-        .def_readonly("line", &Fault::line)
-        .def_readonly("point", &Fault::point)
-        .def_readonly("channel", &Fault::channel)
+        .def_readonly("row", &Fault::row, "Row of the measurement, from 0.")
+        .def_readonly("run", &Fault::run, "Of the line, from 0.")
+        .def_readonly("line", &Fault::line, "Such as \"ppp\".")
+        .def_readonly("point", &Fault::point, "On the line, from 0.")
+        .def_readonly("channel", &Fault::channel, "\"distance\", ...")
         .def_readonly("size", &Fault::size, "What was read too much, mm or rad.")
         .def_readonly("standard_uncertainty", &Fault::standard_uncertainty, "Of the size.")
         .def_readonly("chi_square_gain", &Fault::chi_square_gain, "What it takes off chi-square.");
@@ -269,7 +272,7 @@ void bind_result(py::module_& m) {
             "the fault between them, so that the spread of the alternatives is in the uncertainties; \"none\".")
         .def_readonly("corrected", &FaultClass::corrected,
                       "Whether the verdict is that of the fit after its treatment.")
-        .def_property_readonly("told_apart", &FaultClass::told_apart)
+        .def_property_readonly("told_apart", &FaultClass::told_apart, "Whether the readings tell which one it was.")
         .def_readonly("widest", &FaultClass::widest,
                       "The parameter that estimated alternatives differ in most; empty where there are none.")
         .def_readonly("spread", &FaultClass::spread, "By how much they differ in it, mm or rad.")
@@ -287,8 +290,10 @@ void bind_result(py::module_& m) {
             "differ in `parameter`; \"scaled\": what the uncertainties were multiplied by; \"mistake\": `parameter` "
             "says "
             "which one would explain the readings.")
-        .def_readonly("value", &FitReason::value)
-        .def_readonly("limit", &FitReason::limit)
+        .def_readonly("value", &FitReason::value, "Of a trend mm or rad.")
+        .def_readonly(
+            "limit", &FitReason::limit,
+            "Of an uneven misfit the value of the other readings; of noise, trends and scatter what is expected.")
         .def_readonly("standard_uncertainty", &FitReason::standard_uncertainty,
                       "Of the value of a misfit, no_misfit, trend, scaled; else 0.")
         .def_readonly("line", &FitReason::line, "Of an uneven misfit, a trend or a prior; empty: all.")
@@ -313,7 +318,7 @@ void bind_result(py::module_& m) {
         .def_property_readonly(
             "fit", [](const Verdict& v) { return name(v.fit); },
             "\"accepted\", \"doubtful\", \"rejected\" or \"unchecked\".")
-        .def_readonly("reasons", &Verdict::reasons);
+        .def_readonly("reasons", &Verdict::reasons, "A FitReason for each; empty of an accepted fit without remarks.");
 
     py::class_<KnownCombination>(m, "KnownCombination",
                                  "A sum of unknowns that are not determined one by one: of slopes of positioning "
@@ -330,7 +335,7 @@ void bind_result(py::module_& m) {
         .def_readonly("run", &KnownCombination::run, "Of a set-up: the first run that has it.")
         .def_readonly("line", &KnownCombination::line, "Of a set-up; empty for slopes.")
         .def_readonly("value", &KnownCombination::value, "rad; of slopes mm/mm.")
-        .def_readonly("standard_uncertainty", &KnownCombination::standard_uncertainty);
+        .def_readonly("standard_uncertainty", &KnownCombination::standard_uncertainty, "rad; of slopes mm/mm.");
 
     const auto by_family = [](double FaultControl::Effect::* effect) {
         return [effect](const FaultControl& c) {
@@ -386,7 +391,8 @@ void bind_result(py::module_& m) {
     using Result = AdjustmentOfRun;
     py::class_<Result>(m, "Adjustment", "What an adjustment found: calibration, set-ups, and how the readings fit.")
         .def_property_readonly("calibration", [](const Result& r) { return r.adjustment.calibration; })
-        .def_property_readonly("setup", [](const Result& r) { return r.adjustment.setup; })
+        .def_property_readonly(
+            "setup", [](const Result& r) { return r.adjustment.setup; }, "A SetupEstimate for each set-up unknown.")
         .def_property_readonly(
             "expansion", [](const AdjustmentOfRun& a) { return a.adjustment.expansion; },
             "Expansion coefficients that were unknowns.")
@@ -441,14 +447,23 @@ void bind_result(py::module_& m) {
         .def_property_readonly(
             "unseen", [](const Result& r) { return r.adjustment.unseen; },
             "By kind of fault, what may be in it unseen.")
-        .def_property_readonly("verdict", [](const Result& r) { return r.adjustment.verdict; })
-        .def_property_readonly("weighted_square_sum", [](const Result& r) { return r.adjustment.weighted_square_sum; })
-        .def_property_readonly("variance_factor", [](const Result& r) { return r.adjustment.variance_factor(); })
-        .def_property_readonly("degrees_of_freedom", [](const Result& r) { return r.adjustment.degrees_of_freedom; })
+        .def_property_readonly(
+            "verdict", [](const Result& r) { return r.adjustment.verdict; },
+            "Whether the readings agree with each other and with the priors.")
+        .def_property_readonly(
+            "weighted_square_sum", [](const Result& r) { return r.adjustment.weighted_square_sum; },
+            "Of residuals and priors.")
+        .def_property_readonly(
+            "variance_factor", [](const Result& r) { return r.adjustment.variance_factor(); },
+            "weighted_square_sum/degrees_of_freedom; 1 without freedom.")
+        .def_property_readonly(
+            "degrees_of_freedom", [](const Result& r) { return r.adjustment.degrees_of_freedom; },
+            "Readings and priors more than unknowns.")
         .def_property_readonly(
             "chi_square_probability", [](const Result& r) { return r.adjustment.chi_square_probability; },
             "Of a larger square sum, if model and uncertainties are right.")
-        .def_property_readonly("iterations", [](const Result& r) { return r.adjustment.iterations; })
+        .def_property_readonly(
+            "iterations", [](const Result& r) { return r.adjustment.iterations; }, "Gauss-Newton steps from zero.")
         .def_property_readonly(
             "combinations", [](const Result& r) { return r.adjustment.combinations; },
             "What is known of unknowns that are not determined one by one.")

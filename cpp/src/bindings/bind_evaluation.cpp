@@ -132,7 +132,8 @@ void bind_evaluation(py::module_& m) {
                                [](const KnownExpansion& k) {
                                    return k.temperature ? std::optional(to_numpy_vector(*k.temperature)) : std::nullopt;
                                })
-        .def_readonly("one_temperature", &KnownExpansion::one_temperature);
+        .def_readonly("one_temperature", &KnownExpansion::one_temperature,
+                      "Whether one sensor measured it for all axes.");
 
     py::class_<ReadingUncertainty>(m, "ReadingUncertainty",
                                    "Standard uncertainty of a reading where the run gives none: distance (mm; also d1 "
@@ -172,10 +173,14 @@ void bind_evaluation(py::module_& m) {
     py::class_<Calibration>(
         m, "Calibration",
         "The 21 parameters as far as the readings determine them, with standard uncertainties; native units (mm, rad).")
-        .def_readonly("method", &Calibration::method)
-        .def_readonly("chain", &Calibration::chain)
-        .def_property_readonly("volume", [](const Calibration& c) { return to_numpy_vector(c.volume); })
-        .def_property_readonly("tool", [](const Calibration& c) { return to_numpy_vector(c.tool); })
+        .def_readonly("method", &Calibration::method,
+                      "\"conventional\", \"enhanced\" or \"adjustment\", perhaps with remarks.")
+        .def_readonly("chain", &Calibration::chain, "Of the machine.")
+        .def_property_readonly(
+            "volume", [](const Calibration& c) { return to_numpy_vector(c.volume); }, "(3,) edges, mm")
+        .def_property_readonly(
+            "tool", [](const Calibration& c) { return to_numpy_vector(c.tool); },
+            "(3,) offset of the functional point, mm")
         .def_property_readonly(
             "functions",
             [](const Calibration& c) {

@@ -54,18 +54,25 @@ void bind_beam(py::module_& m) {
             py::arg("waist_radius") = 0.8, py::arg("waist_position") = 0.0, py::arg("housing") = HeadBeam{}.housing,
             "A conventional laser whose beam comes to a sensor; `housing`: edge of the square around it that stops "
             "light.")
-        .def_readonly("name", &HeadBeam::name)
-        .def_readonly("sensor", &HeadBeam::sensor)
-        .def_property_readonly("is_interferometer", [](const HeadBeam& b) { return b.interferometer.has_value(); })
-        .def_property_readonly("wavelength", [](const HeadBeam& beam) { return beam.mode.wavelength; })
-        .def_property_readonly("waist_radius", [](const HeadBeam& beam) { return beam.mode.waist_radius; })
-        .def_property_readonly("waist_position", [](const HeadBeam& beam) { return beam.mode.waist_position; })
+        .def_readonly("name", &HeadBeam::name, "As the description has it.")
+        .def_readonly("sensor", &HeadBeam::sensor, "Name of the sensor it comes to; empty of an interferometer.")
+        .def_property_readonly(
+            "is_interferometer", [](const HeadBeam& b) { return b.interferometer.has_value(); },
+            "Otherwise it is a laser to a sensor.")
+        .def_property_readonly(
+            "wavelength", [](const HeadBeam& beam) { return beam.mode.wavelength; }, "In vacuum, nm.")
+        .def_property_readonly(
+            "waist_radius", [](const HeadBeam& beam) { return beam.mode.waist_radius; }, "1/e^2 of power, mm")
+        .def_property_readonly(
+            "waist_position", [](const HeadBeam& beam) { return beam.mode.waist_position; },
+            "Along the beam from its source, mm.")
         .def_property_readonly(
             "size", [](const HeadBeam& b) { return b.interferometer ? b.interferometer->aperture : b.housing; },
             "Edge of the square around the source, mm.")
         .def_property_readonly("position",
                                [](const HeadBeam& beam) { return to_numpy_vector(beam.placement.position); })
-        .def_property_readonly("rotation", [](const HeadBeam& beam) { return to_numpy(beam.placement.rotation); });
+        .def_property_readonly(
+            "rotation", [](const HeadBeam& beam) { return to_numpy(beam.placement.rotation); }, "head_R_beam, (3, 3).");
 }
 
 void bind_sensor(py::module_& m) {
@@ -103,8 +110,10 @@ void bind_sensor(py::module_& m) {
             py::arg("bits") = pixels.bits, py::arg("centroid") = name(pixels.centroid),
             py::arg("threshold") = pixels.threshold,
             "A pixel array; centroid: \"gaussian_fit\" or \"centre_of_gravity\".")
-        .def_readonly("name", &SpotSensor::name)
-        .def_property_readonly("size", [](const SpotSensor& sensor) { return to_numpy_vector(sensor.size()); })
+        .def_readonly("name", &SpotSensor::name, "As the description has it.")
+        .def_property_readonly(
+            "size", [](const SpotSensor& sensor) { return to_numpy_vector(sensor.size()); },
+            "(2,) width and height, mm")
         .def_property_readonly("position",
                                [](const SpotSensor& sensor) { return to_numpy_vector(sensor.placement.position); })
         .def_property_readonly("rotation",
@@ -178,8 +187,8 @@ void bind_interferometer(py::module_& m) {
              py::arg("wavelength"), py::arg("waist_radius"), py::arg("waist_position") = 0.0,
              "Raises InvalidArgument for what is not positive or not finite.")
         .def_readonly("wavelength", &GaussianMode::wavelength)
-        .def_readonly("waist_radius", &GaussianMode::waist_radius)
-        .def_readonly("waist_position", &GaussianMode::waist_position)
+        .def_readonly("waist_radius", &GaussianMode::waist_radius, "1/e^2 of power, mm")
+        .def_readonly("waist_position", &GaussianMode::waist_position, "Along the beam from its source, mm.")
         .def_property_readonly("rayleigh_length", &rayleigh_length, "pi w0^2 / wavelength, mm (reduced: t/n).");
 
     py::class_<ReturnedBeam>(
@@ -306,12 +315,12 @@ void bind_camera(py::module_& m) {
              "\"gaussian_fit\" or \"centre_of_gravity\", the latter of what exceeds the threshold, a share of the "
              "brightest pixel above background. Raises InvalidArgument naming the value.")
         .def_readonly("pixel", &Camera::pixel)
-        .def_readonly("columns", &Camera::columns)
-        .def_readonly("rows", &Camera::rows)
+        .def_readonly("columns", &Camera::columns, "Pixels along x.")
+        .def_readonly("rows", &Camera::rows, "Pixels along y.")
         .def_readonly("electrons", &Camera::electrons)
         .def_readonly("background", &Camera::background)
         .def_readonly("read_noise", &Camera::read_noise)
-        .def_readonly("shot_noise", &Camera::shot_noise)
+        .def_readonly("shot_noise", &Camera::shot_noise, "Whether the light is counted in quanta.")
         .def_readonly("full_well", &Camera::full_well)
         .def_readonly("bits", &Camera::bits)
         .def_property_readonly("centroid", [](const Camera& camera) { return name(camera.centroid); })
@@ -500,7 +509,8 @@ static void bind_traced_head(py::module_& m) {
     py::class_<BeamSegment>(m, "BeamSegment", "A straight piece of a beam's way, in the sensor frame, mm.")
         .def_readonly("beam", &BeamSegment::beam)
         .def_readonly("parent", &BeamSegment::parent, "Index of the segment it comes from; -1: the source.")
-        .def_property_readonly("start", [](const BeamSegment& s) { return to_numpy_vector(s.start); })
+        .def_property_readonly(
+            "start", [](const BeamSegment& s) { return to_numpy_vector(s.start); }, "(3,) mm")
         .def_property_readonly(
             "end", [](const BeamSegment& s) { return to_numpy_vector(s.end); },
             "Where it meets a face; 50 mm on where it leaves.")
@@ -517,11 +527,16 @@ static void bind_traced_head(py::module_& m) {
     py::class_<Sensitivity>(m, "Sensitivity",
                             "First derivatives of a head's readings by one parameter: signals (n,) in mm by its unit, "
                             "and reading (3,): distance (mm), alpha and beta (rad).")
-        .def_readonly("component", &Sensitivity::component)
-        .def_readonly("quantity", &Sensitivity::quantity)
-        .def_readonly("unit", &Sensitivity::unit)
-        .def_property_readonly("signals", [](const Sensitivity& s) { return to_numpy_vector(s.signals); })
-        .def_property_readonly("reading", [](const Sensitivity& s) { return to_numpy_vector(s.reading); });
+        .def_readonly("component", &Sensitivity::component, "Its name; \"mirror\", \"air\", \"all interferometers\".")
+        .def_readonly("quantity", &Sensitivity::quantity,
+                      "\"shift x\", ..., \"rotation x\", ..., \"index\", \"temperature\", \"pressure\", \"humidity\"")
+        .def_readonly("unit", &Sensitivity::unit, "Of the quantity: \"mm\", \"rad\", \"1\", \"K\", \"Pa\"")
+        .def_property_readonly(
+            "signals", [](const Sensitivity& s) { return to_numpy_vector(s.signals); },
+            "(n,) change of the signals by unit of the quantity, mm")
+        .def_property_readonly(
+            "reading", [](const Sensitivity& s) { return to_numpy_vector(s.reading); },
+            "(3,) change of distance (mm), alpha and beta (rad) by unit of the quantity");
     m.def(
         "head_sensitivities",
         [](const Head& head, double distance, const ArrayLike& tilt, const ArrayLike& lateral,
@@ -559,8 +574,12 @@ Heads to_heads(const HeadLike& heads, const Plan& plan) {
 void bind_head(py::module_& m) {
     py::class_<HeadCalibration>(m, "HeadCalibration",
                                 "What evaluators know of a head: the constants that its readings are reduced with, mm.")
-        .def_readonly("psd_distance", &HeadCalibration::psd_distance)
-        .def_property_readonly("spot_beam", [](const HeadCalibration& c) { return to_numpy_vector(c.spot_beam); })
+        .def_readonly("psd_distance", &HeadCalibration::psd_distance,
+                      "Of the unfolded sensor behind the reference plane, mm, reduced: glass counts as t n_air/n; None "
+                      "without one.")
+        .def_property_readonly(
+            "spot_beam", [](const HeadCalibration& c) { return to_numpy_vector(c.spot_beam); },
+            "(2,) where the beam that makes the spot leaves, (u, v), mm.")
         .def_property_readonly("beam_offsets",
                                [](const HeadCalibration& c) {
                                    Eigen::MatrixXd offsets(c.beam_offsets.size(), 2);
@@ -568,7 +587,9 @@ void bind_head(py::module_& m) {
                                        offsets.row(Eigen::Index(i)) = c.beam_offsets[i].transpose();
                                    return to_numpy(offsets);
                                })
-        .def_property_readonly("head_constants", [](const HeadCalibration& c) { return to_numpy(c.head_constants); });
+        .def_property_readonly(
+            "head_constants", [](const HeadCalibration& c) { return to_numpy(c.head_constants); },
+            "What glass and way before the reference plane add to each distance, mm; readings are corrected for it.");
 
     bind_beam(m);
     bind_sensor(m);
@@ -588,7 +609,7 @@ void bind_head(py::module_& m) {
              py::arg("most_hits") = TreeLimits{}.most_hits, py::arg("least_power") = TreeLimits{}.least_power,
              "Raises InvalidArgument for names given twice, a layout without its beams or sensor, components that "
              "overlap or touch, a beam that does not come back from a mirror square to it.")
-        .def_readonly("name", &HeadDesign::name)
+        .def_readonly("name", &HeadDesign::name, "As the description has it.")
         .def_property_readonly("layout", [](const HeadDesign& design) { return name(design.layout); })
         .def_readonly("bodies", &HeadDesign::bodies)
         .def_readonly("beams", &HeadDesign::beams)
@@ -642,8 +663,8 @@ void bind_head(py::module_& m) {
         .def_property_readonly("calibration", &Head::calibration,
                                "What evaluators know of the head, by a nominal trace where it has a design.")
         .def_property_readonly("layout", [](const Head& head) { return name(head.layout); })
-        .def_readonly("standoff", &Head::standoff)
-        .def_readonly("psd_distance", &Head::psd_distance)
+        .def_readonly("standoff", &Head::standoff, "From the beam's origin to a line's first functional point, mm.")
+        .def_readonly("psd_distance", &Head::psd_distance, "Of the unfolded sensor behind the reference plane, mm.")
         .def_property_readonly("beam_offsets",
                                [](const Head& head) {
                                    Eigen::MatrixXd offsets(head.beam_offsets.size(), 2);
@@ -652,7 +673,7 @@ void bind_head(py::module_& m) {
                                    return to_numpy(offsets);
                                })
         .def_readonly("wavelength", &Head::wavelength)
-        .def_readonly("aperture", &Head::aperture)
+        .def_readonly("aperture", &Head::aperture, "Edge of the square that takes a beam back, mm.")
         .def_property_readonly(
             "mirror",
             [](const Head& head) { return head.mirror ? std::optional(to_numpy_vector(*head.mirror)) : std::nullopt; })

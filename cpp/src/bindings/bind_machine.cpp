@@ -76,7 +76,7 @@ void bind_machine(py::module_& m) {
                       "marks an axis before the bed.")
         .def(py::init(&Chain::parse), py::arg("text"),
              "Raises InvalidArgument when a link is missing, doubled, or primed on the wrong side of b.")
-        .def_property_readonly("name", &Chain::name)
+        .def_property_readonly("name", &Chain::name, "As it is written: \"[w X' b Y Z t]\".")
         .def(
             "carries_workpiece",
             [](const Chain& chain, const std::string& axis) { return chain.carries_workpiece(to_axis(axis)); },

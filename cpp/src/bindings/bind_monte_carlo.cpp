@@ -140,13 +140,14 @@ void bind_result(py::module_& m) {
         .def_readonly("unstable", &Stability::unstable, "Outputs with a ratio above 1.")
         .def_property_readonly("stable", &Stability::stable);
     py::class_<MonteCarloResult>(m, "MonteCarloResult", "Figures of every output. Native units.")
-        .def_readonly("outputs", &MonteCarloResult::outputs)
-        .def_readonly("options", &MonteCarloResult::options)
-        .def_readonly("seed", &MonteCarloResult::seed)
+        .def_readonly("outputs", &MonteCarloResult::outputs, "With name, position (mm) and unit.")
+        .def_readonly("options", &MonteCarloResult::options, "The StatisticsOptions of the run.")
+        .def_readonly("seed", &MonteCarloResult::seed, "Of the random numbers.")
         .def_readonly("target", &MonteCarloResult::target, "The instruction set: the same bits for the same one.")
         .def_readonly("samples", &MonteCarloResult::samples, "Samples that gave a result.")
         .def_readonly("lost", &MonteCarloResult::lost, "Samples that gave none: left out.")
-        .def_property_readonly("mean", [](const MonteCarloResult& r) { return to_numpy_vector(r.mean); })
+        .def_property_readonly(
+            "mean", [](const MonteCarloResult& r) { return to_numpy_vector(r.mean); }, "(outputs,)")
         .def_property_readonly("standard_uncertainty",
                                [](const MonteCarloResult& r) { return to_numpy_vector(r.standard_uncertainty); })
         .def_property_readonly(
@@ -155,8 +156,11 @@ void bind_result(py::module_& m) {
         .def_property_readonly(
             "shortest", [](const MonteCarloResult& r) { return to_numpy(r.shortest); },
             "(outputs, 2): ends of the shortest coverage intervals")
-        .def_property_readonly("lowest", [](const MonteCarloResult& r) { return to_numpy_vector(r.lowest); })
-        .def_property_readonly("highest", [](const MonteCarloResult& r) { return to_numpy_vector(r.highest); })
+        .def_property_readonly(
+            "lowest", [](const MonteCarloResult& r) { return to_numpy_vector(r.lowest); }, "(outputs,) of all samples")
+        .def_property_readonly(
+            "highest", [](const MonteCarloResult& r) { return to_numpy_vector(r.highest); },
+            "(outputs,) of all samples")
         .def_readonly("outside", &MonteCarloResult::outside,
                       "Values beyond the bins, by output: an interval's end among them is known roughly.")
         .def_property_readonly("covariance",
@@ -171,7 +175,7 @@ void bind_result(py::module_& m) {
                 return kept;
             },
             "Values by output, in the order of samples; nan for a lost one.")
-        .def_readonly("joint", &MonteCarloResult::joint)
+        .def_readonly("joint", &MonteCarloResult::joint, "A JointRegion for each group that was asked for.")
         .def_readonly("stability", &MonteCarloResult::stability, "Of an adaptive run; else None.");
 }
 
@@ -303,8 +307,8 @@ static void bind_sample_model(py::module_& m) {
     py::class_<SampleModel>(m, "SampleModel",
                             "A measurement model as the Monte Carlo method sees it (JCGM 101, 5.9): outputs of sample "
                             "after sample, each a pure function of the seed and the sample's index.")
-        .def_property_readonly("outputs", &SampleModel::outputs)
-        .def_property_readonly("seed", &SampleModel::seed)
+        .def_property_readonly("outputs", &SampleModel::outputs, "With name, position (mm) and unit.")
+        .def_property_readonly("seed", &SampleModel::seed, "Of the random numbers.")
         .def_property_readonly("target", &SampleModel::target,
                                "The instruction set, for which the bits of a sample are the same.")
         .def(
@@ -339,11 +343,12 @@ void bind_monte_carlo(py::module_& m) {
              "InvalidArgument for a spread below 0, an edge not between 0 and the half width, degrees of freedom not "
              "above 0 (t: 2).")
         .def_property_readonly("kind", [](const Distribution& d) { return name(d.kind); })
-        .def_readonly("expectation", &Distribution::expectation)
+        .def_readonly("expectation", &Distribution::expectation, "In the unit of the input.")
         .def_readonly("spread", &Distribution::spread)
         .def_readonly("degrees_of_freedom", &Distribution::degrees_of_freedom)
         .def_readonly("edge", &Distribution::edge)
-        .def_property_readonly("standard_uncertainty", &Distribution::standard_uncertainty);
+        .def_property_readonly("standard_uncertainty", &Distribution::standard_uncertainty,
+                               "In the unit of the input.");
 
     m.def("normal_quantile", &normal_quantile, py::arg("probability"),
           "The number that a standard normal number is below with this probability. Raises InvalidArgument.");

@@ -137,7 +137,7 @@ void bind_optics(py::module_& m) {
             rotation, reflectance,
             "A convex polyhedron: corners (n, 3), faces as lists of corner indices in order around each face. It must "
             "be closed, its faces planar.")
-        .def_readonly("name", &HeadBody::name)
+        .def_readonly("name", &HeadBody::name, "As the description has it.")
         .def_property_readonly("material",
                                [](const HeadBody& body) -> std::variant<std::string, double> {
                                    if (const Glass* of = std::get_if<Glass>(&body.material)) return of->name;

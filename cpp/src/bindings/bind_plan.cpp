@@ -103,9 +103,11 @@ void bind_plan(py::module_& m) {
         .def_property_readonly_static("largest_step_count", [](const py::object&) { return Plan::largest_step_count; })
         .def_property_readonly("volume", [](const Plan& plan) { return to_numpy_vector(plan.volume()); })
         .def_property_readonly("lines", [](const Plan& plan) { return line_names(plan.lines()); })
-        .def_property_readonly("scale_lines", [](const Plan& plan) { return line_names(plan.scale_lines()); })
+        .def_property_readonly(
+            "scale_lines", [](const Plan& plan) { return line_names(plan.scale_lines()); },
+            "Single-axis lines of two points.")
         .def_property_readonly("steps", &Plan::steps)
-        .def_property_readonly("check_points", &Plan::check_points)
+        .def_property_readonly("check_points", &Plan::check_points, "Returns that tell drift.")
         .def_property_readonly(
             "order", [](const Plan& plan) { return order_name(plan.order()); }, "The order of run 0.")
         .def_property_readonly("orders",

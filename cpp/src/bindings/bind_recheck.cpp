@@ -88,10 +88,12 @@ void bind_rechecking(py::module_& m) {
                       "Directions of change that the readings tell better than the priors.")
         .def_readonly("probability", &Recheck::probability, "Of a larger chi-square, if nothing has changed.")
         .def_readonly("fit_chi_square", &Recheck::fit_chi_square, "Of all readings, with the change.")
-        .def_readonly("fit_degrees_of_freedom", &Recheck::fit_degrees_of_freedom)
+        .def_readonly("fit_degrees_of_freedom", &Recheck::fit_degrees_of_freedom, "Of all readings, with the change.")
         .def_readonly("fit_probability", &Recheck::fit_probability,
                       "Of a larger one, if such a change explains the readings.")
-        .def_property_readonly("terms", [](const Recheck& r) { return to_tuple(r.terms); })
+        .def_property_readonly(
+            "terms", [](const Recheck& r) { return to_tuple(r.terms); },
+            "A ChangeTerm for each way in which the machine may change.")
         .def_property_readonly(
             "combinations", [](const Recheck& r) { return to_tuple(r.combinations); }, "The best told first.")
         .def_property_readonly(
@@ -118,8 +120,8 @@ void bind_rechecking(py::module_& m) {
 void bind_recheck(py::module_& m) {
     bind_rechecking(m);
     py::class_<LineDeviation>(m, "LineDeviation", "What a line of one run reads too much from end to end.")
-        .def_readonly("run", &LineDeviation::run)
-        .def_readonly("line", &LineDeviation::line)
+        .def_readonly("run", &LineDeviation::run, "Of the line, from 0.")
+        .def_readonly("line", &LineDeviation::line, "Such as \"ppp\".")
         .def_property_readonly(
             "direction", [](const LineDeviation& d) { return d.backward ? "backward" : "forward"; },
             "\"forward\" or \"backward\".")
@@ -148,8 +150,10 @@ void bind_recheck(py::module_& m) {
             [](const Result& r) { return r.by_channel([](const PredictedReading& x) { return x.normalised(); }); },
             "channel -> (n,) E_n: deviations by their expanded uncertainties (k = 2); 0 for a reading that only tells "
             "how head and mirror stood.")
-        .def_property_readonly("chi_square", [](const Result& r) { return r.verification.chi_square; })
-        .def_property_readonly("degrees_of_freedom", [](const Result& r) { return r.verification.degrees_of_freedom; })
+        .def_property_readonly(
+            "chi_square", [](const Result& r) { return r.verification.chi_square; }, "Of all deviations.")
+        .def_property_readonly(
+            "degrees_of_freedom", [](const Result& r) { return r.verification.degrees_of_freedom; }, "Of chi_square.")
         .def_property_readonly(
             "probability", [](const Result& r) { return r.verification.probability; },
             "Of a larger chi-square, if calibration, readings and uncertainties are right.")

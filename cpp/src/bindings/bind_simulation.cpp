@@ -37,8 +37,8 @@ void bind_simulation(py::module_& m) {
              py::arg("distance_constant") = 0.0, py::arg("beam_constants") = std::vector<double>{}, py::kw_only(),
              py::arg("lateral") = zeros(2), py::arg("roll") = 0.0, py::arg("gain") = 0.0, py::arg("drift") = 0.0,
              "Raises InvalidArgument for what is no pair of finite numbers.")
-        .def_readonly("distance_constant", &Misalignment::distance_constant)
-        .def_readonly("beam_constants", &Misalignment::beam_constants)
+        .def_readonly("distance_constant", &Misalignment::distance_constant, "What all distances read too much, mm.")
+        .def_readonly("beam_constants", &Misalignment::beam_constants, "What d1, d2, ... read too much, mm.")
         .def_readonly("roll", &Misalignment::roll)
         .def_readonly("gain", &Misalignment::gain)
         .def_readonly("drift", &Misalignment::drift)
@@ -76,10 +76,10 @@ void bind_simulation(py::module_& m) {
              py::arg("one_sensor") = false,
              "start (3,): of X, Y, Z at the run's first reading, degrees Celsius; rate (3,), K/s. simulate() checks "
              "them.")
-        .def_readonly("expansion", &ScaleTemperatures::expansion)
+        .def_readonly("expansion", &ScaleTemperatures::expansion, "Of the scales.")
         .def_property_readonly("start", [](const ScaleTemperatures& s) { return to_numpy_vector(s.start); })
         .def_property_readonly("rate", [](const ScaleTemperatures& s) { return to_numpy_vector(s.rate); })
-        .def_readonly("one_sensor", &ScaleTemperatures::one_sensor);
+        .def_readonly("one_sensor", &ScaleTemperatures::one_sensor, "Whether one sensor measures for all axes.");
 
     m.attr("largest_repeat_count") = SimulationOptions::largest_repeat_count;
     py::class_<SimulationOptions>(
@@ -109,7 +109,7 @@ void bind_simulation(py::module_& m) {
              py::arg("scales") = std::nullopt, py::arg("machine_drift") = zeros(3),
              "Raises InvalidArgument for repeats that are no small number; simulate() checks the rest.")
         .def_readonly("misalignment", &SimulationOptions::misalignment)
-        .def_readonly("noise", &SimulationOptions::noise)
+        .def_readonly("noise", &SimulationOptions::noise, "Of the readings.")
         .def_readonly("environment", &SimulationOptions::environment)
         .def_readonly("assumed_environment", &SimulationOptions::assumed)
         .def_readonly("verified_share", &SimulationOptions::verified_share)

@@ -49,11 +49,13 @@ static void bind_uncertain_inputs(py::module_& m) {
              py::arg("quantity"), py::arg("distribution"), py::kw_only(), py::arg("line") = "", py::arg("part") = "",
              py::arg("component") = integer(0), "Raises InvalidArgument for a quantity that is not known.")
         .def_property_readonly("quantity", [](const UncertainInput& input) { return name(input.quantity); })
-        .def_readonly("distribution", &UncertainInput::distribution)
+        .def_readonly("distribution", &UncertainInput::distribution,
+                      "Of the deviation from the nominal value, mm, rad or the quantity's unit.")
         .def_readonly("line", &UncertainInput::line)
         .def_readonly("part", &UncertainInput::part)
         .def_readonly("component", &UncertainInput::component)
-        .def_property_readonly("name", [](const UncertainInput& input) { return name(input); });
+        .def_property_readonly(
+            "name", [](const UncertainInput& input) { return name(input); }, "With its line, component and part.");
 
     py::class_<ReadingNoise>(
         m, "ReadingNoise",
@@ -68,10 +70,11 @@ static void bind_uncertain_inputs(py::module_& m) {
              py::arg("quantity"), py::arg("distribution"), py::kw_only(), py::arg("channel") = "",
              py::arg("component") = integer(0), "Raises InvalidArgument for a quantity that is not known.")
         .def_property_readonly("quantity", [](const ReadingNoise& noise) { return name(noise.quantity); })
-        .def_readonly("distribution", &ReadingNoise::distribution)
+        .def_readonly("distribution", &ReadingNoise::distribution, "Of each draw, mm or rad.")
         .def_readonly("channel", &ReadingNoise::channel)
         .def_readonly("component", &ReadingNoise::component)
-        .def_property_readonly("name", [](const ReadingNoise& noise) { return name(noise); });
+        .def_property_readonly(
+            "name", [](const ReadingNoise& noise) { return name(noise); }, "With its line and component.");
 
     using Correlation = std::pair<std::vector<int>, ArrayLike>;
     py::class_<UncertainInputs>(m, "UncertainInputs", "What is uncertain about a virtual calibration.")
@@ -89,7 +92,7 @@ static void bind_uncertain_inputs(py::module_& m) {
              "an input given twice, a line, part or component that its quantity does not have, a matrix that is no "
              "correlation.")
         .def_readonly("inputs", &UncertainInputs::inputs)
-        .def_readonly("noise", &UncertainInputs::noise)
+        .def_readonly("noise", &UncertainInputs::noise, "A ReadingNoise for each.")
         .def_property_readonly("correlations", [](const UncertainInputs& all) {
             std::vector<std::pair<std::vector<int>, DoubleArray>> correlations;
             for (const CorrelatedInputs& correlated : all.correlations)
@@ -152,7 +155,8 @@ void bind_points(py::module_& m) {
         m, "DiagonalErrors",
         "Along a body diagonal (ISO 230-6): how much further than commanded the functional point is from where the "
         "diagonal begins.")
-        .def_property_readonly("line", [](const DiagonalErrors& d) { return d.line.name(); })
+        .def_property_readonly(
+            "line", [](const DiagonalErrors& d) { return d.line.name(); }, "The body diagonal: \"ppp\", ...")
         .def_property_readonly(
             "point", [](const DiagonalErrors& d) { return to_numpy(Eigen::MatrixXd(d.point)); }, "(n, 3) mm, commanded")
         .def_property_readonly(
@@ -217,7 +221,7 @@ void bind_volume(py::module_& m) {
         .def_property_readonly(
             "missing", [](const VolumetricAccuracy& v) { return missing_by_name(v.missing, range_names); },
             "Name -> parameters that act in it and are not determined; its numbers are NaN.")
-        .def_readonly("samples", &VolumetricAccuracy::samples);
+        .def_readonly("samples", &VolumetricAccuracy::samples, "Draws of the covariance.");
 
     m.def(
         "volumetric_accuracy",
@@ -576,9 +580,9 @@ static void bind_validation(py::module_& m) {
         m, "Validation",
         "Propagation beside the Monte Carlo method (JCGM 101, 8), arrays in the order of `outputs`, native units: "
         "validated where neither end of y -+ U is further than delta from that of the symmetric coverage interval.")
-        .def_readonly("outputs", &Validation::outputs)
-        .def_readonly("coverage", &Validation::coverage)
-        .def_readonly("digits", &Validation::digits)
+        .def_readonly("outputs", &Validation::outputs, "With name, position (mm) and unit.")
+        .def_readonly("coverage", &Validation::coverage, "Of the intervals.")
+        .def_readonly("digits", &Validation::digits, "Significant digits of u that the tolerance comes from.")
         .def_property_readonly("delta", vector(&Validation::delta),
                                "(m,) half a unit of the last significant digit of u.")
         .def_property_readonly("low", vector(&Validation::low), "(m,) y - U")
