@@ -177,8 +177,8 @@ class KnownEnvironmentKeys(Section):
 class EnvironmentSection(KnownEnvironmentKeys, AirKeys):
     """The air around machine and head, constant over a run: a `refractive_index`, or the state of the air.
 
-    Without any key, the air is that of 20 °C for a described head, and the index is 1 for a head given by its layout. With
-    a key in `[environment.assumed]`, the air is that of 20 °C for every head.
+    Without any key, the air is that of 20 °C for a described head, and the index is 1 for a head given by its layout.
+    With a key in `[environment.assumed]`, the air is that of 20 °C for every head.
 
     Used by `simulate` only, except `readings`, and the assumed air with `constant_index`. The equations hold for
     wavelengths of 300 to 1700 nm."""

@@ -225,8 +225,8 @@ class NoiseSection(NoiseKeys):
 
 
 class PlausibleSection(Section):
-    """Limits of plausible errors. An evaluation whose result exceeds these limits, by more than three times its standard
-    uncertainty, ends with an error: the readings are in another unit, of another volume or of another plan."""
+    """Limits of plausible errors. An evaluation whose result exceeds these limits, by more than three times its
+    standard uncertainty, ends with an error: the readings are in another unit, of another volume or of another plan."""
 
     positioning_um_per_m: Positive = key(
         POSITIVE, "Limit of a positioning error, by the travel of its axis.", 1000.0, 1000.0
@@ -236,8 +236,8 @@ class PlausibleSection(Section):
 
 
 class ChangeSection(Section):
-    """Possible changes of the machine since its calibration, for `stepdiag recheck`: standard uncertainties with which a
-    change is known to be 0. With 0 this change is impossible. The defaults are typical for wear, a collision, another
+    """Possible changes of the machine since its calibration, for `stepdiag recheck`: standard uncertainties with which
+    a change is known to be 0. With 0 this change is impossible. The defaults are typical for wear, a collision, another
     temperature and re-levelling."""
 
     scale_um_per_m: Amplitude = key(AMPLITUDE, "Of the scale of each axis.", 30.0, 30.0)
