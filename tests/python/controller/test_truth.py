@@ -13,8 +13,9 @@ from usual import ALL_CHAINS, VOLUME
 
 import stepdiag as sd
 
-# No large numbers are subtracted: errors of 0.1 mm, sums of a dozen products, have roundings of a few 1e-17 mm.
-ERROR = 2e-16  # mm
+# Each interval has its functions continued to the position 0: values of about a millimetre and products of that size,
+# each with a rounding of 1e-16 mm.
+ERROR = 1e-15  # mm
 ORIENTATION = 1e-18  # rad: of 1e-4 rad, and a series that ends where 1e-14 of it is left
 # A position has a rounding of 5.7e-14 mm below 1000 mm, and below 2000 mm twice that.
 POSITION = 2.4e-13  # mm
