@@ -69,7 +69,7 @@ class Reader:
 
 
 def scenarios() -> list[bytes]:
-    files = [*ROOT.glob("tests/data/runs/*/scenario.toml"), *ROOT.glob("examples/*.toml")]
+    files = [*ROOT.glob("python/stepdiag/selftest/known/runs/*/scenario.toml"), *ROOT.glob("examples/*.toml")]
     # The map lies where the scenario did.
     return [path.read_bytes().replace(b'"truth.csv"', f'"{path.parent}/truth.csv"'.encode()) for path in sorted(files)]
 

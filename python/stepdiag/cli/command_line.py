@@ -47,6 +47,7 @@ COMMANDS: Final = {
     "positions": ("positions", "Evaluate or predict positioning tests (ISO 230-2, 230-6)."),
     "export": ("export", "Write a calibration for a controller."),
     "check": ("files", "Check files, and whether a scenario and a run belong together."),
+    "selftest": ("files", "Compare this installation with known truths."),
     "head": ("head", "Draw and check descriptions of laser heads."),
 }
 

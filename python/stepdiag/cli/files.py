@@ -1,4 +1,4 @@
-"""Commands that create a user's first files, and that check files."""
+"""Commands that create a user's first files, and that check files and the installation."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,7 +9,7 @@ import click
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, json_option, tell
 from stepdiag.cli.terminal import plain, say
-from stepdiag.io.outputs import OutputFile
+from stepdiag.io.outputs import SELFTEST, OutputFile
 from stepdiag.progress import Progress
 
 Result = TypeVar("Result")
@@ -138,3 +138,40 @@ def init(output: OutputFile, scenario: Path | None, head_name: str | None) -> No
     write_measurement(sheet, folder / "measurement.csv")
     for path in written:
         click.echo(f"wrote {path}")
+
+
+@click.command(epilog="\b\nExample: stepdiag selftest -o selftest.txt")
+@click.option("-o", "output", type=Writes(SELFTEST), metavar="FILE", help="Also write the record (.txt).")
+@json_option
+@click.pass_context
+def selftest(context: click.Context, output: OutputFile | None, as_json: bool) -> None:
+    """Run cases with a known truth on this installation, and print the record.
+
+    Compares evaluations, the compensator, indices of air and glass, and uncertainties with values
+    that do not come from stepdiag, and tries files that must be refused. The table says for each
+    case what is compared, the largest deviation, what is allowed, and where the truth comes from.
+
+    Ends with exit code 3 if a case fails: do not use this installation.
+    """
+    from stepdiag.io.whole_files import write_whole
+    from stepdiag.selftest.cases import run_selftest
+
+    path = None if output is None else output.claim()
+    with Progress("self-test"):
+        found = run_selftest()
+    failed = sorted({row.case for row in found.rows if not row.passed})
+    warnings = [] if found.passed else [f"the self-test failed ({', '.join(failed)}): do not use this installation"]
+    text = found.text
+    if as_json:
+        from stepdiag.objects.selftest import selftest_object
+        from stepdiag.objects.writer import json_text
+
+        click.echo(json_text(selftest_object(found, warnings)))
+    else:
+        click.echo(text, nl=False)
+    if path is not None:
+        write_whole(path, text)
+    for warning in warnings:
+        tell("warning", warning)
+    if warnings:
+        context.exit(NOT_TO_BE_TRUSTED)

@@ -26,6 +26,7 @@ _FORMATS: Final = {
     "error grid": "error grid",
     "squareness": "squareness table",
     "position error": "position error table",
+    "selftest": "self-test",
 }
 _NUMBER: Final = r"[-+]?[\d.]+(?:e[-+]?\d+)?"
 # Other kinds, by a pattern for the beginning of the file.

@@ -48,6 +48,7 @@ PAGE: Final = FileKind("report page", (".html",))
 # Not .nc: a usual ending of programs, but in stepdiag it means netCDF.
 PROGRAM: Final = FileKind("measuring program", (".ngc", ".iso", ".cnc", ".tap", ".mpf", ".txt"))
 KINEMATICS_TABLE: Final = FileKind("calibration", (".csv",))
+SELFTEST: Final = FileKind("self-test", (".txt",))
 ISG_TABLE: Final = FileKind("ISG table", (".csv",))
 GRID: Final = FileKind("error grid", (".csv",))
 SQUARENESS_TABLE: Final = FileKind("squareness table", (".csv",))

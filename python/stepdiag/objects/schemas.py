@@ -22,6 +22,7 @@ OBJECTS: Final = {
     "positions": ("stepdiag.objects.positions", "PositionsObject"),
     "recheck": ("stepdiag.objects.recheck", "RecheckObject"),
     "report": ("stepdiag.objects.report", "ReportObject"),
+    "selftest": ("stepdiag.objects.selftest", "SelftestObject"),
     "verification": ("stepdiag.objects.verification", "VerificationObject"),
     "volume": ("stepdiag.objects.volume", "VolumeObject"),
 }

@@ -6,14 +6,12 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from stepdiag._core import Distribution, FunctionModel, StatisticsOptions
+from stepdiag.selftest.jcgm import UNIFORM, B, gauge_block, straight_line, sum_of_four
 from stepdiag.uncertainty import monte_carlo
 
-Array = npt.NDArray[np.float64]
 STANDARD = Distribution(spread=1.0)
-UNIFORM = Distribution("rectangular", spread=math.sqrt(3.0))  # of standard deviation 1
 
 
 @dataclass(frozen=True)
@@ -27,55 +25,16 @@ class Published:
     shortest: bool = False
 
 
-def sum_of_four(each: Distribution, last: Distribution | None = None, seed: int = 1) -> FunctionModel:
-    """JCGM 101, 9.2."""
-    return FunctionModel(lambda x: x.sum(axis=0), [each] * 3 + [last or each], ["Y"], seed=seed)
-
-
 def logarithm(seed: int = 1) -> FunctionModel:
     """y = ln x with a density that rises to its upper end: the shortest interval is far from the symmetric one.
     Closed forms."""
     return FunctionModel(np.log, [Distribution("rectangular", spread=0.5, expectation=0.6)], ["Y"], seed=seed)
 
 
-NOMINAL_LENGTH = 50_000_000.0  # nm
-
-
-def gauge_block(seed: int = 1) -> FunctionModel:
-    """JCGM 101, 9.5 (GUM H.1): deviation of a gauge block from its nominal length, nm, with the distributions of its
-    table 10. The comparator's difference is D + d1 + d2; the blocks' temperature theta0 + delta cycles."""
-    inputs = [
-        Distribution("t", expectation=50_000_623.0, spread=25.0, degrees_of_freedom=18),  # length of the standard
-        Distribution("t", expectation=215.0, spread=6.0, degrees_of_freedom=24),
-        Distribution("t", spread=4.0, degrees_of_freedom=5),
-        Distribution("t", spread=7.0, degrees_of_freedom=8),
-        Distribution("rectangular", expectation=11.5e-6, spread=2e-6),  # expansion of the standard, 1/K
-        Distribution(expectation=-0.1, spread=0.2),  # K, beside 20 degrees Celsius
-        Distribution("arcsine", spread=0.5),
-        Distribution("curvilinear_trapezoid", spread=1e-6, edge=0.1e-6),  # difference of expansions
-        Distribution("curvilinear_trapezoid", spread=0.05, edge=0.025),  # difference of temperatures
-    ]
-
-    def deviation(x: Array) -> Array:
-        standard, mean, random, systematic, expansion, average, cycle, of_expansion, of_temperature = x
-        thermal = standard * (of_expansion * (average + cycle) + expansion * of_temperature)
-        return np.asarray(standard + mean + random + systematic - thermal - NOMINAL_LENGTH)
-
-    return FunctionModel(deviation, inputs, ["deltaL"], seed=seed)
-
-
-T = np.array([21.521, 22.012, 22.512, 23.003, 23.507, 23.999, 24.513, 25.002, 25.503, 26.010, 26.511])
-B = -np.array([0.171, 0.169, 0.166, 0.159, 0.164, 0.165, 0.156, 0.157, 0.159, 0.161, 0.160])
-
-
 def calibration_line(seed: int = 1) -> FunctionModel:
     """GUM H.3: a straight line y1 + y2 (t - 20) through corrections of a thermometer, whose standard deviation is that
     of the residuals; outputs y1, y2 and the correction at 30 degrees Celsius."""
-    design = np.column_stack([np.ones_like(T), T - 20.0])
-    inverse = np.linalg.pinv(design)
-    residuals = B - design @ (inverse @ B)
-    deviation = math.sqrt(residuals @ residuals / (len(T) - 2))
-    rows = np.vstack([inverse, np.array([1.0, 10.0]) @ inverse])
+    rows, deviation = straight_line()
     inputs = [Distribution(expectation=b, spread=deviation) for b in B]
     return FunctionModel(lambda b: rows @ b, inputs, ["y1", "y2", "b(30)"], seed=seed)
 

@@ -15,11 +15,13 @@ SCHEMAS = Path(__file__).parents[3] / "docs" / "json"
 UNITS = ("um", "mm", "urad", "ppm", "um_per_h", "um_per_k", "um_per_m", "um_per_m_k", "per_mm", "c", "minutes")
 # Numbers that have no unit.
 OF_UNIT_ONE = {
+    "allowed",
     "alpha",
     *("positioning", "straightness", "angle", "squareness"),  # exponents
     "chi_square",
     "chi_square_gain",
     "chi_square_probability",
+    "deviation",  # in the `unit` beside it, as allowed
     "fit_chi_square",
     "fit_probability",
     "linear",  # mm of mm
