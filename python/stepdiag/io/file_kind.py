@@ -29,6 +29,7 @@ _FORMATS: Final = {
     "selftest": "self-test",
 }
 _NUMBER: Final = r"[-+]?[\d.]+(?:e[-+]?\d+)?"
+_TOML_LINE: Final = r"""\s*(?:\[|[\w."'-]+\s*=)"""
 # Other kinds, by a pattern for the beginning of the file.
 _BEGINNINGS: Final = {
     "checkpoint": CHECKPOINT_BEGINS,
@@ -84,7 +85,7 @@ def kind_of_text(text: str) -> str | None:
         return "raw readings"
     if {"line", "point"} & columns:
         return "measurement"
-    return "TOML file" if header.lstrip().startswith("[") or "=" in header else None
+    return "TOML file" if re.match(_TOML_LINE, header) else None
 
 
 def head_of(text: str) -> tuple[list[str], str]:
