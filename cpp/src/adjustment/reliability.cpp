@@ -353,6 +353,7 @@ private:
             std::vector<int> rows;
             const std::size_t step = (list.size() + most_uncontrolled - 1) / most_uncontrolled;
             for (std::size_t i = 0; i < list.size(); i += step) rows.push_back(list[i]);
+            UnseenFault& faults = faults_[group];
             for_eights(rows, [&](const int* some, int count) {
                 const Sides effects = tests_.effects(some, count);
                 OfSides noise = OfSides::Zero();
@@ -360,8 +361,8 @@ private:
                 for (const CalibratedValue& value : values_) {
                     const OfSides changed = value.form->values(effects).cwiseAbs().cwiseProduct(noise);
                     if (!(changed.maxCoeff() > nothing * value.standard_uncertainty)) continue;
-                    faults_[group].controlled = false;
-                    faults_[group].*unseen_families[value.family] = std::numeric_limits<double>::infinity();
+                    faults.controlled = false;
+                    faults.*unseen_families[value.family] = std::numeric_limits<double>::infinity();
                 }
             });
         }
