@@ -132,7 +132,7 @@ bool GaussNewton::descend(Eigen::VectorXd& x, const Step& step) {
     constexpr double small = 1e-3;  // of the square sum: next to the minimum Newton's steps shrink faster
     constexpr double first = 1e-2, least = 1e-4, climbs = 10.0, falls = 100.0;
     constexpr double most = 1e12;
-    constexpr double rounding = 1e-10;
+    constexpr double rounding = 1e-8;  // of the square sum, of readings that are a million times their noise and more
     const double before = objective(x);
     const auto moves_by = [&](const Eigen::VectorXd& move, double least_decrease) {
         Eigen::VectorXd moved = x + move;
