@@ -1,4 +1,4 @@
-# What is installed: libraries, headers, CMake package and pkg-config files. Included by CMakeLists.txt.
+# What is installed: libraries, headers, CMake package, pkg-config files and self-tests. Included by CMakeLists.txt.
 set(config_dir "${CMAKE_INSTALL_LIBDIR}/cmake/stepdiag")
 set(pkg_config_dir "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
 
@@ -25,6 +25,22 @@ if(TARGET stepdiag)
   install_library(stepdiag library stepdiagTargets)
   install(DIRECTORY cpp/include/ DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" COMPONENT library_dev
           REGEX "/stepdiag/(controller|machine|core/(axis|error|rotation|units)\\.hpp)$" EXCLUDE)
+endif()
+
+# The self-tests, beside the headers: packages of several versions of a shared library may be installed together.
+set(known python/stepdiag/selftest/known)
+set(known_dir "${CMAKE_INSTALL_DATADIR}/stepdiag/selftest")
+if(TARGET stepdiag-controller-selftest)
+  install(TARGETS stepdiag-controller-selftest RUNTIME COMPONENT controller_dev)
+  install(FILES ${known}/compensator.csv ${known}/compensator_table.csv DESTINATION "${known_dir}"
+          COMPONENT controller_dev)
+endif()
+if(TARGET stepdiag-selftest)
+  install(TARGETS stepdiag-selftest RUNTIME COMPONENT library_dev)
+  foreach(run clean misaligned)
+    install(FILES ${known}/runs/${run}/measurement.csv ${known}/runs/${run}/truth.csv
+            DESTINATION "${known_dir}/runs/${run}" COMPONENT library_dev)
+  endforeach()
 endif()
 
 configure_package_config_file(cmake/stepdiagConfig.cmake.in stepdiagConfig.cmake INSTALL_DESTINATION "${config_dir}")
