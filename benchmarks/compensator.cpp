@@ -98,6 +98,36 @@ void command_fine(benchmark::State& state) { run(state, 1000, ask_command); }
 void command_chain(benchmark::State& state) { run_chain(state, ask_command); }
 void forward_chain(benchmark::State& state) { run_chain(state, ask_forward); }
 
+// Many positions in one call: time of one. `statuses` are asked for, orientations are not.
+void errors_at_once(benchmark::State& state) {
+    const Bench bench(int(state.range(0)));
+    std::vector<Position> answers(points);
+    std::vector<unsigned> statuses(points);
+    for (auto _ : state) {
+        bench.compensator.errors(points, bench.positions[0].data(), tool.data(), nullptr, answers[0].data(), nullptr,
+                                 statuses.data());
+        benchmark::ClobberMemory();
+    }
+    for (std::size_t i = 0; i < points; ++i)
+        expect_near((vector(answers[i]) - vector(bench.compensator.error(bench.positions[i], tool).position)).norm(),
+                    0.0, 1e-15, "errors at once");
+    state.SetItemsProcessed(state.iterations() * std::int64_t(points));
+}
+void commands_at_once(benchmark::State& state) {
+    const Bench bench(int(state.range(0)));
+    std::vector<Position> answers(points);
+    std::vector<unsigned> statuses(points);
+    for (auto _ : state) {
+        bench.compensator.commands(points, bench.positions[0].data(), tool.data(), nullptr, answers[0].data(),
+                                   statuses.data());
+        benchmark::ClobberMemory();
+    }
+    for (std::size_t i = 0; i < points; ++i)
+        expect_near((vector(bench.compensator.forward(answers[i], tool).position) - vector(bench.positions[i])).norm(),
+                    0.0, bench.compensator.inverse_bound(), "commands at once");
+    state.SetItemsProcessed(state.iterations() * std::int64_t(points));
+}
+
 // Time of an error vector from Machine, which searches each of the eighteen tables.
 void machine_error(benchmark::State& state) {
     const Bench bench(50);
@@ -115,6 +145,8 @@ BENCHMARK(command_chain);
 BENCHMARK(command_fine);
 BENCHMARK(forward);
 BENCHMARK(forward_chain);
+BENCHMARK(errors_at_once)->Arg(50)->Arg(1000);
+BENCHMARK(commands_at_once)->Arg(50)->Arg(1000);
 BENCHMARK(machine_error);
 
 }  // namespace

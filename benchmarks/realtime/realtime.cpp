@@ -1,6 +1,6 @@
 // Tests whether the compensator is suitable for a real-time thread. The program loads a table, locks its memory, and
 // selects the scheduler SCHED_FIFO if permitted. It then makes CALLS calls of stepdiag_error, _command and _forward at
-// random positions and checks that there is
+// random positions, and as many answers of stepdiag_errors and _commands for many positions, and checks that there is
 //   - no allocation: malloc and its variants are hooked;
 //   - no page fault: getrusage before and after;
 //   - no system call: seccomp's strict mode kills the program for calls other than read, write and _exit; the program
@@ -87,11 +87,33 @@ void call(const stepdiag_compensator* compensator, const std::vector<Position>& 
     }
 }
 
+// The same by calls for `block` positions at a time. The commands' forwards are the targets.
+constexpr std::size_t block = 50;
+void call_for_many(const stepdiag_compensator* compensator, const std::vector<Position>& targets, long count,
+                   Findings& findings) {
+    const double tool[3] = {10.0, -20.0, 150.0}, warm[3] = {24.0, 31.5, 18.0};
+    double errors[3 * block], orientations[3 * block], commands[3 * block], actual[3];
+    unsigned statuses[block];
+    for (long i = 0; 2 * i * long(block) < count; ++i) {
+        const double* some = targets[std::size_t(i) * block % (targets.size() - block)].data();
+        const double* const temperature = i % 4 < 2 ? warm : nullptr;
+        unsigned status = stepdiag_commands(compensator, block, some, tool, temperature, commands, statuses);
+        status |= stepdiag_errors(compensator, block, commands, tool, temperature, errors, orientations, statuses);
+        findings.wrong += status != 0;
+        for (std::size_t k = 0; k < block; ++k) {
+            stepdiag_forward_at_temperature(compensator, commands + 3 * k, tool, temperature, actual);
+            for (std::size_t a = 0; a < 3; ++a)
+                findings.largest_residual = std::max(findings.largest_residual, std::abs(actual[a] - some[3 * k + a]));
+        }
+    }
+}
+
 // Makes the calls in a separate process. seccomp kills it if one of them is a system call.
 void measure(const stepdiag_compensator* compensator, const std::vector<Position>& targets, long count, bool strict,
              int out) {
     Findings warm = {}, findings = {};
     call<true>(compensator, targets, 3 * long(targets.size()), warm);
+    call_for_many(compensator, targets, 4 * long(targets.size()), warm);
     rusage before = {}, after = {};
     getrusage(RUSAGE_SELF, &after);  // first call loads its own pages
     getrusage(RUSAGE_SELF, &before);
@@ -100,6 +122,7 @@ void measure(const stepdiag_compensator* compensator, const std::vector<Position
     if (!strict) call<true>(compensator, targets, count, findings);
     else if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) == 0) call<false>(compensator, targets, count, findings);
     else _exit(3);
+    call_for_many(compensator, targets, count, findings);
     if (!strict) findings.seconds = now() - start;
     findings.allocations = allocation_calls() - allocations;
     if (!strict) {
@@ -171,7 +194,8 @@ int main(int count, char** arguments) {
     std::vector<Position> targets(10'000);
     for (Position& p : targets) p = {800.0 * unit(engine), 600.0 * unit(engine), 500.0 * unit(engine)};
 
-    std::printf("%ld calls of stepdiag_command, _error, _forward; %s\n", calls, scheduling().c_str());
+    std::printf("%ld calls of stepdiag_command, _error, _forward, and as many answers of _commands, _errors; %s\n",
+                calls, scheduling().c_str());
     std::fflush(stdout);
     bool good = true;
     const auto expect = [&](bool holds, const char* claim) {

@@ -95,22 +95,23 @@ Position tool_of(const Compensator& compensator, const std::optional<ArrayLike>&
     return tool ? to_position(to_vector3(*tool, "tool")) : compensator.tool();
 }
 
-// `ask` returns three numbers for a position.
+// `ask(rows, tool, temperature, answers, statuses)` answers rows of positions; NaN where it refuses one.
 template <class Ask>
-DoubleArray for_each_position(const ArrayLike& positions, const char* name, Ask&& ask) {
+DoubleArray answers(const Compensator& compensator, const ArrayLike& positions, const char* name,
+                    const std::optional<ArrayLike>& tool, const std::optional<ArrayLike>& temperature, Ask&& ask) {
     const Points points = to_points(positions, name);
+    const Position offset = tool_of(compensator, tool);
+    const Scales scales(temperature);
+    const auto count = std::size_t(points.rows());
     DoubleArray result({points.rows(), Eigen::Index(3)});
     double* out = result.mutable_data();
     py::gil_scoped_release release;
-    for (Eigen::Index i = 0; i < points.rows(); ++i) {
-        const Position answer = ask(Position{points(i, 0), points(i, 1), points(i, 2)});
-        std::copy(answer.begin(), answer.end(), out + 3 * i);
-    }
+    std::vector<unsigned> statuses(count);
+    const unsigned flags = ask(count, points.data(), offset.data(), scales, out, statuses.data());
+    if (flags & compensation_refused)
+        for (std::size_t i = 0; i < count; ++i)
+            if (statuses[i] & compensation_refused) std::fill_n(out + 3 * i, 3, no_answer);
     return result;
-}
-
-Position unless_refused(const Position& answer, unsigned status) {
-    return status & compensation_refused ? Position{no_answer, no_answer, no_answer} : answer;
 }
 
 py::array_t<int> status(const Compensator& compensator, const ArrayLike& positions,
@@ -121,11 +122,10 @@ py::array_t<int> status(const Compensator& compensator, const ArrayLike& positio
     py::array_t<int> result(points.rows());
     int* out = result.mutable_data();
     py::gil_scoped_release release;
-    for (Eigen::Index i = 0; i < points.rows(); ++i) {
-        const Position p = {points(i, 0), points(i, 1), points(i, 2)};
-        Position error;
-        out[i] = int(compensator.error(p.data(), offset.data(), scales, error.data(), nullptr));
-    }
+    std::vector<double> errors(std::size_t(points.size()));
+    std::vector<unsigned> statuses(std::size_t(points.rows()));
+    compensator.errors(statuses.size(), points.data(), offset.data(), scales, errors.data(), nullptr, statuses.data());
+    std::copy(statuses.begin(), statuses.end(), out);
     return result;
 }
 
@@ -159,13 +159,10 @@ void bind_controller(py::module_& m) {
             "error",
             [](const Compensator& c, const ArrayLike& positions, const std::optional<ArrayLike>& tool,
                const std::optional<ArrayLike>& temperature) {
-                return for_each_position(
-                    positions, "positions",
-                    [&, offset = tool_of(c, tool), scales = Scales(temperature)](const Position& p) {
-                        MachineError e;
-                        e.status = c.error(p.data(), offset.data(), scales, e.position.data(), e.orientation.data());
-                        return unless_refused(e.position, e.status);
-                    });
+                return answers(
+                    c, positions, "positions", tool, temperature,
+                    [&c](std::size_t count, const double* p, const double* offset, const double* scales, double* errors,
+                         unsigned* statuses) { return c.errors(count, p, offset, scales, errors, nullptr, statuses); });
             },
             py::arg("positions"), py::arg("tool") = std::nullopt, py::arg("temperature") = std::nullopt,
             "Error of the functional point (n, 3), mm: exact, and the whole of it where corrections are capped.")
@@ -173,13 +170,12 @@ void bind_controller(py::module_& m) {
             "orientation",
             [](const Compensator& c, const ArrayLike& positions, const std::optional<ArrayLike>& tool,
                const std::optional<ArrayLike>& temperature) {
-                return for_each_position(
-                    positions, "positions",
-                    [&, offset = tool_of(c, tool), scales = Scales(temperature)](const Position& p) {
-                        MachineError e;
-                        e.status = c.error(p.data(), offset.data(), scales, e.position.data(), e.orientation.data());
-                        return unless_refused(e.orientation, e.status);
-                    });
+                return answers(c, positions, "positions", tool, temperature,
+                               [&c](std::size_t count, const double* p, const double* offset, const double* scales,
+                                    double* orientations, unsigned* statuses) {
+                                   std::vector<double> errors(3 * count);
+                                   return c.errors(count, p, offset, scales, errors.data(), orientations, statuses);
+                               });
             },
             py::arg("positions"), py::arg("tool") = std::nullopt, py::arg("temperature") = std::nullopt,
             "Rotation vectors of the tool (n, 3), rad.")
@@ -187,13 +183,11 @@ void bind_controller(py::module_& m) {
             "command",
             [](const Compensator& c, const ArrayLike& targets, const std::optional<ArrayLike>& tool,
                const std::optional<ArrayLike>& temperature) {
-                return for_each_position(
-                    targets, "targets",
-                    [&, offset = tool_of(c, tool), scales = Scales(temperature)](const Position& p) {
-                        CompensatedPosition answer;
-                        answer.status = c.command(p.data(), offset.data(), scales, answer.position.data());
-                        return unless_refused(answer.position, answer.status);
-                    });
+                return answers(c, targets, "targets", tool, temperature,
+                               [&c](std::size_t count, const double* p, const double* offset, const double* scales,
+                                    double* commands, unsigned* statuses) {
+                                   return c.commands(count, p, offset, scales, commands, statuses);
+                               });
             },
             py::arg("targets"), py::arg("tool") = std::nullopt, py::arg("temperature") = std::nullopt,
             "Where the axes must stand (n, 3), mm, for the tool to be at the targets (n, 3).")
@@ -201,13 +195,14 @@ void bind_controller(py::module_& m) {
             "forward",
             [](const Compensator& c, const ArrayLike& commands, const std::optional<ArrayLike>& tool,
                const std::optional<ArrayLike>& temperature) {
-                return for_each_position(
-                    commands, "commands",
-                    [&, offset = tool_of(c, tool), scales = Scales(temperature)](const Position& p) {
-                        CompensatedPosition answer;
-                        answer.status = c.forward(p.data(), offset.data(), scales, answer.position.data());
-                        return unless_refused(answer.position, answer.status);
-                    });
+                return answers(c, commands, "commands", tool, temperature,
+                               [&c](std::size_t count, const double* p, const double* offset, const double* scales,
+                                    double* actual, unsigned* statuses) {
+                                   unsigned flags = 0;
+                                   for (std::size_t i = 0; i < count; ++i)
+                                       flags |= statuses[i] = c.forward(p + 3 * i, offset, scales, actual + 3 * i);
+                                   return flags;
+                               });
             },
             py::arg("commands"), py::arg("tool") = std::nullopt, py::arg("temperature") = std::nullopt,
             "Where the tool is (n, 3), mm, when the axes stand at the commands (n, 3).")

@@ -17,7 +17,25 @@ struct AtTemperature {
     }
 };
 
-// Baseline functions for all processors that the library supports.
+// The answer to row i by itself; stores its status if there is a place for it.
+auto one_error(decltype(Answers::error) error, const Tables& t, const double* p, const double* tool,
+               const double* temperature, double* e, double* turns, unsigned* statuses) noexcept {
+    return [=, &t](std::size_t i) noexcept {
+        const unsigned status = error(t, p + 3 * i, tool, temperature, e + 3 * i, turns ? turns + 3 * i : nullptr);
+        if (statuses) statuses[i] = status;
+        return status;
+    };
+}
+auto one_command(decltype(Answers::command) command, const Tables& t, const double* targets, const double* tool,
+                 const double* temperature, double* commands, unsigned* statuses) noexcept {
+    return [=, &t](std::size_t i) noexcept {
+        const unsigned status = command(t, targets + 3 * i, tool, temperature, commands + 3 * i);
+        if (statuses) statuses[i] = status;
+        return status;
+    };
+}
+
+// Baseline functions for all processors that the library supports. They answer many positions one after the other.
 template <class Order, class Way>
 struct Plain {
     static unsigned error(const Tables& t, const double* p, const double* tool, const double* temperature, double* e,
@@ -31,6 +49,20 @@ struct Plain {
     static unsigned forward(const Tables& t, const double* command, const double* tool, const double* temperature,
                             double* actual) noexcept {
         return answer_forward(Order{}, Way::scales(t, temperature), t, command, tool, actual);
+    }
+    static unsigned errors(const Tables& t, std::size_t count, const double* p, const double* tool,
+                           const double* temperature, double* e, double* turns, unsigned* statuses) noexcept {
+        const auto one = one_error(error, t, p, tool, temperature, e, turns, statuses);
+        unsigned flags = 0;
+        for (std::size_t i = 0; i < count; ++i) flags |= one(i);
+        return flags;
+    }
+    static unsigned commands(const Tables& t, std::size_t count, const double* targets, const double* tool,
+                             const double* temperature, double* commands, unsigned* statuses) noexcept {
+        const auto one = one_command(command, t, targets, tool, temperature, commands, statuses);
+        unsigned flags = 0;
+        for (std::size_t i = 0; i < count; ++i) flags |= one(i);
+        return flags;
     }
 };
 
@@ -51,6 +83,18 @@ struct Fused {
                                            const double* temperature, double* actual) noexcept {
         return answer_forward(Order{}, Way::scales(t, temperature), t, command, tool, actual);
     }
+    STEPDIAG_FUSED static unsigned errors(const Tables& t, std::size_t count, const double* p, const double* tool,
+                                          const double* temperature, double* e, double* turns,
+                                          unsigned* statuses) noexcept {
+        return answer_errors(Order{}, Way::scales(t, temperature), t, count, p, tool, e, turns, statuses,
+                             one_error(error, t, p, tool, temperature, e, turns, statuses));
+    }
+    STEPDIAG_FUSED static unsigned commands(const Tables& t, std::size_t count, const double* targets,
+                                            const double* tool, const double* temperature, double* commands,
+                                            unsigned* statuses) noexcept {
+        return answer_commands(Order{}, Way::scales(t, temperature), t, count, targets, tool, commands, statuses,
+                               one_command(command, t, targets, tool, temperature, commands, statuses));
+    }
 };
 #else
 template <class Order, class Way>
@@ -61,7 +105,8 @@ template <class Order, class Way>
 Answers answers(bool fused) {
     using P = Plain<Order, Way>;
     using F = Fused<Order, Way>;
-    return fused ? Answers{F::error, F::command, F::forward} : Answers{P::error, P::command, P::forward};
+    return fused ? Answers{F::error, F::command, F::forward, F::errors, F::commands}
+                 : Answers{P::error, P::command, P::forward, P::errors, P::commands};
 }
 
 template <int first, int second, int third>

@@ -55,13 +55,13 @@ std::vector<double> boundaries(const std::array<std::vector<const FunctionTable*
     return all;
 }
 
-// The coefficients of 1 - |theta|^2 / 6. The next term of sin|theta| / |theta| is small enough: see add_turn.
+// Sets the coefficients of 1 - |theta|^2 / 6. The next term of sin|theta| / |theta| is small enough: see add_turn.
 void set_sine(AxisInterval& interval) {
     const Four value2 = interval.theta * interval.theta, product = interval.theta * interval.theta_slope,
                slope2 = interval.theta_slope * interval.theta_slope;
-    interval.delta[3] = 1.0 - (value2[0] + value2[1] + value2[2]) / 6.0;
-    interval.delta_slope[3] = -(product[0] + product[1] + product[2]) / 3.0;
-    interval.theta[3] = -(slope2[0] + slope2[1] + slope2[2]) / 6.0;
+    interval.theta[3] = 1.0 - (value2[0] + value2[1] + value2[2]) / 6.0;
+    interval.delta[3] = -(product[0] + product[1] + product[2]) / 3.0;
+    interval.delta_slope[3] = -(slope2[0] + slope2[1] + slope2[2]) / 6.0;
 }
 
 // The interval from the boundary `start` on, with its functions continued to the position 0.

@@ -143,6 +143,30 @@ unsigned Compensator::forward(const double* command, const double* tool, const d
         .forward(*tables_, command, tool ? tool : tables_->tool.data(), temperature, actual);
 }
 
+unsigned Compensator::errors(std::size_t count, const double* positions, const double* tool, const double* temperature,
+                             double* errors, double* orientations, unsigned* statuses) const noexcept {
+    if (temperature && !tables_->scales.holds(temperature)) {
+        std::fill_n(errors, 3 * count, 0.0);
+        if (orientations) std::fill_n(orientations, 3 * count, 0.0);
+        if (statuses) std::fill_n(statuses, count, compensation_refused | compensation_temperature);
+        return count ? compensation_refused | compensation_temperature : 0;
+    }
+    return answers(*tables_, temperature)
+        .errors(*tables_, count, positions, tool ? tool : tables_->tool.data(), temperature, errors, orientations,
+                statuses);
+}
+
+unsigned Compensator::commands(std::size_t count, const double* targets, const double* tool, const double* temperature,
+                               double* commands, unsigned* statuses) const noexcept {
+    if (temperature && !tables_->scales.holds(temperature)) {
+        std::copy_n(targets, 3 * count, commands);
+        if (statuses) std::fill_n(statuses, count, compensation_refused | compensation_temperature);
+        return count ? compensation_refused | compensation_temperature : 0;
+    }
+    return answers(*tables_, temperature)
+        .commands(*tables_, count, targets, tool ? tool : tables_->tool.data(), temperature, commands, statuses);
+}
+
 unsigned Compensator::error(const double* position, const double* tool, double* error,
                             double* orientation) const noexcept {
     return this->error(position, tool, nullptr, error, orientation);

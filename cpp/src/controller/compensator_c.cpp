@@ -126,6 +126,19 @@ unsigned stepdiag_forward(const stepdiag_compensator* compensator, const double 
     return stepdiag_forward_at_temperature(compensator, command, tool, nullptr, actual);
 }
 
+unsigned stepdiag_errors(const stepdiag_compensator* compensator, size_t count, const double* positions,
+                         const double tool[3], const double temperature[3], double* errors, double* orientations,
+                         unsigned* statuses) {
+    if (!compensator || !positions || !errors) return STEPDIAG_REFUSED;
+    return compensator->compensator.errors(count, positions, tool, temperature, errors, orientations, statuses);
+}
+
+unsigned stepdiag_commands(const stepdiag_compensator* compensator, size_t count, const double* targets,
+                           const double tool[3], const double temperature[3], double* commands, unsigned* statuses) {
+    if (!compensator || !targets || !commands) return STEPDIAG_REFUSED;
+    return compensator->compensator.commands(count, targets, tool, temperature, commands, statuses);
+}
+
 uint64_t stepdiag_fingerprint(const stepdiag_compensator* compensator) {
     return compensator ? compensator->compensator.fingerprint() : 0;
 }

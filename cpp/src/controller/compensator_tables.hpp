@@ -29,6 +29,10 @@ struct Answers {
                         double* command) noexcept;
     unsigned (*forward)(const Tables&, const double* command, const double* tool, const double* temperature,
                         double* actual) noexcept;
+    unsigned (*errors)(const Tables&, std::size_t count, const double* positions, const double* tool,
+                       const double* temperature, double* errors, double* orientations, unsigned* statuses) noexcept;
+    unsigned (*commands)(const Tables&, std::size_t count, const double* targets, const double* tool,
+                         const double* temperature, double* commands, unsigned* statuses) noexcept;
 };
 
 // Temperatures that calls may state. Without any, `lowest` exceeds `highest`.
@@ -95,6 +99,9 @@ struct CompensatorTables {
     // Whether a position in the volume is requested, for a tool of the permitted length. Such a position is its own
     // nearest point, and its status is 0. Most are, so this test comes first.
     STEPDIAG_INLINED bool is_usual(const Vector3& p, const Vector3& tool_offset) const noexcept {  // never NaN
+        return within.holds(p) && dot(tool_offset, tool_offset) <= largest_tool2;
+    }
+    STEPDIAG_INLINED bool are_usual(const Vector3Of<Four>& p, const Vector3& tool_offset) const noexcept {
         return within.holds(p) && dot(tool_offset, tool_offset) <= largest_tool2;
     }
     // Status of any requested tool position, or of an axis position.
@@ -178,6 +185,69 @@ STEPDIAG_INLINED unsigned answer_forward(Order order, const Scales& scales, cons
     const unsigned status = t.inside_of_results.holds(at) ? 0 : t.status_outside(at, t.inside_of_results);
     if (status & compensation_refused) return write(asked, actual), status;
     return write(result, actual), status | capped;
+}
+
+// Answers for many positions, rows (count, 3), four at once. `one(i)` answers row i by itself: rows that are left over,
+// and those that are not usual. Both return the flags of all statuses.
+template <class Order, class Scales, class One>
+STEPDIAG_INLINED unsigned answer_errors(Order order, const Scales& scales, const CompensatorTables& t,
+                                        std::size_t count, const double* positions, const double* tool, double* errors,
+                                        double* orientations, unsigned* statuses, One&& one) noexcept {
+    const Vector3 offset = read(tool);
+    unsigned flags = 0;
+    std::size_t i = 0;
+    for (; i + 4 <= count; i += 4) {
+        const Vector3Of<Four> p = read_four(positions + 3 * i) - broadcast<Four>(t.origin);
+        if (!t.are_usual(p, offset)) {
+            for (std::size_t j = i; j < i + 4; ++j) flags |= one(j);
+            continue;
+        }
+        const auto cell = t.model.cell(p);
+        const Vector3Of<Four> e = t.model.error(order, scales, p, offset, cell);
+        write_four(e, errors + 3 * i);
+        if (orientations) write_four(t.model.orientation(order, p, cell), orientations + 3 * i);
+        const FourTruths capped = dot(e, e) > t.largest_correction2;
+        for (std::size_t j = 0; j < 4; ++j) {
+            const unsigned status = capped[j] ? unsigned(compensation_capped) : 0;
+            flags |= status;
+            if (statuses) statuses[i + j] = status;
+        }
+    }
+    for (; i < count; ++i) flags |= one(i);
+    return flags;
+}
+
+// Four at once take the two usual steps of answer_command, whose bounds decide whether these suffice.
+template <class Order, class Scales, class One>
+STEPDIAG_INLINED unsigned answer_commands(Order order, const Scales& scales, const CompensatorTables& t,
+                                          std::size_t count, const double* targets, const double* tool,
+                                          double* commands, unsigned* statuses, One&& one) noexcept {
+    const Vector3 offset = read(tool);
+    unsigned flags = 0;
+    std::size_t i = 0;
+    for (; i + 4 <= count; i += 4) {
+        const Vector3Of<Four> asked = read_four(targets + 3 * i), p = asked - broadcast<Four>(t.origin);
+        if (!t.are_usual(p, offset)) {
+            for (std::size_t j = i; j < i + 4; ++j) flags |= one(j);
+            continue;
+        }
+        const auto cell = t.model.cell(p);
+        const auto [estimate, slope] = t.model.estimate(order, scales, p, offset, cell);
+        const Vector3Of<Four> first = slope * estimate - estimate, at = p + first;
+        const Vector3Of<Four> r = first + t.model.error(order, scales, at, offset, cell);
+        const Vector3Of<Four> k = first - (r - slope * r), command = asked + k;
+        const FourTruths suffice = cell.holds(at) & (dot(r, r) <= t.last_step2) & (dot(k, k) <= t.uncapped2);
+        for (std::size_t j = 0; j < 4; ++j) {
+            if (!suffice[j]) {
+                flags |= one(i + j);
+                continue;
+            }
+            write(lane(command, j), commands + 3 * (i + j));
+            if (statuses) statuses[i + j] = 0;
+        }
+    }
+    for (; i < count; ++i) flags |= one(i);
+    return flags;
 }
 
 // `fused`: with AVX2 and FMA. This is a quarter faster and changes the last digits of an error (1e-16 relative).

@@ -1,56 +1,108 @@
-// Vector operations of the compensator. Components are plain scalars, which compilers keep in registers.
+// Vector operations of the compensator, on one position or on four. Components are plain numbers, which compilers keep
+// in registers.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <type_traits>
 
 // Inlines whole evaluations, so that the compiler can use the known values of their arguments.
 #define STEPDIAG_INLINED [[gnu::always_inline]] inline
+// How calls pass Four depends on the instruction set: no call does, because all of this is inlined.
+#pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace stepdiag {
 
-struct Vector3 {
-    double x, y, z;
+// Four numbers that are computed at once where the processor can: of four positions, or of one.
+using Four = double __attribute__((vector_size(32)));
 
-    // A component with an index known at compile time.
-    template <int axis>
-    double& at() noexcept {
-        static_assert(axis >= 0 && axis < 3);
-        if constexpr (axis == 0) return x;
-        else if constexpr (axis == 1) return y;
-        else return z;
-    }
-    template <int axis>
-    double at() const noexcept {
-        Vector3 copy = *this;
-        return copy.at<axis>();
-    }
+// `value` as a number N: a double, or in each of Four.
+template <class N>
+STEPDIAG_INLINED N broadcast(double value) noexcept {
+    if constexpr (std::is_same_v<N, double>) return value;
+    else return N{value, value, value, value};
+}
+
+template <class N>
+struct Vector3Of {
+    N x, y, z;
 };
+using Vector3 = Vector3Of<double>;
 
-STEPDIAG_INLINED Vector3 operator+(const Vector3& a, const Vector3& b) noexcept {
+// x, y or z, for an axis known at compile time.
+template <int axis, class Triple>
+STEPDIAG_INLINED auto& of_axis(Triple& v) noexcept {
+    static_assert(axis >= 0 && axis < 3);
+    if constexpr (axis == 0) return v.x;
+    else if constexpr (axis == 1) return v.y;
+    else return v.z;
+}
+
+template <class N>
+STEPDIAG_INLINED Vector3Of<N> broadcast(const Vector3& v) noexcept {
+    return {broadcast<N>(v.x), broadcast<N>(v.y), broadcast<N>(v.z)};
+}
+template <class N>
+STEPDIAG_INLINED Vector3Of<N> operator+(const Vector3Of<N>& a, const Vector3Of<N>& b) noexcept {
     return {a.x + b.x, a.y + b.y, a.z + b.z};
 }
-STEPDIAG_INLINED Vector3 operator-(const Vector3& a, const Vector3& b) noexcept {
+template <class N>
+STEPDIAG_INLINED Vector3Of<N> operator-(const Vector3Of<N>& a, const Vector3Of<N>& b) noexcept {
     return {a.x - b.x, a.y - b.y, a.z - b.z};
 }
-STEPDIAG_INLINED Vector3 operator*(double s, const Vector3& v) noexcept { return {s * v.x, s * v.y, s * v.z}; }
-STEPDIAG_INLINED double dot(const Vector3& a, const Vector3& b) noexcept { return a.x * b.x + a.y * b.y + a.z * b.z; }
-STEPDIAG_INLINED Vector3 cross(const Vector3& a, const Vector3& b) noexcept {
+template <class S, class N>
+STEPDIAG_INLINED Vector3Of<N> operator*(const S& s, const Vector3Of<N>& v) noexcept {
+    return {s * v.x, s * v.y, s * v.z};
+}
+template <class N>
+STEPDIAG_INLINED N dot(const Vector3Of<N>& a, const Vector3Of<N>& b) noexcept {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+template <class N>
+STEPDIAG_INLINED Vector3Of<N> cross(const Vector3Of<N>& a, const Vector3Of<N>& b) noexcept {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 // v + a x b, in an order that gives two fused multiply-adds for each component.
-STEPDIAG_INLINED Vector3 add_cross(const Vector3& v, const Vector3& a, const Vector3& b) noexcept {
+template <class N>
+STEPDIAG_INLINED Vector3Of<N> add_cross(const Vector3Of<N>& v, const Vector3Of<N>& a, const Vector3Of<N>& b) noexcept {
     return {(v.x - a.z * b.y) + a.y * b.z, (v.y - a.x * b.z) + a.z * b.x, (v.z - a.y * b.x) + a.x * b.y};
 }
 // v x e_axis
-template <int axis>
-STEPDIAG_INLINED Vector3 cross_unit(const Vector3& v) noexcept {
-    if constexpr (axis == 0) return {0.0, v.z, -v.y};
-    else if constexpr (axis == 1) return {-v.z, 0.0, v.x};
-    else return {v.y, -v.x, 0.0};
+template <int axis, class N>
+STEPDIAG_INLINED Vector3Of<N> cross_unit(const Vector3Of<N>& v) noexcept {
+    if constexpr (axis == 0) return {N{}, v.z, -v.y};
+    else if constexpr (axis == 1) return {-v.z, N{}, v.x};
+    else return {v.y, -v.x, N{}};
 }
 STEPDIAG_INLINED Vector3 read(const double* v) noexcept { return {v[0], v[1], v[2]}; }
 STEPDIAG_INLINED void write(const Vector3& v, double* out) noexcept { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
+
+// Four vectors at once: of rows (4, 3), and with their components in four rows.
+STEPDIAG_INLINED Vector3Of<Four> read_four(const double* v) noexcept {
+    return {Four{v[0], v[3], v[6], v[9]}, Four{v[1], v[4], v[7], v[10]}, Four{v[2], v[5], v[8], v[11]}};
+}
+STEPDIAG_INLINED Vector3 lane(const Vector3Of<Four>& v, std::size_t i) noexcept { return {v.x[i], v.y[i], v.z[i]}; }
+STEPDIAG_INLINED void write_four(const Vector3Of<Four>& v, double* out) noexcept {
+    for (std::size_t i = 0; i < 4; ++i) write(lane(v, i), out + 3 * i);
+}
+struct FourRows {
+    Four a, b, c, d;
+};
+STEPDIAG_INLINED FourRows transposed(const FourRows& m) noexcept {
+    const Four even01 = __builtin_shufflevector(m.a, m.b, 0, 4, 2, 6),
+               odd01 = __builtin_shufflevector(m.a, m.b, 1, 5, 3, 7),
+               even23 = __builtin_shufflevector(m.c, m.d, 0, 4, 2, 6),
+               odd23 = __builtin_shufflevector(m.c, m.d, 1, 5, 3, 7);
+    return {__builtin_shufflevector(even01, even23, 0, 1, 4, 5), __builtin_shufflevector(odd01, odd23, 0, 1, 4, 5),
+            __builtin_shufflevector(even01, even23, 2, 3, 6, 7), __builtin_shufflevector(odd01, odd23, 2, 3, 6, 7)};
+}
+
+// What a comparison of Four gives: -1 where it is true.
+using FourTruths = decltype(Four{} <= Four{});
+STEPDIAG_INLINED bool all(const FourTruths& truths) noexcept {
+    return (truths[0] & truths[1] & truths[2] & truths[3]) != 0;
+}
 
 // Box of positions from `lowest` to `highest` in each component.
 struct Box {
@@ -59,6 +111,10 @@ struct Box {
     STEPDIAG_INLINED bool holds(const Vector3& v) const noexcept {  // never NaN
         return lowest.x <= v.x && v.x <= highest.x && lowest.y <= v.y && v.y <= highest.y && lowest.z <= v.z &&
                v.z <= highest.z;
+    }
+    STEPDIAG_INLINED bool holds(const Vector3Of<Four>& v) const noexcept {  // all; never NaN
+        return all((lowest.x <= v.x) & (v.x <= highest.x) & (lowest.y <= v.y) & (v.y <= highest.y) & (lowest.z <= v.z) &
+                   (v.z <= highest.z));
     }
     STEPDIAG_INLINED Vector3 nearest(const Vector3& v) const noexcept {
         return {std::min(std::max(v.x, lowest.x), highest.x), std::min(std::max(v.y, lowest.y), highest.y),
@@ -71,17 +127,12 @@ struct Box {
 };
 
 // A 3 x 3 matrix by its columns.
-struct Matrix3 {
-    Vector3 x, y, z;
-
-    template <int axis>
-    Vector3& column() noexcept {
-        if constexpr (axis == 0) return x;
-        else if constexpr (axis == 1) return y;
-        else return z;
-    }
+template <class N>
+struct Matrix3Of {
+    Vector3Of<N> x, y, z;
 };
-STEPDIAG_INLINED Vector3 operator*(const Matrix3& m, const Vector3& v) noexcept {
+template <class N>
+STEPDIAG_INLINED Vector3Of<N> operator*(const Matrix3Of<N>& m, const Vector3Of<N>& v) noexcept {
     return v.x * m.x + v.y * m.y + v.z * m.z;
 }
 

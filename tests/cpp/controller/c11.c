@@ -26,6 +26,12 @@ const char* stepdiag_c11_failure(const char* path, const char* chain) {
         EXPECT(fabs(actual[i] - position[i]) <= stepdiag_inverse_bound(compensator));
         EXPECT(fabs(command[i] - (position[i] - error[i])) < 1e-3);
     }
+    const double positions[6] = {100.0, 200.0, 300.0, 100.0, 200.0, NAN};
+    double errors[6];
+    unsigned statuses[2];
+    EXPECT(stepdiag_errors(compensator, 2, positions, NULL, NULL, errors, NULL, statuses) == STEPDIAG_REFUSED);
+    EXPECT(statuses[0] == 0 && statuses[1] == STEPDIAG_REFUSED && errors[0] == error[0] && errors[5] == 0.0);
+    EXPECT(stepdiag_commands(compensator, 1, positions, NULL, NULL, errors, NULL) == 0 && errors[0] == command[0]);
     EXPECT(stepdiag_command(compensator, nowhere, NULL, command) == STEPDIAG_REFUSED);
     EXPECT(isnan(command[0]) && command[1] == 0.0);
     EXPECT(stepdiag_command_at_temperature(compensator, position, NULL, NULL, command) == 0);

@@ -84,6 +84,23 @@ TEST(CompensatorC, TheAnswerMayReplaceTheQuestion) {
     EXPECT_EQ(std::memcmp(p, separate, sizeof p), 0);
 }
 
+TEST(CompensatorC, ManyAtOnceHaveTheBitsOfCpp) {
+    const Loaded loaded;
+    const Compensator compensator = Compensator::load(loaded.path, "wX'bYZt");
+    const std::vector<Position> asked = random_positions(11, 10.0);
+    const double tool[3] = {1.0, 2.0, 3.0};
+    double c[33], cpp[33], turns[33];
+    unsigned statuses[11], statuses_cpp[11];
+    EXPECT_EQ(stepdiag_errors(loaded.compensator, 11, asked[0].data(), tool, nullptr, c, turns, statuses),
+              compensator.errors(11, asked[0].data(), tool, nullptr, cpp, nullptr, statuses_cpp));
+    EXPECT_EQ(std::memcmp(c, cpp, sizeof c), 0);
+    EXPECT_EQ(std::memcmp(statuses, statuses_cpp, sizeof statuses), 0);
+    EXPECT_EQ(stepdiag_commands(loaded.compensator, 11, asked[0].data(), tool, nullptr, c, statuses),
+              compensator.commands(11, asked[0].data(), tool, nullptr, cpp, statuses_cpp));
+    EXPECT_EQ(std::memcmp(c, cpp, sizeof c), 0);
+    EXPECT_EQ(std::memcmp(statuses, statuses_cpp, sizeof statuses), 0);
+}
+
 TEST(CompensatorC, NullIsRefusedAndNeverFollowed) {
     const Loaded loaded;
     char message[300];
@@ -102,6 +119,9 @@ TEST(CompensatorC, NullIsRefusedAndNeverFollowed) {
     EXPECT_EQ(stepdiag_command(loaded.compensator, nullptr, nullptr, out), unsigned(STEPDIAG_REFUSED));
     EXPECT_EQ(stepdiag_error(loaded.compensator, p, nullptr, nullptr, nullptr), 0u);
     EXPECT_EQ(stepdiag_forward(loaded.compensator, p, nullptr, nullptr), 0u);
+    EXPECT_EQ(stepdiag_errors(nullptr, 1, p, nullptr, nullptr, out, nullptr, nullptr), unsigned(STEPDIAG_REFUSED));
+    EXPECT_EQ(stepdiag_commands(loaded.compensator, 1, p, nullptr, nullptr, nullptr, nullptr),
+              unsigned(STEPDIAG_REFUSED));
     EXPECT_EQ(stepdiag_fingerprint(nullptr), 0u);
     EXPECT_EQ(stepdiag_inverse_bound(nullptr), 0.0);
     stepdiag_compensator_free(nullptr);

@@ -98,7 +98,85 @@ TEST(Compensator, EveryInstructionSetGivesTheSameAnswers) {
                           plain.command(*tables, p.data(), tool, t, a.data()));
                 EXPECT_LE(distance(b, p), 1e-10);
             }
+            const std::vector<Position> many = random_positions(50, 10.0);
+            std::vector<Position> a(50), b(50), turns_a(50), turns_b(50);
+            plain.errors(*tables, 50, many[0].data(), tool, t, a[0].data(), turns_a[0].data(), nullptr);
+            fused.errors(*tables, 50, many[0].data(), tool, t, b[0].data(), turns_b[0].data(), nullptr);
+            for (std::size_t i = 0; i < 50; ++i) EXPECT_LE(distance(a[i], b[i]), 1e-15);
+            for (std::size_t i = 0; i < 50; ++i) EXPECT_LE(distance(turns_a[i], turns_b[i]), 1e-18);
+            plain.commands(*tables, 50, many[0].data(), tool, t, a[0].data(), nullptr);
+            fused.commands(*tables, 50, many[0].data(), tool, t, b[0].data(), nullptr);
+            for (std::size_t i = 0; i < 50; ++i) EXPECT_LE(distance(a[i], b[i]), 2e-10);
         }
+}
+
+// Positions in the volume and outside of it, and some that are none: in groups of four of every kind.
+std::vector<Position> positions_of_every_kind() {
+    std::vector<Position> positions = random_positions(200);
+    for (const Position& p : random_positions(203, 20.0, 2)) positions.push_back(p);
+    positions[7][1] = nan, positions[42][2] = infinity, positions[150][0] = 1e300;
+    return positions;
+}
+
+TEST(Compensator, ManyAtOnceHaveTheAnswersOfEach) {
+    const Position warm = {23.0, 27.5, 11.0};
+    for (const std::string& chain : all_chains())
+        for (const double* temperature : {static_cast<const double*>(nullptr), warm.data()}) {
+            CompensatorOptions options = outside(Outside::refuse);
+            options.origin = {-100.0, 30.0, 0.1};
+            options.largest_correction = 0.05;  // shorter than some errors of this table
+            options.temperatures = {10.0, 30.0};
+            const Compensator c(expanding(random_table(50, chain)), "table", chain, options);
+            std::vector<Position> asked = positions_of_every_kind();
+            for (Position& p : asked)
+                for (int a = 0; a < 3; ++a) p[a] += options.origin[a];
+            const std::size_t n = asked.size();
+            std::vector<Position> errors(n), turns(n), commands = asked;
+            std::vector<unsigned> statuses(n), statuses_of_commands(n);
+            const unsigned flags =
+                c.errors(n, asked[0].data(), nullptr, temperature, errors[0].data(), turns[0].data(), statuses.data());
+            c.commands(n, commands[0].data(), nullptr, temperature, commands[0].data(), statuses_of_commands.data());
+            unsigned all = 0;
+            for (std::size_t i = 0; i < n; ++i) {
+                Position e, turn, command, back;
+                all |= statuses[i];
+                ASSERT_EQ(statuses[i], c.error(asked[i].data(), nullptr, temperature, e.data(), turn.data()));
+                EXPECT_LE(distance(errors[i], e), 1e-15);    // sums of errors of 0.1 mm, each rounded to 1e-17 mm
+                EXPECT_LE(distance(turns[i], turn), 1e-18);  // of 1e-4 rad
+                ASSERT_EQ(statuses_of_commands[i], c.command(asked[i].data(), nullptr, temperature, command.data()));
+                if (statuses_of_commands[i] & compensation_refused) continue;
+                EXPECT_EQ(c.forward(commands[i].data(), nullptr, temperature, back.data()), statuses_of_commands[i]);
+                EXPECT_LE(distance(back, asked[i]), c.inverse_bound());
+            }
+            EXPECT_EQ(flags, all);
+            EXPECT_EQ(flags, compensation_outside | compensation_capped | compensation_refused);
+        }
+}
+
+TEST(Compensator, ManyAtOnceMayBeFewAndWithoutStatus) {
+    const Compensator c(random_table(), "table", test_chain);
+    const std::vector<Position> asked = random_positions(9);
+    for (std::size_t n = 0; n <= asked.size(); ++n) {
+        std::vector<Position> errors(asked.size(), {7.0, 7.0, 7.0}), commands = errors;
+        EXPECT_EQ(c.errors(n, asked[0].data(), nullptr, nullptr, errors[0].data(), nullptr, nullptr), 0u);
+        EXPECT_EQ(c.commands(n, asked[0].data(), nullptr, nullptr, commands[0].data(), nullptr), 0u);
+        for (std::size_t i = 0; i < asked.size(); ++i) {
+            const auto e = c.error(asked[i], c.tool()).position, command = c.command(asked[i], c.tool()).position;
+            EXPECT_LE(distance(errors[i], i < n ? e : Position{7.0, 7.0, 7.0}), 1e-15);
+            EXPECT_LE(distance(commands[i], i < n ? command : Position{7.0, 7.0, 7.0}), 2e-10);  // two bounds
+        }
+    }
+    // A tool that is too long, and temperatures that no option permits, are refused for all.
+    std::vector<Position> answers(9, {7.0, 7.0, 7.0});
+    std::vector<unsigned> statuses(9);
+    const Position long_tool = {0.0, 0.0, 2000.0}, warm = {20.0, 20.0, 20.0};
+    EXPECT_EQ(c.errors(9, asked[0].data(), long_tool.data(), nullptr, answers[0].data(), nullptr, statuses.data()),
+              unsigned(compensation_refused));
+    EXPECT_EQ(answers[8], (Position{0.0, 0.0, 0.0}));
+    EXPECT_EQ(c.commands(9, asked[0].data(), nullptr, warm.data(), answers[0].data(), statuses.data()),
+              compensation_refused | compensation_temperature);
+    EXPECT_EQ(answers, asked);
+    EXPECT_EQ(statuses[8], compensation_refused | compensation_temperature);
 }
 
 TEST(Compensator, NodesMayStandAnywhere) {

@@ -58,6 +58,16 @@ unsigned stepdiag_command_at_temperature(const stepdiag_compensator* compensator
                                          const double tool[3], const double temperature[3], double command[3]);
 unsigned stepdiag_forward_at_temperature(const stepdiag_compensator* compensator, const double command[3],
                                          const double tool[3], const double temperature[3], double actual[3]);
+/* The same for `count` positions at once, as rows x, y, z: positions[3 * count], and so on; four at a time where the
+ * processor has AVX2. `temperature` may be NULL: without. `orientations` and `statuses` [count] may be NULL.
+ * STEPDIAG_REFUSED if another pointer is NULL; then nothing is written. Returns the flags of all statuses: 0 if each of
+ * them is 0. */
+unsigned stepdiag_errors(const stepdiag_compensator* compensator, size_t count, const double* positions,
+                         const double tool[3], const double temperature[3], double* errors, double* orientations,
+                         unsigned* statuses);
+unsigned stepdiag_commands(const stepdiag_compensator* compensator, size_t count, const double* targets,
+                           const double tool[3], const double temperature[3], double* commands, unsigned* statuses);
+
 /* Temperature of the scales at which they add nothing, degrees Celsius; NAN unless options.temperatures are stated. */
 double stepdiag_temperature_reference(const stepdiag_compensator* compensator);
 

@@ -18,6 +18,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -116,6 +117,14 @@ public:
                      double* command) const noexcept;
     unsigned forward(const double* command, const double* tool, const double* temperature,
                      double* actual) const noexcept;
+
+    // The same for many positions at once, `count` rows (x, y, z): four at a time where the processor has AVX2. Errors
+    // and orientations differ from those of single calls by at most 1e-15 mm and 1e-18 rad, commands meet the same
+    // bound. `orientations` and `statuses` may be null. Returns the flags of all statuses: 0 if each of them is 0.
+    unsigned errors(std::size_t count, const double* positions, const double* tool, const double* temperature,
+                    double* errors, double* orientations, unsigned* statuses) const noexcept;
+    unsigned commands(std::size_t count, const double* targets, const double* tool, const double* temperature,
+                      double* commands, unsigned* statuses) const noexcept;
 
     // Hash that identifies the corrections of the table: chain, volume, tool, nodes and values, and its expansion if it
     // has one. It does not depend on the spelling and order of the file, on options, uncertainties, method and date.
