@@ -1,6 +1,7 @@
 #include "bindings.hpp"
 #include "stepdiag/core/air.hpp"
 #include "stepdiag/core/instruction_set.hpp"
+#include "stepdiag/version.hpp"
 
 namespace stepdiag::bindings {
 
@@ -42,6 +43,9 @@ void bind_core(py::module_& m) {
             [](const Environment& environment, double wavelength) { return refractive_index(environment, wavelength); },
             py::arg("wavelength"), "Phase index at a vacuum wavelength (nm).");
 
+    m.def("newer_format", &newer_format, py::arg("expected"), py::arg("given"),
+          "The end of a refusal: where `given` is `expected` with a larger number at its end, it says that it takes a "
+          "newer stepdiag; else it is empty.");
     m.def("instruction_set", &instruction_set,
           "The instruction set of this processor that is in use, such as \"AVX3\": traces and random numbers have the "
           "same bits for the same one.");

@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/version.hpp"
 
 namespace stepdiag {
 namespace {
@@ -205,6 +206,29 @@ CsvFile parse_csv(std::string_view text, const std::string& file_name) {
     }
     if (file.header.fields.empty()) throw InvalidArgument(file_name + ": has no header row");
     return file;
+}
+
+void check_format(const CsvFile& csv, const std::string& file_name, const std::vector<std::string>& expected) {
+    for (const CsvRow& comment : csv.comments) {
+        const std::string& text = comment.fields.front();
+        const auto equals = text.find('=');
+        if (equals == std::string::npos || trimmed(text.substr(0, equals)) != "format") continue;
+        const std::string given = trimmed(text.substr(equals + 1));
+        std::string all, newer;
+        for (const std::string& one : expected) {
+            if (one == given) return;
+            all += (all.empty() ? "\"" : " or \"") + one + "\"";
+            newer += newer_format(one, given);
+        }
+        throw InvalidArgument(file_name + ", line " + std::to_string(comment.line) + ": format: expected " + all +
+                              ", got \"" + given + "\"" + newer);
+    }
+}
+
+std::string trimmed(std::string_view text) {
+    const auto first = text.find_first_not_of(' ');
+    return first == std::string_view::npos ? ""
+                                           : std::string(text.substr(first, text.find_last_not_of(' ') + 1 - first));
 }
 
 std::optional<double> parse_decimal(std::string_view text, int exponent_shift) {

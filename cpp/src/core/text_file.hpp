@@ -33,6 +33,13 @@ struct CsvFile {
 // fields than the header, or a missing header.
 CsvFile parse_csv(std::string_view text, const std::string& file_name);
 
+// Checks the leading line "# format=..." of a file that has one. Throws InvalidArgument, which names `file_name` and
+// line, for a text other than those in `expected`.
+void check_format(const CsvFile& csv, const std::string& file_name, const std::vector<std::string>& expected);
+
+// Without the spaces at both ends.
+std::string trimmed(std::string_view text);
+
 // Converts between decimal text and double with a power of ten as factor. Both directions are exact to the last bit:
 // parse_decimal("2.5", -6) is the double nearest to 2.5e-6; format_decimal(2.5e-6, 6) is "2.5", the shortest text that
 // parses back. Multiplying by 1e6 instead would round twice.

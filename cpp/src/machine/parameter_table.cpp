@@ -23,12 +23,6 @@ constexpr int micro_to_radian = -6;  // urad -> rad
 
 std::string quoted(const std::string& text) { return "\"" + text + "\""; }
 
-std::string trimmed(std::string_view text) {
-    const auto first = text.find_first_not_of(' ');
-    return first == std::string_view::npos ? ""
-                                           : std::string(text.substr(first, text.find_last_not_of(' ') + 1 - first));
-}
-
 // The same for both kinds of line ends, which programs change that do not mean to change a file.
 std::string checksum(std::string_view body) {
     std::string text(body);
@@ -60,14 +54,12 @@ private:
     }
 
     void read_header() {
+        check_format(csv_, file_name_, {error_map_format, calibration_format});
         for (const CsvRow& comment : csv_.comments) {
             const std::string_view text = comment.fields.front();
             const auto equals = text.find('=');
             if (equals == std::string_view::npos) continue;  // a remark without a key
             const std::string key = trimmed(text.substr(0, equals)), given = trimmed(text.substr(equals + 1));
-            if (key == "format" && given != error_map_format && given != calibration_format)
-                fail(comment.line, "format: expected " + quoted(error_map_format) + " or " +
-                                       quoted(calibration_format) + ", got " + quoted(given));
             if (key == rows_key || key == checksum_key) {
                 expect(key, comment.line, given,
                        key == rows_key ? std::to_string(csv_.rows.size()) : checksum(csv_.body));

@@ -31,6 +31,7 @@ public:
         : file_name_(file_name), csv_(parse_csv(text, file_name)) {}
 
     Measurement read() {
+        check_format(csv_, file_name_, {"stepdiag measurement 1"});
         find_columns();
         std::vector<Station> stations;
         for (const CsvRow& row : csv_.rows) {

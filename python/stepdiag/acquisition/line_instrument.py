@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import Any, Final, Self
 from urllib.parse import urlsplit
 
-from stepdiag._core import InvalidArgument
+from stepdiag._core import InvalidArgument, newer_format
 from stepdiag.acquisition.ids3010_messages import shown
 from stepdiag.acquisition.instrument import InstrumentError, ReadColumn, Sample, columns_of_signals
 from stepdiag.acquisition.line_streams import Connection, LineFeed, ProgramOutput, Stream
@@ -41,7 +41,8 @@ def parse_header(line: bytes) -> LineHeader:
     expected = f'expected a header such as {{"stepdiag_lines": {VERSION}, "channels": ["distance_mm"]}}'
     content = _object(line, expected)
     if content.get("stepdiag_lines") != VERSION or isinstance(content["stepdiag_lines"], bool):
-        raise ValueError(f"{expected}, got {shown(line)}")
+        newer = newer_format(str(VERSION), str(content.get("stepdiag_lines")))
+        raise ValueError(f"{expected}, got {shown(line)}{newer}")
     names, visits = content.get("channels"), content.get("visits", False)
     if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
         raise ValueError("channels: expected a list of names such as distance_mm")

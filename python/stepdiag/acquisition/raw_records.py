@@ -1,5 +1,6 @@
 """The records of a raw file, one per line."""
 
+import json
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import (
@@ -12,11 +13,12 @@ from pydantic import (
     model_validator,
 )
 
-from stepdiag._core import InvalidArgument
+from stepdiag._core import InvalidArgument, newer_format
 from stepdiag.acquisition.instrument import Number, ReadColumn
 from stepdiag.acquisition.settling import ValueKind
 from stepdiag.config.key_types import Section, Triple
 
+LATEST: Final = 2  # version of the format
 LARGEST: Final = 2**63  # pm; 9 km
 
 
@@ -67,7 +69,7 @@ class Header(Section):
 
     record: Literal["header"] = "header"
     format: Literal["stepdiag raw readings"] = "stepdiag raw readings"
-    version: Literal[1, 2] = 2
+    version: Literal[1, 2] = LATEST
     created: AwareDatetime
     scenario: str
     digest: str  # of channels and plan, see digest_of
@@ -169,11 +171,24 @@ Record = Annotated[Header | Session | Again | TemperatureRow | Value | RawReadin
 _RECORD: TypeAdapter[Record] = TypeAdapter(Record)
 
 
+def _check_not_newer(line: bytes, place: str) -> None:
+    """Of a header. Raises InvalidArgument beginning with `place`."""
+    try:
+        content = json.loads(line)
+    except ValueError:
+        return
+    given = content.get("version") if isinstance(content, dict) else None
+    newer = newer_format(str(LATEST), str(given))
+    if newer:
+        raise InvalidArgument(f"{place}: version: expected {LATEST} or less, got {given}{newer}") from None
+
+
 def parse_record(line: bytes, place: str) -> Record:
     """Parse a line. Raises InvalidArgument beginning with `place`."""
     try:
         return _RECORD.validate_json(line)
     except ValidationError as error:
+        _check_not_newer(line, place)
         detail = error.errors(include_url=False)[0]
         keys = ".".join(str(key) for key in detail["loc"][1:])
         got = ascii(line[:40].decode(errors="replace") if detail["type"] == "json_invalid" else detail["input"])

@@ -17,12 +17,14 @@ from stepdiag.config.key_types import (
     READING_MODEL,
     SHARE,
     Amplitude,
+    Format,
     Length,
     Positive,
     PositiveLength,
     ReadingModel,
     Section,
     Share,
+    format_key,
     key,
     tables,
 )
@@ -158,6 +160,7 @@ AnySensor = Annotated[LateralEffectKeys | CameraKeys, Field(discriminator="kind"
 class HeadFile(Section):
     """The first keys, above all sections:"""
 
+    format: Format = format_key()
     name: Annotated[str, Field(min_length=1)] = key("a text", "What the head is called.", example="my head")
     layout: Literal["psd", "multi_beam"] = key(
         '"psd" or "multi_beam"',

@@ -20,6 +20,7 @@ Pair = tuple[Length, Length]
 Triple = tuple[Length, Length, Length]
 AnglePair = tuple[Angle, Angle]
 AngleTriple = tuple[Angle, Angle, Angle]
+Format = Annotated[int, Field(ge=1, le=1)]
 ReadingModel = Literal["chief_ray", "coupled_mode"]
 
 # What they expect, for messages and tables.
@@ -35,6 +36,11 @@ THREE_LENGTHS: Final = "three lengths in mm"
 READING_MODEL: Final = '"chief_ray" or "coupled_mode"'
 
 
+FILE_FORMAT: Final = (
+    1  # of scenarios, heads and studies: a number that changes where an older program would misread one
+)
+
+
 class Section(BaseModel):
     """Keys are typed strictly (an integer may stand for a float), finite, and no other is accepted."""
 
@@ -47,6 +53,15 @@ class Section(BaseModel):
 def key(expected: str, meaning: str, default: Any = ..., example: Any = None) -> Any:
     """A key of a section. `expected` completes "expected ..." in messages; `example` is for the template."""
     return Field(default, description=meaning, json_schema_extra={"expected": expected, "example": example})
+
+
+def format_key() -> Any:
+    """The version of a file's format, which is its first key."""
+    return key(
+        f"the number {FILE_FORMAT}",
+        "The version of the file's format; without it 1. A program refuses a newer one.",
+        FILE_FORMAT,
+    )
 
 
 def tables(placeholder: str) -> Any:

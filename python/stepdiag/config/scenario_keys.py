@@ -22,12 +22,14 @@ from stepdiag.config.key_types import (
     Amplitude,
     Angle,
     AnglePair,
+    Format,
     Length,
     Pair,
     Positive,
     Section,
     Seed,
     Triple,
+    format_key,
     key,
     tables,
 )
@@ -249,6 +251,7 @@ class ChangeSection(Section):
 class KnownKeys(Section):
     """What is known when a run is evaluated: these keys, and how the heads are made by design."""
 
+    format: Format = format_key()
     volume: VolumeSection
     machine: KnownMachineKeys
     plan: PlanSection
@@ -277,7 +280,7 @@ class TruthKeys(Section):
 
 
 class ScenarioKeys(TruthKeys, KnownKeys):
-    """The whole file, section by section: what is known, and the truth."""
+    """The first key, above all sections:"""
 
     machine: MachineSection
     head: HeadSection

@@ -22,6 +22,8 @@ def template(head: str | None = None) -> str:
         "# A scenario for stepdiag: machine, plan and head. The end of a key is its unit.",
         "",
     ]
+    for name, field in keys(ScenarioKeys):
+        lines += [*_comment(field.description or ""), f"{name} = {show_full(field.default)}", ""]
     for part in sections(ScenarioKeys):
         active = part.required and "." not in part.title
         lines += [*_comment(paragraphs(part.model)), f"{'' if active else '# '}[{_named(part)}]"]

@@ -7,9 +7,9 @@ from typing import Any, Final, TypeVar
 
 from pydantic import ValidationError, create_model
 
-from stepdiag._core import InvalidArgument
+from stepdiag._core import InvalidArgument, newer_format
 from stepdiag.config.key_errors import explain
-from stepdiag.config.key_types import Section
+from stepdiag.config.key_types import FILE_FORMAT, Section
 
 Keys = TypeVar("Keys", bound=Section)
 
@@ -17,7 +17,7 @@ DEEPEST: Final = 32  # tables and lists in each other; our keys have six, and fa
 
 
 def parse_toml(text: str, file: str) -> dict[str, Any]:
-    """The tables of a TOML text. Raises InvalidArgument, with `file` in front."""
+    """The tables of a TOML text. Raises InvalidArgument, with `file` in front, also for a newer `format`."""
     try:
         content = tomllib.loads(text)
     except RecursionError:
@@ -29,7 +29,16 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
         raise InvalidArgument(f"{file}: not valid TOML: a number has too many digits") from None
     if _too_deep(content):  # dotted names of tables, which tomllib reads at any length
         raise InvalidArgument(f"{file}: not valid TOML: nested too deeply")
+    _check_not_newer(content, file)
     return content
+
+
+def _check_not_newer(content: Mapping[str, Any], file: str) -> None:
+    """Before the keys, of which such a file may have others."""
+    given = content.get("format")
+    newer = newer_format(str(FILE_FORMAT), str(given)) if type(given) is int else ""
+    if newer:
+        raise InvalidArgument(f"{file}: format: expected {FILE_FORMAT}, got {given}{newer}")
 
 
 def check_keys(content: Mapping[str, Any], root: type[Keys], file: str) -> Keys:

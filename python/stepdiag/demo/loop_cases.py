@@ -99,6 +99,8 @@ def scenario_text(case: LoopCase, steps: int = STEPS, seed: int | None = None, *
     return "\n".join(
         [
             f"# The closed loop in a controller: {case.title}",
+            "format = 1",
+            "",
             "[volume]",
             *(f"{axis}_mm = {edge}" for axis, edge in zip("xyz", VOLUME, strict=True)),
             "",

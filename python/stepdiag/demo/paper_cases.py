@@ -123,6 +123,8 @@ def scenario_of(case: Case) -> str:
     return "\n".join(
         [
             f"# Case {case.name} of stepdiag's demonstration: {case.title}",
+            "format = 1",
+            "",
             "[volume]",
             *(f"{axis}_mm = {edge}" for axis, edge in zip("xyz", VOLUME, strict=True)),
             "",

@@ -122,6 +122,7 @@ def read_drawn_uncertainty(path: Path) -> DrawnUncertainty:
     from stepdiag.io.netcdf import open_dataset
 
     with open_dataset(path) as file:
+        file.check_format(UNCERTAINTY_FORMAT)
         return _of_netcdf(file)
 
 

@@ -13,6 +13,7 @@ from stepdiag.io.adjustment_table import adjustment_table
 from stepdiag.io.data_files import is_netcdf
 from stepdiag.io.labelled_tables import channel_units
 from stepdiag.io.netcdf import NetcdfFile, open_dataset
+from stepdiag.io.netcdf_read import CALIBRATION_FORMAT
 from stepdiag.setup_quantities import SETUP_QUANTITIES
 
 FloatArray = npt.NDArray[np.float64]
@@ -77,6 +78,7 @@ def read_fit_details(path: Path) -> FitDetails | None:
     if not is_netcdf(path):
         return None
     with open_dataset(path) as file:
+        file.check_format(CALIBRATION_FORMAT)
         return _details(file) if "degrees_of_freedom" in file and "reading_line" in file else None
 
 

@@ -49,9 +49,7 @@ def _read_netcdf(path: Path) -> StoredComparison:
     from stepdiag.io.netcdf import open_dataset  # imports xarray, which takes half a second
 
     with open_dataset(path) as file:
-        given = file.text("format", COMPARISON_FORMAT)
-        if given != COMPARISON_FORMAT:
-            raise file.fail("attribute format", f'expected "{COMPARISON_FORMAT}", got "{given}"')
+        file.check_format(COMPARISON_FORMAT)
         names = [name.removesuffix("_difference") for name in file.names if name.endswith("_difference")]
         differences = tuple(_difference(file, name) for name in names if _PARAMETER.fullmatch(name))
         numbers = {key: file.number(key) for key in ("limit", "values")}

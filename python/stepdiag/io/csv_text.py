@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stepdiag._core import InvalidArgument
+from stepdiag._core import InvalidArgument, newer_format
 from stepdiag.calibration.table_sums import FloatArray
 from stepdiag.io.whole_files import read_text
 
@@ -53,8 +53,10 @@ def read_csv(path: Path, columns: Sequence[str], format_: str = "") -> CsvTable:
     lines = read_text(path).split("\n")
     start = next((k for k, line in enumerate(lines) if line.strip() and not line.startswith("#")), len(lines))
     leading = dict(re.findall(r"(?m)^#\s*(\w+)\s*=\s*(.*?)\s*$", "\n".join(lines[:start])))
-    if format_ and leading.get("format") != format_:
-        raise InvalidArgument(f'{path}: format: expected "{format_}", got "{leading.get("format", "")}"')
+    given = leading.get("format", "")
+    if format_ and given != format_:
+        newer = newer_format(format_, given)
+        raise InvalidArgument(f'{path}: format: expected "{format_}", got "{given}"{newer}')
     table = csv.DictReader(lines[start:], strict=True)
     try:
         found = table.fieldnames or ()

@@ -20,7 +20,7 @@ import numpy.typing as npt
 import xarray as xr
 from xarray.backends import NetCDF4DataStore
 
-from stepdiag._core import InvalidArgument, __version__
+from stepdiag._core import InvalidArgument, __version__, newer_format
 from stepdiag.interruption import at_end, uninterrupted
 from stepdiag.io.whole_files import check_output, read_bytes, write_whole
 
@@ -118,6 +118,12 @@ class NetcdfFile:
     def __init__(self, path: Path, dataset: xr.Dataset) -> None:
         self.path = path
         self._dataset = dataset
+
+    def check_format(self, expected: str) -> None:
+        """Check the attribute `format`, which files of other programs may lack. Raises InvalidArgument."""
+        given = self.text("format", expected)
+        if given != expected:
+            raise self.fail("attribute format", f'expected "{expected}", got "{given}"{newer_format(expected, given)}')
 
     def check(self) -> None:
         """Compare the content with the checksum of the file, if it has one. Raises InvalidArgument."""

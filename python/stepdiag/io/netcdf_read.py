@@ -44,7 +44,7 @@ def kind_of_netcdf(path: Path) -> str:
 def read_measurement_netcdf(path: Path) -> Measurement:
     """Read a measurement. Raises InvalidArgument naming file and variable."""
     with open_dataset(path) as file:
-        _check_format(file, MEASUREMENT_FORMAT)
+        file.check_format(MEASUREMENT_FORMAT)
         rows = file.dimensions("line")
         if len(rows) != 1:
             raise file.fail("line", f"expected one dimension, got {len(rows)}")
@@ -62,7 +62,7 @@ def read_measurement_netcdf(path: Path) -> Measurement:
 def read_calibration_netcdf(path: Path) -> Calibration:
     """Read a calibration. Raises InvalidArgument naming file and variable."""
     with open_dataset(path) as file:
-        _check_format(file, CALIBRATION_FORMAT)
+        file.check_format(CALIBRATION_FORMAT)
         functions = {name: _function(file, name) for name in file.names if _FUNCTION.fullmatch(name)}
         reversals = {name[:3]: name for name in file.names if _REVERSAL.fullmatch(name)}
         parts: dict[str, Any] = {
@@ -109,12 +109,6 @@ def read_calibration_netcdf(path: Path) -> Calibration:
         return calibration
     with located(str(path)):
         return Calibration(**parts, covariance=covariance)
-
-
-def _check_format(file: NetcdfFile, expected: str) -> None:
-    given = file.text("format", expected)  # files of other programs may lack it
-    if given != expected:
-        raise file.fail("attribute format", f'expected "{expected}", got "{given}"')
 
 
 def _channels(file: NetcdfFile, rows: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -13,6 +13,7 @@ from stepdiag.page.look import INK
 from stepdiag.page.numbers import position, shown
 from stepdiag.parameters import KINDS, Kind, kind_of
 from stepdiag.style import SERIES
+from stepdiag.uncertainty.result import UNCERTAINTY_FORMAT
 from stepdiag.units import report_value
 
 # Groups that make less than this of every variance are added up.
@@ -43,7 +44,10 @@ def read_budget(path: Path, calibration: Calibration) -> Budget:
     """Read the budget of an uncertainty result (netCDF). Raises InvalidArgument where it is none, or of a machine or a
     method other than the calibration's."""
     with open_dataset(path) as file:
-        if not file.text("format", "").startswith("stepdiag uncertainty") or "budget" not in file:
+        is_uncertainty = file.text("format", "").startswith("stepdiag uncertainty")
+        if is_uncertainty:
+            file.check_format(UNCERTAINTY_FORMAT)
+        if not is_uncertainty or "budget" not in file:
             raise InvalidArgument(f"{path}: expected a result of `stepdiag uncertainty` (.nc) with its budget")
         _check_belongs(file, path, calibration)
         outputs = ("output",)

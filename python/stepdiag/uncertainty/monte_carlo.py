@@ -23,6 +23,7 @@ from stepdiag._core import (
     StatisticsOptions,
     leaf_samples,
     make_bins,
+    newer_format,
     run_ranges,
 )
 from stepdiag.io.file_kind import CHECKPOINT_BEGINS
@@ -272,7 +273,8 @@ def _closing(parts: Iterator[PartialStatistics]) -> Iterator[PartialStatistics]:
 
 def _parts_of(saved: bytes, name: str) -> tuple[bytes, bytes]:
     if not saved.startswith(MAGIC):
-        raise InvalidArgument(f"{name}: expected a checkpoint of this version of stepdiag")
+        expected, given = (text.split(b"\n")[0][:40].decode(errors="replace") for text in (MAGIC, saved))
+        raise InvalidArgument(f'{name}: expected "{expected}", got {given!a}{newer_format(expected, given)}')
     parts, rest = [], saved[len(MAGIC) :]
     for _ in range(2):
         if len(rest) < 8:

@@ -26,7 +26,7 @@ from pydantic import Field
 
 from stepdiag._core import InvalidArgument
 from stepdiag.config.key_errors import show, suggest
-from stepdiag.config.key_types import SEED, Section, Seed, key
+from stepdiag.config.key_types import SEED, Format, Section, Seed, format_key, key
 from stepdiag.config.toml_text import check_keys, located, parse_toml
 from stepdiag.io.whole_files import read_text
 from stepdiag.scenario.description import Scenario, scenario_of
@@ -34,7 +34,7 @@ from stepdiag.scenario.description import Scenario, scenario_of
 Method = Literal["enhanced", "conventional", "adjustment", "one_step"]
 
 MOST_CELLS: Final = 10_000
-SECTIONS: Final = ("study", "grid", "together")
+SECTIONS: Final = ("format", "study", "grid", "together")
 
 
 class StudySection(Section):
@@ -59,6 +59,7 @@ class StudySection(Section):
 
 
 class StudyKeys(Section):
+    format: Format = format_key()
     study: StudySection
 
 
@@ -119,7 +120,8 @@ def read_study(path: str | PathLike[str]) -> Study:
     for name in content:
         if name not in SECTIONS:
             raise InvalidArgument(f"{file}: {name}: unknown section; {suggest(name, SECTIONS)}")
-    settings = check_keys({"study": content.get("study", {})}, StudyKeys, str(file)).study
+    own = {"study": {}} | {name: value for name, value in content.items() if name in StudyKeys.model_fields}
+    settings = check_keys(own, StudyKeys, str(file)).study
     if len(set(settings.methods)) < len(settings.methods):
         raise InvalidArgument(f"{file}: study.methods: expected each method once, got {show(settings.methods)}")
     axes = tuple(_axes(content, file))
