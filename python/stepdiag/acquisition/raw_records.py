@@ -1,6 +1,5 @@
 """The records of a raw file, one per line."""
 
-import json
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import (
@@ -12,6 +11,7 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
+from pydantic_core import from_json
 
 from stepdiag._core import InvalidArgument, newer_format
 from stepdiag.acquisition.instrument import Number, ReadColumn
@@ -174,7 +174,7 @@ _RECORD: TypeAdapter[Record] = TypeAdapter(Record)
 def _check_not_newer(line: bytes, place: str) -> None:
     """Of a header. Raises InvalidArgument beginning with `place`."""
     try:
-        content = json.loads(line)
+        content = from_json(line)  # json.loads ends with a RecursionError where brackets are nested too deeply
     except ValueError:
         return
     given = content.get("version") if isinstance(content, dict) else None
