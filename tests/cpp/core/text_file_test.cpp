@@ -11,6 +11,7 @@
 #include <random>
 #include <thread>
 
+#include "stepdiag/version.hpp"
 #include "support/refuses.hpp"
 
 namespace {
@@ -228,4 +229,14 @@ TEST(TextFile, ManyThreadsWritingOneFileLeaveOneWholeText) {
     EXPECT_EQ(text, std::string(10'000, text[0]));
     EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
     fs::remove_all(folder);
+}
+
+TEST(NewerFormat, IsALargerNumberBehindTheSameName) {
+    for (const auto& [expected, given] : std::vector<std::pair<const char*, const char*>>{
+             {"1", "2"}, {"9", "10"}, {"stepdiag calibration 1", "stepdiag calibration 2"}, {"1", "0020"}})
+        EXPECT_EQ(stepdiag::newer_format(expected, given),
+                  ": it is for a newer stepdiag than " STEPDIAG_VERSION "; install that one");
+    for (const auto& [expected, given] : std::vector<std::pair<const char*, const char*>>{
+             {"1", "1"}, {"10", "9"}, {"1", "01"}, {"1", ""}, {"1", "0"}, {"1", "-2"}, {"a 1", "b 2"}, {"a 1", "a"}})
+        EXPECT_EQ(stepdiag::newer_format(expected, given), "") << given;
 }

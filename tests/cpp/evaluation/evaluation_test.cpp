@@ -32,7 +32,9 @@ Plan plan(std::vector<Line> lines, int steps) {
     return Plan(volume, std::move(lines), steps, stepdiag::all_axes, scale_lines);
 }
 
-std::string file(const std::string& name) { return std::string(STEPDIAG_TEST_DATA) + "/runs/" + name; }
+std::string file(const std::string& name) {
+    return STEPDIAG_TEST_DATA "/../../python/stepdiag/selftest/known/runs/" + name;
+}
 
 struct Worst {
     double position = 0.0, angle = 0.0;

@@ -139,7 +139,8 @@ TEST(Measurement, EveryRunWithKnownTruthIsReadBackToTheSameText) {
     // The files were written by another program with the shortest digits, so equal values must be equal bits.
     for (const char* name :
          {"clean", "misaligned", "displaced_psd", "three_beams", "noisy", "reversed_order", "faces"}) {
-        const auto path = std::string(STEPDIAG_TEST_DATA) + "/runs/" + name + "/measurement.csv";
+        const auto path =
+            std::string(STEPDIAG_TEST_DATA "/../../python/stepdiag/selftest/known/runs/") + name + "/measurement.csv";
         const Measurement measurement = stepdiag::read_measurement(path);
         expect_same_bits(parse_measurement(format_measurement(measurement), "again"), measurement);
         EXPECT_GT(measurement.size(), 100u) << name;
