@@ -10,6 +10,7 @@ namespace stepdiag {
 namespace {
 
 constexpr int most_steps = 30;
+constexpr int accelerated_after = 4;  // steps; the first is too long to tell of later ones
 // Limit of the square sum per reading. Above it, the solution may be another minimum than the one next to zero.
 constexpr double gross_scatter = 100.0;
 
@@ -42,7 +43,8 @@ SimdAdjustment::SimdAdjustment(const SimdStart& start)
       dx_(start.pattern.problem.size() + 1),
       centre_(start.pattern.problem.size()),
       s_(Eigen::Index(start.input.size())),
-      r_(Eigen::Index(start.input.size())) {}
+      r_(Eigen::Index(start.input.size())),
+      acceleration_(std::size_t(start.pattern.problem.size()), start.input.size()) {}
 
 // Values are F x, and dx = N^-1 J^T (d reading/u). Computes lane_group rows of F N^-1 J^T at a time.
 Eigen::MatrixXd simd_gain(const SimdStart& start, std::size_t readings) {
@@ -66,8 +68,8 @@ Eigen::MatrixXd simd_gain(const SimdStart& start, std::size_t readings) {
     return gain;
 }
 
-// The last two changes predict the next ones: steps shrink alternately by more and by less, so only the ratio over two
-// steps is steady.
+// As long as steps are not combined, the last two changes predict the next ones: steps shrink alternately by more and
+// by less, so only the ratio over two steps is steady.
 void SimdAdjustment::Progress::add(double largest) {
     constexpr double diverges = 1e4, shrinks = 0.25;
     constexpr int early = 4, late = 12, most_steps_left = 16;
@@ -82,7 +84,7 @@ void SimdAdjustment::Progress::add(double largest) {
     } else if (steps >= 3) {
         const double ratio = change[0] / change[2];
         const double left = (change[0] + change[1]) * ratio / (1.0 - ratio);
-        if (ratio < shrinks && safety * left < settled_tolerance) state = settled;
+        if (steps <= accelerated_after && ratio < shrinks && safety * left < settled_tolerance) state = settled;
         // Decides by the mean rate since the early steps, because a full Gauss-Newton step costs more than a step here.
         if (steps == early) at_early = std::max(change[0], change[1]);
         const double rate = std::log(at_early / change[0]) / (steps - early + 1);
@@ -142,21 +144,6 @@ void SimdAdjustment::step(const double* readings, std::size_t stride) {
     start_.tilt_effects.divide(x_.data(), dx_.data());
 }
 
-// The largest change of a value, in units of its standard uncertainty; NaN if any change is NaN.
-void SimdAdjustment::find_changes(double* largest) const {
-    std::fill_n(largest, lane_group, 0.0);
-    for (std::size_t e = 0; e < start_.pattern.forms.size(); ++e) {
-        const LinearForm& form = start_.pattern.forms[e];
-        Lanes change = {};
-        for (int k = 0; k < form.size; ++k)
-            for (std::size_t i = 0; i < lane_group; ++i) change[i] += form.coefficient[k] * dx_.at(form.unknown[k])[i];
-        for (std::size_t i = 0; i < lane_group; ++i) {
-            const double size = std::abs(change[i]) * start_.one_over_uncertainty[e];
-            largest[i] = size > largest[i] || size != size ? size : largest[i];
-        }
-    }
-}
-
 // The square sum of the residuals before the last step.
 void SimdAdjustment::find_square_sum(double* sum) const {
     std::fill_n(sum, lane_group, 0.0);
@@ -164,13 +151,18 @@ void SimdAdjustment::find_square_sum(double* sum) const {
         for (std::size_t i = 0; i < lane_group; ++i) sum[i] += r_.at(Eigen::Index(r))[i] * r_.at(Eigen::Index(r))[i];
 }
 
-void SimdAdjustment::move() {
-    Lanes part;
-    for (std::size_t i = 0; i < lane_group; ++i) part[i] = progress_[i].state == Progress::goes_on ? 1.0 : 0.0;
+void SimdAdjustment::accelerate() {
+    Lanes ready;
+    for (std::size_t i = 0; i < lane_group; ++i)
+        ready[i] = progress_[i].state == Progress::goes_on && progress_[i].steps >= accelerated_after ? 1.0 : 0.0;
+    acceleration_.apply(ready, x_.data(), dx_.data(), s_.data());
+}
+
+void SimdAdjustment::move(const double* moves) {
     for (Eigen::Index j = 0; j < start_.pattern.start.size(); ++j) {
         double* x = x_.at(j);
         const double* dx = dx_.at(j);
-        for (std::size_t i = 0; i < lane_group; ++i) x[i] = part[i] != 0.0 ? x[i] + dx[i] : x[i];
+        for (std::size_t i = 0; i < lane_group; ++i) x[i] = moves[i] != 0.0 ? x[i] + dx[i] : x[i];
     }
 }
 
@@ -187,19 +179,22 @@ void SimdAdjustment::adjust(const double* readings, std::size_t stride, double* 
     const bool has_open = !start_.pattern.solver.dependent().empty();
     counts_.fill({0, false});
     const auto goes_on = [](const Progress& p) { return p.state == Progress::goes_on; };
+    const auto any_goes_on = [&] { return std::any_of(progress_.begin(), progress_.end(), goes_on); };
     first_step(readings, stride);
     start_.jacobian.subtract_product(r_.data(), dx_.data(), s_.data());
-    for (bool is_first = true; std::any_of(progress_.begin(), progress_.end(), goes_on); is_first = false) {
+    for (bool is_first = true; any_goes_on(); is_first = false) {
         if (!is_first) step(readings, stride);
-        Lanes largest;
-        find_changes(largest);
-        move();
+        Lanes largest, moves;
+        find_largest(start_.pattern.forms, start_.one_over_uncertainty, dx_.data(), largest);
         for (std::size_t lane = 0; lane < lane_group; ++lane) {
-            if (!goes_on(progress_[lane])) continue;
-            ++counts_[lane].steps;
-            progress_[lane].add(largest[lane]);
-            if (progress_[lane].state == Progress::settled && has_open && !progress_[lane].recentred) recentre(lane);
+            moves[lane] = goes_on(progress_[lane]) ? 1.0 : 0.0;
+            if (goes_on(progress_[lane])) progress_[lane].add(largest[lane]), ++counts_[lane].steps;
         }
+        if (!is_first && any_goes_on()) accelerate();
+        move(moves);
+        for (std::size_t lane = 0; has_open && lane < lane_group; ++lane)
+            if (moves[lane] != 0.0 && progress_[lane].state == Progress::settled && !progress_[lane].recentred)
+                recentre(lane);
     }
     Lanes square_sum;
     find_square_sum(square_sum);
@@ -215,7 +210,9 @@ void SimdAdjustment::adjust_in_one_step(const double* readings, std::size_t stri
                                         std::size_t value_stride) {
     begin(readings, stride);
     first_step(readings, stride);
-    move();
+    Lanes all;
+    std::fill_n(all, lane_group, 1.0);
+    move(all);
     put_values(values, value_stride);
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "batch/prepared_adjustment.hpp"
+#include "batch/simd_acceleration.hpp"
 #include "batch/simd_model.hpp"
 #include "batch/simd_solver.hpp"
 #include "batch/tilt_effects.hpp"
@@ -55,6 +56,8 @@ private:
 // Its fixed point is J(x)^T r(x) = P x, the solution of the adjustment. A step reduces the error by a factor of (J -
 // J0)/J0. J0 T(x) (tilt_effects.hpp) takes the place of J0: it is nearer to J(x), and with T^T P T = P nearly,
 //   N0 T dx = J0^T (r(x) - s) + T^-T (J(x)^T s - P x),   s := r(x) - J0 T dx.
+// What T leaves, mainly what angles do to distances of a tilted mirror, acts twice, from x to s and from s to x: two
+// steps turn the sign of such an error. Hence steps are accelerated (simd_acceleration.hpp).
 class SimdAdjustment {
 public:
     explicit SimdAdjustment(const SimdStart& start);
@@ -87,9 +90,9 @@ private:
     void begin(const double* readings, std::size_t stride);
     void first_step(const double* readings, std::size_t stride);
     void step(const double* readings, std::size_t stride);
-    void find_changes(double* largest) const;
     void find_square_sum(double* sum) const;
-    void move();
+    void accelerate();
+    void move(const double* moves);  // lanes where it is not 0
     void recentre(std::size_t lane);
     void put_values(double* values, std::size_t value_stride) const;
     bool has_all_readings(const double* readings, std::size_t stride, std::size_t lane) const;
@@ -99,6 +102,7 @@ private:
     SimdModel model_;
     std::unique_ptr<PreparedAdjustment> in_full_;  // created on first use
     SimdNumbers x_, dx_, centre_, s_, r_;
+    SimdAcceleration acceleration_;
     std::array<Progress, lane_group> progress_;
     std::array<Count, lane_group> counts_;
 };

@@ -151,6 +151,23 @@ void solve(const SimdFactor::Numbers& factor, double* x) {
     for (std::size_t lane = 0; lane < lane_group; lane += pair_lanes()) solve_pair(factor, x + lane);
 }
 
+void find_largest(const std::vector<LinearForm>& forms, const std::vector<double>& factor, const double* unknowns,
+                  double* largest) {
+    for (std::size_t lane = 0; lane < lane_group; lane += pair_lanes()) {
+        Pair most = all(0.0);
+        for (std::size_t e = 0; e < forms.size(); ++e) {
+            Pair value = all(0.0);
+            for (int k = 0; k < forms[e].size; ++k) {
+                const double* from = unknowns + lane_group * std::size_t(forms[e].unknown[k]) + lane;
+                value = mul_add(all(forms[e].coefficient[k]), load(from), value);
+            }
+            const Pair size = magnitude(value) * all(factor[e]);
+            most = select(either(size > most, no(size <= size)), size, most);
+        }
+        store(most, largest + lane);
+    }
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace stepdiag
 HWY_AFTER_NAMESPACE();
@@ -162,6 +179,7 @@ namespace {
 HWY_EXPORT(add_transposed_difference);
 HWY_EXPORT(subtract_product);
 HWY_EXPORT(solve);
+HWY_EXPORT(find_largest);
 
 }  // namespace
 
@@ -209,6 +227,11 @@ void SimdJacobian::subtract_product(const double* readings, const double* unknow
 }
 
 void SimdFactor::solve(double* right_hand_side) const { HWY_DYNAMIC_DISPATCH(solve)(numbers_, right_hand_side); }
+
+void find_largest(const std::vector<LinearForm>& forms, const std::vector<double>& factor, const double* unknowns,
+                  double* largest) {
+    HWY_DYNAMIC_DISPATCH(find_largest)(forms, factor, unknowns, largest);
+}
 
 }  // namespace stepdiag
 #endif  // HWY_ONCE

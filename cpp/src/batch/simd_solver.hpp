@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "adjustment/adjustment_tables.hpp"
 #include "adjustment/normal_equations.hpp"
 
 namespace stepdiag {
@@ -55,5 +56,9 @@ public:
 private:
     Numbers numbers_;
 };
+
+// The largest of |form(unknowns)| factor in each lane; NaN if any is NaN.
+void find_largest(const std::vector<LinearForm>& forms, const std::vector<double>& factor, const double* unknowns,
+                  double* largest);
 
 }  // namespace stepdiag
