@@ -1,8 +1,9 @@
-"""Compares the compensator with NumPy.
+"""Compares the compensator with NumPy and with a trilinear table.
 
-NumPy computes the error vector from the same 18 tables by numpy.interp: 1,000 positions at once, to first order and
-exactly, and one position at a time as for a controller. Times are in ns of one thread's processor time per error
-vector, measured in one run with benchmarks/compensator.cpp.
+The trilinear table (trilinear.c) has the errors for one tool at nodes in space. NumPy computes the
+error vector from the same 18 tables by numpy.interp: 1,000 positions at once, to first order and
+exactly, and one position at a time as for a controller. Times are in ns of one thread's processor
+time per error vector, measured in one run with benchmarks/compensator.cpp.
 """
 
 import argparse
@@ -98,14 +99,39 @@ def main() -> int:
         sys.exit(f"NumPy's errors are not ours: {exact:.1e} mm, to first order {first:.1e} mm")
 
     measured = run_own(build / "bench_compensator", 0.2)
-    vector, command = float(measured["error_vector"]["cpu_time"]), float(measured["command"]["cpu_time"])
+
+    def ns(name: str) -> float:
+        """Time of one position."""
+        rate = measured[name].get("items_per_second")
+        return 1e9 / float(rate) if rate else float(measured[name]["cpu_time"])
+
+    def trilinear(nodes: int) -> list[tuple[str, float, str]]:
+        of_table = measured[f"trilinear_at_once/{nodes}"]
+        size = 24 * nodes**3 / 1000
+        off = f"off by {of_table['rms']:.1e} mm rms, {of_table['largest']:.1e} at most"
+        return [
+            (f"trilinear, {nodes} nodes, one at a time", ns(f"trilinear/{nodes}"), f"{size:.0f} kB"),
+            (f"trilinear, {nodes} nodes, many at once", ns(f"trilinear_at_once/{nodes}"), off),
+        ]
+
+    vector = ns("error_vector")
     one = positions[:1]
     rows = [
         ("stepdiag, error vector", vector, "one position after the other, exact"),
-        ("stepdiag, with orientation", float(measured["error"]["cpu_time"]), "and the rotation vector of the tool"),
-        ("stepdiag, command", command, "the compensated position, to 1e-10 mm"),
-        ("stepdiag, Python, 1,000 at once", cpu_time(lambda: compensator.error(positions), POINTS), "and orientation"),
+        ("stepdiag, with orientation", ns("error"), "and the rotation vector of the tool"),
+        ("stepdiag, command", ns("command"), "the compensated position, to 1e-10 mm"),
+        ("stepdiag, many errors at once", ns("errors_at_once/50"), "exact, each with its status"),
+        ("  its floor", ns("floor/50"), f"loads and exact pose alone; ratio {measured['floor/50']['ratio']:.2f}"),
+        ("stepdiag, many commands at once", ns("commands_at_once/50"), "to 1e-10 mm, each with its status"),
+        ("stepdiag, Python, 1,000 at once", cpu_time(lambda: compensator.error(positions), POINTS), "exact"),
+        (
+            "stepdiag, Python, 1,000 commands",
+            cpu_time(lambda: compensator.command(positions), POINTS),
+            "to 1e-10 mm",
+        ),
         ("stepdiag, Python, one at a time", cpu_time(lambda: compensator.error(one), 1), "most of it is the call"),
+        *trilinear(9),
+        *trilinear(51),
         (f"NumPy {np.__version__}, interp alone", cpu_time(lambda: tables.look_up(positions), POINTS), "18 tables"),
         (
             "  first order, 1,000 at once",
