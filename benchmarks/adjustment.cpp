@@ -215,7 +215,7 @@ BENCHMARK_CAPTURE(adjusted, defaults, {})->Arg(50)->Arg(1000)->Unit(benchmark::k
 BENCHMARK(solve)->Arg(50)->Arg(1000)->Unit(benchmark::kMillisecond);
 BENCHMARK(variances)->Arg(50)->Arg(1000)->Unit(benchmark::kMillisecond);
 void layouts_and_angles(benchmark::internal::Benchmark* benchmark) {
-    benchmark->ArgNames({"layout_b", "urad"})->ArgsProduct({{0, 1}, {100, 1000}})->Unit(benchmark::kMillisecond);
+    benchmark->ArgNames({"layout_b", "urad"})->ArgsProduct({{0, 1}, {100, 1000, 3000}})->Unit(benchmark::kMillisecond);
 }
 BENCHMARK_CAPTURE(samples, three_quantities, false)->Apply(layouts_and_angles);
 BENCHMARK_CAPTURE(samples, defaults, true)->Apply(layouts_and_angles);
