@@ -139,7 +139,8 @@ public:
     const std::vector<int>& held() const { return held_; }
 
     // Right-hand sides beside each other: one way through the factor serves all of them, in little more time than one.
-    static constexpr int sides = widest_vector;
+    // Two vectors of them: each element of the factor that is loaded then serves two products.
+    static constexpr int sides = 2 * widest_vector;
     using Sides = Eigen::Matrix<double, Eigen::Dynamic, sides, Eigen::RowMajor>;
     using OfSides = Eigen::Matrix<double, 1, sides>;
 

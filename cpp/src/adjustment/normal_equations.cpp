@@ -49,6 +49,11 @@ void NormalEquations::Row::add_to(Side v, double times) const {
         if (unknown[i] != no_unknown) v[unknown[i]] += times * derivative[i];
 }
 
+void NormalEquations::Row::add_to(BorderedFactor::Sides& v, const BorderedFactor::OfSides& times) const {
+    for (int i = 0; i < size; ++i)
+        if (unknown[i] != no_unknown) v.row(unknown[i]) += derivative[i] * times;
+}
+
 NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&problem) {
     for (const LineSetup& setup : problem.setups()) models_.push_back(setup.model);
     std::size_t weights = 0;
@@ -319,10 +324,10 @@ void NormalEquations::assemble_point(const AdjustedPoint& point, int number, Bor
     const auto rounded_up = [&](int step) { return (size + step - 1) / step * step; };
     thread_local Eigen::MatrixXd square;  // -J^T J
     square.setZero(rounded_up(widest_vector), rounded_up(BorderedBand::block_size));
-    for (int r = point.first_reading; r < point.end_reading; ++r) {
-        if (!problem_->readings()[r].used()) continue;
-        const double* row = derivatives_.data() + first_weight_[r];
-        subtract_product(size, square.cols(), 1, {row, size}, {row, 1, size}, {square.data(), square.rows()});
+    for (int r = point.first_reading, end; r < point.end_reading; r = end + 1) {
+        for (end = r; end < point.end_reading && problem_->readings()[end].used();) ++end;
+        const double* rows = derivatives_.data() + first_weight_[r];
+        subtract_product(size, square.cols(), end - r, {rows, size}, {rows, 1, size}, {square.data(), square.rows()});
     }
 
     const int banded = 6 * matrix.blocks();
