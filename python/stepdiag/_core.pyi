@@ -3575,7 +3575,7 @@ def word_unseen_faults_with(words: collections.abc.Callable[[list[UnseenFault], 
     """
     Sets the function that makes sentences of what faults may be unseen in a calibration; the package does so.
     """
-__version__: str = '0.1.0'
+__version__: str = '1.0.0'
 adjusted_quantity_count: int = 9
 largest_repeat_count: int = 1000
 leaf_samples: int = 2000
