@@ -233,7 +233,7 @@ def test_a_checkpoint_that_is_none_is_refused(tmp_path: Path) -> None:
         (content[:200], "not all there|damaged"),
         (content[:200] + bytes([content[200] ^ 1]) + content[201:], "damaged"),
         (content + b"!", "1 bytes too many"),
-        (b"something else", "expected a checkpoint"),
+        (b"something else", 'expected "stepdiag checkpoint 1"'),
     ]:
         checkpoint.write_bytes(damaged)
         with pytest.raises(InvalidArgument, match=message):
