@@ -80,6 +80,7 @@ public:
     int leaf_row(int unknown) const {  // of the band or the border
         return unknown < block_size * blocks() ? unknown : int(leaf_border_) + border_place(unknown);
     }
+    std::ptrdiff_t leaf_border() const { return leaf_border_; }  // row of the border's first unknown
 
     // column <= row <= reach(column)
     Block block(int row, int column) { return Block(at(row, column), Eigen::OuterStride<>(band_step_)); }

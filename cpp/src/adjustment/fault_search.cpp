@@ -18,7 +18,6 @@ constexpr double large_gain = 1000.0;   // where second order may tell
 constexpr double credible = largest_noise_factor * largest_noise_factor;  // variance factor; above it is rejected
 constexpr double twin = 0.99;  // correlation of what shows the same in all other readings
 constexpr std::size_t most_exact = 20;
-constexpr int few_solutions = 300;        // of slips
 constexpr std::size_t most_members = 40;  // which are near enough to what is behind them
 
 // Two-sided, squared: 28 for a probability of 1.2e-7.
@@ -143,27 +142,17 @@ FaultSearch::Tested FaultSearch::test(Solution& solution, const Eigen::VectorXd&
     const Eigen::VectorXd residuals = equations.residuals() - equations.image(dx);
     Tested tested{std::make_unique<FaultHypotheses>(solution.problem()), nullptr,
                   equations.square_sum(residuals, x + dx), solution.degrees_of_freedom()};
-    const auto make = [&](int most_solutions) {
-        tested.tests = std::make_unique<FaultTests>(equations, solution.solver().factor(), solution.reading_variances(),
-                                                    *tested.hypotheses, residuals, most_solutions);
-    };
-    // A sound run needs no more than to be known as one.
-    constexpr double near_limit = 0.7;
-    make(few_solutions);
-    for (const FaultScore& score : tested.tests->scores())
-        if (score.gain >= near_limit * limit_ * tested.noise_beside(score.gain)) {
-            make(FaultTests::usual_most_solutions);
-            break;
-        }
+    tested.tests = std::make_unique<FaultTests>(equations, solution.solver().factor(), solution.inverse(),
+                                                solution.reading_variances(), *tested.hypotheses, residuals);
     return tested;
 }
 
-FaultTests& FaultSearch::tests(Solution& solution) {
+const FaultTests& FaultSearch::tests(Solution& solution) {
     const bool solved_again = options_.smoothness && options_.smoothness->cross_validated;
     if (!last_ || solved_again) {
         auto hypotheses = std::make_unique<FaultHypotheses>(solution.problem());
         auto tests = std::make_unique<FaultTests>(solution.solver().equations(), solution.solver().factor(),
-                                                  solution.reading_variances(), *hypotheses, few_solutions);
+                                                  solution.inverse(), solution.reading_variances(), *hypotheses);
         last_ = std::make_shared<Tested>(Tested{std::move(hypotheses), std::move(tests)});
     }
     return *last_->tests;

@@ -35,9 +35,8 @@ public:
     std::vector<FaultClass> classes(const Solution& solution, const CalibratedForms& forms,
                                     const Measurement& measurement) const;
 
-    // At the adjustment that came out, as it is now. Where a run has more than 300 slips, the uncertainty of most is
-    // interpolated (FaultTests), and may be far off: whoever states one refines it first.
-    FaultTests& tests(Solution& solution);
+    // At the adjustment that came out, as it is now.
+    const FaultTests& tests(Solution& solution);
 
 private:
     struct Candidate {

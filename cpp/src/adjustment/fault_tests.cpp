@@ -131,8 +131,9 @@ bool FaultHypotheses::differs_from_slip(const FaultHypothesis& reading) const {
     return as_slip(reading) && is_tilt_[reading.sequence];
 }
 
-FaultTests::FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const Eigen::VectorXd& variances,
-                       const FaultHypotheses& hypotheses, const Eigen::VectorXd& residuals, int most_solutions)
+FaultTests::FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const BorderedBand& inverse,
+                       const Eigen::VectorXd& variances, const FaultHypotheses& hypotheses,
+                       const Eigen::VectorXd& residuals)
     : equations_(&equations), factor_(&factor), hypotheses_(&hypotheses), residuals_(residuals) {
     const std::vector<AdjustedReading>& readings = equations.problem().readings();
     weight_.setZero(Eigen::Index(readings.size()));
@@ -142,20 +143,15 @@ FaultTests::FaultTests(const NormalEquations& equations, const BorderedFactor& f
     const std::vector<FaultHypothesis>& all = hypotheses.all();
     c_r_c_.resize(all.size());
     scores_.resize(all.size());
-    exact_.assign(all.size(), false);
     sum_readings();
+    const auto of_slips = slip_squares(hypotheses.sequences(), equations, factor, inverse, variances, weight_);
     for (std::size_t h = 0; h < all.size(); ++h) {
+        if (all[h].kind == FaultKind::slip) set(int(h), of_slips[all[h].sequence][all[h].first]);
         if (all[h].kind != FaultKind::reading) continue;
         const int r = *hypotheses.readings(all[h]).begin();
-        const double share = 1.0 - variances[r];
-        set(int(h), share < controlled_share ? 0.0 : weight_[r] * weight_[r] * share);
-        exact_[h] = true;
+        set(int(h), weight_[r] * weight_[r] * (1.0 - variances[r]));
     }
-    std::vector<int> factors;
-    for (std::size_t h = 0; h < all.size(); ++h)
-        if (all[h].kind == FaultKind::factor) factors.push_back(int(h));
-    refine(factors);
-    test_slips(most_solutions);
+    test_factors();
 }
 
 void FaultTests::sum_readings() {
@@ -181,71 +177,21 @@ void FaultTests::sum_readings() {
     }
 }
 
-void FaultTests::test_slips(int most_solutions) {
-    const std::vector<FaultHypothesis>& all = hypotheses_->all();
-    // By sequence and by the axis that moved last: q goes up and down with that.
-    std::map<std::pair<int, int>, std::vector<int>> alike;
-    int count = 0;
-    for (std::size_t h = 0; h < all.size(); ++h) {
-        if (all[h].kind != FaultKind::slip) continue;
-        const ReadingSequence& sequence = hypotheses_->sequences()[all[h].sequence];
-        const int axes = equations_->problem().setups()[sequence.setup].line.moved_axes();
-        alike[{all[h].sequence, all[h].first % axes}].push_back(int(h));
-        ++count;
-    }
-    const int step = std::max(1, (count + most_solutions - 1) / std::max(1, most_solutions));
-    std::vector<int> computed;
-    for (const auto& [place, slips] : alike) {
-        for (std::size_t i = 0; i < slips.size(); i += std::size_t(step)) computed.push_back(slips[i]);
-        computed.push_back(slips.back());
-    }
-    refine(computed);
-    std::vector<std::pair<double, int>> likely;  // minus gain: the largest comes first
-    for (const auto& [place, slips] : alike)
-        for (int i = 0, next, last = int(slips.size()) - 1; i < last; i = next) {
-            next = std::min(i + step, last);
-            for (int k = i + 1; k < next; ++k) {
-                const double part = double(k - i) / double(next - i);
-                set(slips[k], (1.0 - part) * c_r_c_[slips[i]] + part * c_r_c_[slips[next]]);
-                if (4.0 * scores_[slips[k]].gain >= significant) likely.emplace_back(-scores_[slips[k]].gain, slips[k]);
-            }
-        }
-    std::sort(likely.begin(), likely.end());
-    if (int(likely.size()) > most_solutions) likely.resize(std::size_t(most_solutions));
-    computed.clear();
-    for (const auto& [gain, h] : likely) computed.push_back(h);
-    refine(computed);
-}
-
-void FaultTests::refine(const std::vector<int>& hypotheses) {
+void FaultTests::test_factors() {
     std::vector<int> list;
-    for (const int h : hypotheses) {
-        if (!exact_[h]) list.push_back(h);
-        exact_[h] = true;
-    }
+    for (std::size_t h = 0; h < hypotheses_->all().size(); ++h)
+        if (hypotheses_->all()[h].kind == FaultKind::factor) list.push_back(int(h));
     for (std::size_t first = 0; first < list.size(); first += BorderedFactor::sides) {
         const int* some = list.data() + first;
         const int count = int(std::min<std::size_t>(BorderedFactor::sides, list.size() - first));
-        const BorderedFactor::OfSides squares =
-            factor_->inverse_squares(gradients(some, count), common_leaf(some, count));
-        for (int k = 0; k < count; ++k) {
-            const double all = square(some[k]), q = all - squares[k];
-            set(some[k], q < controlled_share * all ? 0.0 : q);
-        }
+        const BorderedFactor::OfSides squares = factor_->inverse_squares(gradients(some, count));
+        for (int k = 0; k < count; ++k) set(some[k], square(some[k]) - squares[k]);
     }
 }
 
-int FaultTests::common_leaf(const int* hypotheses, int count) const {
-    if (equations_->problem().leaves().size.empty()) return BorderedFactor::every_leaf;
-    const auto set_up = [&](int h) { return hypotheses_->sequences()[hypotheses_->all()[h].sequence].setup; };
-    const bool common =
-        std::all_of(hypotheses, hypotheses + count, [&](int h) { return set_up(h) == set_up(hypotheses[0]); });
-    return common ? set_up(hypotheses[0]) : BorderedFactor::every_leaf;
-}
-
 void FaultTests::set(int hypothesis, double c_r_c) {
-    c_r_c_[hypothesis] = c_r_c;
-    scores_[hypothesis] = FaultScore(product_[hypothesis], c_r_c);
+    c_r_c_[hypothesis] = c_r_c < controlled_share * square(hypothesis) ? 0.0 : c_r_c;
+    scores_[hypothesis] = FaultScore(product_[hypothesis], c_r_c_[hypothesis]);
 }
 
 void FaultTests::add_gradient(const FaultHypothesis& hypothesis, NormalEquations::Side gradient) const {

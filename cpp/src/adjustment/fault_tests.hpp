@@ -11,16 +11,9 @@
 #include <optional>
 #include <vector>
 
-#include "adjustment/normal_equations.hpp"
+#include "adjustment/slip_squares.hpp"
 
 namespace stepdiag {
-
-// The readings of one channel in one set-up, in the order in which they were made: into AdjustmentProblem::readings().
-struct ReadingSequence {
-    int setup;
-    int channel;
-    std::vector<int> readings;
-};
 
 struct FaultHypothesis {
     FaultKind kind;
@@ -87,29 +80,21 @@ struct FaultScore {
 std::vector<FaultScore> scores_of(const std::vector<const ReadingPattern*>& patterns, const NormalEquations& equations,
                                   const BorderedFactor& factor, double least_share);
 
-// Of readings scores cost nothing, because the inverse is there; of slips a solution each. Where a run has more slips
-// than `most_solutions`, q is computed at evenly spaced ones of each sequence and interpolated between them, for each
-// axis that moves by itself (along a line it changes slowly so), and then computed where the gain so found is above a
-// quarter of what counts, at the `most_solutions` largest. So a long run takes at most about twice as many solutions.
 class FaultTests {
 public:
     static constexpr double significant = 28.0;  // gain in chi-square
-    static constexpr int usual_most_solutions = 1000;
 
-    // At the equations' last linearisation. `factor`: of N there; `variances`: of the readings, from its inverse. The
-    // equations, the factor and the hypotheses must outlive this.
-    FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const Eigen::VectorXd& variances,
-               const FaultHypotheses& hypotheses, int most_solutions = usual_most_solutions)
-        : FaultTests(equations, factor, variances, hypotheses, equations.residuals(), most_solutions) {}
+    // At the equations' last linearisation. `factor`: of N there; `inverse`: its inverse; `variances`: of the readings,
+    // from it. The equations, the factor and the hypotheses must outlive this.
+    FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const BorderedBand& inverse,
+               const Eigen::VectorXd& variances, const FaultHypotheses& hypotheses)
+        : FaultTests(equations, factor, inverse, variances, hypotheses, equations.residuals()) {}
     // The same somewhere else than at the minimum. `residuals`: weighted, at the minimum of that linear problem.
-    FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const Eigen::VectorXd& variances,
-               const FaultHypotheses& hypotheses, const Eigen::VectorXd& residuals,
-               int most_solutions = usual_most_solutions);
+    FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const BorderedBand& inverse,
+               const Eigen::VectorXd& variances, const FaultHypotheses& hypotheses, const Eigen::VectorXd& residuals);
 
     const FaultHypotheses& hypotheses() const { return *hypotheses_; }
     const std::vector<FaultScore>& scores() const { return scores_; }  // by hypothesis
-    // To the exact score, where they are not that.
-    void refine(const std::vector<int>& hypotheses);
 
     double square(int hypothesis) const { return square_[hypothesis]; }  // c.c
     // What a fault of size 1 that is not accounted for does to all unknowns: N^-1 J^T c.
@@ -117,8 +102,10 @@ public:
     Eigen::VectorXd effect(int hypothesis) const { return effect(hypotheses_->all()[hypothesis]); }
     // Of up to BorderedFactor::sides hypotheses, beside each other; all others are 0.
     BorderedFactor::Sides effects(const int* hypotheses, int count) const;
-    // Of one hypothesis with each, from one solution; 0 where nothing controls one of the two. (Where q of the other
-    // one is interpolated, this is as good as that.)
+    // What each fault of size 1 does to values: `use(hypothesis, OfSides)`. `y`: N^-1 of their forms.
+    template <class Use>
+    void each_effect(const BorderedFactor::Sides& y, const Use& use) const;
+    // Of one hypothesis with each, from one solution; 0 where nothing controls one of the two.
     std::vector<double> correlations(int hypothesis) const { return correlations(hypothesis, effect(hypothesis)); }
     std::vector<double> correlations(int hypothesis, const Eigen::VectorXd& effect) const;  // that has this effect
     double correlation(int h, int k) const { return correlations(h)[k]; }
@@ -129,10 +116,9 @@ private:
     }
     void add_gradient(const FaultHypothesis& hypothesis, NormalEquations::Side gradient) const;  // J^T c
     BorderedFactor::Sides gradients(const int* hypotheses, int count) const;
-    int common_leaf(const int* hypotheses, int count) const;
     void sum_readings();
     double controlled(int hypothesis, const Eigen::VectorXd& effect) const;
-    void test_slips(int most_solutions);
+    void test_factors();
     void set(int hypothesis, double c_r_c);
 
     const NormalEquations* equations_;
@@ -143,7 +129,28 @@ private:
     std::vector<double> square_, product_;  // c.c and c.w, by hypothesis
     std::vector<double> c_r_c_;             // q, by hypothesis; 0 where nothing controls it
     std::vector<FaultScore> scores_;
-    std::vector<bool> exact_;
 };
+
+template <class Use>
+void FaultTests::each_effect(const BorderedFactor::Sides& y, const Use& use) const {
+    using OfSides = BorderedFactor::OfSides;
+    const std::vector<FaultHypothesis>& all = hypotheses_->all();
+    const BorderedFactor::Sides image = equations_->images(y);
+    std::vector<OfSides> from;  // of a sequence from each place to its end
+    for (std::size_t h = 0; h < all.size();) {
+        const int sequence = all[h].sequence;
+        const std::vector<int>& readings = hypotheses_->sequences()[sequence].readings;
+        from.assign(readings.size() + 1, OfSides::Zero());
+        for (std::size_t i = readings.size(); i-- > 0;)
+            from[i].noalias() = from[i + 1] + weight_[readings[i]] * image.row(readings[i]);
+        for (; h < all.size() && all[h].sequence == sequence; ++h) {
+            OfSides effect = OfSides::Zero();
+            if (all[h].kind == FaultKind::slip) effect = from[all[h].first];
+            else
+                for (const int r : hypotheses_->readings(all[h])) effect += weight(all[h], r) * image.row(r);
+            use(int(h), effect);
+        }
+    }
+}
 
 }  // namespace stepdiag

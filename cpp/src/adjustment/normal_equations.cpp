@@ -37,13 +37,6 @@ double NormalEquations::Row::product(const Eigen::VectorXd& v) const {
     return sum;
 }
 
-BorderedFactor::OfSides NormalEquations::Row::products(const BorderedFactor::Sides& v) const {
-    BorderedFactor::OfSides sums = BorderedFactor::OfSides::Zero();
-    for (int i = 0; i < size; ++i)
-        if (unknown[i] != no_unknown) sums += derivative[i] * v.row(unknown[i]);
-    return sums;
-}
-
 void NormalEquations::Row::add_to(Side v, double times) const {
     for (int i = 0; i < size; ++i)
         if (unknown[i] != no_unknown) v[unknown[i]] += times * derivative[i];
@@ -56,7 +49,7 @@ void NormalEquations::Row::add_to(BorderedFactor::Sides& v, const BorderedFactor
 
 NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&problem) {
     for (const LineSetup& setup : problem.setups()) models_.push_back(setup.model);
-    std::size_t weights = 0;
+    std::size_t weights = 0, most = 0;
     first_weight_.resize(problem.readings().size());
     point_of_reading_.resize(problem.readings().size());
     std::vector<std::vector<std::pair<int, double>>> faults(problem.readings().size());  // unknown, share
@@ -93,9 +86,11 @@ NormalEquations::NormalEquations(const AdjustmentProblem& problem) : problem_(&p
             }
             weights += count;
         }
+        most = std::max(most, count);
     }
     first_unknown_.push_back(int(unknowns_.size()));
-    derivatives_.assign(weights + widest_vector, 0.0);  // vectors reach beyond the last one
+    // Vectors reach beyond the last one, and whole groups of columns.
+    derivatives_.assign(weights + widest_vector + BorderedBand::block_size * most, 0.0);
     for (const auto& [place, derivative] : of_faults) derivatives_[place] = derivative;
     residuals_.setZero(Eigen::Index(problem.readings().size()));
     if (problem.moves_axes()) by_shift_.resize(problem.readings().size());
@@ -402,6 +397,25 @@ Eigen::VectorXd NormalEquations::image(const Eigen::VectorXd& v) const {
     for (const AdjustedPoint& point : problem_->points())
         for (int r = point.first_reading; r < point.end_reading; ++r) image[r] = row(point, r).product(v);
     return image;
+}
+
+BorderedFactor::Sides NormalEquations::images(const BorderedFactor::Sides& v) const {
+    constexpr int sides = BorderedFactor::sides, six = BorderedBand::block_size;
+    BorderedFactor::Sides images(residuals_.size() + six, sides), own;
+    for (const AdjustedPoint& point : problem_->points()) {
+        const int count = point.end_reading - point.first_reading;
+        const Row any = row(point, point.first_reading);
+        own.resize(any.size, sides);
+        for (int i = 0; i < any.size; ++i) {
+            if (any.unknown[i] == no_unknown) own.row(i).setZero();
+            else own.row(i) = -v.row(any.unknown[i]);
+        }
+        images.middleRows(point.first_reading, count).setZero();
+        // Whole groups of six readings: those beyond are calculated again.
+        subtract_product(sides, (count + six - 1) / six * six, any.size, {own.data(), sides},
+                         {any.derivative, any.size, 1}, {images.row(point.first_reading).data(), sides});
+    }
+    return images;
 }
 
 Eigen::VectorXd NormalEquations::product(const Eigen::VectorXd& v) const { return -transposed(-image(v), v); }

@@ -69,6 +69,8 @@ public:
     // with expansion.
     Eigen::VectorXd gradient_of_shifts(const std::function<Eigen::Vector3d(const AdjustedPoint&)>& shift) const;
     Eigen::VectorXd image(const Eigen::VectorXd& v) const;    // J v, of all readings
+    // The same of vectors beside each other, with rows beyond the last reading.
+    BorderedFactor::Sides images(const BorderedFactor::Sides& v) const;
     Eigen::VectorXd product(const Eigen::VectorXd& v) const;  // (J^T J + P) v
 
     using Side =
@@ -80,12 +82,12 @@ public:
         int size;
 
         double product(const Eigen::VectorXd& v) const;
-        BorderedFactor::OfSides products(const BorderedFactor::Sides& v) const;
         void add_to(Side v, double times) const;
         void add_to(BorderedFactor::Sides& v, const BorderedFactor::OfSides& times) const;
     };
     Row row(const AdjustedPoint& point, int reading) const;
-    Row row(int reading) const { return row(problem_->points()[point_of_reading_[reading]], reading); }
+    Row row(int reading) const { return row(point(reading), reading); }
+    const AdjustedPoint& point(int reading) const { return problem_->points()[point_of_reading_[reading]]; }
     // The part of an inverse that belongs to a point's unknowns; 0 where there is none.
     using Square = Eigen::MatrixXd;
     void gather(const AdjustedPoint& point, const BorderedBand& inverse, Square& covariance) const;

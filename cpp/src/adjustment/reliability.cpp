@@ -13,7 +13,6 @@ namespace {
 constexpr double power_of_99_percent = 7.6;  // square root of the noncentrality: sqrt(28) + 2.3
 constexpr double told_apart = 25.0;          // difference of chi-square
 constexpr double twin = 0.999;               // correlation
-constexpr double similar = 0.5;              // where the correlation of interpolated scores may be that of a twin
 constexpr double most_numbers = 4e6;         // of effects kept
 constexpr std::size_t fewest_places = 200;
 
@@ -84,7 +83,8 @@ public:
           problem_(solution.problem()),
           values_(calibrated_values(forms, solution.inverse())),
           hypotheses_(problem_),
-          tests_(solution.solver().equations(), solution.solver().factor(), solution.reading_variances(), hypotheses_),
+          tests_(solution.solver().equations(), solution.solver().factor(), solution.inverse(),
+                 solution.reading_variances(), hypotheses_),
           effects_(tests_, values_) {}
 
     std::vector<FaultControl> look() {
@@ -106,7 +106,6 @@ public:
 
 private:
     void look_at(int h, FaultControl& control) {
-        tests_.refine({h});
         const Eigen::VectorXd effect = tests_.effect(h);
         const Eigen::VectorXd& changes = effects_.add(h, effect);
         const double u = tests_.scores()[h].standard_uncertainty;
@@ -118,15 +117,9 @@ private:
             double& hidden = (control.*families[values_[i].family]).hidden;
             hidden = std::max(hidden, size_found * std::abs(changes[Eigen::Index(i)]));
         }
-        std::vector<double> correlations = tests_.correlations(h, effect);
+        const std::vector<double> correlations = tests_.correlations(h, effect);
         double nearest = 0.0;
         bool has_twin = false;
-        std::vector<int> alike;
-        for (int k = 0; k < int(correlations.size()); ++k)
-            if (k != h && std::abs(correlations[k]) > similar) alike.push_back(k);
-        for (const int k : alike) correlations[k] /= tests_.scores()[k].standard_uncertainty;
-        tests_.refine(alike);
-        for (const int k : alike) correlations[k] *= tests_.scores()[k].standard_uncertainty;
         for (int k = 0; k < int(correlations.size()); ++k) {
             if (k == h) continue;
             if (std::abs(correlations[k]) < twin) {
@@ -180,11 +173,11 @@ private:
 
 // The largest entries of the matrix whose element (h, v) is what fault h, just not found, does to value v, for each
 // kind of fault and family of values. A row takes one solution, a column as well: N^-1 of the value's form tells what
-// every fault does to it. So from some columns to the rows of their largest entries, from there to the columns of
-// theirs, and once more. Entries that are noted are of rows, and exact: of most slips the uncertainty is interpolated.
+// every fault does to it. So from some columns to the rows of their largest entries, and from there to the columns of
+// theirs.
 class Unseen {
 public:
-    Unseen(Solution& solution, FaultTests& tests, const CalibratedForms& forms, double noise)
+    Unseen(Solution& solution, const FaultTests& tests, const CalibratedForms& forms, double noise)
         : solver_(solution.solver()),
           limit_(power_of_99_percent * noise),
           values_(calibrated_values(forms, solution.inverse())),
@@ -200,16 +193,9 @@ public:
     }
 
     std::vector<UnseenFault> look() {
-        look_at_sizes();
-        std::set<int> columns = first_columns();
-        constexpr int rounds = 2;
-        for (int round = 0; round < rounds && !columns.empty(); ++round) {
-            look_at_rows(rows_of({columns.begin(), columns.end()}));
-            columns_seen_.merge(columns);
-            columns.clear();
-            for (const auto& [place, entry] : best_)
-                if (columns_seen_.count(entry.value) == 0) columns.insert(entry.value);
-        }
+        look_at_columns(first_columns());
+        look_at_rows();
+        look_at_columns(columns_of_largest());
         look_at_uncontrolled();
         return faults_;
     }
@@ -221,131 +207,84 @@ private:
     using Sides = BorderedFactor::Sides;
     using OfSides = BorderedFactor::OfSides;
     struct Entry {
-        double effect = 0.0;
         int hypothesis = 0, value = 0;
     };
 
     // Of each function and squareness the value that is known worst, and both ends.
-    std::set<int> first_columns() const {
+    std::vector<int> first_columns() {
         constexpr int spread = 2;
-        std::set<int> columns;
         for (int first = 0, end; first < int(values_.size()); first = end) {
             int worst = first;
             for (end = first; end < int(values_.size()) && values_[end].table == values_[first].table; ++end)
                 if (values_[end].standard_uncertainty > values_[worst].standard_uncertainty) worst = end;
-            columns.insert(worst);
-            for (int k = 0; k < spread; ++k) columns.insert(first + k * (end - 1 - first) / (spread - 1));
+            columns_seen_.insert(worst);
+            for (int k = 0; k < spread; ++k) columns_seen_.insert(first + k * (end - 1 - first) / (spread - 1));
         }
+        return {columns_seen_.begin(), columns_seen_.end()};
+    }
+
+    std::vector<int> columns_of_largest() {
+        std::vector<int> columns;
+        for (const auto& [place, entry] : best_)
+            if (columns_seen_.insert(entry.value).second) columns.push_back(entry.value);
         return columns;
     }
 
     double uncertainty(int h) const { return tests_.scores()[h].standard_uncertainty; }
     bool is_controlled(int h) const { return !std::isinf(uncertainty(h)); }
 
-    // The largest of each kind. Of slips it is climbed to from the largest of those that are computed.
-    void look_at_sizes() {
+    double& hidden(int group, int value) { return faults_[group].*unseen_families[values_[value].family]; }
+    void note(int h, int value, double effect) {
+        double& largest = hidden(group_[h], value);
+        if (!(effect > largest)) return;
+        largest = effect;
+        best_[{group_[h], values_[value].family}] = {h, value};
+    }
+
+    // Of each kind of fault the largest, and those that do most.
+    void look_at_rows() {
         std::vector<int> worst(faults_.size(), -1);
         for (int h = 0; h < int(group_.size()); ++h) {
             int& of_kind = worst[group_[h]];
             if (!is_controlled(h)) uncontrolled_[group_[h]].push_back(h);
             else if (of_kind < 0 || uncertainty(h) > uncertainty(of_kind)) of_kind = h;
         }
-        worst.erase(std::remove(worst.begin(), worst.end(), -1), worst.end());
-        tests_.refine(worst);
-        constexpr int strides[] = {24, 12, 6, 3, 2, 1};
-        for (const int stride : strides) {
-            std::vector<std::pair<int, int>> steps;  // into worst, and to where
-            std::vector<int> there;
-            for (int w = 0; w < int(worst.size()); ++w)
-                for (const int k : {worst[w] - stride, worst[w] + stride})
-                    if (k >= 0 && k < int(group_.size()) && hypotheses_.all()[k].kind == FaultKind::slip &&
-                        group_[k] == group_[worst[w]]) {
-                        steps.emplace_back(w, k);
-                        there.push_back(k);
-                    }
-            tests_.refine(there);
-            for (const auto& [w, k] : steps)
-                if (is_controlled(k) && uncertainty(k) > uncertainty(worst[w])) worst[w] = k;
-        }
-        look_at_rows(worst);
-    }
-
-    // What each of these faults, just not found, does to each value.
-    void look_at_rows(std::vector<int> rows) {
-        const auto is_seen = [&](int h) { return !rows_seen_.insert(h).second; };
-        rows.erase(std::remove_if(rows.begin(), rows.end(), is_seen), rows.end());
-        tests_.refine(rows);
-        const auto is_open = [&](int h) { return !is_controlled(h); };
-        rows.erase(std::remove_if(rows.begin(), rows.end(), is_open), rows.end());
-        for_eights(rows, [&](const int* some, int count) {
+        std::set<int> rows(worst.begin(), worst.end());
+        rows.erase(-1);
+        for (const int h : rows) faults_[group_[h]].size = limit_ * uncertainty(h);
+        for (const auto& [place, entry] : best_) rows.insert(entry.hypothesis);
+        for_sixteens({rows.begin(), rows.end()}, [&](const int* some, int count) {
             const Sides effects = tests_.effects(some, count);
             OfSides size = OfSides::Zero();
-            for (int k = 0; k < count; ++k) {
-                size[k] = limit_ * uncertainty(some[k]);
-                double& largest = faults_[group_[some[k]]].size;
-                largest = std::max(largest, size[k]);
-            }
+            for (int k = 0; k < count; ++k) size[k] = limit_ * uncertainty(some[k]);
             for (int v = 0; v < int(values_.size()); ++v) {
                 const OfSides changed = values_[v].form->values(effects).cwiseAbs().cwiseProduct(size);
-                for (int k = 0; k < count; ++k) {
-                    double& hidden = faults_[group_[some[k]]].*unseen_families[values_[v].family];
-                    if (!(changed[k] > hidden)) continue;
-                    hidden = changed[k];
-                    best_[{group_[some[k]], values_[v].family}] = {changed[k], some[k], v};
-                }
+                for (int k = 0; k < count; ++k) note(some[k], v, changed[k]);
             }
         });
     }
 
-    // For each kind of fault and each family the fault with most effect on one of these values.
-    std::vector<int> rows_of(const std::vector<int>& columns) const {
-        constexpr int families_count = int(std::size(unseen_families));
-        const auto& all = hypotheses_.all();
+    // What all faults do to each of these values.
+    void look_at_columns(const std::vector<int>& columns) {
         const NormalEquations& equations = solver_.equations();
-        std::vector<Entry> largest(faults_.size() * families_count);
-        for_eights(columns, [&](const int* some, int count) {
+        for_sixteens(columns, [&](const int* some, int count) {
             Sides y = Sides::Zero(equations.problem().size(), BorderedFactor::sides);
             for (int k = 0; k < count; ++k)
                 for (int i = 0; i < values_[some[k]].form->size; ++i)
                     y(values_[some[k]].form->unknown[i], k) += values_[some[k]].form->coefficient[i];
             solver_.factor().solve(y);
-            const std::vector<OfSides> effects = effects_on(y);
-            for (int h = 0; h < int(all.size()); ++h) {
-                if (!is_controlled(h)) continue;
-                const OfSides changed = limit_ * uncertainty(h) * effects[h].cwiseAbs();
-                for (int k = 0; k < count; ++k) {
-                    Entry& entry = largest[group_[h] * families_count + values_[some[k]].family];
-                    if (changed[k] > entry.effect) entry = {changed[k], h, some[k]};
-                }
-            }
+            std::vector<OfSides> largest(faults_.size(), OfSides::Constant(std::numeric_limits<double>::infinity()));
+            for (std::size_t g = 0; g < faults_.size(); ++g)
+                for (int k = 0; k < count; ++k) largest[g][k] = hidden(int(g), some[k]);
+            tests_.each_effect(y, [&](int h, const OfSides& effect) {
+                if (!is_controlled(h)) return;
+                const OfSides changed = limit_ * uncertainty(h) * effect.cwiseAbs();
+                OfSides& so_far = largest[std::size_t(group_[h])];
+                if (!(changed.array() > so_far.array()).any()) return;
+                for (int k = 0; k < count; ++k) note(h, some[k], changed[k]);
+                so_far = so_far.cwiseMax(changed);
+            });
         });
-        std::vector<int> rows;
-        for (const Entry& entry : largest)
-            if (entry.effect > 0.0) rows.push_back(entry.hypothesis);
-        return rows;
-    }
-
-    // Of each fault of size 1, from N^-1 of the values' forms.
-    std::vector<OfSides> effects_on(const Sides& y) const {
-        const NormalEquations& equations = solver_.equations();
-        std::vector<OfSides> of(equations.problem().readings().size(), OfSides::Zero()), effects(group_.size());
-        for (int r = 0; r < int(of.size()); ++r) {
-            const AdjustedReading& reading = equations.problem().readings()[r];
-            if (reading.used()) of[r] = equations.row(r).products(y) / reading.standard_uncertainty;
-        }
-        std::vector<std::vector<OfSides>> from;  // of a sequence from each place to its end
-        for (const ReadingSequence& sequence : hypotheses_.sequences()) {
-            auto& sums = from.emplace_back(sequence.readings.size() + 1, OfSides::Zero());
-            for (std::size_t i = sequence.readings.size(); i-- > 0;) sums[i] = sums[i + 1] + of[sequence.readings[i]];
-        }
-        for (int h = 0; h < int(group_.size()); ++h) {
-            const FaultHypothesis& fault = hypotheses_.all()[h];
-            effects[h] = OfSides::Zero();
-            if (fault.kind == FaultKind::slip) effects[h] = from[fault.sequence][fault.first];
-            else
-                for (const int r : hypotheses_.readings(fault)) effects[h] += hypotheses_.share(fault, r) * of[r];
-        }
-        return effects;
     }
 
     void look_at_uncontrolled() {
@@ -354,7 +293,7 @@ private:
             const std::size_t step = (list.size() + most_uncontrolled - 1) / most_uncontrolled;
             for (std::size_t i = 0; i < list.size(); i += step) rows.push_back(list[i]);
             UnseenFault& faults = faults_[group];
-            for_eights(rows, [&](const int* some, int count) {
+            for_sixteens(rows, [&](const int* some, int count) {
                 const Sides effects = tests_.effects(some, count);
                 OfSides noise = OfSides::Zero();
                 for (int k = 0; k < count; ++k) noise[k] = 1.0 / std::sqrt(tests_.square(some[k]));
@@ -369,7 +308,7 @@ private:
     }
 
     template <class Function>
-    static void for_eights(const std::vector<int>& list, const Function& function) {
+    static void for_sixteens(const std::vector<int>& list, const Function& function) {
         for (std::size_t i = 0; i < list.size(); i += BorderedFactor::sides)
             function(list.data() + i, int(std::min<std::size_t>(BorderedFactor::sides, list.size() - i)));
     }
@@ -378,17 +317,17 @@ private:
     double limit_;
     std::vector<CalibratedValue> values_;
     const FaultHypotheses& hypotheses_;
-    FaultTests& tests_;
+    const FaultTests& tests_;
     std::vector<UnseenFault> faults_;
     std::vector<int> group_;  // by hypothesis, into faults_
     std::map<int, std::vector<int>> uncontrolled_;
     std::map<Place, Entry> best_;
-    std::set<int> rows_seen_, columns_seen_;
+    std::set<int> columns_seen_;
 };
 
 }  // namespace
 
-std::vector<UnseenFault> unseen_faults(Solution& solution, FaultTests& tests, const CalibratedForms& forms,
+std::vector<UnseenFault> unseen_faults(Solution& solution, const FaultTests& tests, const CalibratedForms& forms,
                                        double noise) {
     return Unseen(solution, tests, forms, noise).look();
 }

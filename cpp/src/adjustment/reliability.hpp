@@ -15,7 +15,7 @@ std::vector<FaultControl> reliability(Solution& solution, const CalibratedForms&
 
 // What faults of each kind may do unseen: the worst places only, so that every adjustment can say it. `tests`: at the
 // solution.
-std::vector<UnseenFault> unseen_faults(Solution& solution, FaultTests& tests, const CalibratedForms& forms,
+std::vector<UnseenFault> unseen_faults(Solution& solution, const FaultTests& tests, const CalibratedForms& forms,
                                        double noise = 1.0);
 
 }  // namespace stepdiag
