@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "adjustment/rank_decision.hpp"
 #include "stepdiag/core/error.hpp"
@@ -55,7 +56,7 @@ void GaussNewton::factorize() {
     equations_.assemble(matrix_);
     scale_ = matrix_.diagonal().cwiseSqrt();
     for (const int j : held_) element(matrix_, j, j) = 0.0;  // which holds it again
-    if (factor_) factor_->factorize(matrix_);
+    if (factor_) factor_->factorize(std::move(matrix_));
     else factor_.emplace(matrix_, rank_threshold);
 }
 
@@ -158,7 +159,7 @@ bool GaussNewton::descend(Eigen::VectorXd& x, const Step& step) {
         matrix_ = curved;
         for (int j = 0; j < matrix_.size(); ++j) element(matrix_, j, j) += damping_ * stiffness_[j];
         for (const int j : held_) element(matrix_, j, j) = 0.0;
-        factor_->factorize(matrix_);
+        factor_->factorize(std::move(matrix_));
         if (factor_->held() != held_) continue;
         Eigen::VectorXd move = gradient;
         factor_->solve(move);
@@ -179,7 +180,7 @@ void GaussNewton::follow_set_ups(Eigen::VectorXd& x) {
     equations_.assemble(matrix_);
     for (int j = 0; j < matrix_.size(); ++j) element(matrix_, j, j) += stays * stiffness_[j];
     for (const int j : held_) element(matrix_, j, j) = 0.0;
-    factor_->factorize(matrix_);
+    factor_->factorize(std::move(matrix_));
     Eigen::VectorXd move = equations_.gradient(x);
     factor_->solve(move);
     x += move;

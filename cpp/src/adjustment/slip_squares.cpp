@@ -93,18 +93,13 @@ public:
           leaf_step_(leaf_ == none ? 0 : z_.leaf_column(1) - z_.leaf_column(0)),
           corner_(Eigen::MatrixXd::Zero(border_step_, round_up(z_.border()))),
           own_(Eigen::MatrixXd::Zero(leaf_size_, round_up(leaf_size_))) {
-        corner_.topLeftCorner(z_.border(), z_.border()) = z_.corner();
-        if (leaf_ != none) own_.leftCols(leaf_size_) = z_.leaf(leaf_);
-    }
-
-    void clear() {
-        first_ = 0;
-        last_ = none;
         rest_.setZero(lanes, six * z_.blocks());
         of_border_.setZero(lanes, round_up(z_.border()));
         of_leaf_.setZero(lanes, round_up(leaf_size_));
         border_ = of_border_;
         leaf_part_ = of_leaf_;
+        corner_.topLeftCorner(z_.border(), z_.border()) = z_.corner();
+        if (leaf_ != none) own_.leftCols(leaf_size_) = z_.leaf(leaf_);
     }
 
     // What belongs to blocks before this one is final. With leaves, which come before, nothing is.
@@ -284,18 +279,59 @@ void add_common(const std::vector<Start>& starts, const NormalEquations& equatio
     }
 }
 
-// By step, of those that come with it and after it in the order of a part.
-std::vector<int> lowest_to_come(const Group& group, const Part& part) {
-    std::vector<int> lowest(group.steps.size(), none);
-    int low = none;
-    for (int k = part.end - part.first; k-- > 0;) {
-        const int i = part.forward ? part.first + k : part.end - 1 - k;
-        const int own = group.steps[i].low;
-        if (own != none) low = low == none ? own : std::min(low, own);
-        lowest[i] = low;
+// One part of a group, added step by step.
+class Sweep {
+public:
+    Sweep(const Group& group, const Part& part, const NormalEquations& equations, const BorderedFactor& factor,
+          const BorderedBand& inverse)
+        : group_(&group),
+          part_(part),
+          square_of_start_(group.square[std::size_t(&part - group.parts.data())]),
+          sum_(equations, factor, inverse, group.first->setup) {
+        lowest_to_come_.resize(std::size_t(part.end - part.first));
+        int low = none;
+        for (int k = int(lowest_to_come_.size()); k-- > 0;) {
+            const int own = step(k).low;
+            if (own != none) low = low == none ? own : std::min(low, own);
+            lowest_to_come_[k] = low;
+        }
     }
-    return lowest;
-}
+
+    const Group& group() const { return *group_; }
+
+    // Adds the steps that come before this block is final. `squares`: of the group's sequences.
+    void go_to(int block, const Eigen::VectorXd& variances, const Eigen::VectorXd& weight,
+               std::vector<double>* squares) {
+        for (; next_ < int(lowest_to_come_.size()) && lowest_to_come_[next_] < block; ++next_) {
+            const Step& step = this->step(next_);
+            if (part_.forward) put(step, squares);
+            if (lowest_to_come_[next_] != none) sum_.finish_before(lowest_to_come_[next_]);
+            square_ -= 2.0 * sum_.add(step, weight);
+            for (int lane = 0; lane < group_->count; ++lane)
+                if (const int r = step.reading[lane]; r != none)
+                    square_[lane] += weight[r] * weight[r] * (1.0 - variances[r]);
+            common_ += group_->common[std::size_t(&step - group_->steps.data())];
+            if (!part_.forward) put(step, squares);
+        }
+    }
+
+private:
+    const Step& step(int k) const { return group_->steps[part_.forward ? part_.first + k : part_.end - 1 - k]; }
+
+    void put(const Step& step, std::vector<double>* squares) const {
+        const Lanes square = square_of_start_ + square_ + (part_.forward ? -2.0 : 2.0) * common_;
+        for (int lane = 0; lane < group_->count; ++lane)
+            if (step.reading[lane] != none) squares[lane][step.place[lane]] = square[lane];
+    }
+
+    const Group* group_;
+    Part part_;
+    Lanes square_of_start_;                                // A^T R A
+    Lanes square_ = Lanes::Zero(), common_ = Lanes::Zero();  // h^T R h, A^T R h
+    Sum sum_;
+    std::vector<int> lowest_to_come_;  // block, of those that come with a step and after it
+    int next_ = 0;
+};
 
 }  // namespace
 
@@ -319,32 +355,19 @@ std::vector<std::vector<double>> slip_squares(const std::vector<ReadingSequence>
 
     std::vector<std::vector<double>> squares;
     for (const ReadingSequence& sequence : sequences) squares.emplace_back(sequence.readings.size());
-    for (const Group& group : groups) {
-        Sum sum(equations, factor, inverse, group.first->setup);
-        for (std::size_t p = 0; p < group.parts.size(); ++p) {
-            const Part& part = group.parts[p];
-            const std::vector<int> lowest = lowest_to_come(group, part);
-            Lanes own = Lanes::Zero(), common = Lanes::Zero();  // h^T R h, A^T R h
-            const auto put = [&](const Step& step) {
-                const Lanes square = group.square[p] + own + (part.forward ? -2.0 : 2.0) * common;
-                for (int lane = 0; lane < group.count; ++lane)
-                    if (step.reading[lane] != none)
-                        squares[std::size_t(group.first - sequences.data() + lane)][step.place[lane]] = square[lane];
-            };
-            sum.clear();
-            for (int k = 0; k < part.end - part.first; ++k) {
-                const int i = part.forward ? part.first + k : part.end - 1 - k;
-                const Step& step = group.steps[i];
-                if (part.forward) put(step);
-                if (lowest[i] != none) sum.finish_before(lowest[i]);
-                own -= 2.0 * sum.add(step, weight);
-                for (int lane = 0; lane < group.count; ++lane)
-                    if (const int r = step.reading[lane]; r != none)
-                        own[lane] += weight[r] * weight[r] * (1.0 - variances[r]);
-                common += group.common[i];
-                if (!part.forward) put(step);
-            }
-        }
+    std::vector<std::pair<const Group*, const Part*>> parts;
+    for (const Group& group : groups)
+        for (const Part& part : group.parts) parts.emplace_back(&group, &part);
+    // Some go along the band together, so that each of its blocks comes from memory once.
+    constexpr std::size_t together = 16;
+    constexpr int stride = 32;
+    for (std::size_t first = 0; first < parts.size(); first += together) {
+        std::vector<Sweep> sweeps;
+        for (std::size_t i = first; i < std::min(parts.size(), first + together); ++i)
+            sweeps.emplace_back(*parts[i].first, *parts[i].second, equations, factor, inverse);
+        for (int block = 0; block < inverse.blocks() + stride; block += stride)
+            for (Sweep& sweep : sweeps)
+                sweep.go_to(block, variances, weight, squares.data() + (sweep.group().first - sequences.data()));
     }
     return squares;
 }

@@ -72,7 +72,7 @@ void Solution::look() {
 }
 
 const BorderedBand& Solution::inverse() {
-    if (!inverse_) inverse_ = solver_.factor().selected_inverse();
+    if (!inverse_) solver_.factor().selected_inverse(inverse_.emplace(solver_.equations().matrix()));
     return *inverse_;
 }
 
