@@ -349,27 +349,15 @@ Eigen::Matrix<double, 1, Count> BorderedFactor::divide_leaf(int leaf, double* ow
     return square;
 }
 
-template <int Count>
-Eigen::Matrix<double, 1, Count> BorderedFactor::inverse_squares_beside(const double* v, int only_leaf) const {
-    Split<Count> x(l_, v);
-    Eigen::Matrix<double, 1, Count> squares = Eigen::Matrix<double, 1, Count>::Zero();
-    const int first = only_leaf == every_leaf ? 0 : only_leaf;
-    const int end = only_leaf == every_leaf ? l_.leaves() : only_leaf + 1;
-    for (int leaf = first; leaf < std::min(end, l_.leaves()); ++leaf) {
-        const double* from = v + Count * (l_.first_leaf_unknown() + l_.leaf_start(leaf));
-        Beside<Count> own = Eigen::Map<const Beside<Count>>(from, l_.leaf_size(leaf), Count);
-        squares += divide_leaf<Count>(leaf, own.data(), x);
+BorderedFactor::OfSides BorderedFactor::inverse_squares(const Sides& v) const {
+    Split<sides> x(l_, v.data());
+    OfSides squares = OfSides::Zero();
+    for (int leaf = 0; leaf < l_.leaves(); ++leaf) {
+        Sides own = v.middleRows(l_.first_leaf_unknown() + l_.leaf_start(leaf), l_.leaf_size(leaf));
+        squares += divide_leaf<sides>(leaf, own.data(), x);
     }
     squares += divide(x).colwise().squaredNorm();
     return squares + x.band().colwise().squaredNorm();
-}
-
-double BorderedFactor::inverse_square(const VectorXd& v, int only_leaf) const {
-    return inverse_squares_beside<1>(v.data(), only_leaf)[0];
-}
-
-BorderedFactor::OfSides BorderedFactor::inverse_squares(const Sides& v, int only_leaf) const {
-    return inverse_squares_beside<sides>(v.data(), only_leaf);
 }
 
 void BorderedFactor::solve(Eigen::Ref<VectorXd> right_hand_side) const { solve_beside<1>(right_hand_side.data()); }

@@ -148,11 +148,8 @@ public:
     // In place. Held unknowns are 0, whatever is on the right.
     void solve(Eigen::Ref<Eigen::VectorXd> right_hand_side) const;
     void solve(Sides& right_hand_sides) const;
-    // v^T N^-1 v = |L^-1 v|^2 without the held unknowns, in half the time of a solution. With `only_leaf`, v is 0 in
-    // all other leaves, and they take no time.
-    static constexpr int every_leaf = -1;
-    double inverse_square(const Eigen::VectorXd& v, int only_leaf = every_leaf) const;
-    OfSides inverse_squares(const Sides& v, int only_leaf = every_leaf) const;
+    // v^T N^-1 v = |L^-1 v|^2 without the held unknowns, in half the time of a solution.
+    OfSides inverse_squares(const Sides& v) const;
 
     // L itself, of a matrix without leaves: the band with the reciprocals of its pivots, 0 of held ones, and below it
     // the border's rows; the corner as far as it has rank, its rows and columns being these of the border, in this
@@ -182,8 +179,6 @@ private:
     Eigen::Matrix<double, 1, Count> divide_leaf(int leaf, double* own, Split<Count>& x) const;
     template <int Count>
     void solve_beside(double* right_hand_sides) const;
-    template <int Count>
-    Eigen::Matrix<double, 1, Count> inverse_squares_beside(const double* v, int only_leaf) const;
     void factorize();
     void factorize_leaf(int leaf);
     void eliminate_leaves();

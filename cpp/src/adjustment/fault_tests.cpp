@@ -201,19 +201,7 @@ void FaultTests::add_gradient(const FaultHypothesis& hypothesis, NormalEquations
 
 BorderedFactor::Sides FaultTests::gradients(const int* hypotheses, int count) const {
     BorderedFactor::Sides gradients = BorderedFactor::Sides::Zero(equations_->problem().size(), BorderedFactor::sides);
-    const auto fault = [&](int k) -> const FaultHypothesis& { return hypotheses_->all()[hypotheses[k]]; };
-    for (int first = 0, end; first < count; first = end) {  // those of one sequence: slips share most readings
-        for (end = first; end < count && fault(end).sequence == fault(first).sequence;) ++end;
-        const std::vector<int>& readings = hypotheses_->sequences()[fault(first).sequence].readings;
-        for (int place = 0; place < int(readings.size()); ++place) {
-            const int r = readings[place];
-            BorderedFactor::OfSides times = BorderedFactor::OfSides::Zero();
-            for (int k = first; k < end; ++k)
-                if (fault(k).kind == FaultKind::reading ? place == fault(k).first : place >= fault(k).first)
-                    times[k] = weight(fault(k), r);
-            if (!times.isZero(0.0)) equations_->row(r).add_to(gradients, times);
-        }
-    }
+    for (int k = 0; k < count; ++k) add_gradient(hypotheses_->all()[hypotheses[k]], gradients.col(k));
     return gradients;
 }
 

@@ -80,6 +80,8 @@ struct FaultScore {
 std::vector<FaultScore> scores_of(const std::vector<const ReadingPattern*>& patterns, const NormalEquations& equations,
                                   const BorderedFactor& factor, double least_share);
 
+// Of readings scores cost nothing, because the inverse is there; of slips a little (slip_squares.hpp); of a factor half
+// a solution.
 class FaultTests {
 public:
     static constexpr double significant = 28.0;  // gain in chi-square

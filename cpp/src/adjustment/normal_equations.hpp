@@ -68,7 +68,7 @@ public:
     // J^T of what the readings change by where each axis stands further along itself by shift(point), mm. Of a problem
     // with expansion.
     Eigen::VectorXd gradient_of_shifts(const std::function<Eigen::Vector3d(const AdjustedPoint&)>& shift) const;
-    Eigen::VectorXd image(const Eigen::VectorXd& v) const;    // J v, of all readings
+    Eigen::VectorXd image(const Eigen::VectorXd& v) const;  // J v, of all readings
     // The same of vectors beside each other, with rows beyond the last reading.
     BorderedFactor::Sides images(const BorderedFactor::Sides& v) const;
     Eigen::VectorXd product(const Eigen::VectorXd& v) const;  // (J^T J + P) v
@@ -83,7 +83,6 @@ public:
 
         double product(const Eigen::VectorXd& v) const;
         void add_to(Side v, double times) const;
-        void add_to(BorderedFactor::Sides& v, const BorderedFactor::OfSides& times) const;
     };
     Row row(const AdjustedPoint& point, int reading) const;
     Row row(int reading) const { return row(point(reading), reading); }

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <set>
 #include <tuple>
 #include <unsupported/Eigen/SpecialFunctions>
 
@@ -67,27 +66,47 @@ struct Group {
 // A group and its complement make the same comparison: of the halves one is enough.
 std::map<Group, Share> shares_of_groups(const Adjustment& adjustment, const Measurement& measurement, Share& all) {
     const std::vector<double> when = progress(measurement);
-    std::map<std::string, int> last_point;
-    std::set<int> runs;
+    std::map<std::string, int> lines;  // in the order of their names
+    std::vector<int> line_of;          // by row
     for (const Station& station : measurement.stations()) {
-        int& last = last_point[station.line.name()];
-        last = std::max(last, station.point);
-        runs.insert(station.run);
+        lines.try_emplace(station.line.name(), int(lines.size()));
+        line_of.push_back(lines.at(station.line.name()));
     }
-    std::map<Group, Share> groups;
+    std::vector<int> last_point(lines.size());
+    for (std::size_t row = 0; row < line_of.size(); ++row)
+        last_point[line_of[row]] = std::max(last_point[line_of[row]], measurement.stations()[row].point);
+
+    const auto& channels = measurement.channels();
+    const auto channel_of = [&](const std::string& name) {
+        return std::find_if(channels.begin(), channels.end(), [&](const Channel& c) { return c.name == name; }) -
+               channels.begin();
+    };
+    std::vector<Share> of_line(lines.size()), of_channel(channels.size());
+    std::vector<std::vector<Share>> of_both(lines.size(), of_channel);
+    std::map<int, Share> of_run;
+    for (const Station& station : measurement.stations()) of_run[station.run];
+    Share second_half, far_half;
     for (const ReadingResidual& r : adjustment.residuals) {
         if (!r.used() || r.redundancy == 0.0) continue;
         const Station& station = measurement.stations()[r.row];
-        const std::string line = station.line.name();
+        const int line = line_of[r.row];
+        const auto channel = channel_of(r.channel);
         const Share share{r.normalised * r.normalised * r.redundancy, r.redundancy};
-        all.add(share);
-        groups[{line, ""}].add(share);
-        groups[{"", r.channel}].add(share);
-        groups[{line, r.channel}].add(share);
-        if (runs.size() > 1) groups[{"", "", station.run}].add(share);
-        if (when[r.row] > 0.5) groups[{"", "", -1, FitAspect::second_half}].add(share);
-        if (2 * station.point > last_point[line]) groups[{"", "", -1, FitAspect::far_half}].add(share);
+        for (Share* sum : {&all, &of_line[line], &of_channel[channel], &of_both[line][channel], &of_run[station.run]})
+            sum->add(share);
+        if (when[r.row] > 0.5) second_half.add(share);
+        if (2 * station.point > last_point[line]) far_half.add(share);
     }
+    std::map<Group, Share> groups;
+    for (const auto& [line, l] : lines) {
+        groups[{line, ""}] = of_line[l];
+        for (std::size_t c = 0; c < channels.size(); ++c) groups[{line, channels[c].name}] = of_both[l][c];
+    }
+    for (std::size_t c = 0; c < channels.size(); ++c) groups[{"", channels[c].name}] = of_channel[c];
+    if (of_run.size() > 1)
+        for (const auto& [run, share] : of_run) groups[{"", "", run}] = share;
+    groups[{"", "", -1, FitAspect::second_half}] = second_half;
+    groups[{"", "", -1, FitAspect::far_half}] = far_half;
     return groups;
 }
 
@@ -134,28 +153,32 @@ public:
 
 private:
     void collect(const std::vector<double>& when) {
-        std::map<std::pair<std::string, std::string>, std::array<Trend, 2>> found;  // with time, with position
+        using Both = std::array<Trend, 2>;  // with time, with position
+        std::map<std::pair<std::string, std::string>, Both> found;
+        std::map<std::pair<int, int>, std::array<Both*, 2>> of;  // by set-up and channel: of its line, of all
         double longest = 0.0;
         for (const AdjustedPoint& point : problem_.points()) longest = std::max(longest, std::abs(point.place.travel));
         for (const AdjustedPoint& point : problem_.points())
             for (int r = point.first_reading; r < point.end_reading; ++r) {
                 const AdjustedReading& reading = problem_.readings()[r];
                 if (!reading.used()) continue;
-                const std::string channel = problem_.channel_name(reading);
-                for (const std::string& line : {problem_.setups()[point.setup].line.name(), std::string()}) {
-                    auto& [time, position] = found[{line, channel}];
-                    for (Trend* trend : {&time, &position}) {
-                        trend->line = line;
-                        trend->channel = channel;
-                        trend->pattern.readings.push_back(r);
-                        trend->setup.push_back(point.setup);
+                const auto [at, is_new] = of.try_emplace({point.setup, reading.channel});
+                if (is_new) {
+                    const std::string channel = problem_.channel_name(reading);
+                    at->second = {&found[{problem_.setups()[point.setup].line.name(), channel}], &found[{"", channel}]};
+                }
+                for (Both* both : at->second) {
+                    for (Trend& trend : *both) {
+                        trend.pattern.readings.push_back(r);
+                        trend.setup.push_back(point.setup);
                     }
-                    time.pattern.share.push_back(when[reading.row]);
-                    position.pattern.share.push_back(longest > 0.0 ? point.place.travel / longest : 0.0);
+                    both->front().pattern.share.push_back(when[reading.row]);
+                    both->back().pattern.share.push_back(longest > 0.0 ? point.place.travel / longest : 0.0);
                 }
             }
         for (auto& entry : found) {
             auto& [time, position] = entry.second;
+            for (Trend* trend : {&time, &position}) std::tie(trend->line, trend->channel) = entry.first;
             time.aspect = FitAspect::time;
             position.aspect = FitAspect::position;
             // On one line each set-up counts from its own mean: the constants of set-ups are another matter.

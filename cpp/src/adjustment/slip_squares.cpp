@@ -151,7 +151,8 @@ private:
         added_.setZero(lanes, any.size);
         for (std::ptrdiff_t lane = 0; lane < lanes; ++lane)
             if (const int r = step.reading[lane]; r != none && weight[r] > 0.0)
-                added_.row(lane) = -weight[r] * Eigen::Map<const Eigen::RowVectorXd>(equations_.row(r).derivative, any.size);
+                added_.row(lane) =
+                    -weight[r] * Eigen::Map<const Eigen::RowVectorXd>(equations_.row(r).derivative, any.size);
         runs_.clear();
         const int banded = int(six) * z_.blocks();
         for (int i = 0; i < any.size; ++i) {
@@ -217,10 +218,10 @@ private:
     const BorderedBand &l_, &z_;
     int leaf_, first_leaf_;
     std::ptrdiff_t leaf_size_, band_step_, border_step_, leaf_step_;
-    Eigen::MatrixXd corner_, own_;        // of the inverse: border and leaf, with zeros beyond
-    int first_ = 0, last_ = none;         // blocks of the rest
-    Columns rest_, border_, leaf_part_;   // negative: what is left of the sum
-    Columns of_border_, of_leaf_;         // N^-1 times the sum
+    Eigen::MatrixXd corner_, own_;       // of the inverse: border and leaf, with zeros beyond
+    int first_ = 0, last_ = none;        // blocks of the rest
+    Columns rest_, border_, leaf_part_;  // negative: what is left of the sum
+    Columns of_border_, of_leaf_;        // N^-1 times the sum
     Columns added_;
     std::vector<Run> runs_;
 };
@@ -261,9 +262,8 @@ void add_common(const std::vector<Start>& starts, const NormalEquations& equatio
                 if (const int r = steps[i].reading[starts[k].lane]; r != none) use(i, r);
         };
         for (std::size_t k = begin; k < end; ++k)
-            each_reading(k, starts[k].step, [&](int, int r) {
-                equations.row(r).add_to(sides.col(Eigen::Index(k - begin)), weight[r]);
-            });
+            each_reading(k, starts[k].step,
+                         [&](int, int r) { equations.row(r).add_to(sides.col(Eigen::Index(k - begin)), weight[r]); });
         factor.solve(sides);
         for (std::size_t k = begin; k < end; ++k) {
             const auto [group, p, lane, first] = starts[k];
@@ -326,7 +326,7 @@ private:
 
     const Group* group_;
     Part part_;
-    Lanes square_of_start_;                                // A^T R A
+    Lanes square_of_start_;                                  // A^T R A
     Lanes square_ = Lanes::Zero(), common_ = Lanes::Zero();  // h^T R h, A^T R h
     Sum sum_;
     std::vector<int> lowest_to_come_;  // block, of those that come with a step and after it
