@@ -81,7 +81,7 @@ std::vector<FaultScore> scores_of(const std::vector<const ReadingPattern*>& patt
                                   const BorderedFactor& factor, double least_share);
 
 // Of readings scores cost nothing, because the inverse is there; of slips a little (slip_squares.hpp); of a factor half
-// a solution.
+// a solution, and so of all where the inverse loses digits.
 class FaultTests {
 public:
     static constexpr double significant = 28.0;  // gain in chi-square
@@ -120,7 +120,8 @@ private:
     BorderedFactor::Sides gradients(const int* hypotheses, int count) const;
     void sum_readings();
     double controlled(int hypothesis, const Eigen::VectorXd& effect) const;
-    void test_factors();
+    bool are_exact(std::vector<int> hypotheses, const std::vector<double>& found);
+    void solve_for(const std::vector<int>& hypotheses);
     void set(int hypothesis, double c_r_c);
 
     const NormalEquations* equations_;

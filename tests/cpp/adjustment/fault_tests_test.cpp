@@ -339,10 +339,13 @@ TEST(FaultTests, ThreeFaceDiagonalsOrEverythingTwiceBreakAllTwins) {
     }
 }
 
-// One way and both ways, in other orders of rows, of more set-ups than are worth a dense matrix.
+// One way and both ways, in other orders of rows, of more set-ups than are worth a dense matrix, and of too few lines,
+// where the inverse loses digits.
 TEST(FaultTests, OfSlipsAreWhatSolutionsSay) {
-    Workshop shop, both_ways, many;
+    Workshop shop, both_ways, many, few;
     shop.steps = both_ways.steps = 20;
+    few.steps = 10;
+    few.lines = {Line::parse("ppp"), Line::parse("npp")};
     both_ways.backward = true;
     both_ways.options.one_setup_per_line = true;
     both_ways.repeats = 2;
@@ -358,11 +361,11 @@ TEST(FaultTests, OfSlipsAreWhatSolutionsSay) {
     auto channels = run.channels();
     for (auto& channel : channels) channel.value = in_order(channel.value);
     const Measurement mixed(in_order(run.stations()), channels);
-    for (const Solved& solved :
-         {Solved(shop, shop.run()), Solved(both_ways, run), Solved(both_ways, mixed), Solved(many, many.run())}) {
+    for (const Solved& solved : {Solved(shop, shop.run()), Solved(both_ways, run), Solved(both_ways, mixed),
+                                 Solved(many, many.run()), Solved(few, few.run())}) {
         const FaultTests tests = solved.tests();
         const auto& all = solved.hypotheses.all();
-        ASSERT_GT(all.size(), std::size_t(1000));
+        ASSERT_GT(all.size(), std::size_t(300));
         for (int h = 0; h < int(all.size()); h += 3) {
             if (all[h].kind != FaultKind::slip) continue;
             const VectorXd effect = tests.effect(h);
