@@ -266,14 +266,14 @@ void add_common(const std::vector<Start>& starts, const NormalEquations& equatio
                          [&](int, int r) { equations.row(r).add_to(sides.col(Eigen::Index(k - begin)), weight[r]); });
         factor.solve(sides);
         for (std::size_t k = begin; k < end; ++k) {
-            const auto [group, p, lane, first] = starts[k];
-            const Part& part = group->parts[p];
+            const Start& start = starts[k];
+            const Part& part = start.group->parts[start.part];
             const Eigen::VectorXd effect = sides.col(Eigen::Index(k - begin));
             each_reading(k, part.first, [&](int i, int r) {
-                const bool own = i >= first;
+                const bool own = i >= start.step;
                 const double common = weight[r] * ((own ? weight[r] : 0.0) - equations.row(r).product(effect));
-                if (own) group->square[p][lane] += common;
-                if (i < part.end) group->common[i][lane] = common;
+                if (own) start.group->square[start.part][start.lane] += common;
+                if (i < part.end) start.group->common[i][start.lane] = common;
             });
         }
     }
