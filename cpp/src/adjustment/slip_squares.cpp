@@ -184,33 +184,35 @@ private:
         subtract_product(lanes, six, z_.border(), columns(border_), {z_.border_rows(block).data(), border_step_, 1},
                          to);
         if (leaf_ != none)
-            subtract_product(lanes, six, leaf_size_, columns(leaf_part_),
-                             {z_.leaf_column(first_leaf_) + six * block, 1, leaf_step_}, to);
+            subtract_product(lanes, six, leaf_size_, columns(leaf_part_), {leaf_row(six * block), 1, leaf_step_}, to);
         return product;
     }
 
+    const double* leaf_row(std::ptrdiff_t row) const { return z_.leaf_column(first_leaf_) + row; }
+
     void add(const Run& run) {
         const auto own = added_.middleCols(run.first, run.count);
-        const double* leaf = leaf_ == none ? nullptr : z_.leaf_column(first_leaf_);
-        const auto times = [&](RightFactor of_border, RightFactor of_leaf) {
-            const ConstMatrixView from = columns(std::as_const(added_), run.first);
-            subtract_product(lanes, of_border_.cols(), run.count, from, of_border, columns(of_border_));
-            if (leaf) subtract_product(lanes, of_leaf_.cols(), run.count, from, of_leaf, columns(of_leaf_));
+        const auto times = [&](RightFactor inverse, Columns& to) {
+            subtract_product(lanes, to.cols(), run.count, columns(std::as_const(added_), run.first), inverse,
+                             columns(to));
         };
         switch (run.where) {
             case Where::band:
                 last_ = std::max(last_, int(run.place));
                 rest_.middleCols(six * run.place, six) += own;
-                return times({z_.border_rows(int(run.place)).data(), 1, border_step_},
-                             {leaf + six * run.place, leaf_step_, 1});
+                times({z_.border_rows(int(run.place)).data(), 1, border_step_}, of_border_);
+                if (leaf_ != none) times({leaf_row(six * run.place), leaf_step_, 1}, of_leaf_);
+                break;
             case Where::border:
                 border_.middleCols(run.place, run.count) += own;
-                return times({corner_.col(run.place).data(), 1, border_step_},
-                             {leaf + z_.leaf_border() + run.place, leaf_step_, 1});
+                times({corner_.col(run.place).data(), 1, border_step_}, of_border_);
+                if (leaf_ != none) times({leaf_row(z_.leaf_border() + run.place), leaf_step_, 1}, of_leaf_);
+                break;
             case Where::leaf:
                 leaf_part_.middleCols(run.place, run.count) += own;
-                return times({leaf + leaf_step_ * run.place + z_.leaf_border(), 1, leaf_step_},
-                             {own_.col(run.place).data(), 1, own_.rows()});
+                times({leaf_row(leaf_step_ * run.place + z_.leaf_border()), 1, leaf_step_}, of_border_);
+                times({own_.col(run.place).data(), 1, own_.rows()}, of_leaf_);
+                break;
         }
     }
 
