@@ -67,6 +67,15 @@ std::vector<FitReason> coefficients_in_place_of_faults(const AdjustmentProblem& 
                             drift_estimates(without.problem(), without.x(), without.inverse()));
 }
 
+// Rms of the residuals, each in units of its rounding.
+double residual_rounding(const NormalEquations& equations) {
+    const auto& readings = equations.problem().readings();
+    double sum = 0.0;
+    for (std::size_t r = 0; r < readings.size(); ++r)
+        sum += std::pow(equations.residuals()[Eigen::Index(r)] * readings[r].standard_uncertainty / readings[r].rounding, 2);
+    return std::sqrt(sum / double(readings.size()));
+}
+
 [[noreturn]] void refuse_unsolved(const Measurement& measurement, const Plan& plan) {
     const std::string far = far_reading(measurement, plan);
     throw InvalidArgument("adjustment: " + (!far.empty() ? far
@@ -125,6 +134,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     result.setup = setup_estimates(problem, known, x, inverse);
     result.expansion = expansion_estimates(problem, x, inverse);
     result.machine_drift = drift_estimates(problem, x, inverse);
+    result.rounded = problem.rounded();
     result.residuals = reading_residuals(solver.equations(), solution->reading_variances());
     std::stable_sort(result.residuals.begin(), result.residuals.end(),
                      [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
@@ -134,7 +144,8 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     if (result.degrees_of_freedom > 0)
         result.chi_square_probability = chi_square_probability(result.weighted_square_sum, result.degrees_of_freedom);
     const auto patterns = residual_patterns(result, measurement, solver.equations(), solver.factor());
-    result.verdict = judge(result, patterns, prior_scatter(problem, x, solver.factor()));
+    result.verdict =
+        judge(result, patterns, prior_scatter(problem, x, solver.factor()), residual_rounding(solver.equations()));
     if (!solution->is_minimum()) {
         const double factor = std::sqrt(result.variance_factor());
         result.verdict = {Fit::rejected, {{FitFinding::noise_factor, factor, largest_noise_factor}}};

@@ -6,6 +6,7 @@
 #include <set>
 #include <tuple>
 
+#include "adjustment/rounding.hpp"
 #include "adjustment/setup_priors.hpp"
 #include "evaluation/measurement_rows.hpp"
 #include "stepdiag/core/error.hpp"
@@ -142,6 +143,7 @@ AdjustmentProblem::AdjustmentProblem(const Measurement& measurement, const Plan&
         reversal_ = reversal_ || (options.reversal && station.direction == Direction::backward);
     collect_setups(measurement, options);
     collect_points(measurement, options);
+    round_uncertainties();
     number_unknowns(options, elimination);
 }
 
@@ -240,6 +242,39 @@ void AdjustmentProblem::collect_points(const Measurement& measurement, const Adj
                 point.node[index(axis)] = node_index(axis, target.node[index(axis)], negative);
         }
         points_.push_back(point);
+    }
+}
+
+// Readings are not known better than their numbers are rounded.
+void AdjustmentProblem::round_uncertainties() {
+    const double reach = plan_.volume().norm() + tool_.norm();
+    const int channels = setups_.empty() ? 0 : setups_.front().model.channels();
+    for (int c = 0; c < channels; ++c) {
+        std::vector<double> values, planned;
+        double stated = 0.0, used = 0.0;
+        for (const AdjustedPoint& point : points_)
+            for (int r = point.first_reading; r < point.end_reading; ++r) {
+                if (readings_[r].channel != c) continue;
+                const HeadCalibration& head = setups_[point.setup].model.head();
+                values.push_back(readings_[r].value);
+                const bool is_distance = kind_ == HeadLayout::multi_beam || c == 0;
+                planned.push_back(is_distance ? head.standoff + point.place.travel : 0.0);
+            }
+        const double unit = kind_ == HeadLayout::ideal && c > 0 ? 1e-6 : 1.0;
+        const double step = decimal_step(values, planned, unit);
+        for (const AdjustedPoint& point : points_)
+            for (int r = point.first_reading; r < point.end_reading; ++r) {
+                AdjustedReading& reading = readings_[r];
+                if (reading.channel != c) continue;
+                const HeadCalibration& head = setups_[point.setup].model.head();
+                const double longest = reach + head.standoff + head.psd_distance.value_or(0.0);
+                reading.of_doubles = double_rounding(kind_, c, longest);
+                reading.rounding = std::max(reading.of_doubles, step / std::sqrt(12.0));
+                if (!(reading.standard_uncertainty < reading.rounding)) continue;
+                stated = reading.standard_uncertainty;
+                used = reading.standard_uncertainty = reading.rounding;
+            }
+        if (used > 0.0) rounded_.push_back({stepdiag::channel_name(kind_, c), stated, used, step});
     }
 }
 

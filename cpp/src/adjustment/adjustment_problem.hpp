@@ -47,8 +47,10 @@ struct AdjustedReading {
     std::size_t row;
     int channel;  // of the head: a row of the model
     double value;
-    double standard_uncertainty;
-    int outlier = 0;  // as in ReadingResidual
+    double standard_uncertainty;  // what is stated, or its rounding where that is more
+    double of_doubles = 0.0;      // standard uncertainty by the rounding of doubles, in it and in its model
+    double rounding = 0.0;        // the same, or by the decimals of the file where that is more
+    int outlier = 0;              // as in ReadingResidual
 
     bool used() const { return outlier == 0; }
 };
@@ -116,6 +118,8 @@ public:
     bool has_rotations() const { return rotations_; }
     std::string channel_name(const AdjustedReading& reading) const;
     bool is_length(const AdjustedReading& reading) const;  // mm rather than rad
+    // Channels of which stated uncertainties were below the rounding of readings.
+    const std::vector<RoundedChannel>& rounded() const { return rounded_; }
 
     const std::vector<int>& reach() const { return reach_; }  // of the band's block columns
     int blocks() const { return int(reach_.size()); }
@@ -150,6 +154,7 @@ public:
 private:
     void collect_setups(const Measurement& measurement, const AdjustmentOptions& options);
     void collect_points(const Measurement& measurement, const AdjustmentOptions& options);
+    void round_uncertainties();
     void number_unknowns(const AdjustmentOptions& options, Elimination elimination);
     void choose_elimination(Elimination elimination, int first_of_set_ups);
     void sort_points();
@@ -168,6 +173,7 @@ private:
     std::vector<int> setup_of_row_;
     std::vector<AdjustedPoint> points_;
     std::vector<AdjustedReading> readings_;
+    std::vector<RoundedChannel> rounded_;
     std::vector<int> reach_;
     int border_ = 0;
     Leaves leaves_;

@@ -25,6 +25,8 @@ GaussNewton::GaussNewton(const AdjustmentProblem& problem, const std::array<doub
             stiffness_[setup.unknown[c]] = std::pow(std::min(setup.prior[c], of.usual), -2);
         }
     for (const CoefficientUnknown& of : problem.coefficients()) stiffness_[of.unknown] = std::pow(of.prior, -2);
+    for (const AdjustedReading& reading : problem.readings())
+        rounding_ += std::pow(reading.of_doubles / reading.standard_uncertainty, 2);
     equations_.linearise(Eigen::VectorXd::Zero(problem.size()));
     equations_.drop_roundings();
     factorize();
@@ -97,6 +99,7 @@ bool GaussNewton::is_settled(const Step& step, double ratio, const Eigen::Vector
     constexpr double settled = 1e-12;   // square of what is left, in uncertainties of whatever is known worst
     if (step.effect * std::max(ratio, rounding) < enough) return true;  // as the next step would be
     if (ratio >= 0.25 && step.effect < no_effect) return true;          // rounding is what no longer shrinks
+    if (ratio >= 0.25 && step.decrement < rounding_) return true;
     const double scatter = equations_.square_sum(x) / double(equations_.problem().readings().size());
     return ratio > 1e-3 && step.decrement < settled * std::max(1.0, scatter);
 }

@@ -14,6 +14,9 @@ constexpr double rejected_below = 3e-4;  // probability of a sound run's misfit
 constexpr double pattern_below = 1e-2;
 constexpr double pattern_alone_below = 3e-3;
 constexpr double farthest_prior = 5.0;
+// Residuals that are rounding, and far below what is stated of the noise: nothing tests that statement. An instrument
+// that shows few decimals has residuals of a third of its step, which is not far below what is stated of it.
+constexpr double rounding_alone = 1.0, far_below_stated = 1e-2;
 constexpr double prior_scatter_rejected_below = 1e-6;  // as of a single value beyond five
 
 double noise_factor(const Adjustment& adjustment) { return std::sqrt(adjustment.variance_factor()); }
@@ -77,6 +80,7 @@ void judge_faults(const Adjustment& adjustment, std::vector<FitReason>& reasons)
 std::string name(FitFinding finding) {
     switch (finding) {
         case FitFinding::no_redundancy: return "no_redundancy";
+        case FitFinding::no_noise: return "no_noise";
         case FitFinding::noise_factor: return "noise_factor";
         case FitFinding::misfit: return "misfit";
         case FitFinding::no_misfit: return "no_misfit";
@@ -120,7 +124,7 @@ std::vector<FitReason> far_coefficients(const std::vector<ExpansionEstimate>& ex
 }
 
 Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& patterns,
-              const std::vector<ResidualPattern>& prior_scatter) {
+              const std::vector<ResidualPattern>& prior_scatter, double residual_rounding) {
     std::vector<FitReason> reasons;
     judge_faults(adjustment, reasons);
     if (reasons.empty() && adjustment.degrees_of_freedom <= 0)
@@ -131,6 +135,8 @@ Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& 
     compare_with_priors(adjustment, reasons);
     if (reasons.empty()) take_patterns(prior_scatter, prior_scatter_rejected_below, reasons);
     if (!reasons.empty()) return {Fit::rejected, reasons};
+    if (residual_rounding <= rounding_alone && noise_factor(adjustment) < far_below_stated)
+        return {Fit::unchecked, {{FitFinding::no_noise, residual_rounding, rounding_alone}}};
 
     if (!(probability >= doubtful_below)) {
         take_patterns(patterns, pattern_below, reasons);

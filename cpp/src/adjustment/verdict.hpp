@@ -11,8 +11,9 @@ namespace stepdiag {
 std::vector<FitReason> far_coefficients(const std::vector<ExpansionEstimate>& expansion,
                                         const std::vector<DriftEstimate>& machine_drift);
 
+// `residual_rounding`: rms of the residuals, each in units of its rounding (adjustment/rounding.hpp).
 Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& patterns,
-              const std::vector<ResidualPattern>& prior_scatter);
+              const std::vector<ResidualPattern>& prior_scatter, double residual_rounding);
 
 // AdjustmentOptions::scale_uncertainty, of an adjustment with its verdict.
 void scale_uncertainties(Adjustment& adjustment);

@@ -92,6 +92,13 @@ MEANING: Final = {
     "unchecked": "nothing controls the readings",
 }
 
+# By its reason.
+UNCHECKED: Final = {
+    "no_redundancy": "there are no more readings than unknowns, so that nothing controls them",
+    "no_noise": "no noise: all readings agree to the rounding of their numbers, as those of a simulation without noise "
+    "do; the uncertainties are of the stated noise",
+}
+
 # The better first.
 FITS: Final = ("accepted", "unchecked", "doubtful", "rejected")
 # Of calibrations by linear methods, whose uncertainties know of nothing else.
@@ -238,7 +245,7 @@ def verdict_rows(adjustment: Adjustment) -> Iterator[str]:
     """The verdict of an adjustment with its reasons, and what no verdict tells."""
     verdict = adjustment.verdict
     if verdict.fit == "unchecked":
-        yield "fit: unchecked: there are no more readings than unknowns, so that nothing controls them"
+        yield f"fit: unchecked: {UNCHECKED[verdict.reasons[0].finding]}"
         return
     reasons = reason_texts(verdict.reasons)
     said = reasons.pop(0) if verdict.fit == "doubtful" else MEANING[verdict.fit]
@@ -314,6 +321,8 @@ def reason_text(reason: FitReason) -> str:
             )
         case "mistake":
             return mistake_reason(reason.parameter)
+        case "no_noise":
+            return UNCHECKED["no_noise"]
         case _:
             return "nothing controls the readings"
 

@@ -101,7 +101,7 @@ def fit_warnings(path: Path, fit: str | None) -> list[str]:
     meaning = {
         "rejected": "do not use this calibration",
         "doubtful": "do not rely on the stated uncertainties",
-        "unchecked": "nothing controlled the readings of this calibration",
+        "unchecked": "the readings do not test this calibration",
     }
     return [f"{path}: the fit is {fit}: {meaning[fit]}"] if fit in meaning else []
 

@@ -33,7 +33,7 @@ from stepdiag.objects.calibration import (
     unit_key,
 )
 from stepdiag.objects.writer import in_unit, measured, number
-from stepdiag.report.prior_effects import cosine_rows, drift_rows
+from stepdiag.report.prior_effects import cosine_rows, drift_rows, rounding_rows
 from stepdiag.scenario.description import JudgedEvaluation
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
@@ -308,7 +308,9 @@ def evaluation_object(
         "largest_standard_uncertainties": largest_of(written, uncertainty=True),
         "adjustment": _adjustment(result, known) if isinstance(result, Adjustment) else None,
         "linear": _linear(result) if isinstance(result, JudgedEvaluation) else None,
-        "notes": [*cosine_rows(measurement, known), *drift_rows(measurement, known)] if adjusted else [],
+        "notes": [*rounding_rows(result.rounded), *cosine_rows(measurement, known), *drift_rows(measurement, known)]
+        if isinstance(result, Adjustment)
+        else [],
     }
 
 

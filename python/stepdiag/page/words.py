@@ -33,7 +33,7 @@ _CAN_BE_USED: Final = {
     "accepted": "Yes. The readings agree with each other and with the described set-up.",
     "doubtful": "With care. The values are the best fit, but the stated uncertainties are not to be relied on.",
     "rejected": "No. The readings contradict each other. Do not correct the machine with these values.",
-    "unchecked": "Unchecked. There are no more readings than unknowns, so that nothing would show a wrong one.",
+    "unchecked": "Unchecked. The readings do not test this calibration; the reason is below.",
     None: "Not known. The file does not say how well the readings agree.",
 }
 LEAST_PROBABILITY: Final = 1e-12  # that is told

@@ -23,7 +23,7 @@ from stepdiag.mistakes.search import FoundMistake
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.fault_control import control_rows
 from stepdiag.report.mistakes import change_rows, unchecked_row
-from stepdiag.report.prior_effects import cosine_rows, drift_rows
+from stepdiag.report.prior_effects import cosine_rows, drift_rows, rounding_rows
 from stepdiag.report.setup_table import NOTHING_LEARNT, setup_rows
 from stepdiag.scenario.description import JudgedEvaluation, reduced_run
 from stepdiag.scenario.known import Known
@@ -74,6 +74,7 @@ def _adjusted(
     calibration = adjustment.calibration
     yield from verdict_rows(adjustment)
     yield from change_rows(mistakes)
+    yield from (f"note: {row}" for row in rounding_rows(adjustment.rounded))
     yield from _what_was_done(calibration, measurement, known)
     yield from fault_rows(adjustment.faults)
     yield from uncertainty_rows(calibration)

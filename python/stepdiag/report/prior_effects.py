@@ -1,20 +1,30 @@
 """What angles and drifts that only priors know may do to a result, in words."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import combinations
 from typing import Final
 
 import numpy as np
 
-from stepdiag._core import Measurement
+from stepdiag._core import Measurement, RoundedChannel
 from stepdiag.scenario.adjustment import scale_line_angle
 from stepdiag.scenario.known import Known
 from stepdiag.setup_quantities import SETUP_QUANTITIES
-from stepdiag.units import HOUR, MICRO, MICROMETRE, UNITS
+from stepdiag.units import HOUR, MICRO, MICROMETRE, UNITS, report_value
 
 FOURFOLD: Final = 4.0  # a machine that has not warmed up, against the default
 SQUARENESS_OF: Final[Mapping[str, str]] = {"XY": "C0Y", "XZ": "B0Z", "YZ": "A0Z"}
+
+
+def rounding_rows(rounded: Iterable[RoundedChannel]) -> Iterator[str]:
+    """Channels that were stated to be better known than their numbers are rounded."""
+    for channel in rounded:
+        native = "rad" if channel.channel in ("alpha", "beta") else "mm"
+        stated, unit = report_value(native, channel.stated)
+        used, step = (report_value(native, value)[0] for value in (channel.used, channel.step))
+        because = f"the readings have decimals of {step:g} {unit}" if step else "the readings are rounded as doubles"
+        yield f"{channel.channel}: {stated:.3g} {unit} is stated; {because}, so that {used:.3g} {unit} took its place"
 
 
 def cosine_rows(measurement: Measurement, known: Known) -> Iterator[str]:

@@ -126,6 +126,15 @@ struct ReadingResidual {
     bool used() const { return outlier == 0; }
 };
 
+// Readings of a channel that were stated to be better known than their numbers are rounded: in doubles, or to the
+// decimals of a file, whose step/sqrt(12) took the place of what was stated. mm or rad.
+struct RoundedChannel {
+    std::string channel;
+    double stated;  // standard uncertainty
+    double used;    // in its place
+    double step;    // of the decimals; 0: the rounding of doubles
+};
+
 // What may be wrong with the readings of one channel in one set-up. A slip is an offset of all of them from a point on,
 // in the order in which they were made: a fringe counter that lost count, a head that was knocked. A factor makes
 // distances too long by a part of the travel: the air of a single line, tilts whose zero is off (a distance is
@@ -170,6 +179,7 @@ struct FaultClass {
 // Why a fit is not accepted, or what its residuals have in common.
 enum class FitFinding {
     no_redundancy,  // nothing controls the readings
+    no_noise,       // rms of the residuals in units of their rounding: a simulation without noise
     noise_factor,   // root of the variance factor, beyond what is credible
     misfit,         // root of the variance factor: the readings scatter by it more than stated
     no_misfit,      // root of the variance factor: the readings scatter by it less than stated
@@ -282,6 +292,7 @@ struct Adjustment {
     std::vector<UnseenFault> unseen = {};
     std::vector<ExpansionEstimate> expansion = {};
     std::vector<DriftEstimate> machine_drift = {};
+    std::vector<RoundedChannel> rounded = {};
 
     double variance_factor() const;             // weighted_square_sum/degrees_of_freedom; 1 without freedom
     std::vector<std::size_t> outliers() const;  // readings that were left out: into `residuals`, by their number
