@@ -10,7 +10,7 @@ import os
 import stepdiag.io.displays
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'ChangeCombination', 'ChangePriors', 'ChangeTerm', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'Recheck', 'ReplayMismatch', 'ReturnedBeam', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'newer_format', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'recheck', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'ChangeCombination', 'ChangePriors', 'ChangeTerm', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'Recheck', 'ReplayMismatch', 'ReturnedBeam', 'RoundedChannel', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'newer_format', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'recheck', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -1602,6 +1602,35 @@ class ExpansionEstimate:
         """
         1/K
         """
+class RoundedChannel:
+    """
+    What took the place of a channel's stated uncertainties, which were too small; mm or rad.
+    """
+    @property
+    def cause(self) -> str:
+        """
+        "doubles": rounding of numbers; "decimals": of the file; "weights": tilts or the laser are known so much worse that double precision could not weigh both.
+        """
+    @property
+    def channel(self) -> str:
+        """
+        "distance", ...
+        """
+    @property
+    def stated(self) -> float:
+        """
+        Standard uncertainty.
+        """
+    @property
+    def step(self) -> float:
+        """
+        Of the decimals; 0: more of them than count.
+        """
+    @property
+    def used(self) -> float:
+        """
+        Standard uncertainty in its place.
+        """
 class DriftEstimate:
     """
     A rate of the machine's drift as it was found, mm/s or mm/K.
@@ -1810,7 +1839,7 @@ class FitReason:
     @property
     def finding(self) -> str:
         """
-        "no_redundancy"; "noise_factor", "misfit", "no_misfit": root of the variance factor, not credible, or larger or smaller than chance explains; "uneven_misfit": noise factor of one group of readings, and as the limit that of the others; "trend": what residuals of one channel run by, from the first reading to the last (mm or rad); "prior": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); "fault": what a fault that was not corrected takes off chi-square; "alternatives": by how much alternative faults differ in `parameter`; "scaled": what the uncertainties were multiplied by; "mistake": `parameter` says which one would explain the readings.
+        "no_redundancy"; "no_noise": rms of the residuals in units of their rounding; "noise_factor", "misfit", "no_misfit": root of the variance factor, not credible, or larger or smaller than chance explains; "uneven_misfit": noise factor of one group of readings, and as the limit that of the others; "trend": what residuals of one channel run by, from the first reading to the last (mm or rad); "prior": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); "fault": what a fault that was not corrected takes off chi-square; "alternatives": by how much alternative faults differ in `parameter`; "scaled": what the uncertainties were multiplied by; "mistake": `parameter` says which one would explain the readings.
         """
     @property
     def limit(self) -> float:
@@ -2052,6 +2081,11 @@ class Adjustment:
     def residuals(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
         """
         channel -> (n,) read minus adjusted, mm or rad, by row of the measurement; NaN where nothing was read.
+        """
+    @property
+    def rounded(self) -> list[RoundedChannel]:
+        """
+        Channels of which the stated uncertainties are below what their numbers, or double precision, can bear; that took their place.
         """
     @property
     def setup(self) -> list[SetupEstimate]:

@@ -67,13 +67,16 @@ std::vector<FitReason> coefficients_in_place_of_faults(const AdjustmentProblem& 
                             drift_estimates(without.problem(), without.x(), without.inverse()));
 }
 
-// Rms of the residuals, each in units of its rounding.
+// Rms of the residuals, each in units of its rounding, or of where the solver stops.
 double residual_rounding(const NormalEquations& equations) {
-    const auto& readings = equations.problem().readings();
+    constexpr double stops = 1e-6;  // of a standard uncertainty: no instrument is so much better than was stated
     double sum = 0.0;
-    for (std::size_t r = 0; r < readings.size(); ++r)
-        sum += std::pow(equations.residuals()[Eigen::Index(r)] * readings[r].standard_uncertainty / readings[r].rounding, 2);
-    return std::sqrt(sum / double(readings.size()));
+    Eigen::Index r = 0;
+    for (const AdjustedReading& reading : equations.problem().readings()) {
+        const double u = reading.standard_uncertainty;
+        sum += std::pow(equations.residuals()[r++] * u / std::max(reading.rounding, stops * u), 2);
+    }
+    return std::sqrt(sum / double(r));
 }
 
 [[noreturn]] void refuse_unsolved(const Measurement& measurement, const Plan& plan) {
@@ -85,6 +88,11 @@ double residual_rounding(const NormalEquations& equations) {
 }
 
 }  // namespace
+
+std::string name(RoundingCause cause) {
+    constexpr const char* names[] = {"doubles", "decimals", "weights"};
+    return names[static_cast<int>(cause)];
+}
 
 double Adjustment::variance_factor() const {
     return degrees_of_freedom > 0 ? weighted_square_sum / degrees_of_freedom : 1.0;

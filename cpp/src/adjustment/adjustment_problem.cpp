@@ -122,6 +122,27 @@ double usual_angle(const Plan& plan, const std::map<std::string, LineReadings>& 
     return count == 0 ? usual : std::max(usual, std::sqrt(squares / (4.0 * count)));
 }
 
+// By how much two readings that determine the same thing may differ in their uncertainties, so that the normal
+// equations still tell what only the worse one says from what none does (rank_decision.hpp): measured, with 8 and 50
+// steps, three heads.
+constexpr double widest_weights = 3e4;
+
+// Beams whose constants are unknown say nothing of the mean tilt: that is known as well as the laser is.
+double weighable_beam(const LineSetup& setup) {
+    const std::vector<Eigen::Vector2d>& beams = setup.model.head().beam_offsets;
+    Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+    for (const Eigen::Vector2d& beam : beams) centre += beam / double(beams.size());
+    double arm = 0.0;
+    bool unknown = false;
+    for (std::size_t i = 0; i < beams.size(); ++i) {
+        arm = std::max(arm, (beams[i] - centre).norm());
+        unknown = unknown || setup.prior[setup::beam_constants + int(i)] != fixed_unknown;
+    }
+    const PriorUncertainty laser = std::max(setup.prior[setup::laser], setup.prior[setup::laser + 1]);
+    if (!unknown || laser == fixed_unknown) return 0.0;
+    return std::min(laser, record(SetupQuantity::laser).usual) * arm / widest_weights;
+}
+
 }  // namespace
 
 AdjustmentProblem::AdjustmentProblem(const Measurement& measurement, const Plan& plan, const Chain& chain,
@@ -245,36 +266,53 @@ void AdjustmentProblem::collect_points(const Measurement& measurement, const Adj
     }
 }
 
-// Readings are not known better than their numbers are rounded.
+// Readings are not known better than their numbers are rounded, and count for no more than the solution can bear.
 void AdjustmentProblem::round_uncertainties() {
     const double reach = plan_.volume().norm() + tool_.norm();
     const int channels = setups_.empty() ? 0 : setups_.front().model.channels();
+    const auto longest = [&](const AdjustedPoint& point) {
+        const HeadCalibration& head = setups_[point.setup].model.head();
+        return reach + head.standoff + head.psd_distance.value_or(0.0);
+    };
+    const auto is_distance = [&](int channel) { return kind_ == HeadLayout::multi_beam || channel == 0; };
+    double tilts = 0.0;  // rad: sum of the uncertainties of tilts
+    int count = 0;
+    for (const AdjustedPoint& point : points_)
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            if (is_distance(readings_[r].channel)) continue;
+            tilts += readings_[r].standard_uncertainty / (kind_ == HeadLayout::psd ? 2.0 * longest(point) : 1.0);
+            ++count;
+        }
+    double beams = 0.0;  // mm, of all lines: they are weighed against each other, too
+    if (kind_ == HeadLayout::multi_beam)
+        for (const LineSetup& setup : setups_) beams = std::max(beams, weighable_beam(setup));
     for (int c = 0; c < channels; ++c) {
         std::vector<double> values, planned;
-        double stated = 0.0, used = 0.0;
         for (const AdjustedPoint& point : points_)
             for (int r = point.first_reading; r < point.end_reading; ++r) {
                 if (readings_[r].channel != c) continue;
-                const HeadCalibration& head = setups_[point.setup].model.head();
                 values.push_back(readings_[r].value);
-                const bool is_distance = kind_ == HeadLayout::multi_beam || c == 0;
-                planned.push_back(is_distance ? head.standoff + point.place.travel : 0.0);
+                const double nominal = setups_[point.setup].model.head().standoff + point.place.travel;
+                planned.push_back(is_distance(c) ? nominal : 0.0);
             }
-        const double unit = kind_ == HeadLayout::ideal && c > 0 ? 1e-6 : 1.0;
-        const double step = decimal_step(values, planned, unit);
+        const double step = decimal_step(values, planned, kind_ == HeadLayout::ideal && c > 0 ? 1e-6 : 1.0);
+        RoundedChannel rounded{stepdiag::channel_name(kind_, c), 0.0, 0.0, step, RoundingCause::doubles};
         for (const AdjustedPoint& point : points_)
             for (int r = point.first_reading; r < point.end_reading; ++r) {
                 AdjustedReading& reading = readings_[r];
                 if (reading.channel != c) continue;
-                const HeadCalibration& head = setups_[point.setup].model.head();
-                const double longest = reach + head.standoff + head.psd_distance.value_or(0.0);
-                reading.of_doubles = double_rounding(kind_, c, longest);
+                reading.of_doubles = double_rounding(kind_, c, longest(point));
                 reading.rounding = std::max(reading.of_doubles, step / std::sqrt(12.0));
-                if (!(reading.standard_uncertainty < reading.rounding)) continue;
-                stated = reading.standard_uncertainty;
-                used = reading.standard_uncertainty = reading.rounding;
+                double least = std::max(reading.rounding, beams);
+                if (c == 0 && count > 0) least = std::max(least, tilts / count * longest(point) / widest_weights);
+                if (!(reading.standard_uncertainty < least)) continue;
+                rounded.stated = reading.standard_uncertainty;
+                rounded.used = reading.standard_uncertainty = least;
+                rounded.cause = least > reading.rounding                ? RoundingCause::weights
+                                : reading.rounding > reading.of_doubles ? RoundingCause::decimals
+                                                                        : RoundingCause::doubles;
             }
-        if (used > 0.0) rounded_.push_back({stepdiag::channel_name(kind_, c), stated, used, step});
+        if (rounded.used > 0.0) rounded_.push_back(rounded);
     }
 }
 

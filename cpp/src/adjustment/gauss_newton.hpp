@@ -66,7 +66,7 @@ private:
     Eigen::VectorXd stiffness_;  // 1/usual^2 of what damping holds: the set-ups
     double damping_ = 0.0;
     double rounding_ = 0.0;  // of the square sum: what the rounding of readings and models adds to it
-    bool fresh_ = true;  // derivatives and factor are those at zero, from the beginning
+    bool fresh_ = true;      // derivatives and factor are those at zero, from the beginning
 };
 
 }  // namespace stepdiag

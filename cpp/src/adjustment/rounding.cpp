@@ -18,7 +18,7 @@ double double_rounding(HeadLayout kind, int channel, double longest) {
 
 double decimal_step(const std::vector<double>& values, const std::vector<double>& planned, double unit) {
     constexpr int most_decimals = 9;
-    constexpr double unclear = 1e-3;     // of a step: as much may be rounding
+    constexpr double unclear = 1e-3;   // of a step: as much may be rounding
     constexpr std::size_t enough = 5;  // places beside the plan; fewer may be chance
     double size = 0.0;
     for (const double value : values) size = std::max(size, std::abs(value));

@@ -143,7 +143,9 @@ Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& 
         reasons.push_back(noise(FitFinding::misfit, adjustment));
     } else {
         take_patterns(patterns, pattern_alone_below, reasons);
-        if (probability > doubtful_above) reasons.push_back(noise(FitFinding::no_misfit, adjustment));
+        // Where less was stated than can be weighed, less noise than is used says nothing of what was stated.
+        if (probability > doubtful_above && adjustment.rounded.empty())
+            reasons.push_back(noise(FitFinding::no_misfit, adjustment));
     }
     take_patterns(prior_scatter, pattern_alone_below, reasons);
     return {reasons.empty() ? Fit::accepted : Fit::doubtful, reasons};

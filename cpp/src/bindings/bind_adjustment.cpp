@@ -234,12 +234,16 @@ void bind_result(py::module_& m) {
         .def_readonly("prior", &ExpansionEstimate::prior, "Standard uncertainty of its prior.");
 
     py::class_<RoundedChannel>(m, "RoundedChannel",
-                               "Readings of a channel that were stated to be better known than their numbers are "
-                               "rounded, mm or rad.")
+                               "What took the place of a channel's stated uncertainties, which were too small; mm or "
+                               "rad.")
         .def_readonly("channel", &RoundedChannel::channel, "\"distance\", ...")
         .def_readonly("stated", &RoundedChannel::stated, "Standard uncertainty.")
         .def_readonly("used", &RoundedChannel::used, "Standard uncertainty in its place.")
-        .def_readonly("step", &RoundedChannel::step, "Of the decimals; 0: the rounding of doubles.");
+        .def_readonly("step", &RoundedChannel::step, "Of the decimals; 0: more of them than count.")
+        .def_property_readonly(
+            "cause", [](const RoundedChannel& rounded) { return name(rounded.cause); },
+            "\"doubles\": rounding of numbers; \"decimals\": of the file; \"weights\": tilts or the laser are known so "
+            "much worse that double precision could not weigh both.");
 
     py::class_<DriftEstimate>(m, "DriftEstimate", "A rate of the machine's drift as it was found, mm/s or mm/K.")
         .def_readonly("axis", &DriftEstimate::axis, "0, 1, 2 of X, Y, Z.")
@@ -289,7 +293,8 @@ void bind_result(py::module_& m) {
     py::class_<FitReason>(m, "FitReason", "Why a fit is not accepted, or what its residuals have in common.")
         .def_property_readonly(
             "finding", [](const FitReason& r) { return name(r.finding); },
-            "\"no_redundancy\"; \"no_noise\": rms of the residuals in units of their rounding; \"noise_factor\", \"misfit\", \"no_misfit\": root of the variance factor, not "
+            "\"no_redundancy\"; \"no_noise\": rms of the residuals in units of their rounding; \"noise_factor\", "
+            "\"misfit\", \"no_misfit\": root of the variance factor, not "
             "credible, or larger or smaller than chance explains; \"uneven_misfit\": noise factor of one group of "
             "readings, and as the limit that of the others; \"trend\": what residuals of one channel run by, from the "
             "first reading to the last (mm or rad); "
@@ -406,8 +411,8 @@ void bind_result(py::module_& m) {
             "Expansion coefficients that were unknowns.")
         .def_property_readonly(
             "rounded", [](const AdjustmentOfRun& a) { return a.adjustment.rounded; },
-            "Channels of which the stated uncertainties are below the rounding of the readings, which took their "
-            "place.")
+            "Channels of which the stated uncertainties are below what their numbers, or double precision, can bear; "
+            "that took their place.")
         .def_property_readonly(
             "machine_drift", [](const AdjustmentOfRun& a) { return a.adjustment.machine_drift; },
             "Rates of the machine's drift that were unknowns.")

@@ -18,13 +18,17 @@ SQUARENESS_OF: Final[Mapping[str, str]] = {"XY": "C0Y", "XZ": "B0Z", "YZ": "A0Z"
 
 
 def rounding_rows(rounded: Iterable[RoundedChannel]) -> Iterator[str]:
-    """Channels that were stated to be better known than their numbers are rounded."""
+    """Channels that were stated to be better known than their numbers, or double precision, can bear."""
     for channel in rounded:
         native = "rad" if channel.channel in ("alpha", "beta") else "mm"
         stated, unit = report_value(native, channel.stated)
         used, step = (report_value(native, value)[0] for value in (channel.used, channel.step))
-        because = f"the readings have decimals of {step:g} {unit}" if step else "the readings are rounded as doubles"
-        yield f"{channel.channel}: {stated:.3g} {unit} is stated; {because}, so that {used:.3g} {unit} took its place"
+        because = {
+            "doubles": "the readings are rounded as double-precision numbers",
+            "decimals": f"the readings have decimals of {step:g} {unit}",
+            "weights": "the tilts or the laser are known so much worse that double precision cannot weigh both",
+        }[channel.cause]
+        yield f"{channel.channel}: {stated:.3g} {unit} is stated, {used:.3g} {unit} is used: {because}"
 
 
 def cosine_rows(measurement: Measurement, known: Known) -> Iterator[str]:

@@ -126,13 +126,17 @@ struct ReadingResidual {
     bool used() const { return outlier == 0; }
 };
 
-// Readings of a channel that were stated to be better known than their numbers are rounded: in doubles, or to the
-// decimals of a file, whose step/sqrt(12) took the place of what was stated. mm or rad.
+// Why stated uncertainties of a channel were too small: its numbers are rounded as doubles or to the decimals of a
+// file, or tilts or the laser are known so much worse that double precision could not weigh both.
+enum class RoundingCause { doubles, decimals, weights };
+std::string name(RoundingCause cause);  // "doubles", ...
+// What took the place of a channel's stated uncertainties; mm or rad.
 struct RoundedChannel {
     std::string channel;
     double stated;  // standard uncertainty
     double used;    // in its place
-    double step;    // of the decimals; 0: the rounding of doubles
+    double step;    // of the decimals; 0: more of them than count
+    RoundingCause cause;
 };
 
 // What may be wrong with the readings of one channel in one set-up. A slip is an offset of all of them from a point on,
