@@ -107,10 +107,7 @@ void check_thickness(const HeadBody& body, double least) {
 }  // namespace
 
 double refractive_index(const Material& material, double wavelength) {
-    // Catalogue indices are relative to air at 20 degrees Celsius and 101325 Pa. The catalogue states no humidity; dry
-    // air is assumed.
-    if (const Glass* glass = std::get_if<Glass>(&material))
-        return refractive_index(*glass, wavelength) * refractive_index(Air{20.0, 101325.0, 0.0, 450.0}, wavelength);
+    if (const Glass* glass = std::get_if<Glass>(&material)) return refractive_index(*glass, wavelength);
     const double index = std::get<double>(material);
     if (!(std::isfinite(index) && index >= 1.0))
         throw InvalidArgument("material: expected a glass or an index of at least 1");

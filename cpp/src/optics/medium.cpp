@@ -1,7 +1,9 @@
 #include "stepdiag/optics/medium.hpp"
 
+#include <algorithm>
 #include <cmath>
 
+#include "stepdiag/core/air.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -34,10 +36,14 @@ double refractive_index(const Glass& glass, double wavelength) {
     if (!(wavelength >= lowest && wavelength <= highest))
         throw InvalidArgument(glass.name + ", wavelength in nm: expected " + std::to_string(lowest) + " to " +
                               std::to_string(highest) + ", got " + std::to_string(wavelength));
-    const double L = 1e-6 * wavelength * wavelength;
+    // The catalogue states no humidity.
+    const Air of_catalogue{20.0, 101325.0, 0.0, 450.0};
+    constexpr double longest_in_air = 1700.0;  // its index is smaller by 2e-7 where glasses end
+    const double air = refractive_index(of_catalogue, std::min(wavelength, longest_in_air));
+    const double L = 1e-6 * std::pow(wavelength / air, 2);
     double n2 = 1.0;
     for (int i = 0; i < 3; ++i) n2 += glass.B[i] * L / (L - glass.C[i]);
-    return std::sqrt(n2);
+    return air * std::sqrt(n2);
 }
 
 }  // namespace stepdiag

@@ -67,14 +67,13 @@ def air(known: Path) -> Iterator[SelfTestRow]:
 
 
 def glass(known: Path) -> Iterator[SelfTestRow]:
-    """Of the window of a shipped head. The catalogue's index is relative to air, and its wavelengths are those in air.
-    A head states vacuum wavelengths, and the equation takes them as they are: for the same light, 7e-6 of index less.
-    """
+    """Of the window of a shipped head. Index and wavelength of the catalogue are those in air, of a head in vacuum."""
     window = find_shipped_head("three_beams").read_text(encoding="utf-8")
     off = []
     for row in csv.DictReader((known / "glass.csv").read_text(encoding="utf-8").splitlines()):
-        wavelength = float(row["wavelength_nm"])
-        around = Environment.from_air(relative_humidity=0.0).refractive_index(wavelength)
+        in_air, air = float(row["wavelength_nm"]), Environment.from_air(relative_humidity=0.0)
+        wavelength = in_air * air.refractive_index(in_air)
+        around = air.refractive_index(wavelength)
         text = window.replace("wavelength_nm = 1530.0", f"wavelength_nm = {wavelength!r}")
         design = parse_head_design(text.replace('"N-BK7"', f'"{row["glass"]}"'))
         light = _core.trace_beams(_core.Head.from_design(design, standoff=100.0), distance=100.0)

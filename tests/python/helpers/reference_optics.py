@@ -190,11 +190,12 @@ SELLMEIER = {  # SCHOTT: B1 B2 B3, C1 C2 C3 / um^2
 
 @cache
 def glass_index(name: str, wavelength: float) -> Number:
-    """Absolute: the catalogue's is relative to (dry) air of 20 degrees Celsius and 101325 Pa."""
-    square = (MP.mpf(wavelength) / 1000) ** 2
+    """Absolute, by the vacuum wavelength: the catalogue has both in (dry) air of 20 degrees Celsius and 101325 Pa."""
+    air = ciddor(wavelength, humidity=0.0)
+    square = (MP.mpf(wavelength) / air / 1000) ** 2
     terms = zip(*(map(MP.mpf, text.split()) for text in SELLMEIER[name]), strict=True)
     relative = MP.sqrt(1 + MP.fsum(b * square / (square - c) for b, c in terms))
-    return relative * ciddor(wavelength, humidity=0.0)
+    return relative * air
 
 
 def material_index(material: str | float, wavelength: float) -> Number:

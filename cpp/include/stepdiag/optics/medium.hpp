@@ -13,7 +13,8 @@ struct Medium {
     double index = 1.0;
 };
 
-// Optical glass with the Sellmeier equation n^2 - 1 = sum B_i L / (L - C_i), L = (wavelength/um)^2.
+// Optical glass with the Sellmeier equation n^2 - 1 = sum B_i L / (L - C_i), L = (wavelength/um)^2. Index and
+// wavelength are those in the air of the catalogue: dry, 20 degrees Celsius, 101325 Pa.
 struct Glass {
     std::string name;
     double B[3];
@@ -21,12 +22,12 @@ struct Glass {
 };
 
 // SCHOTT's N-BK7, K7, N-SK4, F2 and N-SF11 with the constants of the catalogue, and fused silica (I. H. Malitson, J.
-// Opt. Soc. Am. 55 (1965) 1205). Catalogue indices are relative to air at 20 degrees Celsius and 101325 Pa.
+// Opt. Soc. Am. 55 (1965) 1205).
 const std::vector<Glass>& glasses();
 // Throws InvalidArgument, which lists the known glasses, for an unknown name.
 const Glass& find_glass(std::string_view name);
 
-// Throws InvalidArgument for a wavelength outside 334 to 2325 nm, the range in which the constants of all glasses are
+// Absolute, for a vacuum wavelength in nm. Throws InvalidArgument for a wavelength outside 334 to 2325 nm, the range in which the constants of all glasses are
 // valid.
 double refractive_index(const Glass& glass, double wavelength);
 
