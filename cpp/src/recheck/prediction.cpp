@@ -22,8 +22,8 @@ Eigen::MatrixXd without_columns(const Eigen::MatrixXd& matrix, Eigen::Index begi
     return rest;
 }
 
-constexpr int most_steps = 30;
-constexpr double settled = 1e-8;  // decrease of the square sum, by reading
+constexpr int most_steps = 100;
+constexpr double settled = 1e-8;  // decrease of the square sum, by reading or, where it is larger, by itself
 
 // A whole step, or a part of it that makes the square sum smaller: angles that act at second order only, as those of a
 // single axis do, have no step that is right. Returns the sum; with a share of 0 that of `before`.
@@ -91,8 +91,13 @@ void Prediction::collect_rows() {
         const LineSetup& setup = problem_.setups()[k];
         const auto size = Eigen::Index(setup.active.size());
         setups_[k].weight.resize(size);
-        for (Eigen::Index j = 0; j < size; ++j)
-            setups_[k].weight[j] = std::pow(usual_prior(setup.prior[setup.active[j]], setup.active[j]), -2);
+        setups_[k].stiffness.resize(size);
+        for (Eigen::Index j = 0; j < size; ++j) {
+            const int column = setup.active[j];
+            setups_[k].weight[j] = std::pow(usual_prior(setup.prior[column], column), -2);
+            setups_[k].stiffness[j] =
+                std::pow(std::min(setup.prior[column], record(setup::component(column).quantity).usual), -2);
+        }
         setups_[k].value.setZero(size);
     }
 }
@@ -200,16 +205,50 @@ void Prediction::settle_setups() {
     }
 }
 
-void Prediction::assemble() {
+void Prediction::linearise(bool derivatives) {
+    for (SetupRows& rows : setups_) linearise(rows, z_, derivatives);
+}
+
+// What the second derivatives of the readings by the set-ups make of the residuals. Machines act at first order, but
+// for their products with set-ups.
+void Prediction::find_curvature() {
+    constexpr double difference = 1e-6;  // rad, and of a metre
+    for (SetupRows& rows : setups_) {
+        const LineSetup& setup = problem_.setups()[std::size_t(&rows - setups_.data())];
+        const Eigen::MatrixXd by_setup = rows.by_setup, by_baseline = rows.by_baseline;
+        const Eigen::VectorXd residual = rows.residual, value = rows.value;
+        rows.curvature.resize(value.size(), value.size());
+        rows.curved_coupling.resize(value.size(), z_.size());
+        for (Eigen::Index j = 0; j < value.size(); ++j) {
+            const bool is_length = record(setup::component(setup.active[std::size_t(j)]).quantity).unit == "mm";
+            const double change = is_length ? 1e3 * difference : difference;
+            rows.value[j] += change;
+            linearise(rows, z_, true);
+            rows.curvature.col(j) = (by_setup - rows.by_setup).transpose() * residual / change;
+            rows.curved_coupling.row(j) = residual.transpose() * (by_baseline - rows.by_baseline) / change;
+            rows.value = value;
+        }
+        rows.by_setup = by_setup;
+        rows.by_baseline = by_baseline;
+        rows.residual = residual;
+        rows.curvature = (0.5 * (rows.curvature + rows.curvature.transpose())).eval();
+    }
+}
+
+bool Prediction::factorize(bool curved, double damping) {
     const Eigen::Index size = z_.size();
     matrix_.setIdentity(size, size);
     gradient_ = -z_;
     for (SetupRows& rows : setups_) {
-        linearise(rows, z_, true);
         Eigen::MatrixXd corner = rows.by_setup.transpose() * rows.by_setup;
-        corner.diagonal() += rows.weight;
+        Eigen::MatrixXd coupling = rows.by_setup.transpose() * rows.by_baseline;
+        corner.diagonal() += rows.weight + damping * rows.stiffness;
+        if (curved) {
+            corner += rows.curvature;
+            coupling += rows.curved_coupling;
+        }
         rows.factor.compute(corner);
-        const Eigen::MatrixXd coupling = rows.by_setup.transpose() * rows.by_baseline;
+        if (!rows.factor.isPositive()) return false;
         rows.transfer = rows.factor.solve(coupling);
         rows.gradient = rows.by_setup.transpose() * rows.residual - rows.weight.cwiseProduct(rows.value);
         matrix_.selfadjointView<Eigen::Lower>().rankUpdate(rows.by_baseline.transpose());
@@ -218,38 +257,60 @@ void Prediction::assemble() {
     }
     matrix_.triangularView<Eigen::StrictlyUpper>() = matrix_.transpose();
     factor_.compute(matrix_);
+    return factor_.info() == Eigen::Success;
 }
 
-double Prediction::step() {
-    assemble();
-    const Eigen::VectorXd z = z_, change = factor_.solve(gradient_);
-    std::vector<Eigen::VectorXd> values, changes;
-    for (const SetupRows& rows : setups_) {
-        values.push_back(rows.value);
-        changes.push_back(rows.factor.solve(rows.gradient) - rows.transfer * change);
-    }
+double Prediction::decrement() const {
+    double sum = gradient_.dot(factor_.solve(gradient_));
+    for (const SetupRows& rows : setups_) sum += rows.gradient.dot(rows.factor.solve(rows.gradient));
+    return sum;
+}
+
+// By the factors; stays where the square sum would not fall by so much.
+bool Prediction::moves(double least_decrease) {
     const double before = chi_square();
-    const auto after = descend(
-        [&](double share) {
-            z_ = z + share * change;
-            for (std::size_t k = 0; k < setups_.size(); ++k) {
-                setups_[k].value = values[k] + share * changes[k];
-                linearise(setups_[k], z_, false);
-            }
-            return chi_square();
-        },
-        before);
-    return before - after;
+    const Eigen::VectorXd z = z_, change = factor_.solve(gradient_);
+    std::vector<Eigen::VectorXd> values;
+    for (const SetupRows& rows : setups_) values.push_back(rows.value);
+    z_ += change;
+    for (SetupRows& rows : setups_) rows.value += rows.factor.solve(rows.gradient) - rows.transfer * change;
+    linearise(false);
+    if (chi_square() <= before - least_decrease) return true;
+    z_ = z;
+    for (std::size_t k = 0; k < setups_.size(); ++k) setups_[k].value = values[k];
+    linearise(false);
+    return false;
+}
+
+// Gauss and Newton's step where it does what it says. Readings that nothing near the calibration explains leave large
+// residuals, and with them the second derivatives count: there it is Newton's, the set-ups being held by a part of what
+// is usual, more of it until the square sum falls (K. Levenberg, Quart. Appl. Math. 2 (1944) 164).
+double Prediction::step() {
+    constexpr double good = 0.75;  // share of what a quadratic would fall by
+    constexpr double first = 1e-2, least = 1e-4, climbs = 10.0, falls = 100.0, most = 1e12;
+    linearise(true);
+    factorize();
+    const double decrement = this->decrement();
+    if (moves(good * decrement)) {
+        damping_ = 0.0;
+        return decrement;
+    }
+    find_curvature();
+    for (; damping_ < most; damping_ = std::max(first, climbs * damping_)) {
+        if (!factorize(true, damping_) || !moves(0.0)) continue;
+        damping_ = damping_ < least ? 0.0 : damping_ / falls;
+        return decrement;
+    }
+    return 0.0;
 }
 
 void Prediction::solve() {
     settle_setups();
-    const double enough = settled * double(sigma_.size());
-    double decrease = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < most_steps && !(decrease < enough); ++i) decrease = step();
-    if (!(decrease < enough))
-        throw InvalidArgument("readings: no machine near the calibration gives them; evaluate the run to see why");
-    assemble();
+    linearise(false);
+    for (int i = 0; i < most_steps; ++i)
+        if (step() < settled * std::max(double(sigma_.size()), chi_square())) break;
+    linearise(true);
+    factorize();
     for (SetupRows& rows : setups_) {
         rows.spread = factor_.matrixL().solve(rows.transfer.transpose());
         linearise(rows, Eigen::VectorXd::Zero(z_.size()), false);

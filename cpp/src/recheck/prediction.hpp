@@ -20,7 +20,8 @@ class Prediction {
 public:
     Prediction(const AdjustmentProblem& problem, const Baseline& baseline);
 
-    // Gauss-Newton to the minimum of e^T e + z^T z + priors of s. Throws InvalidArgument where it is not reached.
+    // To the minimum of e^T e + z^T z + priors of s. Where that is not reached, as near as it gets: the square sum is
+    // then larger than the minimum.
     void solve();
     // After solve(): the estimate without the changes of the baseline, linear from there. What a changed machine reads
     // would take set-ups that must explain it far away from where anything is linear.
@@ -50,10 +51,12 @@ private:
         std::vector<int> points;    // of the problem
         std::vector<int> readings;  // likewise, in the order of the points
         Eigen::VectorXd weight;     // 1/u^2 of the priors of s
+        Eigen::VectorXd stiffness;  // 1/u^2 of what is usual of s
         Eigen::MatrixXd by_setup, by_baseline;
         Eigen::VectorXd residual;
         Eigen::VectorXd value;     // s
         Eigen::VectorXd gradient;  // by s
+        Eigen::MatrixXd curvature, curved_coupling;  // by s, and by s and z
         // At the last factorisation: A = S^T S + P, T = A^-1 S^T Z, and L^-1 T^T with the factor L of z.
         Eigen::LDLT<Eigen::MatrixXd> factor;
         Eigen::MatrixXd transfer, spread;
@@ -63,8 +66,13 @@ private:
     void collect_rows();
     void linearise(SetupRows& rows, const Eigen::VectorXd& z, bool derivatives);
     void settle_setups();
-    void assemble();  // the normal equations at z and s, and their factors
-    double step();    // by how much the square sum became smaller
+    void linearise(bool derivatives);  // all, at z and s
+    void find_curvature();
+    // The normal equations of the last derivatives, and their factors; false where there are none.
+    bool factorize(bool curved = false, double damping = 0.0);
+    double decrement() const;  // by which the square sum would fall if it were a quadratic
+    bool moves(double least_decrease);
+    double step();  // the decrement before it; 0 where the square sum falls no more
     static double objective(const SetupRows& rows);
 
     const AdjustmentProblem& problem_;
@@ -74,6 +82,7 @@ private:
     std::vector<int> setup_of_;  // by reading
     std::vector<SetupRows> setups_;
     Eigen::VectorXd z_;
+    double damping_ = 0.0;
     Eigen::MatrixXd matrix_;
     Eigen::VectorXd gradient_;                      // half of the square sum's derivative by z, downwards
     Eigen::LLT<Eigen::MatrixXd> factor_;            // of matrix_
