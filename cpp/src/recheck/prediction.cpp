@@ -1,8 +1,8 @@
 #include "recheck/prediction.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "stepdiag/core/error.hpp"
 
@@ -82,6 +82,8 @@ void Prediction::collect_rows() {
         SetupRows& rows = setups_[point.setup];
         rows.points.push_back(int(p));
         for (int r = point.first_reading; r < point.end_reading; ++r) {
+            if (!problem_.readings()[r].used()) continue;
+            ++used_;
             place_[r] = int(rows.readings.size());
             setup_of_[r] = point.setup;
             rows.readings.push_back(r);
@@ -154,6 +156,7 @@ void Prediction::linearise(SetupRows& rows, const Eigen::VectorXd& z, bool deriv
             differentiate_pose(problem_.chain(), problem_.tool(), point.place.commanded, errors, derivatives);
         model.read(pose, point.place, reading, derivatives ? &derivative : nullptr);
         for (int r = point.first_reading; r < point.end_reading; ++r) {
+            if (!problem_.readings()[r].used()) continue;
             const int channel = problem_.readings()[r].channel;
             const double weight = 1.0 / sigma_[r];
             const int i = place_[r];
@@ -308,7 +311,7 @@ void Prediction::solve() {
     settle_setups();
     linearise(false);
     for (int i = 0; i < most_steps; ++i)
-        if (step() < settled * std::max(double(sigma_.size()), chi_square())) break;
+        if (step() < settled * std::max(double(used_), chi_square())) break;
     linearise(true);
     factorize();
     for (SetupRows& rows : setups_) {
@@ -350,8 +353,30 @@ double Prediction::chi_square() const {
     return sum;
 }
 
-int Prediction::degrees_of_freedom() const {
-    double told = 0.0;  // of the free unknowns, those that the readings tell
+Eigen::MatrixXd Prediction::information(Eigen::Index begin, Eigen::Index count) const {
+    const Eigen::Index size = matrix_.rows(), after = size - begin - count;
+    // Everything else: the columns before and after.
+    Eigen::MatrixXd others(size - count, size - count), coupling(size - count, count);
+    others << matrix_.topLeftCorner(begin, begin), matrix_.topRightCorner(begin, after),
+        matrix_.bottomLeftCorner(after, begin), matrix_.bottomRightCorner(after, after);
+    coupling << matrix_.block(0, begin, begin, count), matrix_.block(begin + count, begin, after, count);
+    return matrix_.block(begin, begin, count, count) - Eigen::MatrixXd::Identity(count, count) -
+           coupling.transpose() * others.llt().solve(coupling);
+}
+
+ChiSquare Prediction::fit(Eigen::Index begin, Eigen::Index count) const {
+    constexpr double told = 1e-2;  // below, what a prior allows changes the square sum by less, be it there or not
+    ChiSquare test{chi_square(), used_};
+    if (count > 0) {
+        const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(information(begin, count));
+        const Eigen::VectorXd drawn = parts.eigenvectors().transpose() * z_.segment(begin, count);
+        for (Eigen::Index k = 0; k < count; ++k)
+            if (const double information = parts.eigenvalues()[k]; information >= told) {
+                test.square_sum -= drawn[k] * drawn[k] * (1.0 + information) / information;
+                --test.freedom;
+            }
+    }
+    double free = 0.0;  // of the free unknowns, those that the readings tell  // of the free unknowns, those that the readings tell
     for (std::size_t k = 0; k < setups_.size(); ++k) {
         const LineSetup& setup = problem_.setups()[k];
         const SetupRows& rows = setups_[k];
@@ -359,9 +384,10 @@ int Prediction::degrees_of_freedom() const {
         const Eigen::MatrixXd alone = rows.factor.solve(Eigen::MatrixXd::Identity(size, size));
         for (Eigen::Index j = 0; j < size; ++j)
             if (!std::isfinite(setup.prior[setup.active[j]]))
-                told += 1.0 - rows.weight[j] * (alone(j, j) + rows.spread.col(j).squaredNorm());
+                free += 1.0 - rows.weight[j] * (alone(j, j) + rows.spread.col(j).squaredNorm());
     }
-    return int(sigma_.size()) - int(std::lround(told));
+    test.freedom -= int(std::lround(free));
+    return test;
 }
 
 Prediction::Deviation Prediction::deviation(const std::vector<Term>& sum) const {
@@ -382,6 +408,17 @@ Prediction::Deviation Prediction::deviation(const std::vector<Term>& sum) const 
     const double told = by_setup.dot(rows.factor.solve(by_setup)) + (rows.spread * by_setup).squaredNorm();
     constexpr double rounding = 1e-9;
     return {value, variance - told > rounding * variance ? std::sqrt(variance - told) : 0.0};
+}
+
+Prediction::Deviation Prediction::misfit(int reading) const {
+    const SetupRows& rows = setups_[setup_of_[reading]];
+    const int i = place_[reading];
+    const Eigen::VectorXd by_setup = rows.by_setup.row(i).transpose();
+    const Eigen::VectorXd by_baseline = factor_.matrixL().solve(rows.by_baseline.row(i).transpose());
+    const double told =
+        by_setup.dot(rows.factor.solve(by_setup)) + (by_baseline - rows.spread * by_setup).squaredNorm();
+    constexpr double rounding = 1e-9;
+    return {sigma_[reading] * rows.residual[i], 1.0 - told > rounding ? sigma_[reading] * std::sqrt(1.0 - told) : 0.0};
 }
 
 }  // namespace stepdiag

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "adjustment/adjustment_problem.hpp"
+#include "evaluation/fit_test.hpp"
 #include "recheck/baseline.hpp"
 
 namespace stepdiag {
@@ -27,7 +28,10 @@ public:
     // would take set-ups that must explain it far away from where anything is linear.
     void drop_changes();
     double chi_square() const;
-    int degrees_of_freedom() const;
+    // After solve(). Of the test whether all readings go with what is known: nothing is known of `count` components of z
+    // from `begin` on, as far as the readings tell them. Their priors say how far they may be from 0, so that with them
+    // the square sum would be too small by one for each that is 0.
+    ChiSquare fit(Eigen::Index begin, Eigen::Index count) const;
 
     // A sum of readings, in native units.
     struct Term {
@@ -40,11 +44,15 @@ public:
     };
     // Of readings of one set-up. After solve().
     Deviation deviation(const std::vector<Term>& sum) const;
+    // What is left of a reading at the estimate, and its standard uncertainty. After solve().
+    Deviation misfit(int reading) const;
 
     // After solve(): z, and the inverse of its covariance. The root's columns come first, those of the changes last of
     // them.
     const Eigen::VectorXd& values() const { return z_; }
     const Eigen::MatrixXd& information() const { return matrix_; }
+    // What the readings tell of some components by their priors, everything else being estimated with them.
+    Eigen::MatrixXd information(Eigen::Index begin, Eigen::Index count) const;
 
 private:
     struct SetupRows {
@@ -78,6 +86,7 @@ private:
     const AdjustmentProblem& problem_;
     const Baseline& baseline_;
     std::vector<double> sigma_;  // by reading
+    int used_ = 0;               // readings; the others stay out
     std::vector<int> place_;     // by reading: row in its set-up
     std::vector<int> setup_of_;  // by reading
     std::vector<SetupRows> setups_;
