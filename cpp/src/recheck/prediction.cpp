@@ -77,6 +77,7 @@ void Prediction::collect_rows() {
     setups_.resize(problem_.setups().size());
     place_.resize(sigma_.size());
     setup_of_.resize(sigma_.size());
+    missed_.resize(sigma_.size());
     for (std::size_t p = 0; p < problem_.points().size(); ++p) {
         const AdjustedPoint& point = problem_.points()[p];
         SetupRows& rows = setups_[point.setup];
@@ -156,8 +157,11 @@ void Prediction::linearise(SetupRows& rows, const Eigen::VectorXd& z, bool deriv
             differentiate_pose(problem_.chain(), problem_.tool(), point.place.commanded, errors, derivatives);
         model.read(pose, point.place, reading, derivatives ? &derivative : nullptr);
         for (int r = point.first_reading; r < point.end_reading; ++r) {
-            if (!problem_.readings()[r].used()) continue;
             const int channel = problem_.readings()[r].channel;
+            if (!problem_.readings()[r].used()) {
+                missed_[r] = problem_.readings()[r].value - reading[channel];
+                continue;
+            }
             const double weight = 1.0 / sigma_[r];
             const int i = place_[r];
             rows.residual[i] = weight * (problem_.readings()[r].value - reading[channel]);
@@ -239,19 +243,21 @@ void Prediction::find_curvature() {
 }
 
 bool Prediction::factorize(bool curved, double damping) {
+    constexpr double open = 1e-12;  // by itself: what no reading of a set-up tells stays where it is
     const Eigen::Index size = z_.size();
+    bool is_positive = true;
     matrix_.setIdentity(size, size);
     gradient_ = -z_;
     for (SetupRows& rows : setups_) {
         Eigen::MatrixXd corner = rows.by_setup.transpose() * rows.by_setup;
         Eigen::MatrixXd coupling = rows.by_setup.transpose() * rows.by_baseline;
-        corner.diagonal() += rows.weight + damping * rows.stiffness;
+        corner.diagonal() += open * corner.diagonal() + rows.weight + damping * rows.stiffness;
         if (curved) {
             corner += rows.curvature;
             coupling += rows.curved_coupling;
         }
         rows.factor.compute(corner);
-        if (!rows.factor.isPositive()) return false;
+        is_positive = is_positive && rows.factor.isPositive();
         rows.transfer = rows.factor.solve(coupling);
         rows.gradient = rows.by_setup.transpose() * rows.residual - rows.weight.cwiseProduct(rows.value);
         matrix_.selfadjointView<Eigen::Lower>().rankUpdate(rows.by_baseline.transpose());
@@ -260,7 +266,7 @@ bool Prediction::factorize(bool curved, double damping) {
     }
     matrix_.triangularView<Eigen::StrictlyUpper>() = matrix_.transpose();
     factor_.compute(matrix_);
-    return factor_.info() == Eigen::Success;
+    return is_positive && factor_.info() == Eigen::Success;
 }
 
 double Prediction::decrement() const {
@@ -292,9 +298,9 @@ double Prediction::step() {
     constexpr double good = 0.75;  // share of what a quadratic would fall by
     constexpr double first = 1e-2, least = 1e-4, climbs = 10.0, falls = 100.0, most = 1e12;
     linearise(true);
-    factorize();
+    const bool is_definite = factorize();
     const double decrement = this->decrement();
-    if (moves(good * decrement)) {
+    if (is_definite && moves(good * decrement)) {
         damping_ = 0.0;
         return decrement;
     }
@@ -365,14 +371,17 @@ Eigen::MatrixXd Prediction::information(Eigen::Index begin, Eigen::Index count) 
 }
 
 ChiSquare Prediction::fit(Eigen::Index begin, Eigen::Index count) const {
-    constexpr double told = 1e-2;  // below, what a prior allows changes the square sum by less, be it there or not
+    constexpr double told = 1e-2;   // below, what a prior allows changes the square sum by less, be it there or not
+    constexpr double near = 400.0;  // square of 20 priors: farther away no change is near the calibration
     ChiSquare test{chi_square(), used_};
     if (count > 0) {
         const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(information(begin, count));
         const Eigen::VectorXd drawn = parts.eigenvectors().transpose() * z_.segment(begin, count);
         for (Eigen::Index k = 0; k < count; ++k)
             if (const double information = parts.eigenvalues()[k]; information >= told) {
-                test.square_sum -= drawn[k] * drawn[k] * (1.0 + information) / information;
+                const double by_prior = drawn[k] * drawn[k] * (1.0 + information) / information;
+                if (by_prior > near) continue;
+                test.square_sum -= by_prior;
                 --test.freedom;
             }
     }

@@ -46,6 +46,9 @@ public:
     Deviation deviation(const std::vector<Term>& sum) const;
     // What is left of a reading at the estimate, and its standard uncertainty. After solve().
     Deviation misfit(int reading) const;
+    // Of readings that are not used: read - predicted at the estimate, mm or rad; by reading, 0 of all others. After
+    // solve().
+    const std::vector<double>& missed() const { return missed_; }
 
     // After solve(): z, and the inverse of its covariance. The root's columns come first, those of the changes last of
     // them.
@@ -89,6 +92,7 @@ private:
     int used_ = 0;               // readings; the others stay out
     std::vector<int> place_;     // by reading: row in its set-up
     std::vector<int> setup_of_;  // by reading
+    std::vector<double> missed_;
     std::vector<SetupRows> setups_;
     Eigen::VectorXd z_;
     double damping_ = 0.0;

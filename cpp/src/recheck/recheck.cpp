@@ -59,24 +59,7 @@ Calibration with_change(const Baseline& baseline, const Prediction& prediction) 
     return updated;
 }
 
-// By how many standard uncertainties each reading is off, the farthest first; at most `count`.
-std::vector<PredictedReading> largest_misfits(const AdjustmentProblem& problem, const Prediction& prediction,
-                                              std::size_t count) {
-    std::vector<PredictedReading> misfits;
-    for (int r = 0; r < int(problem.readings().size()); ++r) {
-        const AdjustedReading& reading = problem.readings()[r];
-        if (!reading.used()) continue;
-        const auto [value, uncertainty] = prediction.misfit(r);
-        misfits.push_back({reading.row, problem.channel_name(reading), value, uncertainty});
-    }
-    count = std::min(count, misfits.size());
-    std::partial_sort(misfits.begin(), misfits.begin() + std::ptrdiff_t(count), misfits.end(),
-                      [](const auto& a, const auto& b) { return std::abs(a.normalised()) > std::abs(b.normalised()); });
-    misfits.resize(count);
-    return misfits;
-}
-
-Recheck rechecked(const AdjustmentProblem& problem, const Baseline& changing) {
+Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& changing) {
     const auto count = Eigen::Index(changing.changes().size());
     const Eigen::Index begin = changing.root().cols() - count;
 
@@ -93,9 +76,6 @@ Recheck rechecked(const AdjustmentProblem& problem, const Baseline& changing) {
     result.fit_chi_square = fit.square_sum;
     result.fit_degrees_of_freedom = fit.freedom;
     if (fit.freedom > 0) result.fit_probability = chi_square_probability(fit.square_sum, fit.freedom);
-    constexpr std::size_t shown = 5;
-    if (result.fit_probability < readings_asked_below) result.misfits = largest_misfits(problem, changed, shown);
-
     const Eigen::MatrixXd inverse =
         changed.information().llt().solve(Eigen::MatrixXd::Identity(changed.values().size(), changed.values().size()));
     Eigen::VectorXd prior(count);
@@ -114,7 +94,17 @@ Recheck rechecked(const AdjustmentProblem& problem, const Baseline& changing) {
         for (Eigen::Index j = 0; j < count; ++j) sum.weight.push_back(told.direction(j, k));
         result.combinations.push_back(std::move(sum));
     }
-    return result;
+    constexpr std::size_t shown = 5;
+    std::vector<Misfit> misfits;
+    if (result.fit_probability < readings_asked_below) misfits = largest_misfits(problem, changed, shown);
+    for (const Misfit& misfit : misfits) {
+        const AdjustedReading& reading = problem.readings()[misfit.reading];
+        result.misfits.push_back(
+            {reading.row, problem.channel_name(reading), misfit.value, misfit.standard_uncertainty});
+    }
+    const bool is_asked = std::min(result.probability, result.fit_probability) < readings_asked_below;
+    const double probability = result.fit_probability;
+    return {std::move(result), fit, probability, is_asked, std::move(misfits), changed.missed()};
 }
 
 }  // namespace
@@ -151,17 +141,8 @@ Recheck recheck(const Calibration& baseline, const Measurement& measurement, con
     AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine(options));
     if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
     const Baseline changing(baseline, priors, read_positions(problem));
-    Recheck result = rechecked(problem, changing);
-    if (result.fit_degrees_of_freedom < 1)
-        throw InvalidArgument("readings: there are no more of them than unknowns of how head and mirror stood");
-    if (std::min(result.probability, result.fit_probability) >= readings_asked_below) return result;
-    const std::vector<FaultClass> faults = faults_of_run(measurement, plan, chain, tool, heads, options);
-    if (faults.empty()) return result;
-    leave_out(faults, problem);
-    Recheck without = rechecked(problem, changing);
-    if (without.fit_degrees_of_freedom < 1) return result;
-    without.left_out = faults;
-    return without;
+    return judge_without_wrong_readings({measurement, plan, chain, tool, heads, options}, problem,
+                                        [&](const AdjustmentProblem& rest) { return rechecked(rest, changing); });
 }
 
 }  // namespace stepdiag

@@ -63,7 +63,7 @@ std::vector<LineDeviation> line_deviations(const Measurement& measurement, const
     return lines;
 }
 
-Verification verified(const Measurement& measurement, const AdjustmentProblem& problem, const Baseline& baseline) {
+Judgement<Verification> verified(const Measurement& measurement, const AdjustmentProblem& problem, const Baseline& baseline) {
     Prediction prediction(problem, baseline);
     prediction.solve();
     prediction.drop_changes();
@@ -84,7 +84,11 @@ Verification verified(const Measurement& measurement, const AdjustmentProblem& p
         result.readings.begin(), result.readings.end(),
         [](const auto& a, const auto& b) { return std::abs(a.normalised()) < std::abs(b.normalised()); });
     result.worst = std::size_t(worst - result.readings.begin());
-    return result;
+    const double probability = result.probability;
+    const bool is_asked = probability < readings_asked_below;
+    std::vector<Misfit> misfits;
+    if (is_asked) misfits = largest_misfits(problem, prediction, 5);
+    return {std::move(result), fit, probability, is_asked, std::move(misfits), prediction.missed()};
 }
 
 }  // namespace
@@ -96,17 +100,9 @@ Verification verify(const Calibration& calibration, const Measurement& measureme
     AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine(options));
     if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
     const Baseline baseline(calibration, largest_change, read_positions(problem));
-    Verification result = verified(measurement, problem, baseline);
-    if (result.degrees_of_freedom < 1)
-        throw InvalidArgument("readings: there are no more of them than unknowns of how head and mirror stood");
-    if (result.probability >= readings_asked_below) return result;
-    const std::vector<FaultClass> faults = faults_of_run(measurement, plan, chain, tool, heads, options);
-    if (faults.empty()) return result;
-    leave_out(faults, problem);
-    Verification without = verified(measurement, problem, baseline);
-    if (without.degrees_of_freedom < 1) return result;
-    without.left_out = faults;
-    return without;
+    return judge_without_wrong_readings(
+        {measurement, plan, chain, tool, heads, options}, problem,
+        [&](const AdjustmentProblem& rest) { return verified(measurement, rest, baseline); });
 }
 
 }  // namespace stepdiag
