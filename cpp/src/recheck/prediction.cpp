@@ -46,7 +46,7 @@ Baseline::Positions read_positions(const AdjustmentProblem& problem) {
 }
 
 Prediction::Prediction(const AdjustmentProblem& problem, const Baseline& baseline)
-    : problem_(problem), baseline_(baseline) {
+    : problem_(problem), baseline_(baseline), root_(baseline.root()) {
     weigh_readings();
     collect_rows();
     z_.setZero(baseline.root().cols() + Eigen::Index(problem.coefficients().size() + problem.sensors().size()));
@@ -113,15 +113,16 @@ void Prediction::linearise(SetupRows& rows, const Eigen::VectorXd& z, bool deriv
     for (std::size_t j = 0; j < setup.active.size(); ++j) whole[setup.active[j]] = rows.value[Eigen::Index(j)];
     model.set_up(whole);
 
-    const Eigen::MatrixXd& root = baseline_.root();
+    const Eigen::Index columns = root_.cols();
     const auto& coefficients = problem_.coefficients();
     const auto& expansion = problem_.expansion();
-    const Eigen::VectorXd values = root * z.head(root.cols());
+    const Eigen::VectorXd values = root_ * z.head(columns);
+    Eigen::RowVectorXd row(z.size());
     const auto count = Eigen::Index(rows.readings.size());
     rows.residual.resize(count);
     if (derivatives) {
         rows.by_setup.resize(count, Eigen::Index(setup.active.size()));
-        rows.by_baseline.setZero(count, z.size());
+        rows.by_baseline.resize(count, z.size());
     }
     Eigen::VectorXd reading(model.channels());
     ChannelDerivative derivative(model.channels(), 18 + model.setup_size());
@@ -138,7 +139,7 @@ void Prediction::linearise(SetupRows& rows, const Eigen::VectorXd& z, bool deriv
             errors[a] = baseline_.errors(axis, position, point.negative[a], shares[a]);
             for (const Baseline::Share& share : shares[a])
                 errors[a][share.component] += share.weight * values[share.entry];
-            added[a].setZero(z.size() - root.cols());
+            added[a].setZero(z.size() - columns);
             if (!expansion) continue;
             errors[a][a] += expansion->expansion.coefficient[a] * point.place.stretch[a];
             for (std::size_t c = 0; c < coefficients.size(); ++c)
@@ -168,13 +169,14 @@ void Prediction::linearise(SetupRows& rows, const Eigen::VectorXd& z, bool deriv
             if (!derivatives) continue;
             for (std::size_t j = 0; j < setup.active.size(); ++j)
                 rows.by_setup(i, Eigen::Index(j)) = weight * derivative(channel, 18 + setup.active[j]);
+            row.setZero();
             for (int a = 0; a < 3; ++a) {
                 for (const Baseline::Share& share : shares[a])
-                    rows.by_baseline.row(i).head(root.cols()) +=
-                        weight * derivative(channel, 6 * a + share.component) * share.weight * root.row(share.entry);
-                rows.by_baseline.row(i).tail(added[a].size()) +=
-                    weight * derivative(channel, 7 * a) * added[a].transpose();
+                    row.head(columns) +=
+                        weight * derivative(channel, 6 * a + share.component) * share.weight * root_.row(share.entry);
+                row.tail(added[a].size()) += weight * derivative(channel, 7 * a) * added[a].transpose();
             }
+            rows.by_baseline.row(i) = row;
         }
     }
 }

@@ -88,6 +88,7 @@ private:
 
     const AdjustmentProblem& problem_;
     const Baseline& baseline_;
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> root_;  // of the baseline
     std::vector<double> sigma_;  // by reading
     int used_ = 0;               // readings; the others stay out
     std::vector<int> place_;     // by reading: row in its set-up

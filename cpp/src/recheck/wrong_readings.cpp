@@ -25,7 +25,10 @@ std::vector<Misfit> largest_misfits(const AdjustmentProblem& problem, const Pred
 
 std::vector<FaultClass> faults_of(const Run& run) {
     try {
-        return adjust(run.measurement, run.plan, run.chain, run.tool, run.heads, run.options).faults;
+        std::vector<FaultClass> faults =
+            adjust(run.measurement, run.plan, run.chain, run.tool, run.heads, run.options).faults;
+        for (FaultClass& one : faults) one.treatment = FaultTreatment::left_out;
+        return faults;
     } catch (const InvalidArgument&) {
         return {};  // a short run may tell too little of a machine
     }
@@ -40,8 +43,12 @@ void leave_out(const std::vector<FaultClass>& faults, AdjustmentProblem& problem
             const std::size_t row = problem.readings()[r].row;
             of_row[row] = {point.setup, Place(point.place.time, row)};
         }
-    for (std::size_t k = 0; k < faults.size(); ++k)
-        for (const Fault& fault : faults[k].members) {
+    for (std::size_t k = 0; k < faults.size(); ++k) {
+        const std::vector<Fault>& members = faults[k].members;
+        const bool is_reading = std::any_of(members.begin(), members.end(),
+                                            [](const Fault& fault) { return fault.kind == FaultKind::reading; });
+        for (const Fault& fault : members) {
+            if (is_reading && fault.kind != FaultKind::reading) continue;
             const auto& [setup, begin] = of_row.at(fault.row);
             for (AdjustedReading& reading : problem.readings()) {
                 const auto& [its_setup, place] = of_row.at(reading.row);
@@ -52,6 +59,7 @@ void leave_out(const std::vector<FaultClass>& faults, AdjustmentProblem& problem
                 if (is_hit && problem.channel_name(reading) == fault.channel) reading.outlier = int(k) + 1;
             }
         }
+    }
 }
 
 Fault wrong_reading(const Run& run, const AdjustmentProblem& problem, const Misfit& before, double after, double gain) {

@@ -2,6 +2,8 @@
 // judged. Internal: not installed.
 #pragma once
 
+#include <cmath>
+#include <utility>
 #include <vector>
 
 #include "recheck/prediction.hpp"
@@ -34,10 +36,10 @@ struct Run {
 
 // The faults that an adjustment of the run by itself finds, with a machine that is not known: a change of the machine is
 // none of them. None where there is no such adjustment.
-std::vector<FaultClass> faults_of(const Run& run);
+std::vector<FaultClass> faults_of(const Run& run);  // as they are left out
 
-// Leaves out all readings that the faults may have spoilt: of a slip those of its channel from there on, of a factor all
-// on its line.
+// Leaves out the readings that the faults may have spoilt: of a slip those of its channel from there on, of a factor all
+// on its line. Where a slip may as well be a single reading, leaving that out removes the slip, too.
 void leave_out(const std::vector<FaultClass>& faults, AdjustmentProblem& problem);
 
 // A wrong reading that is left out, from the judgement before and after.
@@ -47,8 +49,8 @@ template <class Result>
 struct Judgement {
     Result result;
     ChiSquare fit;
-    double probability;      // of the fit
-    bool is_asked;           // whether readings may be wrong
+    double probability;  // of the fit
+    bool is_asked;       // whether readings may be wrong
     std::vector<Misfit> misfits;
     std::vector<double> missed;  // by reading: Prediction::missed
 };
@@ -59,7 +61,7 @@ struct Judgement {
 template <class Judge>
 auto judge_without_wrong_readings(const Run& run, AdjustmentProblem& problem, const Judge& judge) {
     constexpr double gain_of_a_fault = 28.0;  // as an adjustment has it
-    constexpr double next_to_the_worst = 0.7;
+    constexpr double next_to_the_worst = 0.5, least_share = 0.5;
     auto judged = judge(problem);
     if (judged.fit.freedom < 1)
         throw InvalidArgument("readings: there are no more of them than unknowns of how head and mirror stood");
@@ -78,7 +80,9 @@ auto judge_without_wrong_readings(const Run& run, AdjustmentProblem& problem, co
         FaultClass wrong{{}, FaultTreatment::left_out, true};
         std::vector<int> without;
         for (const Misfit& misfit : judged.misfits) {
-            if (std::abs(misfit.by_uncertainty()) < next_to_the_worst * std::abs(judged.misfits[0].by_uncertainty()))
+            const double explains = std::pow(misfit.by_uncertainty(), 2);  // of the square sum, if that is a quadratic
+            if (explains < next_to_the_worst * std::pow(judged.misfits[0].by_uncertainty(), 2) ||
+                explains < least_share * judged.fit.square_sum - judged.fit.freedom)
                 break;
             problem.readings()[misfit.reading].outlier = int(found.size()) + 1;
             const auto rest = judge(problem);
