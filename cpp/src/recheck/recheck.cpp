@@ -104,7 +104,7 @@ Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& c
     }
     const bool is_asked = std::min(result.probability, result.fit_probability) < readings_asked_below;
     const double probability = result.fit_probability;
-    return {std::move(result), fit, probability, is_asked, std::move(misfits), changed.missed()};
+    return {std::move(result), fit, probability, is_asked, std::move(misfits), fit.square_sum, changed.missed()};
 }
 
 }  // namespace

@@ -87,8 +87,15 @@ Judgement<Verification> verified(const Measurement& measurement, const Adjustmen
     const double probability = result.probability;
     const bool is_asked = probability < readings_asked_below;
     std::vector<Misfit> misfits;
-    if (is_asked) misfits = largest_misfits(problem, prediction, 5);
-    return {std::move(result), fit, probability, is_asked, std::move(misfits), prediction.missed()};
+    double square_sum = fit.square_sum;
+    if (is_asked) {
+        constexpr std::size_t tried = 5;
+        Prediction changed(problem, baseline);
+        changed.solve();
+        misfits = largest_misfits(problem, changed, tried);
+        square_sum = changed.chi_square();
+    }
+    return {std::move(result), fit, probability, is_asked, std::move(misfits), square_sum, prediction.missed()};
 }
 
 }  // namespace

@@ -51,7 +51,10 @@ struct Judgement {
     ChiSquare fit;
     double probability;  // of the fit
     bool is_asked;       // whether readings may be wrong
+    // Where the machine may have changed, which leaves the least of what is wrong: the largest misfits, and the square
+    // sum.
     std::vector<Misfit> misfits;
+    double square_sum;
     std::vector<double> missed;  // by reading: Prediction::missed
 };
 
@@ -82,7 +85,7 @@ auto judge_without_wrong_readings(const Run& run, AdjustmentProblem& problem, co
         for (const Misfit& misfit : judged.misfits) {
             const double explains = std::pow(misfit.by_uncertainty(), 2);  // of the square sum, if that is a quadratic
             if (explains < next_to_the_worst * std::pow(judged.misfits[0].by_uncertainty(), 2) ||
-                explains < least_share * judged.fit.square_sum - judged.fit.freedom)
+                explains < least_share * judged.square_sum - judged.fit.freedom)
                 break;
             problem.readings()[misfit.reading].outlier = int(found.size()) + 1;
             const auto rest = judge(problem);

@@ -101,15 +101,15 @@ def recheck_report(judged: Judged, measurement: Measurement, volume: VolumeError
     match judged.verdict:
         case "unexplained":
             yield (
-                f"the machine has changed, unexplained{without}: they go neither with the calibration nor with a "
-                "change of low order; it has changed otherwise, or more readings are wrong "
+                f"the machine has changed, unexplained: {_rest(found.left_out)} go neither with the calibration nor "
+                "with a change of low order; it has changed otherwise, or readings are wrong "
                 f"(chi-square {found.fit_chi_square:.1f} with {found.fit_degrees_of_freedom} degrees of freedom, by "
                 f"chance larger in {_percent(found.fit_probability)} of cases, limit {100.0 * judged.alpha:g} %)"
             )
             yield from fault_rows(found.left_out)
             yield "readings that are farthest from the machine with the best change of low order:"
             yield from (f"  {text}" for text in _misfits(found, measurement))
-            yield f"test for a change of low order: {tested}"
+            yield f"change of low order: {tested}"
         case "changed":
             yield f"the machine has changed{without}: {tested}"
             yield from fault_rows(found.left_out)

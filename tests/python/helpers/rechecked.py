@@ -62,6 +62,7 @@ def changed_machine(drawn: coverage_cases.Drawn, change: dict[str, float]) -> sd
 
 # What happens to a machine that was calibrated, or to the readings of the run that rechecks it.
 SCREW, SHAPE, WRONG = 5e-3, 5e-3, 1.0  # mm
+LAYOUTS = ("ideal", "psd", "multi_beam")
 EVENTS = ("nothing", "screw", "cubic bow", "wrong reading", "slip")
 
 
