@@ -82,6 +82,11 @@ void bind_rechecking(py::module_& m) {
         .def_readonly("value", &ChangeCombination::value, "In units of the priors.")
         .def_readonly("standard_uncertainty", &ChangeCombination::standard_uncertainty,
                       "Of the readings and the calibration alone.");
+    py::class_<PredictedReading>(m, "PredictedReading", "A reading against what was to be read.")
+        .def_readonly("row", &PredictedReading::row, "Of the measurement, from 0.")
+        .def_readonly("channel", &PredictedReading::channel, "\"distance\", ...")
+        .def_readonly("deviation", &PredictedReading::deviation, "Read minus predicted, mm or rad.")
+        .def_readonly("standard_uncertainty", &PredictedReading::standard_uncertainty, "Of the deviation.");
     py::class_<Recheck>(m, "Recheck", "Whether a machine has changed since its calibration, and by what.")
         .def_readonly("chi_square", &Recheck::chi_square, "Of no change at all.")
         .def_readonly("degrees_of_freedom", &Recheck::degrees_of_freedom,
@@ -90,7 +95,7 @@ void bind_rechecking(py::module_& m) {
         .def_readonly("fit_chi_square", &Recheck::fit_chi_square, "Of all readings, with the change.")
         .def_readonly("fit_degrees_of_freedom", &Recheck::fit_degrees_of_freedom, "Of all readings, with the change.")
         .def_readonly("fit_probability", &Recheck::fit_probability,
-                      "Of a larger one, if such a change explains the readings.")
+                      "Of a larger one, if such a change, of any size, explains the readings.")
         .def_property_readonly(
             "terms", [](const Recheck& r) { return to_tuple(r.terms); },
             "A ChangeTerm for each way in which the machine may change.")
@@ -105,7 +110,15 @@ void bind_rechecking(py::module_& m) {
              "(n,) smallest change of each term, alone, that such readings show with the probability `power` if an "
              "unchanged machine is said to have changed with the probability `alpha`; inf where they tell nothing of "
              "it. Raises InvalidArgument unless 0 < alpha < power < 1.")
-        .def_readonly("updated", &Recheck::updated, "The calibration with the change, and their joint covariance.");
+        .def_readonly("updated", &Recheck::updated, "The calibration with the change, and their joint covariance.")
+        .def_property_readonly(
+            "left_out", [](const Recheck& r) { return to_tuple(r.left_out); },
+            "A FaultClass for each fault that an adjustment of the run by itself finds, where the readings do not go "
+            "with the baseline. The readings that they may have spoilt are left out of everything.")
+        .def_property_readonly(
+            "misfits", [](const Recheck& r) { return to_tuple(r.misfits); },
+            "Where no such change explains the readings, a PredictedReading for those that are farthest from the "
+            "machine with the change, the worst first.");
 
     m.def(
         "recheck", &recheck_run, py::arg("baseline"), py::arg("measurement"), py::arg("plan"), py::arg("head"),
@@ -157,6 +170,10 @@ void bind_recheck(py::module_& m) {
         .def_property_readonly(
             "probability", [](const Result& r) { return r.verification.probability; },
             "Of a larger chi-square, if calibration, readings and uncertainties are right.")
+        .def_property_readonly(
+            "left_out", [](const Result& r) { return to_tuple(r.verification.left_out); },
+            "A FaultClass for each fault that an adjustment of the run by itself finds, where the readings do not "
+            "agree. The readings that they may have spoilt are left out of everything.")
         .def_property_readonly(
             "worst",
             [](const Result& r) {

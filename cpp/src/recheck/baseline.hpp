@@ -34,6 +34,8 @@ public:
     // values = calibration_values + root z + rest, where z has independent components of variance 1, and the rest is
     // independent of it and 0 at what is read.
     const Eigen::MatrixXd& root() const { return root_; }
+    // The root's columns up to here are of the calibration's covariance; then come slopes that it does not determine.
+    Eigen::Index own_columns() const { return own_columns_; }
     Eigen::MatrixXd rest_covariance() const;
     // A column of the root each, the last ones, with their priors; values are not estimated here.
     const std::vector<ChangeTerm>& changes() const { return changes_; }
@@ -46,7 +48,7 @@ private:
     Calibration calibration_;
     std::array<int, function_count + squareness_count> first_entry_;
     Eigen::MatrixXd root_;
-    Eigen::Index own_columns_;  // of the root, the first ones: of the calibration's covariance
+    Eigen::Index own_columns_;
     std::vector<ChangeTerm> changes_;
 };
 

@@ -1,8 +1,8 @@
 #include "recheck/prediction.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "stepdiag/core/error.hpp"
 
@@ -22,8 +22,8 @@ Eigen::MatrixXd without_columns(const Eigen::MatrixXd& matrix, Eigen::Index begi
     return rest;
 }
 
-constexpr int most_steps = 30;
-constexpr double settled = 1e-8;  // decrease of the square sum, by reading
+constexpr int most_steps = 100;
+constexpr double settled = 1e-8;  // decrease of the square sum, by reading or, where it is larger, by itself
 
 // A whole step, or a part of it that makes the square sum smaller: angles that act at second order only, as those of a
 // single axis do, have no step that is right. Returns the sum; with a share of 0 that of `before`.
@@ -46,7 +46,7 @@ Baseline::Positions read_positions(const AdjustmentProblem& problem) {
 }
 
 Prediction::Prediction(const AdjustmentProblem& problem, const Baseline& baseline)
-    : problem_(problem), baseline_(baseline) {
+    : problem_(problem), baseline_(baseline), root_(baseline.root()) {
     weigh_readings();
     collect_rows();
     z_.setZero(baseline.root().cols() + Eigen::Index(problem.coefficients().size() + problem.sensors().size()));
@@ -77,11 +77,14 @@ void Prediction::collect_rows() {
     setups_.resize(problem_.setups().size());
     place_.resize(sigma_.size());
     setup_of_.resize(sigma_.size());
+    missed_.resize(sigma_.size());
     for (std::size_t p = 0; p < problem_.points().size(); ++p) {
         const AdjustedPoint& point = problem_.points()[p];
         SetupRows& rows = setups_[point.setup];
         rows.points.push_back(int(p));
         for (int r = point.first_reading; r < point.end_reading; ++r) {
+            if (!problem_.readings()[r].used()) continue;
+            ++used_;
             place_[r] = int(rows.readings.size());
             setup_of_[r] = point.setup;
             rows.readings.push_back(r);
@@ -91,8 +94,13 @@ void Prediction::collect_rows() {
         const LineSetup& setup = problem_.setups()[k];
         const auto size = Eigen::Index(setup.active.size());
         setups_[k].weight.resize(size);
-        for (Eigen::Index j = 0; j < size; ++j)
-            setups_[k].weight[j] = std::pow(usual_prior(setup.prior[setup.active[j]], setup.active[j]), -2);
+        setups_[k].stiffness.resize(size);
+        for (Eigen::Index j = 0; j < size; ++j) {
+            const int column = setup.active[j];
+            setups_[k].weight[j] = std::pow(usual_prior(setup.prior[column], column), -2);
+            setups_[k].stiffness[j] =
+                std::pow(std::min(setup.prior[column], record(setup::component(column).quantity).usual), -2);
+        }
         setups_[k].value.setZero(size);
     }
 }
@@ -105,15 +113,16 @@ void Prediction::linearise(SetupRows& rows, const Eigen::VectorXd& z, bool deriv
     for (std::size_t j = 0; j < setup.active.size(); ++j) whole[setup.active[j]] = rows.value[Eigen::Index(j)];
     model.set_up(whole);
 
-    const Eigen::MatrixXd& root = baseline_.root();
+    const Eigen::Index columns = root_.cols();
     const auto& coefficients = problem_.coefficients();
     const auto& expansion = problem_.expansion();
-    const Eigen::VectorXd values = root * z.head(root.cols());
+    const Eigen::VectorXd values = root_ * z.head(columns);
+    Eigen::RowVectorXd row(z.size());
     const auto count = Eigen::Index(rows.readings.size());
     rows.residual.resize(count);
     if (derivatives) {
         rows.by_setup.resize(count, Eigen::Index(setup.active.size()));
-        rows.by_baseline.setZero(count, z.size());
+        rows.by_baseline.resize(count, z.size());
     }
     Eigen::VectorXd reading(model.channels());
     ChannelDerivative derivative(model.channels(), 18 + model.setup_size());
@@ -130,7 +139,7 @@ void Prediction::linearise(SetupRows& rows, const Eigen::VectorXd& z, bool deriv
             errors[a] = baseline_.errors(axis, position, point.negative[a], shares[a]);
             for (const Baseline::Share& share : shares[a])
                 errors[a][share.component] += share.weight * values[share.entry];
-            added[a].setZero(z.size() - root.cols());
+            added[a].setZero(z.size() - columns);
             if (!expansion) continue;
             errors[a][a] += expansion->expansion.coefficient[a] * point.place.stretch[a];
             for (std::size_t c = 0; c < coefficients.size(); ++c)
@@ -150,19 +159,24 @@ void Prediction::linearise(SetupRows& rows, const Eigen::VectorXd& z, bool deriv
         model.read(pose, point.place, reading, derivatives ? &derivative : nullptr);
         for (int r = point.first_reading; r < point.end_reading; ++r) {
             const int channel = problem_.readings()[r].channel;
+            if (!problem_.readings()[r].used()) {
+                missed_[r] = problem_.readings()[r].value - reading[channel];
+                continue;
+            }
             const double weight = 1.0 / sigma_[r];
             const int i = place_[r];
             rows.residual[i] = weight * (problem_.readings()[r].value - reading[channel]);
             if (!derivatives) continue;
             for (std::size_t j = 0; j < setup.active.size(); ++j)
                 rows.by_setup(i, Eigen::Index(j)) = weight * derivative(channel, 18 + setup.active[j]);
+            row.setZero();
             for (int a = 0; a < 3; ++a) {
                 for (const Baseline::Share& share : shares[a])
-                    rows.by_baseline.row(i).head(root.cols()) +=
-                        weight * derivative(channel, 6 * a + share.component) * share.weight * root.row(share.entry);
-                rows.by_baseline.row(i).tail(added[a].size()) +=
-                    weight * derivative(channel, 7 * a) * added[a].transpose();
+                    row.head(columns) +=
+                        weight * derivative(channel, 6 * a + share.component) * share.weight * root_.row(share.entry);
+                row.tail(added[a].size()) += weight * derivative(channel, 7 * a) * added[a].transpose();
             }
+            rows.by_baseline.row(i) = row;
         }
     }
 }
@@ -200,16 +214,52 @@ void Prediction::settle_setups() {
     }
 }
 
-void Prediction::assemble() {
+void Prediction::linearise(bool derivatives) {
+    for (SetupRows& rows : setups_) linearise(rows, z_, derivatives);
+}
+
+// What the second derivatives of the readings by the set-ups make of the residuals. Machines act at first order, but
+// for their products with set-ups.
+void Prediction::find_curvature() {
+    constexpr double difference = 1e-6;  // rad, and of a metre
+    for (SetupRows& rows : setups_) {
+        const LineSetup& setup = problem_.setups()[std::size_t(&rows - setups_.data())];
+        const Eigen::MatrixXd by_setup = rows.by_setup, by_baseline = rows.by_baseline;
+        const Eigen::VectorXd residual = rows.residual, value = rows.value;
+        rows.curvature.resize(value.size(), value.size());
+        rows.curved_coupling.resize(value.size(), z_.size());
+        for (Eigen::Index j = 0; j < value.size(); ++j) {
+            const bool is_length = record(setup::component(setup.active[std::size_t(j)]).quantity).unit == "mm";
+            const double change = is_length ? 1e3 * difference : difference;
+            rows.value[j] += change;
+            linearise(rows, z_, true);
+            rows.curvature.col(j) = (by_setup - rows.by_setup).transpose() * residual / change;
+            rows.curved_coupling.row(j) = residual.transpose() * (by_baseline - rows.by_baseline) / change;
+            rows.value = value;
+        }
+        rows.by_setup = by_setup;
+        rows.by_baseline = by_baseline;
+        rows.residual = residual;
+        rows.curvature = (0.5 * (rows.curvature + rows.curvature.transpose())).eval();
+    }
+}
+
+bool Prediction::factorize(bool curved, double damping) {
+    constexpr double open = 1e-12;  // by itself: what no reading of a set-up tells stays where it is
     const Eigen::Index size = z_.size();
+    bool is_positive = true;
     matrix_.setIdentity(size, size);
     gradient_ = -z_;
     for (SetupRows& rows : setups_) {
-        linearise(rows, z_, true);
         Eigen::MatrixXd corner = rows.by_setup.transpose() * rows.by_setup;
-        corner.diagonal() += rows.weight;
+        Eigen::MatrixXd coupling = rows.by_setup.transpose() * rows.by_baseline;
+        corner.diagonal() += open * corner.diagonal() + rows.weight + damping * rows.stiffness;
+        if (curved) {
+            corner += rows.curvature;
+            coupling += rows.curved_coupling;
+        }
         rows.factor.compute(corner);
-        const Eigen::MatrixXd coupling = rows.by_setup.transpose() * rows.by_baseline;
+        is_positive = is_positive && rows.factor.isPositive();
         rows.transfer = rows.factor.solve(coupling);
         rows.gradient = rows.by_setup.transpose() * rows.residual - rows.weight.cwiseProduct(rows.value);
         matrix_.selfadjointView<Eigen::Lower>().rankUpdate(rows.by_baseline.transpose());
@@ -218,38 +268,60 @@ void Prediction::assemble() {
     }
     matrix_.triangularView<Eigen::StrictlyUpper>() = matrix_.transpose();
     factor_.compute(matrix_);
+    return is_positive && factor_.info() == Eigen::Success;
 }
 
-double Prediction::step() {
-    assemble();
-    const Eigen::VectorXd z = z_, change = factor_.solve(gradient_);
-    std::vector<Eigen::VectorXd> values, changes;
-    for (const SetupRows& rows : setups_) {
-        values.push_back(rows.value);
-        changes.push_back(rows.factor.solve(rows.gradient) - rows.transfer * change);
-    }
+double Prediction::decrement() const {
+    double sum = gradient_.dot(factor_.solve(gradient_));
+    for (const SetupRows& rows : setups_) sum += rows.gradient.dot(rows.factor.solve(rows.gradient));
+    return sum;
+}
+
+// By the factors; stays where the square sum would not fall by so much.
+bool Prediction::moves(double least_decrease) {
     const double before = chi_square();
-    const auto after = descend(
-        [&](double share) {
-            z_ = z + share * change;
-            for (std::size_t k = 0; k < setups_.size(); ++k) {
-                setups_[k].value = values[k] + share * changes[k];
-                linearise(setups_[k], z_, false);
-            }
-            return chi_square();
-        },
-        before);
-    return before - after;
+    const Eigen::VectorXd z = z_, change = factor_.solve(gradient_);
+    std::vector<Eigen::VectorXd> values;
+    for (const SetupRows& rows : setups_) values.push_back(rows.value);
+    z_ += change;
+    for (SetupRows& rows : setups_) rows.value += rows.factor.solve(rows.gradient) - rows.transfer * change;
+    linearise(false);
+    if (chi_square() <= before - least_decrease) return true;
+    z_ = z;
+    for (std::size_t k = 0; k < setups_.size(); ++k) setups_[k].value = values[k];
+    linearise(false);
+    return false;
+}
+
+// Gauss and Newton's step where it does what it says. Readings that nothing near the calibration explains leave large
+// residuals, and with them the second derivatives count: there it is Newton's, the set-ups being held by a part of what
+// is usual, more of it until the square sum falls (K. Levenberg, Quart. Appl. Math. 2 (1944) 164).
+double Prediction::step() {
+    constexpr double good = 0.75;  // share of what a quadratic would fall by
+    constexpr double first = 1e-2, least = 1e-4, climbs = 10.0, falls = 100.0, most = 1e12;
+    linearise(true);
+    const bool is_definite = factorize();
+    const double decrement = this->decrement();
+    if (is_definite && moves(good * decrement)) {
+        damping_ = 0.0;
+        return decrement;
+    }
+    find_curvature();
+    for (; damping_ < most; damping_ = std::max(first, climbs * damping_)) {
+        if (!factorize(true, damping_) || !moves(0.0)) continue;
+        damping_ = damping_ < least ? 0.0 : damping_ / falls;
+        return decrement;
+    }
+    return 0.0;
 }
 
 void Prediction::solve() {
     settle_setups();
-    const double enough = settled * double(sigma_.size());
-    double decrease = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < most_steps && !(decrease < enough); ++i) decrease = step();
-    if (!(decrease < enough))
-        throw InvalidArgument("readings: no machine near the calibration gives them; evaluate the run to see why");
-    assemble();
+    linearise(false);
+    for (int i = 0; i < most_steps; ++i)
+        if (step() < settled * std::max(double(used_), chi_square())) break;
+    linearise(true);
+    factorize();
     for (SetupRows& rows : setups_) {
         rows.spread = factor_.matrixL().solve(rows.transfer.transpose());
         linearise(rows, Eigen::VectorXd::Zero(z_.size()), false);
@@ -289,8 +361,33 @@ double Prediction::chi_square() const {
     return sum;
 }
 
-int Prediction::degrees_of_freedom() const {
-    double told = 0.0;  // of the free unknowns, those that the readings tell
+Eigen::MatrixXd Prediction::information(Eigen::Index begin, Eigen::Index count) const {
+    const Eigen::Index size = matrix_.rows(), after = size - begin - count;
+    // Everything else: the columns before and after.
+    Eigen::MatrixXd others(size - count, size - count), coupling(size - count, count);
+    others << matrix_.topLeftCorner(begin, begin), matrix_.topRightCorner(begin, after),
+        matrix_.bottomLeftCorner(after, begin), matrix_.bottomRightCorner(after, after);
+    coupling << matrix_.block(0, begin, begin, count), matrix_.block(begin + count, begin, after, count);
+    return matrix_.block(begin, begin, count, count) - Eigen::MatrixXd::Identity(count, count) -
+           coupling.transpose() * others.llt().solve(coupling);
+}
+
+ChiSquare Prediction::fit(Eigen::Index begin, Eigen::Index count) const {
+    constexpr double told = 1e-2;   // below, what a prior allows changes the square sum by less, be it there or not
+    constexpr double near = 400.0;  // square of 20 priors: farther away no change is near the calibration
+    ChiSquare test{chi_square(), used_};
+    if (count > 0) {
+        const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(information(begin, count));
+        const Eigen::VectorXd drawn = parts.eigenvectors().transpose() * z_.segment(begin, count);
+        for (Eigen::Index k = 0; k < count; ++k)
+            if (const double information = parts.eigenvalues()[k]; information >= told) {
+                const double by_prior = drawn[k] * drawn[k] * (1.0 + information) / information;
+                if (by_prior > near) continue;
+                test.square_sum -= by_prior;
+                --test.freedom;
+            }
+    }
+    double free = 0.0;  // of the free unknowns, those that the readings tell  // of the free unknowns, those that the readings tell
     for (std::size_t k = 0; k < setups_.size(); ++k) {
         const LineSetup& setup = problem_.setups()[k];
         const SetupRows& rows = setups_[k];
@@ -298,9 +395,10 @@ int Prediction::degrees_of_freedom() const {
         const Eigen::MatrixXd alone = rows.factor.solve(Eigen::MatrixXd::Identity(size, size));
         for (Eigen::Index j = 0; j < size; ++j)
             if (!std::isfinite(setup.prior[setup.active[j]]))
-                told += 1.0 - rows.weight[j] * (alone(j, j) + rows.spread.col(j).squaredNorm());
+                free += 1.0 - rows.weight[j] * (alone(j, j) + rows.spread.col(j).squaredNorm());
     }
-    return int(sigma_.size()) - int(std::lround(told));
+    test.freedom -= int(std::lround(free));
+    return test;
 }
 
 Prediction::Deviation Prediction::deviation(const std::vector<Term>& sum) const {
@@ -321,6 +419,17 @@ Prediction::Deviation Prediction::deviation(const std::vector<Term>& sum) const 
     const double told = by_setup.dot(rows.factor.solve(by_setup)) + (rows.spread * by_setup).squaredNorm();
     constexpr double rounding = 1e-9;
     return {value, variance - told > rounding * variance ? std::sqrt(variance - told) : 0.0};
+}
+
+Prediction::Deviation Prediction::misfit(int reading) const {
+    const SetupRows& rows = setups_[setup_of_[reading]];
+    const int i = place_[reading];
+    const Eigen::VectorXd by_setup = rows.by_setup.row(i).transpose();
+    const Eigen::VectorXd by_baseline = factor_.matrixL().solve(rows.by_baseline.row(i).transpose());
+    const double told =
+        by_setup.dot(rows.factor.solve(by_setup)) + (by_baseline - rows.spread * by_setup).squaredNorm();
+    constexpr double rounding = 1e-9;
+    return {sigma_[reading] * rows.residual[i], 1.0 - told > rounding ? sigma_[reading] * std::sqrt(1.0 - told) : 0.0};
 }
 
 }  // namespace stepdiag

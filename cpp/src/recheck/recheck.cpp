@@ -2,11 +2,13 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 #include "evaluation/fit_test.hpp"
 #include "recheck/prediction.hpp"
 #include "recheck/same_machine.hpp"
+#include "recheck/wrong_readings.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -22,16 +24,7 @@ struct Told {
 
 // By the normal equations at the estimate with priors, which draw it towards 0 along each direction.
 Told told_of_changes(const Prediction& prediction, Eigen::Index begin, Eigen::Index count) {
-    const Eigen::MatrixXd& matrix = prediction.information();
-    const Eigen::Index size = matrix.rows(), after = size - begin - count;
-    // Everything else: the columns before and after.
-    Eigen::MatrixXd others(size - count, size - count), coupling(size - count, count);
-    others << matrix.topLeftCorner(begin, begin), matrix.topRightCorner(begin, after),
-        matrix.bottomLeftCorner(after, begin), matrix.bottomRightCorner(after, after);
-    coupling << matrix.block(0, begin, begin, count), matrix.block(begin + count, begin, after, count);
-    const Eigen::MatrixXd information = matrix.block(begin, begin, count, count) -
-                                        Eigen::MatrixXd::Identity(count, count) -
-                                        coupling.transpose() * others.llt().solve(coupling);
+    const Eigen::MatrixXd information = prediction.information(begin, count);
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(information);
     const Eigen::VectorXd drawn = parts.eigenvectors().transpose() * prediction.values().segment(begin, count);
     Told told{parts.eigenvalues(), parts.eigenvectors(), Eigen::VectorXd::Zero(count), count};
@@ -66,6 +59,54 @@ Calibration with_change(const Baseline& baseline, const Prediction& prediction) 
     return updated;
 }
 
+Judgement<Recheck> rechecked(const AdjustmentProblem& problem, const Baseline& changing) {
+    const auto count = Eigen::Index(changing.changes().size());
+    const Eigen::Index begin = changing.root().cols() - count;
+
+    Prediction changed(problem, changing);
+    changed.solve();
+    const Told told = told_of_changes(changed, begin, count);
+
+    Recheck result{0.0, 0, 1.0, 0.0, 0, 1.0, changing.changes(), {}, {}, {}, with_change(changing, changed)};
+    result.chi_square = told.estimate.cwiseAbs2().dot(told.information);
+    result.degrees_of_freedom = int(count - told.first);
+    if (result.degrees_of_freedom > 0)
+        result.probability = chi_square_probability(result.chi_square, result.degrees_of_freedom);
+    const ChiSquare fit = changed.fit(changing.own_columns(), changing.root().cols() - changing.own_columns());
+    result.fit_chi_square = fit.square_sum;
+    result.fit_degrees_of_freedom = fit.freedom;
+    if (fit.freedom > 0) result.fit_probability = chi_square_probability(fit.square_sum, fit.freedom);
+    const Eigen::MatrixXd inverse =
+        changed.information().llt().solve(Eigen::MatrixXd::Identity(changed.values().size(), changed.values().size()));
+    Eigen::VectorXd prior(count);
+    for (Eigen::Index j = 0; j < count; ++j) prior[j] = changing.changes()[std::size_t(j)].prior;
+    result.covariance = prior.asDiagonal() * inverse.block(begin, begin, count, count) * prior.asDiagonal();
+    result.shape = changing.root().rightCols(count) * prior.cwiseInverse().asDiagonal();
+    const Eigen::MatrixXd strong = told.direction.rightCols(count - told.first);
+    for (Eigen::Index j = 0; j < count; ++j) {
+        ChangeTerm& term = result.terms[std::size_t(j)];
+        term.value = prior[j] * changed.values()[begin + j];
+        term.standard_uncertainty = std::sqrt(result.covariance(j, j));
+        term.told = strong.row(j).squaredNorm();
+    }
+    for (Eigen::Index k = count; k-- > told.first;) {
+        ChangeCombination sum{{}, told.estimate[k], 1.0 / std::sqrt(told.information[k])};
+        for (Eigen::Index j = 0; j < count; ++j) sum.weight.push_back(told.direction(j, k));
+        result.combinations.push_back(std::move(sum));
+    }
+    constexpr std::size_t shown = 5;
+    std::vector<Misfit> misfits;
+    if (result.fit_probability < readings_asked_below) misfits = largest_misfits(problem, changed, shown);
+    for (const Misfit& misfit : misfits) {
+        const AdjustedReading& reading = problem.readings()[misfit.reading];
+        result.misfits.push_back(
+            {reading.row, problem.channel_name(reading), misfit.value, misfit.standard_uncertainty});
+    }
+    const bool is_asked = std::min(result.probability, result.fit_probability) < readings_asked_below;
+    const double probability = result.fit_probability;
+    return {std::move(result), fit, probability, is_asked, std::move(misfits), fit.square_sum, changed.missed()};
+}
+
 }  // namespace
 
 Eigen::VectorXd smallest_changes_seen(const Recheck& recheck, double alpha, double power) {
@@ -97,46 +138,11 @@ Recheck recheck(const Calibration& baseline, const Measurement& measurement, con
                 const Eigen::Vector3d& tool, const HeadCalibrations& heads, const AdjustmentOptions& options,
                 const ChangePriors& priors) {
     check_same_machine(baseline, plan, chain, tool, options);
-    const AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine(options));
+    AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine(options));
     if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
     const Baseline changing(baseline, priors, read_positions(problem));
-    const auto count = Eigen::Index(changing.changes().size());
-    const Eigen::Index begin = changing.root().cols() - count;
-
-    Prediction changed(problem, changing);
-    changed.solve();
-    const Told told = told_of_changes(changed, begin, count);
-
-    Recheck result{0.0, 0, 1.0, 0.0, 0, 1.0, changing.changes(), {}, {}, {}, with_change(changing, changed)};
-    result.chi_square = told.estimate.cwiseAbs2().dot(told.information);
-    result.degrees_of_freedom = int(count - told.first);
-    if (result.degrees_of_freedom > 0)
-        result.probability = chi_square_probability(result.chi_square, result.degrees_of_freedom);
-    result.fit_chi_square = changed.chi_square();
-    result.fit_degrees_of_freedom = changed.degrees_of_freedom();
-    if (result.fit_degrees_of_freedom < 1)
-        throw InvalidArgument("readings: there are no more of them than unknowns of how head and mirror stood");
-    result.fit_probability = chi_square_probability(result.fit_chi_square, result.fit_degrees_of_freedom);
-
-    const Eigen::MatrixXd inverse =
-        changed.information().llt().solve(Eigen::MatrixXd::Identity(changed.values().size(), changed.values().size()));
-    Eigen::VectorXd prior(count);
-    for (Eigen::Index j = 0; j < count; ++j) prior[j] = changing.changes()[std::size_t(j)].prior;
-    result.covariance = prior.asDiagonal() * inverse.block(begin, begin, count, count) * prior.asDiagonal();
-    result.shape = changing.root().rightCols(count) * prior.cwiseInverse().asDiagonal();
-    const Eigen::MatrixXd strong = told.direction.rightCols(count - told.first);
-    for (Eigen::Index j = 0; j < count; ++j) {
-        ChangeTerm& term = result.terms[std::size_t(j)];
-        term.value = prior[j] * changed.values()[begin + j];
-        term.standard_uncertainty = std::sqrt(result.covariance(j, j));
-        term.told = strong.row(j).squaredNorm();
-    }
-    for (Eigen::Index k = count; k-- > told.first;) {
-        ChangeCombination sum{{}, told.estimate[k], 1.0 / std::sqrt(told.information[k])};
-        for (Eigen::Index j = 0; j < count; ++j) sum.weight.push_back(told.direction(j, k));
-        result.combinations.push_back(std::move(sum));
-    }
-    return result;
+    return judge_without_wrong_readings({measurement, plan, chain, tool, heads, options}, problem,
+                                        [&](const AdjustmentProblem& rest) { return rechecked(rest, changing); });
 }
 
 }  // namespace stepdiag

@@ -8,6 +8,7 @@
 #include "evaluation/fit_test.hpp"
 #include "recheck/prediction.hpp"
 #include "recheck/same_machine.hpp"
+#include "recheck/wrong_readings.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -28,7 +29,7 @@ std::vector<LineDeviation> line_deviations(const Measurement& measurement, const
     for (const AdjustedPoint& point : problem.points()) {
         std::map<int, int> distances;
         for (int r = point.first_reading; r < point.end_reading; ++r)
-            if (problem.channel_name(problem.readings()[r]).front() == 'd')
+            if (problem.readings()[r].used() && problem.channel_name(problem.readings()[r]).front() == 'd')
                 distances[problem.readings()[r].channel] = r;
         if (distances.empty()) continue;
         const std::size_t row = problem.readings()[point.first_reading].row;
@@ -62,31 +63,19 @@ std::vector<LineDeviation> line_deviations(const Measurement& measurement, const
     return lines;
 }
 
-}  // namespace
-
-Verification verify(const Calibration& calibration, const Measurement& measurement, const Plan& plan,
-                    const Chain& chain, const Eigen::Vector3d& tool, const HeadCalibrations& heads,
-                    const AdjustmentOptions& options) {
-    check_same_machine(calibration, plan, chain, tool, options);
-    const AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine(options));
-    if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
-    const Baseline baseline(calibration, largest_change, read_positions(problem));
+Judgement<Verification> verified(const Measurement& measurement, const AdjustmentProblem& problem, const Baseline& baseline) {
     Prediction prediction(problem, baseline);
     prediction.solve();
     prediction.drop_changes();
+    const Eigen::Index own = baseline.own_columns(), changes = Eigen::Index(baseline.changes().size());
+    const ChiSquare fit = prediction.fit(own, baseline.root().cols() - changes - own);
 
-    Verification result{{},
-                        line_deviations(measurement, problem, prediction),
-                        prediction.chi_square(),
-                        prediction.degrees_of_freedom(),
-                        1.0,
-                        0};
-    if (result.degrees_of_freedom < 1)
-        throw InvalidArgument("readings: there are no more of them than unknowns of how head and mirror stood");
-    result.probability = chi_square_probability(result.chi_square, result.degrees_of_freedom);
+    Verification result{{}, line_deviations(measurement, problem, prediction), fit.square_sum, fit.freedom, 1.0, 0};
+    if (fit.freedom > 0) result.probability = chi_square_probability(fit.square_sum, fit.freedom);
     for (int r = 0; r < int(problem.readings().size()); ++r) {
-        const auto [value, uncertainty] = prediction.deviation({{r, 1.0}});
         const AdjustedReading& reading = problem.readings()[r];
+        if (!reading.used()) continue;
+        const auto [value, uncertainty] = prediction.deviation({{r, 1.0}});
         result.readings.push_back({reading.row, problem.channel_name(reading), value, uncertainty});
     }
     std::stable_sort(result.readings.begin(), result.readings.end(),
@@ -95,7 +84,32 @@ Verification verify(const Calibration& calibration, const Measurement& measureme
         result.readings.begin(), result.readings.end(),
         [](const auto& a, const auto& b) { return std::abs(a.normalised()) < std::abs(b.normalised()); });
     result.worst = std::size_t(worst - result.readings.begin());
-    return result;
+    const double probability = result.probability;
+    const bool is_asked = probability < readings_asked_below;
+    std::vector<Misfit> misfits;
+    double square_sum = fit.square_sum;
+    if (is_asked) {
+        constexpr std::size_t tried = 5;
+        Prediction changed(problem, baseline);
+        changed.solve();
+        misfits = largest_misfits(problem, changed, tried);
+        square_sum = changed.chi_square();
+    }
+    return {std::move(result), fit, probability, is_asked, std::move(misfits), square_sum, prediction.missed()};
+}
+
+}  // namespace
+
+Verification verify(const Calibration& calibration, const Measurement& measurement, const Plan& plan,
+                    const Chain& chain, const Eigen::Vector3d& tool, const HeadCalibrations& heads,
+                    const AdjustmentOptions& options) {
+    check_same_machine(calibration, plan, chain, tool, options);
+    AdjustmentProblem problem(measurement, plan, chain, tool, heads, of_known_machine(options));
+    if (problem.readings().empty()) throw InvalidArgument("readings: all are lost");
+    const Baseline baseline(calibration, largest_change, read_positions(problem));
+    return judge_without_wrong_readings(
+        {measurement, plan, chain, tool, heads, options}, problem,
+        [&](const AdjustmentProblem& rest) { return verified(measurement, rest, baseline); });
 }
 
 }  // namespace stepdiag

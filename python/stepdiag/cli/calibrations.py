@@ -280,11 +280,14 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     and noise. The report says by chi-square whether all agree, by E_n (ISO 17043) how each line
     does, and which reading deviates most. How head and mirror stand is estimated from the readings.
 
-    If the readings do not agree, the command ends with a warning and exit code 3.
+    Where the readings do not agree, those that the tests of `evaluate` find wrong are named and left
+    out. If the rest does not agree, or readings were left out, the command ends with a warning and
+    exit code 3.
     """
     from stepdiag.config.toml_text import located
     from stepdiag.io.data_files import read_calibration, read_measurement
     from stepdiag.io.whole_files import check_input
+    from stepdiag.calibration.finding_text import fault_text
     from stepdiag.rechecking.verification import check_other_run, verify_scenario
     from stepdiag.report.verification import agrees, verification_report
     from stepdiag.scenario.description import read_scenario
@@ -305,6 +308,7 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
             f"{run}: does not agree with {calibration}: do not use the calibration until you know why",
             *warnings,
         ]
+    warnings += [f"{run}: {fault_text(found)}" for found in verification.left_out]
     if as_json:
         from stepdiag.objects.verification import verification_object
         from stepdiag.objects.writer import json_text
@@ -316,7 +320,7 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
             say(line)
     for warning in warnings:
         tell("warning", warning)
-    if not agrees(verification, alpha) or tested.fit == "rejected":
+    if not agrees(verification, alpha) or verification.left_out or tested.fit == "rejected":
         context.exit(NOT_TO_BE_TRUSTED)
 
 
@@ -330,7 +334,7 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     default=0.001,
     show_default=True,
     metavar="P",
-    help="Share of rechecks in which an unchanged machine is said to have changed.",
+    help="Share of rechecks in which each of the two tests (change, explained) refuses an unchanged machine.",
 )
 @click.option(
     "--update",
@@ -356,9 +360,11 @@ def recheck(
     changed, which changes the readings tell one by one, which only together, what may be hidden in
     the volume, and the error there now.
 
-    If the machine has changed, or no such change explains the readings, the command ends with a
-    warning and exit code 3.
+    Readings that the tests of `evaluate` find wrong are named and left out. If the machine has
+    changed, no such change explains the readings (changed, unexplained), or readings were left out,
+    the command ends with a warning and exit code 3.
     """
+    from stepdiag.calibration.finding_text import fault_text
     from stepdiag.calibration.volume import volume_errors
     from stepdiag.config.toml_text import located
     from stepdiag.io.data_files import read_calibration, read_measurement, write_calibration
@@ -385,19 +391,23 @@ def recheck(
     if target is not None:
         write_calibration(judged.updated, target, provenance=provenance_of(known, run))
     warnings = fit_warnings(baseline, before.fit)
-    if not judged.is_explained:
-        warnings.append(f"{run}: no change of low order explains these readings: evaluate them to see why")
-    elif judged.has_changed:
+    if judged.verdict == "unexplained":
+        warnings.append(
+            f"{run}: the machine has changed, unexplained: no change of low order explains these readings; "
+            f"do not use {baseline}, and evaluate the run to see why"
+        )
+    elif judged.verdict == "changed":
         warnings.append(f"{baseline}: the machine has changed since: do not use it as it is")
+    warnings += [f"{run}: {fault_text(found)}" for found in judged.recheck.left_out]
     if as_json:
         from stepdiag.objects.recheck import recheck_object
         from stepdiag.objects.writer import json_text
 
-        click.echo(json_text(recheck_object(judged, volume, (baseline, run, target), warnings)))
+        click.echo(json_text(recheck_object(judged, measurement, volume, (baseline, run, target), warnings)))
     else:
-        for line in recheck_report(judged, volume):
+        for line in recheck_report(judged, measurement, volume):
             say(line)
     for warning in warnings:
         tell("warning", warning)
-    if judged.has_changed or not judged.is_explained or before.fit == "rejected":
+    if not judged.is_sound or before.fit == "rejected":
         context.exit(NOT_TO_BE_TRUSTED)

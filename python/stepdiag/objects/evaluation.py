@@ -436,7 +436,7 @@ def _adjustment(found: Adjustment, known: Known) -> AdjustmentPart:
         "setup": setup_of(found.setup),
         "expansion": [_expansion(one) for one in found.expansion],
         "machine_drift": [_machine_drift(one, known) for one in found.machine_drift],
-        "faults": [_faults(one) for one in found.faults],
+        "faults": [faults_of(one) for one in found.faults],
         "combinations": combinations_of(found.combinations),
         "smoothness": _smoothness(found.smoothness),
         "reliability": reliability_of(found.reliability),
@@ -450,7 +450,8 @@ def _smoothness(deviations: Mapping[str, float]) -> list[Any]:
     ]
 
 
-def _faults(found: FaultClass) -> Faults:
+def faults_of(found: FaultClass) -> Faults:
+    """A fault, or those that it may be."""
     treatment: Any = found.treatment
     return {
         "text": fault_text(found),

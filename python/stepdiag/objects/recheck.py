@@ -6,9 +6,10 @@ from typing import Any, Literal
 
 from typing_extensions import TypedDict
 
-from stepdiag._core import ChangeCombination, ChangeTerm, __version__
+from stepdiag._core import ChangeCombination, ChangeTerm, Measurement, PredictedReading, __version__
 from stepdiag.calibration.volume import VolumeErrors
 from stepdiag.objects.calibration import Fit, fit_of
+from stepdiag.objects.evaluation import Faults, faults_of
 from stepdiag.objects.writer import in_unit, measured
 from stepdiag.rechecking.recheck import Judged
 from stepdiag.units import MICROMETRE
@@ -59,6 +60,29 @@ class SumOfChanges(TypedDict):
     """Standard uncertainty, of the readings and the calibration alone."""
 
 
+class Misfit(TypedDict):
+    """A reading against the machine with the change."""
+
+    row: int
+    """Of the file, from 0."""
+    run: int
+    line: str
+    point: int
+    channel: str
+
+
+class LengthMisfit(Misfit):
+    deviation_um: float
+    """Read minus predicted."""
+    standard_uncertainty_um: float
+
+
+class AngleMisfit(Misfit):
+    deviation_urad: float
+    """Read minus predicted."""
+    standard_uncertainty_urad: float
+
+
 class RecheckObject(TypedDict):
     """Result of `stepdiag recheck`."""
 
@@ -79,6 +103,12 @@ class RecheckObject(TypedDict):
     """The probability is below alpha."""
     explained: bool
     """The probability of the readings, with the change, is at least alpha."""
+    verdict: Literal["unchanged", "changed", "unexplained"]
+    """unexplained: neither the baseline nor a change of low order explains the readings."""
+    left_out: list[Faults]
+    """Of the readings. All that they may have spoilt are left out of everything else."""
+    misfits: list[LengthMisfit | AngleMisfit]
+    """Where the readings are not explained: those that are farthest from the machine with the change, worst first."""
     alpha: float
     chi_square: float
     """Of no change."""
@@ -104,7 +134,11 @@ class RecheckObject(TypedDict):
 
 
 def recheck_object(
-    judged: Judged, volume: VolumeErrors, files: tuple[Path, Path, Path | None], warnings: Sequence[str]
+    judged: Judged,
+    measurement: Measurement,
+    volume: VolumeErrors,
+    files: tuple[Path, Path, Path | None],
+    warnings: Sequence[str],
 ) -> RecheckObject:
     """Whether a machine has changed, and by what. `files`: the baseline, the run and what was written."""
     found = judged.recheck
@@ -120,6 +154,9 @@ def recheck_object(
         "updated": None if files[2] is None else str(files[2]),
         "changed": judged.has_changed,
         "explained": judged.is_explained,
+        "verdict": judged.verdict,
+        "left_out": [faults_of(one) for one in found.left_out],
+        "misfits": [_misfit(one, measurement) for one in found.misfits if not judged.is_explained],
         "alpha": judged.alpha,
         "chi_square": found.chi_square,
         "degrees_of_freedom": found.degrees_of_freedom,
@@ -136,6 +173,21 @@ def recheck_object(
         "largest_um": in_unit("um", volume.largest),
         "largest_interval_um": None if interval is None else (interval[0] / MICROMETRE, interval[1] / MICROMETRE),
     }
+
+
+def _misfit(found: PredictedReading, measurement: Measurement) -> Any:
+    values = measured(
+        "urad" if found.channel in ("alpha", "beta") else "um",
+        deviation=found.deviation,
+        standard_uncertainty=found.standard_uncertainty,
+    )
+    place = {
+        "row": found.row,
+        "run": int(measurement.run[found.row]),
+        "line": measurement.line[found.row],
+        "point": int(measurement.point[found.row]),
+    }
+    return {**place, "channel": found.channel, **values}
 
 
 def _changes(terms: Sequence[ChangeTerm], kind: str, unit: str) -> Any:

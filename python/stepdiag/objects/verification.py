@@ -8,6 +8,7 @@ from typing_extensions import TypedDict
 
 from stepdiag._core import Calibration, LineDeviation, Measurement, Verification, __version__
 from stepdiag.objects.calibration import Fit, fit_of
+from stepdiag.objects.evaluation import Faults, faults_of
 from stepdiag.objects.writer import in_unit, measured
 from stepdiag.report.verification import agrees
 
@@ -57,6 +58,8 @@ class VerificationObject(TypedDict):
     """The file."""
     agrees: bool
     """The probability is at least alpha."""
+    left_out: list[Faults]
+    """Of the readings. All that they may have spoilt are left out of everything else."""
     alpha: float
     chi_square: float
     degrees_of_freedom: int
@@ -84,6 +87,7 @@ def verification_object(
         "fit": fit_of(calibration),
         "run": str(files[1]),
         "agrees": agrees(verification, alpha),
+        "left_out": [faults_of(one) for one in verification.left_out],
         "alpha": alpha,
         "chi_square": verification.chi_square,
         "degrees_of_freedom": verification.degrees_of_freedom,

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,8 @@ from stepdiag.scenario.known import Known
 from stepdiag.units import MICROMETRE, MICRORADIAN
 
 FloatArray = npt.NDArray[np.float64]
+
+Verdict = Literal["unchanged", "changed", "unexplained"]
 
 GRID: Final = 5  # positions an axis, of the low-order changes in the volume
 # Native values of a change in the unit of reports.
@@ -71,6 +73,18 @@ class Judged:
     def is_explained(self) -> bool:
         """Whether a change of low order explains the readings."""
         return self.recheck.fit_probability >= self.alpha
+
+    @property
+    def verdict(self) -> Verdict:
+        """Unexplained: neither the baseline nor a change of low order explains the readings."""
+        if not self.is_explained:
+            return "unexplained"
+        return "changed" if self.has_changed else "unchanged"
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether the baseline is as good as before, by readings that are all right."""
+        return self.verdict == "unchanged" and not self.recheck.left_out
 
     @property
     def updated(self) -> Calibration:

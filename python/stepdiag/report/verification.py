@@ -2,7 +2,10 @@
 
 from collections.abc import Iterator, Sequence
 
-from stepdiag._core import ChangeCombination, ChangeTerm, Measurement, Verification
+import numpy as np
+
+from stepdiag._core import ChangeCombination, ChangeTerm, FaultClass, Measurement, Recheck, Verification
+from stepdiag.calibration.finding_text import fault_rows
 from stepdiag.calibration.volume import VolumeErrors
 from stepdiag.rechecking.recheck import CHANGE_UNITS, Judged
 from stepdiag.report.text_columns import text_columns
@@ -23,10 +26,12 @@ def verification_report(verification: Verification, measurement: Measurement, al
         f"chi-square {verification.chi_square:.1f} with {verification.degrees_of_freedom} degrees of freedom; "
         f"by chance it is larger in {_percent(p)} of cases"
     )
+    rest = _rest(verification.left_out)
     if agrees(verification, alpha):
-        yield f"the readings agree with the calibration: {tested}"
+        yield f"{rest} agree with the calibration: {tested}"
     else:
-        yield f"the readings do not agree with the calibration: {tested} (limit {100.0 * alpha:g} %)"
+        yield f"{rest} do not agree with the calibration: {tested} (limit {100.0 * alpha:g} %)"
+    yield from fault_rows(verification.left_out)
     rows = [("line", "run", "direction", "deviation", "U", "E_n")]
     for line in verification.lines:
         deviation, expanded = line.deviation / MICROMETRE, COVERAGE * line.standard_uncertainty / MICROMETRE
@@ -37,7 +42,11 @@ def verification_report(verification: Verification, measurement: Measurement, al
         yield from text_columns(rows, left=(0, 2))
         beyond = sum(abs(line.normalised) > 1.0 for line in verification.lines)
         yield f"  beyond 1: {beyond} of {len(verification.lines)}; 4.6 % are expected by chance"
-    yield f"largest deviation of a reading: {_worst(verification, measurement)}"
+    if agrees(verification, alpha):
+        yield f"largest deviation of a reading: {next(_worst(verification, measurement))}"
+    else:
+        yield "largest deviations of readings:"
+        yield from (f"  {text}" for text in _worst(verification, measurement))
 
 
 def _percent(p: float) -> str:
@@ -46,14 +55,33 @@ def _percent(p: float) -> str:
     return f"{100.0 * p:.0f} %" if p > 0.1 else f"{100.0 * p:.2g} %"
 
 
-def _worst(verification: Verification, measurement: Measurement) -> str:
-    row, channel = verification.worst
-    unit, scale = ("µrad", MICRORADIAN) if channel in ("alpha", "beta") else ("µm", MICROMETRE)
-    deviation = float(verification.deviations[channel][row]) / scale
-    expanded = COVERAGE * float(verification.standard_uncertainties[channel][row]) / scale
-    normalised = float(verification.normalised[channel][row])
-    place = f"line {measurement.line[row]}, run {measurement.run[row]}, point {measurement.point[row]}"
-    return f"{channel} at {place}: {deviation:+.3g} {unit}, U {expanded:.3g} {unit}, E_n {normalised:+.2f}"
+def _rest(left_out: Sequence[FaultClass]) -> str:
+    return "the readings that are not left out" if left_out else "the readings"
+
+
+def _worst(verification: Verification, measurement: Measurement) -> Iterator[str]:
+    """The readings with the largest E_n, the worst first."""
+    shown = 3
+    channels = list(verification.normalised)
+    table = np.nan_to_num(np.abs(np.array([verification.normalised[channel] for channel in channels])))
+    for place in np.argsort(-table, axis=None, kind="stable")[:shown]:
+        k, row = divmod(int(place), table.shape[1])
+        channel = channels[k]
+        unit, scale = _unit(channel)
+        deviation = float(verification.deviations[channel][row]) / scale
+        expanded = COVERAGE * float(verification.standard_uncertainties[channel][row]) / scale
+        yield (
+            f"{channel} at {_place(measurement, row)}: {deviation:+.3g} {unit}, U {expanded:.3g} {unit}, "
+            f"E_n {float(verification.normalised[channel][row]):+.2f}"
+        )
+
+
+def _unit(channel: str) -> tuple[str, float]:
+    return ("µrad", MICRORADIAN) if channel in ("alpha", "beta") else ("µm", MICROMETRE)
+
+
+def _place(measurement: Measurement, row: int) -> str:
+    return f"line {measurement.line[row]}, run {measurement.run[row]}, point {measurement.point[row]}"
 
 
 TOLD = 0.9  # of a change that readings tell alone
@@ -62,20 +90,32 @@ SHARE = 0.2  # of a sum, below which a term is not named
 MOSTLY = 0.5  # of a sum, that has to be of changes told together
 
 
-def recheck_report(judged: Judged, volume: VolumeErrors) -> Iterator[str]:
+def recheck_report(judged: Judged, measurement: Measurement, volume: VolumeErrors) -> Iterator[str]:
     """The verdict first; then what is known of each change, what may be hidden, and the volume's error."""
     found = judged.recheck
     tested = (
         f"chi-square {found.chi_square:.1f} of {found.degrees_of_freedom} directions of change that the readings tell; "
         f"by chance it is larger in {_percent(found.probability)} of cases (limit {100.0 * judged.alpha:g} %)"
     )
-    if not judged.is_explained:
-        yield (
-            "the readings do not go with the calibration, nor with a change of low order: a reading is wrong, or the "
-            f"machine has changed otherwise (chi-square {found.fit_chi_square:.1f} with "
-            f"{found.fit_degrees_of_freedom} degrees of freedom, by chance larger in {_percent(found.fit_probability)})"
-        )
-    yield f"the machine has changed: {tested}" if judged.has_changed else f"no change of the machine is seen: {tested}"
+    without = ", by the readings that are not left out" if found.left_out else ""
+    match judged.verdict:
+        case "unexplained":
+            yield (
+                f"the machine has changed, unexplained: {_rest(found.left_out)} go neither with the calibration nor "
+                "with a change of low order; it has changed otherwise, or readings are wrong "
+                f"(chi-square {found.fit_chi_square:.1f} with {found.fit_degrees_of_freedom} degrees of freedom, by "
+                f"chance larger in {_percent(found.fit_probability)} of cases, limit {100.0 * judged.alpha:g} %)"
+            )
+            yield from fault_rows(found.left_out)
+            yield "readings that are farthest from the machine with the best change of low order:"
+            yield from (f"  {text}" for text in _misfits(found, measurement))
+            yield f"change of low order: {tested}"
+        case "changed":
+            yield f"the machine has changed{without}: {tested}"
+            yield from fault_rows(found.left_out)
+        case "unchanged":
+            yield f"no change of the machine is seen{without}: {tested}"
+            yield from fault_rows(found.left_out)
     told = [term for term in found.terms if term.told >= TOLD]
     if told:
         yield "changes that the readings tell one by one, U their expanded uncertainty (k = 2):"
@@ -97,6 +137,16 @@ def recheck_report(judged: Judged, volume: VolumeErrors) -> Iterator[str]:
         low, high = (end / MICROMETRE for end in volume.largest_interval)
         interval = f", 95 % interval {low:.1f} to {high:.1f} µm"
     yield f"largest error in the volume with the change: {volume.largest / MICROMETRE:.1f} µm{interval}"
+
+
+def _misfits(found: Recheck, measurement: Measurement) -> Iterator[str]:
+    for misfit in found.misfits:
+        unit, scale = _unit(misfit.channel)
+        times = abs(misfit.deviation) / misfit.standard_uncertainty
+        yield (
+            f"{misfit.channel} at {_place(measurement, misfit.row)}: {misfit.deviation / scale:+.3g} {unit}, "
+            f"{times:.3g} times its standard uncertainty"
+        )
 
 
 def _change_row(term: ChangeTerm) -> tuple[str, ...]:

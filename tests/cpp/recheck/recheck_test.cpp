@@ -95,6 +95,59 @@ TEST(Recheck, UpdatedCalibrationIsNearerToTheMachine) {
     EXPECT_LT(normalised, 20.0 + 3.3 * std::sqrt(40.0));
 }
 
+// Of all 21 terms those that are free take their degrees of freedom with them: the square sum is chi-square distributed
+// where nothing has changed, and where the machine has.
+TEST(Recheck, FitOfSoundReadingsIsChiSquareDistributedWhetherOrNotTheMachineHasChanged) {
+    for (const double hit : {0.0, 40e-6}) {
+        RecheckWorkshop workshop;
+        double chi_square = 0.0, freedom = 0.0;
+        for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+            workshop.machine_seed = seed;
+            workshop.hit = 0.0;
+            const Calibration baseline = workshop.calibration(seed);
+            workshop.hit = hit;
+            const Recheck found = rechecked(workshop, baseline, 1000 + seed);
+            chi_square += found.fit_chi_square;
+            freedom += found.fit_degrees_of_freedom;
+        }
+        EXPECT_NEAR(chi_square, freedom, 3.3 * std::sqrt(2.0 * freedom));
+    }
+}
+
+TEST(Recheck, NewScrewErrorIsUnexplainedAndItsMisfitsAreNamed) {
+    RecheckWorkshop workshop;
+    workshop.test_lines = stepdiag::test::diagonals;
+    const Calibration baseline = workshop.calibration(1);
+    workshop.screw = 20e-3;
+    const Recheck found = rechecked(workshop, baseline, 2);
+    EXPECT_LT(found.fit_probability, 1e-12);
+    EXPECT_TRUE(found.left_out.empty());
+    ASSERT_EQ(found.misfits.size(), 5u);
+    double before = std::abs(found.misfits[0].normalised());
+    EXPECT_GT(before, 10.0);
+    for (const auto& misfit : found.misfits) {
+        EXPECT_LE(std::abs(misfit.normalised()), before);
+        before = std::abs(misfit.normalised());
+    }
+}
+
+// On one diagonal, from which no adjustment could tell.
+TEST(Recheck, OneWrongReadingIsNamedAndTheMachineJudgedWithoutIt) {
+    RecheckWorkshop workshop;
+    workshop.test_lines = {Line::parse("ppp")};
+    const Calibration baseline = workshop.calibration(1);
+    for (const double wrong : {20e-3, 1.0}) {
+        const Recheck found = recheck(baseline, workshop.test_run_with(4, wrong), workshop.test_plan(),
+                                      workshop.machine().chain(), workshop.tool, workshop.head.calibration());
+        ASSERT_EQ(found.left_out.size(), 1u);
+        EXPECT_EQ(found.left_out[0].members[0].row, 4u);
+        const stepdiag::Fault& fault = found.left_out[0].members[0];
+        EXPECT_NEAR(fault.size, wrong, 5.0 * fault.standard_uncertainty);
+        EXPECT_GT(found.probability, 1e-3);
+        EXPECT_GT(found.fit_probability, 1e-3);
+    }
+}
+
 TEST(Recheck, PriorsThatMakeNoSenseAreRefused) {
     const RecheckWorkshop workshop;
     const Calibration baseline = workshop.calibration(1);

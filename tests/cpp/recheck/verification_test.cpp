@@ -73,16 +73,21 @@ TEST(Verify, ChangedSquarenessIsSeenOnItsLines) {
     EXPECT_LT(found.lines[0].deviation * found.lines[1].deviation, 0.0);  // one longer, the other shorter
 }
 
-TEST(Verify, OneWrongReadingIsTheWorst) {
-    Workshop workshop;
-    const Measurement run = workshop.test_run(2);
-    auto channels = run.channels();
-    channels[0].value[5] = *channels[0].value[5] + 5e-3;
-    const Verification found =
-        verified(workshop, workshop.calibration(1), Measurement(run.stations(), std::move(channels)));
-    EXPECT_EQ(found.readings[found.worst].row, 5u);
-    EXPECT_EQ(found.readings[found.worst].channel, "distance");
-    EXPECT_GT(found.readings[found.worst].deviation, 2e-3);  // the set-ups take the rest
+TEST(Verify, OneWrongReadingIsNamedAndTheRestAgrees) {
+    const Workshop workshop;
+    const Calibration calibration = workshop.calibration(1);
+    for (const double wrong : {5e-3, -1.0}) {
+        const Verification found = verified(workshop, calibration, workshop.test_run_with(5, wrong));
+        EXPECT_GT(found.probability, 1e-3);
+        ASSERT_EQ(found.left_out.size(), 1u);
+        ASSERT_EQ(found.left_out[0].members.size(), 1u);
+        const stepdiag::Fault& fault = found.left_out[0].members[0];
+        EXPECT_EQ(fault.row, 5u);
+        EXPECT_EQ(fault.channel, "distance");
+        EXPECT_NEAR(fault.size, wrong, 5.0 * fault.standard_uncertainty);
+        EXPECT_LT(fault.standard_uncertainty, 1e-3);
+        for (const auto& reading : found.readings) EXPECT_FALSE(reading.row == 5 && reading.channel == "distance");
+    }
 }
 
 TEST(Verify, WhatCannotBePredictedIsRefusedByName) {

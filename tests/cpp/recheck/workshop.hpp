@@ -14,7 +14,8 @@ struct RecheckWorkshop {
     Eigen::Vector3d volume = test::volume, tool{20.0, -10.0, 50.0};
     std::uint64_t machine_seed = 3;
     std::vector<Line> test_lines = {Line::parse("ppp"), Line::parse("pnp")};
-    double hit = 0.0;  // what C0Y has become larger by
+    double hit = 0.0;    // what C0Y has become larger by
+    double screw = 0.0;  // mm: amplitude of a new error of X's screw
 
     Machine machine() const {
         RandomErrorMap errors;
@@ -22,6 +23,9 @@ struct RecheckWorkshop {
         errors.seed = machine_seed;
         ParameterTable table = make_random_error_map(volume, errors).table();
         table.squarenesses[0]->value += hit;
+        FunctionTable& positioning = *table.functions[0];
+        for (std::size_t k = 0; k < positioning.position.size(); ++k)
+            positioning.value[k] += screw * std::sin(2.0 * positioning.position[k]);
         return {chain, ErrorMap(table), tool};
     }
     Plan plan() const { return {volume, diagonals, steps, all_axes, scale_lines}; }
@@ -45,6 +49,13 @@ struct RecheckWorkshop {
     Measurement run(std::uint64_t seed) const { return simulate(machine(), plan(), head, simulation(plan(), seed)); }
     Measurement test_run(std::uint64_t seed) const {
         return simulate(machine(), test_plan(), head, simulation(test_plan(), seed));
+    }
+    // One distance reads too much.
+    Measurement test_run_with(std::size_t row, double wrong) const {
+        const Measurement run = test_run(2);
+        auto channels = run.channels();
+        channels[0].value[row] = *channels[0].value[row] + wrong;
+        return Measurement(run.stations(), std::move(channels));
     }
     Calibration calibration(std::uint64_t seed) const {
         AdjustmentOptions options;

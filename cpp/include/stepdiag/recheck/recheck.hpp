@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/recheck/verification.hpp"
 
 namespace stepdiag {
 
@@ -54,7 +55,9 @@ struct Recheck {
     double chi_square;
     int degrees_of_freedom;
     double probability;  // of a larger one, if nothing has changed
-    // Of all readings, with the change: whether such a change explains them.
+    // Of all readings: whether a change by these terms, of any size, explains them. What the readings tell of the terms
+    // is free here, so that the probability is that of a sound run, of a machine that has changed and of one that has
+    // not.
     double fit_chi_square;
     int fit_degrees_of_freedom;
     double fit_probability;
@@ -65,6 +68,12 @@ struct Recheck {
     // The calibration with the change, and the covariance of both together. Its method names the date of the
     // calibration, and it has none of its own; fit and provenance are those of the calibration.
     Calibration updated;
+    // Where the readings do not go with the calibration: faults that an adjustment of the run by itself finds, whatever
+    // the machine is. All readings that they may have spoilt are left out of everything above.
+    std::vector<FaultClass> left_out = {};
+    // Where no such change explains the readings: those that are farthest, in units of their uncertainty, from what the
+    // machine with the change would read.
+    std::vector<PredictedReading> misfits = {};
 };
 
 // As verify() (recheck/verification.hpp), which says what counts of `options` and what is refused; and for priors that

@@ -50,6 +50,9 @@ struct Verification {
     int degrees_of_freedom;
     double probability;  // of a larger chi-square, if all is right; 1 without freedom
     std::size_t worst;   // of `readings`: the largest |E_n|
+    // Where the readings do not agree: faults that an adjustment of the run by itself finds, whatever the machine is.
+    // All readings that they may have spoilt are left out of everything above.
+    std::vector<FaultClass> left_out = {};
 };
 
 // `plan`, `heads` and `options` are those of the readings. Of `options` count: the uncertainties of readings and of

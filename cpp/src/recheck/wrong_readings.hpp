@@ -1,0 +1,109 @@
+// Readings that do not go with what is known, because some of them are wrong: they are found, left out, and the rest is
+// judged. Internal: not installed.
+#pragma once
+
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "recheck/prediction.hpp"
+#include "stepdiag/core/error.hpp"
+
+namespace stepdiag {
+
+// Where readings are less probable by what is known, it is asked whether they are wrong.
+inline constexpr double readings_asked_below = 1e-2;
+
+struct Misfit {
+    int reading;
+    double value;  // read - predicted, mm or rad
+    double standard_uncertainty;
+
+    double by_uncertainty() const { return standard_uncertainty > 0.0 ? value / standard_uncertainty : 0.0; }
+};
+// Those that are farthest by their uncertainties, the worst first.
+std::vector<Misfit> largest_misfits(const AdjustmentProblem& problem, const Prediction& prediction, std::size_t count);
+
+// What readings are judged by, and with.
+struct Run {
+    const Measurement& measurement;
+    const Plan& plan;
+    const Chain& chain;
+    const Eigen::Vector3d& tool;
+    const HeadCalibrations& heads;
+    const AdjustmentOptions& options;
+};
+
+// The faults that an adjustment of the run by itself finds, with a machine that is not known: a change of the machine is
+// none of them. None where there is no such adjustment.
+std::vector<FaultClass> faults_of(const Run& run);  // as they are left out
+
+// Leaves out the readings that the faults may have spoilt: of a slip those of its channel from there on, of a factor all
+// on its line. Where a slip may as well be a single reading, leaving that out removes the slip, too.
+void leave_out(const std::vector<FaultClass>& faults, AdjustmentProblem& problem);
+
+// A wrong reading that is left out, from the judgement before and after.
+Fault wrong_reading(const Run& run, const AdjustmentProblem& problem, const Misfit& before, double after, double gain);
+
+template <class Result>
+struct Judgement {
+    Result result;
+    ChiSquare fit;
+    double probability;  // of the fit
+    bool is_asked;       // whether readings may be wrong
+    // Where the machine may have changed, which leaves the least of what is wrong: the largest misfits, and the square
+    // sum.
+    std::vector<Misfit> misfits;
+    double square_sum;
+    std::vector<double> missed;  // by reading: Prediction::missed
+};
+
+// judge(problem): a Judgement of the readings that are not left out. First the faults of the run are left out. If the
+// rest still does not go with what is known, so is a single reading without which it does, and all others without which
+// it does, too.
+template <class Judge>
+auto judge_without_wrong_readings(const Run& run, AdjustmentProblem& problem, const Judge& judge) {
+    constexpr double gain_of_a_fault = 28.0;  // as an adjustment has it
+    constexpr double next_to_the_worst = 0.5, least_share = 0.5;
+    auto judged = judge(problem);
+    if (judged.fit.freedom < 1)
+        throw InvalidArgument("readings: there are no more of them than unknowns of how head and mirror stood");
+    if (!judged.is_asked) return judged.result;
+    std::vector<FaultClass> found = faults_of(run);
+    if (!found.empty()) {
+        leave_out(found, problem);
+        if (auto rest = judge(problem); rest.fit.freedom > 0) {
+            judged = std::move(rest);
+        } else {
+            for (AdjustedReading& reading : problem.readings()) reading.outlier = 0;
+            found.clear();
+        }
+    }
+    if (judged.probability < readings_asked_below) {
+        FaultClass wrong{{}, FaultTreatment::left_out, true};
+        std::vector<int> without;
+        for (const Misfit& misfit : judged.misfits) {
+            const double explains = std::pow(misfit.by_uncertainty(), 2);  // of the square sum, if that is a quadratic
+            if (explains < next_to_the_worst * std::pow(judged.misfits[0].by_uncertainty(), 2) ||
+                explains < least_share * judged.square_sum - judged.fit.freedom)
+                break;
+            problem.readings()[misfit.reading].outlier = int(found.size()) + 1;
+            const auto rest = judge(problem);
+            problem.readings()[misfit.reading].outlier = 0;
+            const double gain = judged.fit.square_sum - rest.fit.square_sum;
+            if (rest.fit.freedom < 1 || rest.probability < readings_asked_below || gain < gain_of_a_fault) continue;
+            wrong.members.push_back(wrong_reading(run, problem, misfit, rest.missed[misfit.reading], gain));
+            without.push_back(misfit.reading);
+        }
+        for (const int reading : without) problem.readings()[reading].outlier = int(found.size()) + 1;
+        if (!without.empty())
+            if (auto rest = judge(problem); rest.fit.freedom > 0) {
+                judged = std::move(rest);
+                found.push_back(std::move(wrong));
+            }
+    }
+    judged.result.left_out = std::move(found);
+    return judged.result;
+}
+
+}  // namespace stepdiag
