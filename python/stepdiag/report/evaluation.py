@@ -21,10 +21,12 @@ from stepdiag.calibration.unseen_text import unseen_rows
 from stepdiag.mistakes.copies import passes_of
 from stepdiag.mistakes.search import FoundMistake
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
+from stepdiag.report.conditions import condition_rows
 from stepdiag.report.fault_control import control_rows
 from stepdiag.report.mistakes import change_rows, unchecked_row
 from stepdiag.report.prior_effects import cosine_rows, drift_rows, rounding_rows
 from stepdiag.report.setup_table import NOTHING_LEARNT, setup_rows
+from stepdiag.scenario.conditions import conditions_of
 from stepdiag.scenario.description import JudgedEvaluation, reduced_run
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
@@ -100,6 +102,7 @@ def _what_was_done(calibration: Calibration, measurement: Measurement, known: Kn
     yield f"method: {calibration.method}, chain {calibration.chain.name}"
     yield f"readings: {len(measurement)} points on {len(set(measurement.line))} lines"
     yield from temperature_rows(calibration)
+    yield from condition_rows(conditions_of(known, measurement), known)
     yield from air_rows(measurement, known)
     incomplete, missing = lost_readings(measurement, known.plan, known.signals)
     if incomplete or missing:

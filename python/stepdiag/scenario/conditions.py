@@ -1,0 +1,76 @@
+"""Under which conditions a run was evaluated: temperatures of the scales, the air, the time, as they were used."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stepdiag._core import Measurement
+from stepdiag.scenario.known import Known
+from stepdiag.scenario.temperature import three
+
+AXES = ("x", "y", "z")
+AIR = ("air_temperature", "air_pressure", "air_humidity")
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class ScaleTemperature:
+    """Of the scale of one axis, °C: the range over the readings that were used, and the columns or keys that say it."""
+
+    range: Range
+    origin: str
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What an evaluation used, in native units.
+
+    scales: of X, Y, Z; None where nothing says the temperature. air: recorded ranges by channel; of an instrument that
+    compensates, evaluations do not use them. span: from the first to the last reading used, s; None without times."""
+
+    scales: tuple[ScaleTemperature | None, ScaleTemperature | None, ScaleTemperature | None]
+    air: dict[str, Range]
+    span: float | None
+
+
+def conditions_of(known: Known, measurement: Measurement) -> Conditions:
+    """Over the rows that have a distance."""
+    channels = measurement.channels
+    distances = [values for name, values in channels.items() if name in known.signals and name.startswith("d")]
+    used = np.any(np.isfinite(distances), axis=0) if distances else np.ones(len(measurement), dtype=bool)
+    lines = np.array(measurement.line)
+    ranges = {name: _range(channels[name][used]) for name in (*AIR, "time") if name in channels}
+    time = ranges.pop("time", None)
+    return Conditions(
+        (
+            _scale(0, known, channels, lines, used),
+            _scale(1, known, channels, lines, used),
+            _scale(2, known, channels, lines, used),
+        ),
+        {name: found for name, found in ranges.items() if found is not None},
+        None if time is None else time[1] - time[0],
+    )
+
+
+def _scale(
+    axis: int, known: Known, channels: dict[str, NDArray[np.float64]], lines: NDArray[np.str_], used: NDArray[np.bool_]
+) -> ScaleTemperature | None:
+    own = f"temperature_{AXES[axis]}"
+    name = own if own in channels else "temperature"
+    recorded = channels[name][used] if name in channels else np.full(np.count_nonzero(used), np.nan)
+    origins = [f"column {name}_c"] if np.any(np.isfinite(recorded)) else []
+    keys = known.keys.temperature
+    if keys is not None and keys.axes_c is not None:
+        measured = np.unique(lines[used][np.isfinite(recorded)])
+        if not np.all(np.isin(lines[used], measured)):  # lines without any temperature have that of the scenario
+            recorded = np.append(recorded, three(keys.axes_c)[axis])
+            origins.append("axes_c")
+    found = _range(recorded)
+    return None if found is None else ScaleTemperature(found, " and ".join(origins))
+
+
+def _range(values: NDArray[np.float64]) -> Range | None:
+    finite = values[np.isfinite(values)]
+    return (float(finite.min()), float(finite.max())) if finite.size else None
