@@ -90,7 +90,8 @@ Judgement<Verification> verified(const Measurement& measurement, const Adjustmen
     double square_sum = fit.square_sum;
     if (is_asked) {
         constexpr std::size_t tried = 5;
-        Prediction changed(problem, baseline);
+        const Baseline changing(baseline.calibration(), ChangePriors{}, read_positions(problem));
+        Prediction changed(problem, changing);
         changed.solve();
         misfits = largest_misfits(problem, changed, tried);
         square_sum = changed.chi_square();

@@ -51,56 +51,67 @@ struct Judgement {
     ChiSquare fit;
     double probability;  // of the fit
     bool is_asked;       // whether readings may be wrong
-    // Where the machine may have changed, which leaves the least of what is wrong: the largest misfits, and the square
-    // sum.
+    // If the readings do not fit: the largest misfits where the machine may have changed, which leaves the least of what
+    // is not wrong, and the square sum there.
     std::vector<Misfit> misfits;
     double square_sum;
     std::vector<double> missed;  // by reading: Prediction::missed
 };
 
-// judge(problem): a Judgement of the readings that are not left out. First the faults of the run are left out. If the
-// rest still does not go with what is known, so is a single reading without which it does, and all others without which
-// it does, too.
-template <class Judge>
-auto judge_without_wrong_readings(const Run& run, AdjustmentProblem& problem, const Judge& judge) {
+// judge(problem): a Judgement of the readings that are not left out. Leaves out a single reading without which the rest
+// goes with what is known, and all others without which it does, too. Whether there is one.
+template <class Judge, class Judged>
+bool leave_out_one(const Run& run, AdjustmentProblem& problem, const Judge& judge, Judged& judged,
+                   std::vector<FaultClass>& found) {
     constexpr double gain_of_a_fault = 28.0;  // as an adjustment has it
     constexpr double next_to_the_worst = 0.5, least_share = 0.5;
+    FaultClass wrong{{}, FaultTreatment::left_out, true};
+    std::vector<int> without;
+    for (const Misfit& misfit : judged.misfits) {
+        const double explains = std::pow(misfit.by_uncertainty(), 2);  // of the square sum, if that is a quadratic
+        if (explains < next_to_the_worst * std::pow(judged.misfits[0].by_uncertainty(), 2) ||
+            explains < least_share * judged.square_sum - judged.fit.freedom)
+            break;
+        problem.readings()[misfit.reading].outlier = int(found.size()) + 1;
+        const auto rest = judge(problem);
+        problem.readings()[misfit.reading].outlier = 0;
+        const double gain = judged.fit.square_sum - rest.fit.square_sum;
+        if (rest.fit.freedom < 1 || rest.probability < readings_asked_below || gain < gain_of_a_fault) continue;
+        wrong.members.push_back(wrong_reading(run, problem, misfit, rest.missed[misfit.reading], gain));
+        without.push_back(misfit.reading);
+    }
+    if (without.empty()) return false;
+    for (const int reading : without) problem.readings()[reading].outlier = int(found.size()) + 1;
+    auto rest = judge(problem);
+    if (rest.fit.freedom < 1) {
+        for (const int reading : without) problem.readings()[reading].outlier = 0;
+        return false;
+    }
+    judged = std::move(rest);
+    found.push_back(std::move(wrong));
+    return true;
+}
+
+// The same for any number of faults. What is known tells single readings apart better than the run by itself does; of
+// all else the run's own faults are left out, and then perhaps one more reading.
+template <class Judge>
+auto judge_without_wrong_readings(const Run& run, AdjustmentProblem& problem, const Judge& judge) {
     auto judged = judge(problem);
     if (judged.fit.freedom < 1)
         throw InvalidArgument("readings: there are no more of them than unknowns of how head and mirror stood");
-    if (!judged.is_asked) return judged.result;
-    std::vector<FaultClass> found = faults_of(run);
-    if (!found.empty()) {
+    std::vector<FaultClass> found;
+    if (judged.is_asked && !leave_out_one(run, problem, judge, judged, found)) {
+        found = faults_of(run);
         leave_out(found, problem);
-        if (auto rest = judge(problem); rest.fit.freedom > 0) {
-            judged = std::move(rest);
-        } else {
-            for (AdjustedReading& reading : problem.readings()) reading.outlier = 0;
-            found.clear();
-        }
-    }
-    if (judged.probability < readings_asked_below) {
-        FaultClass wrong{{}, FaultTreatment::left_out, true};
-        std::vector<int> without;
-        for (const Misfit& misfit : judged.misfits) {
-            const double explains = std::pow(misfit.by_uncertainty(), 2);  // of the square sum, if that is a quadratic
-            if (explains < next_to_the_worst * std::pow(judged.misfits[0].by_uncertainty(), 2) ||
-                explains < least_share * judged.square_sum - judged.fit.freedom)
-                break;
-            problem.readings()[misfit.reading].outlier = int(found.size()) + 1;
-            const auto rest = judge(problem);
-            problem.readings()[misfit.reading].outlier = 0;
-            const double gain = judged.fit.square_sum - rest.fit.square_sum;
-            if (rest.fit.freedom < 1 || rest.probability < readings_asked_below || gain < gain_of_a_fault) continue;
-            wrong.members.push_back(wrong_reading(run, problem, misfit, rest.missed[misfit.reading], gain));
-            without.push_back(misfit.reading);
-        }
-        for (const int reading : without) problem.readings()[reading].outlier = int(found.size()) + 1;
-        if (!without.empty())
-            if (auto rest = judge(problem); rest.fit.freedom > 0) {
+        if (!found.empty()) {
+            auto rest = judge(problem);
+            if (rest.fit.freedom < 1) {
+                found.clear();
+            } else {
                 judged = std::move(rest);
-                found.push_back(std::move(wrong));
+                leave_out_one(run, problem, judge, judged, found);
             }
+        }
     }
     judged.result.left_out = std::move(found);
     return judged.result;

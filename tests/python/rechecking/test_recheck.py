@@ -11,6 +11,7 @@ from refusal import refused
 import stepdiag as sd
 from stepdiag.cli import main
 from stepdiag.rechecking.recheck import Judged
+from stepdiag.rechecking.verification import ALPHA
 
 KNOWN = """
 [volume]
@@ -159,3 +160,147 @@ def test_machine_that_has_changed_in_all_ways_is_told_as_such(seed: int) -> None
     assert found.probability < 1e-12
     assert found.fit_probability > 1e-6
     assert sd.verify(*given, options=rechecked.options(drawn)).probability < 1e-12
+
+
+def with_wrong_distance(run: sd.Measurement, row: int, wrong: float) -> sd.Measurement:
+    distance = np.array(run.channels["distance"])
+    distance[row] += wrong
+    return sd.Measurement(run.line, run.point, run.position, {**run.channels, "distance": distance})
+
+
+def test_change_that_is_not_of_low_order_is_unexplained(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    errors = sd.read_error_map("machine.csv")
+    position, value = errors.functions["EXX"]
+    ripple = np.where(np.arange(len(position)) % 4 == 2, 5e-3, 0.0)  # at every other node that is read
+    sd.ErrorMap({**errors.functions, "EXX": (position, value + ripple)}, errors.squareness).write("machine.csv")
+    assert main(["simulate", "short.toml", "-o", "screw.csv"]) == 0
+    capsys.readouterr()
+    assert main(["recheck", "calibration.nc", "short.toml", "screw.csv", "--update", "updated.nc"]) == 3
+    said, warned = capsys.readouterr()
+    assert said.startswith("the machine has changed, unexplained: the readings go neither with the calibration nor ")
+    rows = [line for line in said.splitlines() if "times its standard uncertainty" in line]
+    assert len(rows) == 5
+    assert all(row.startswith("  distance at line ") for row in rows)
+    assert warned.startswith("warning: screw.csv: the machine has changed, unexplained: ")
+    updated = sd.read_calibration("updated.nc")
+    assert updated.fit == "rejected"
+    assert "recheck: no change of low order explains the readings" in updated.fit_reasons
+    result = printed("recheck", capsys, "recheck", "calibration.nc", "short.toml", "screw.csv", status=3)
+    assert (result["verdict"], result["explained"], result["left_out"]) == ("unexplained", False, [])
+    for one, row in zip(result["misfits"], rows, strict=True):
+        assert f"line {one['line']}, run 0, point {one['point']}: " in row
+    times = [abs(one["deviation_um"]) / one["standard_uncertainty_um"] for one in result["misfits"]]
+    assert times == sorted(times, reverse=True)
+
+
+@pytest.mark.parametrize("wrong", [0.02, -1.0])
+def test_wrong_reading_is_named_and_left_out(folder: Path, capsys: pytest.CaptureFixture[str], wrong: float) -> None:
+    run = sd.read_measurement("same.csv")
+    row = 15
+    with_wrong_distance(run, row, wrong).write("wrong.csv")
+    capsys.readouterr()
+    for command, verdict in (
+        ("recheck", "no change of the machine is seen, by the readings that are not left out: "),
+        ("verify", "the readings that are not left out agree with the calibration: "),
+    ):
+        assert main([command, "calibration.nc", "short.toml", "wrong.csv"]) == 3
+        said, warned = capsys.readouterr()
+        assert said.startswith(verdict)
+        what = f"a wrong reading: distance of {run.line[row]} point {run.point[row]} is "
+        assert what in said
+        assert f"warning: wrong.csv: {what}" in warned
+    result = printed("recheck", capsys, "recheck", "calibration.nc", "short.toml", "wrong.csv", status=3)
+    assert (result["verdict"], result["changed"], result["misfits"]) == ("unchanged", False, [])
+    (fault,) = result["left_out"][0]["members"]
+    assert (fault["row"], fault["kind"]) == (row, "reading")
+    assert abs(fault["size_um"] - 1e3 * wrong) < 5.0 * fault["standard_uncertainty_um"]
+
+
+@pytest.mark.parametrize("layout", rechecked.LAYOUTS)
+@pytest.mark.parametrize("event", rechecked.EVENTS)
+def test_whatever_happened_is_judged(event: str, layout: str) -> None:
+    """No calibration near the baseline explains most of these; the run is judged all the same."""
+    for seed in range(4):
+        one = rechecked.after(event, layout, seed)
+        judged = Judged(sd.recheck(*one.given, options=one.options), one.baseline, ALPHA)
+        verified = sd.verify(*one.given, options=one.options)
+        if event == "nothing":
+            assert judged.is_sound
+            assert verified.probability >= ALPHA
+        if event == "cubic bow":
+            assert judged.verdict != "unchanged"
+            assert verified.probability < ALPHA
+        if event == "wrong reading":
+            assert not judged.is_sound
+            for left_out in (judged.recheck.left_out, verified.left_out):
+                assert one.hit in {(fault.line, fault.point) for found in left_out for fault in found.members}
+            assert judged.verdict == "unchanged"
+            assert verified.probability >= ALPHA
+
+
+def test_fit_refuses_as_many_unchanged_machines_as_it_says() -> None:
+    """Of 300 machines 5 %, within four binomial standard deviations."""
+    probabilities = []
+    for seed in range(300):
+        drawn, baseline, rng = rechecked.calibrated(seed, 4)
+        plan = rechecked.short_plan(drawn, seed, 4)
+        run = rechecked.read_again(drawn, drawn.machine, plan, rng)
+        given = (baseline, run, plan, drawn.head, sd.Chain(drawn.chain), drawn.machine.tool)
+        probabilities.append(sd.recheck(*given, options=rechecked.options(drawn)).fit_probability)
+    refused_share = np.mean(np.array(probabilities) < 0.05)
+    assert abs(refused_share - 0.05) < 4.0 * np.sqrt(0.05 * 0.95 / len(probabilities))
+
+
+def test_square_sum_of_the_fit_is_that_of_generalised_least_squares(folder: Path) -> None:
+    """An oracle that shares nothing with the solution: dense, derivatives by differences of `simulate`."""
+    baseline, scenario = sd.read_calibration("calibration.nc"), sd.read_scenario("short.toml")
+    run, known = sd.read_measurement("same.csv"), scenario.known
+    found = sd.recheck_scenario(baseline, scenario, run)
+    labels, lines = baseline.covariance_labels, ("ppp", "npp", "pnp", "nnp")
+
+    def read(change: np.ndarray, setups: np.ndarray) -> np.ndarray:
+        functions = {name: (p, v.copy()) for name, (p, v, _) in baseline.functions.items()}
+        squareness = {name: value for name, (value, _) in baseline.squareness.items()}
+        for (name, position), by in zip(labels, change, strict=True):
+            if name in squareness:
+                squareness[name] += by
+            else:
+                functions[name][1][functions[name][0] == position] += by
+        misalignment = {
+            line: sd.Misalignment(reflector=s[:2], laser=s[2:4], distance_constant=s[4])
+            for line, s in zip(lines, setups.reshape(4, 5), strict=True)
+        }
+        machine = sd.Machine(known.chain, sd.ErrorMap(functions, squareness), known.tool)
+        made = sd.simulate(machine, known.plan, sd.Head(), misalignment=misalignment)
+        return np.concatenate([made.channels[c] for c in ("distance", "alpha", "beta")])
+
+    def columns(function, at, steps):  # type: ignore[no-untyped-def]
+        return np.stack(
+            [(function(at + step) - function(at - step)) / (2 * step[step != 0][0]) for step in np.diag(steps)], axis=1
+        )
+
+    zero, setups = np.zeros(len(labels)), np.zeros(20)
+    sizes = np.array([1e-4 if name[0] == "E" and name[1] in "XYZ" else 1e-6 for name, _ in labels])
+    by_value = columns(lambda change: read(change, setups), zero, sizes)
+    values = np.concatenate([run.channels[c] for c in ("distance", "alpha", "beta")])
+    u = np.repeat([0.2e-3, 1e-6, 1e-6], len(run))
+    weight = np.linalg.inv(by_value @ baseline.covariance @ by_value.T + np.diag(u**2))
+    steps = np.tile([1e-6, 1e-6, 1e-6, 1e-6, 1e-3], 4)
+    root = np.linalg.cholesky(weight).T
+    # Of the terms by their priors, the directions that readings tell beside free set-ups.
+    by_term = root @ by_value @ found.shape * [term.prior for term in found.terms]
+    basis, _ = np.linalg.qr(root @ columns(lambda s: read(zero, s), setups, steps))
+    beside = by_term - basis @ (basis.T @ by_term)
+    information, direction = np.linalg.eigh(beside.T @ beside)
+    free = by_term @ direction[:, information >= 1e-2]
+    change = np.zeros(free.shape[1])
+    for _ in range(6):
+        all_columns = np.hstack([root @ columns(lambda s: read(zero, s), setups, steps), free])
+        residual = root @ (values - read(zero, setups)) - free @ change
+        step = np.linalg.lstsq(all_columns / np.linalg.norm(all_columns, axis=0), residual, rcond=None)[0]
+        step /= np.linalg.norm(all_columns, axis=0)
+        setups, change = setups + step[:20], change + step[20:]
+    residual = root @ (values - read(zero, setups)) - free @ change
+    assert found.fit_degrees_of_freedom == len(values) - 20 - len(change)
+    # Second order of the change, and differences for derivatives, are below this.
+    assert found.fit_chi_square == pytest.approx(residual @ residual, rel=2e-3)
