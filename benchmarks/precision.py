@@ -43,14 +43,18 @@ def toml(table: dict[str, Any], prefix: str = "") -> str:
     return (f"[{prefix}]\n" if prefix else "") + own + "".join(deeper)
 
 
-def scenario(layout: str, size: float, relative: float, *, balanced: bool, noisy: bool, steps: int, seed: int) -> sd.Scenario:
+def scenario(
+    layout: str, size: float, relative: float, *, balanced: bool, noisy: bool, steps: int, seed: int
+) -> sd.Scenario:
     share = min(1.0, size / 100.0)
     lever = 100.0 * share  # mm, from a tilt to a spot or a difference of beams
     tilt = relative if balanced else USUAL_TILT
     head = {
         "ideal": {},
         "psd": {"psd_distance_mm": lever},
-        "multi_beam": {"beam_offsets_mm": [[0.0, 0.5 * lever], [-0.433 * lever, -0.25 * lever], [0.433 * lever, -0.25 * lever]]},
+        "multi_beam": {
+            "beam_offsets_mm": [[0.0, 0.5 * lever], [-0.433 * lever, -0.25 * lever], [0.433 * lever, -0.25 * lever]]
+        },
     }[layout]
     noise = {"distance_um": 1e3 * relative * size, "tilt_urad": 1e6 * tilt, "spot_um": 2e3 * tilt * lever}
     return sd.parse_scenario(
@@ -120,7 +124,10 @@ def main() -> int:
     with multiprocessing.get_context("fork").Pool(given.workers) as pool:
         for layout in heads:
             for balanced in (True, False):
-                print(f"{layout}, {'balanced' if balanced else 'usual tilts'}\n\n| σ/size | {sizes} |\n|{'---|' * (1 + len(SIZES))}")
+                print(
+                    f"{layout}, {'balanced' if balanced else 'usual tilts'}\n\n| σ/size | {sizes} |\n"
+                    f"|{'---|' * (1 + len(SIZES))}"
+                )
                 for relative in RELATIVE:
                     work = [(layout, balanced, size, relative) for size in SIZES]
                     fields = pool.map(functools.partial(cell, given.steps, given.seed), work, chunksize=1)
@@ -128,11 +135,16 @@ def main() -> int:
                     messages.update(message for _, message in fields if message)
                     print(f"| {relative:.0e} | {' | '.join(field for field, _ in fields)} |", flush=True)
                 print()
-        print(f"without noise: rms of the residuals of distances, mm\n\n| head | {sizes} |\n|{'---|' * (1 + len(SIZES))}")
+        print(
+            f"without noise: rms of the residuals of distances, mm\n\n| head | {sizes} |\n|{'---|' * (1 + len(SIZES))}"
+        )
         for layout in heads:
             fields = pool.map(functools.partial(floor, given.steps), [(layout, size) for size in SIZES], chunksize=1)
             print(f"| {layout} | {' | '.join(fields)} |")
-    print(f"\n{', '.join(f'{n} {kind}' for kind, n in kinds.most_common())} of {kinds.total()}; {time.monotonic() - start:.0f} s")
+    print(
+        f"\n{', '.join(f'{n} {kind}' for kind, n in kinds.most_common())} of {kinds.total()}; "
+        f"{time.monotonic() - start:.0f} s"
+    )
     for message, count in messages.most_common():
         print(f"{count} times: {message}")
     return 0

@@ -295,7 +295,6 @@ def evaluation_object(
     mistakes: Sequence[FoundMistake] = (),
 ) -> EvaluationObject:
     """What an evaluation found. `written`: its calibration with the date and provenance of its file."""
-    adjusted = isinstance(result, Adjustment)
     return {
         "stepdiag": __version__,
         "format": "stepdiag evaluation 1",

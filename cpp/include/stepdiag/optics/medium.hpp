@@ -27,8 +27,8 @@ const std::vector<Glass>& glasses();
 // Throws InvalidArgument, which lists the known glasses, for an unknown name.
 const Glass& find_glass(std::string_view name);
 
-// Absolute, for a vacuum wavelength in nm. Throws InvalidArgument for a wavelength outside 334 to 2325 nm, the range in which the constants of all glasses are
-// valid.
+// Absolute, for a vacuum wavelength in nm. Throws InvalidArgument for a wavelength outside 334 to 2325 nm, the range in
+// which the constants of all glasses are valid.
 double refractive_index(const Glass& glass, double wavelength);
 
 }  // namespace stepdiag
