@@ -5,9 +5,9 @@
 Machines of 1 mm to 100 m (edges 8 : 6 : 5), simulated with distances of a noise from 1e-6 to 1e-13 of the longest edge;
 the noise of tilts and spots goes with it (balanced), or tilts have 1 µrad and spots the same angle (usual tilts). Below
 100 mm head and errors are smaller in proportion. Each field: the first letter of the fit (a, d, r, u; E: an error, no
-result; T: none within 5 s), the variance factor, and the largest error at a node of a table in its standard uncertainties. Set-ups
-are better than their priors, so that the factor is below 1 where the priors count. The last table is of runs without
-noise: rms of the residuals of distances, mm, where σ is 1e-9 of the size.
+result; T: none within 5 s), the variance factor, and the largest error at a node of a table in its standard
+uncertainties. Set-ups are better than their priors, so that the factor is below 1 where the priors count. The last
+table is of runs without noise: rms of the residuals of distances, mm, where σ is 1e-9 of the size.
 """
 
 from __future__ import annotations
@@ -46,14 +46,18 @@ def toml(table: dict[str, Any], prefix: str = "") -> str:
     return (f"[{prefix}]\n" if prefix else "") + own + "".join(deeper)
 
 
-def scenario(layout: str, size: float, relative: float, *, balanced: bool, noisy: bool, steps: int, seed: int) -> sd.Scenario:
+def scenario(
+    layout: str, size: float, relative: float, *, balanced: bool, noisy: bool, steps: int, seed: int
+) -> sd.Scenario:
     share = min(1.0, size / 100.0)
     lever = 100.0 * share  # mm, from a tilt to a spot or a difference of beams
     tilt = relative if balanced else USUAL_TILT
     head = {
         "ideal": {},
         "psd": {"psd_distance_mm": lever},
-        "multi_beam": {"beam_offsets_mm": [[0.0, 0.5 * lever], [-0.433 * lever, -0.25 * lever], [0.433 * lever, -0.25 * lever]]},
+        "multi_beam": {
+            "beam_offsets_mm": [[0.0, 0.5 * lever], [-0.433 * lever, -0.25 * lever], [0.433 * lever, -0.25 * lever]]
+        },
     }[layout]
     noise = {"distance_um": 1e3 * relative * size, "tilt_urad": 1e6 * tilt, "spot_um": 2e3 * tilt * lever}
     return sd.parse_scenario(
@@ -91,7 +95,9 @@ def cell(steps: int, seed: int, of: tuple[str, bool, float, float]) -> tuple[str
         described = scenario(layout, size, relative, balanced=balanced, noisy=True, steps=steps, seed=seed)
         found = sd.adjust_scenario(described, sd.simulate_scenario(described))
     except (sd.InvalidArgument, MemoryError) as error:
-        return "E", f"{layout} {size:g} mm: {error!r}" if isinstance(error, MemoryError) else str(error).splitlines()[0][:120]
+        return "E", f"{layout} {size:g} mm: {error!r}" if isinstance(error, MemoryError) else str(error).splitlines()[
+            0
+        ][:120]
     factor = found.calibration.variance_factor
     deviation = worst(found.calibration, described.machine().errors)
     return f"{found.verdict.fit[0]} {factor:.3g} {deviation:.2g}", ""
@@ -139,7 +145,8 @@ def main() -> int:
     with ThreadPool(given.workers) as pool:
         for layout in heads:
             for balanced in (True,) if layout == "multi_beam" else (True, False):
-                print(f"{layout}, {'balanced' if balanced else 'usual tilts'}\n\n| σ/size | {sizes} |\n|{'---|' * (1 + len(SIZES))}")
+                print(f"{layout}, {'balanced' if balanced else 'usual tilts'}\n")
+                print(f"| σ/size | {sizes} |\n|{'---|' * (1 + len(SIZES))}")
                 for relative in RELATIVE:
                     work = [(layout, balanced, size, relative) for size in SIZES]
                     fields = pool.map(functools.partial(timed_cell, given.steps, given.seed), work, chunksize=1)
@@ -147,11 +154,14 @@ def main() -> int:
                     messages.update(message for _, message in fields if message)
                     print(f"| {relative:.0e} | {' | '.join(field for field, _ in fields)} |", flush=True)
                 print()
-        print(f"without noise: rms of the residuals of distances, mm\n\n| head | {sizes} |\n|{'---|' * (1 + len(SIZES))}")
+        print(
+            f"without noise: rms of the residuals of distances, mm\n\n| head | {sizes} |\n|{'---|' * (1 + len(SIZES))}"
+        )
         for layout in heads:
             fields = pool.map(functools.partial(floor, given.steps), [(layout, size) for size in SIZES], chunksize=1)
             print(f"| {layout} | {' | '.join(fields)} |")
-    print(f"\n{', '.join(f'{n} {kind}' for kind, n in kinds.most_common())} of {kinds.total()}; {time.monotonic() - start:.0f} s")
+    counts = ", ".join(f"{n} {kind}" for kind, n in kinds.most_common())
+    print(f"\n{counts} of {kinds.total()}; {time.monotonic() - start:.0f} s")
     for message, count in messages.most_common():
         print(f"{count} times: {message}")
     return 0

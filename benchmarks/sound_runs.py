@@ -10,7 +10,6 @@ where more than 0.2 % more are doubtful, or any more are rejected or refused.
 from __future__ import annotations
 
 import argparse
-import functools
 import json
 import math
 import multiprocessing
@@ -30,7 +29,10 @@ import stepdiag as sd
 
 BODY, FACES, SCALES = ["ppp", "npp", "pnp", "nnp"], ["pp0", "p0p", "0pp", "np0", "n0p", "0np"], ["p00", "0p0", "00p"]
 TEMPERATURE = {"expansion_um_per_m_k": 11.5, "u_expansion_um_per_m_k": 1.0, "u_temperature_c": 0.1}
-AIR = {"readings": "constant_index", "assumed": {"temperature_c": 20.0, "pressure_hpa": 1013.25, "humidity_percent": 50.0}}
+AIR = {
+    "readings": "constant_index",
+    "assumed": {"temperature_c": 20.0, "pressure_hpa": 1013.25, "humidity_percent": 50.0},
+}
 TIMED = {"seconds_per_reading": 4.0}
 # plan, head and what else is stated
 PLANS: dict[str, tuple[str, dict[str, Any], dict[str, dict[str, Any]]]] = {
@@ -38,14 +40,22 @@ PLANS: dict[str, tuple[str, dict[str, Any], dict[str, dict[str, Any]]]] = {
     "body diagonals, psd": ("psd", {"lines": BODY}, {}),
     "body diagonals, multi_beam": ("multi_beam", {"lines": BODY}, {}),
     "faces, psd": ("psd", {"lines": FACES}, {}),
-    "body and faces, ideal, temperatures": ("ideal", {"lines": BODY + FACES[:3], **TIMED}, {"temperature": TEMPERATURE}),
+    "body and faces, ideal, temperatures": (
+        "ideal",
+        {"lines": BODY + FACES[:3], **TIMED},
+        {"temperature": TEMPERATURE},
+    ),
     "body and faces, multi_beam, air": ("multi_beam", {"lines": BODY + FACES[:3], **TIMED}, {"environment": AIR}),
     "repeats, backward, ideal": ("ideal", {"lines": BODY, "repeats": 2, "backward": True}, {}),
     "backward, psd, temperatures, air": (
-        "psd", {"lines": BODY, "backward": True, **TIMED}, {"temperature": TEMPERATURE, "environment": AIR}
+        "psd",
+        {"lines": BODY, "backward": True, **TIMED},
+        {"temperature": TEMPERATURE, "environment": AIR},
     ),
     "check points, ideal, temperatures": (
-        "ideal", {"lines": BODY + FACES[:3], "check_points": 2, **TIMED}, {"temperature": TEMPERATURE}
+        "ideal",
+        {"lines": BODY + FACES[:3], "check_points": 2, **TIMED},
+        {"temperature": TEMPERATURE},
     ),
 }
 
@@ -65,7 +75,9 @@ def scenario(plan: str, number: int) -> sd.Scenario:
     head = {
         "ideal": {},
         "psd": {"psd_distance_mm": 100.0 * share},
-        "multi_beam": {"beam_offsets_mm": [[0.0, 50.0 * share], [-43.3 * share, -25.0 * share], [43.3 * share, -25.0 * share]]},
+        "multi_beam": {
+            "beam_offsets_mm": [[0.0, 50.0 * share], [-43.3 * share, -25.0 * share], [43.3 * share, -25.0 * share]]
+        },
     }[layout]
     lines = {
         line: {
@@ -80,25 +92,41 @@ def scenario(plan: str, number: int) -> sd.Scenario:
         "volume": {"x_mm": size, "y_mm": 0.75 * size, "z_mm": 0.625 * size},
         "machine": {
             "chain": "[w X' b Y Z t]",
-            "random": {"seed": number, "translation_um": 20.0 * size / 800.0, "rotation_urad": 60.0, "squareness_urad": 60.0},
+            "random": {
+                "seed": number,
+                "translation_um": 20.0 * size / 800.0,
+                "rotation_urad": 60.0,
+                "squareness_urad": 60.0,
+            },
         },
         "plan": {**of_plan, "steps": int(rng.integers(4, 7)), "scale_lines": SCALES},
         "head": {"layout": layout, "standoff_mm": 100.0 * share, **head},
         "misalignment": lines,
-        "noise": {"distance_um": noise, "tilt_urad": 10.0 ** rng.uniform(-1.0, 1.0), "spot_um": max(1.0, 10.0 * noise) * share,
-                  "seed": number},
+        "noise": {
+            "distance_um": noise,
+            "tilt_urad": 10.0 ** rng.uniform(-1.0, 1.0),
+            "spot_um": max(1.0, 10.0 * noise) * share,
+            "seed": number,
+        },
         **more,
     }
     if "temperature" in more:
-        sections["temperature"] = {**TEMPERATURE, "axes_c": list(rng.uniform(18.0, 26.0) + rng.normal(size=3)),
-                                   "axes_c_per_h": float(rng.uniform(-1.0, 1.0))}
+        sections["temperature"] = {
+            **TEMPERATURE,
+            "axes_c": list(rng.uniform(18.0, 26.0) + rng.normal(size=3)),
+            "axes_c_per_h": float(rng.uniform(-1.0, 1.0)),
+        }
     if "environment" in more:
-        sections["environment"] = {**AIR, "temperature_c": rng.uniform(18.0, 26.0), "pressure_hpa": rng.uniform(970.0, 1030.0),
-                                   "humidity_percent": rng.uniform(20.0, 70.0)}
+        sections["environment"] = {
+            **AIR,
+            "temperature_c": rng.uniform(18.0, 26.0),
+            "pressure_hpa": rng.uniform(970.0, 1030.0),
+            "humidity_percent": rng.uniform(20.0, 70.0),
+        }
     return sd.parse_scenario(toml(sections))
 
 
-def one(runs: int, number: int) -> tuple[str, str, list[str], float, str]:
+def one(number: int) -> tuple[str, str, list[str], float, str]:
     """Plan, fit ("refused": no result), codes of the reasons, processor seconds of the evaluation, what was refused."""
     plan = list(PLANS)[number % len(PLANS)]
     described = scenario(plan, number)
@@ -125,7 +153,9 @@ def main() -> int:
     seconds = dict.fromkeys(PLANS, 0.0)
     outcomes: list[str] = []
     with multiprocessing.get_context("fork").Pool(given.workers) as pool:
-        for plan, fit, reasons, spent, refusal in pool.imap(functools.partial(one, given.runs), range(given.runs), chunksize=9):
+        for plan, fit, reasons, spent, refusal in pool.imap(
+            functools.partial(one, given.runs), range(given.runs), chunksize=9
+        ):
             fits[plan][fit] += 1
             outcomes.append(fit)
             codes[plan].update(f"{fit}: {code}" for code in reasons)
@@ -133,16 +163,25 @@ def main() -> int:
             if refusal:
                 print(refusal[:300].replace("\n", " "), file=sys.stderr)
     names = ["accepted", "doubtful", "rejected", "unchecked", "refused"]
-    print(f"stepdiag {sd.__version__}\n\n| plan and head | {' | '.join(names)} | ms a run | reasons |\n|{'---|' * (len(names) + 3)}")
+    print(f"stepdiag {sd.__version__}\n")
+    print(f"| plan and head | {' | '.join(names)} | ms a run | reasons |\n|{'---|' * (len(names) + 3)}")
     for plan, counted in fits.items():
         reasons = ", ".join(f"{code} {n}" for code, n in codes[plan].most_common())
         shares = " | ".join(str(counted[name]) for name in names)
         print(f"| {plan} | {shares} | {1e3 * seconds[plan] / max(1, counted.total()):.1f} | {reasons} |")
     total = sum(fits.values(), Counter[str]())
-    print(f"| all | {' | '.join(str(total[name]) for name in names)} | {1e3 * sum(seconds.values()) / given.runs:.1f} | |")
+    print(
+        f"| all | {' | '.join(str(total[name]) for name in names)} | {1e3 * sum(seconds.values()) / given.runs:.1f} | |"
+    )
     print(f"\n{sum(seconds.values()):.1f} s of processor time, {time.monotonic() - start:.0f} s")
-    now = {"version": sd.__version__, "runs": given.runs, "fits": fits, "reasons": codes, "outcomes": outcomes,
-           "seconds": sum(seconds.values())}
+    now = {
+        "version": sd.__version__,
+        "runs": given.runs,
+        "fits": fits,
+        "reasons": codes,
+        "outcomes": outcomes,
+        "seconds": sum(seconds.values()),
+    }
     if given.output:
         given.output.write_text(json.dumps(now, indent=1) + "\n", encoding="utf-8")
     return 0 if given.baseline is None else compared(now, json.loads(given.baseline.read_text(encoding="utf-8")))
@@ -152,13 +191,17 @@ def compared(now: dict[str, Any], before: dict[str, Any]) -> int:
     if now["runs"] != before["runs"]:
         print(f"expected {before['runs']} runs, as the baseline has, got {now['runs']}")
         return 2
-    total, was = ({name: kind["outcomes"].count(name) for name in ("doubtful", "rejected", "refused", "unchecked")}
-                  for kind in (now, before))
+    total, was = (
+        {name: kind["outcomes"].count(name) for name in ("doubtful", "rejected", "refused", "unchecked")}
+        for kind in (now, before)
+    )
     more = {name: total[name] - was[name] for name in total}
     changed = Counter(f"{a} → {b}" for a, b in zip(before["outcomes"], now["outcomes"], strict=True) if a != b)
     good = more["doubtful"] <= math.floor(0.002 * now["runs"]) and max(more["rejected"], more["refused"]) <= 0
-    print(f"against {before['version']}: {more['doubtful']:+d} doubtful, {more['rejected']:+d} rejected, "
-          f"{more['refused']:+d} refused; processor time times {now['seconds'] / before['seconds']:.3f}")
+    print(
+        f"against {before['version']}: {more['doubtful']:+d} doubtful, {more['rejected']:+d} rejected, "
+        f"{more['refused']:+d} refused; processor time times {now['seconds'] / before['seconds']:.3f}"
+    )
     print("changed: " + (", ".join(f"{n} {what}" for what, n in changed.most_common()) or "none"))
     print("as it must be" if good else "**not as it must be**")
     return 0 if good else 1

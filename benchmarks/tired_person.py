@@ -283,33 +283,88 @@ def mistakes() -> list[Mistake]:
     found = [Mistake("units", name, change, "named", words) for name, change, words in units]
     found += [
         Mistake("units", "time in ms", of_columns("time_s", lambda v: 1e3 * v), "named", r"\bms\b|time_s|millisecond"),
-        Mistake("units", "time in minutes", of_columns("time_s", lambda v: v / 60.0), TOLD, "time_s|minute|reading.* s"),
-        Mistake("units", "noise stated 10 times too small", stated("uncertainty", {"distance_um": 0.01, "tilt_urad": 0.1}),
-                "named", "noise|as much as stated|uncertaint"),
-        Mistake("units", "noise stated 10 times too large", stated("uncertainty", {"distance_um": 1.0, "tilt_urad": 10.0}),
-                TOLD, "noise|less|as much as stated|as stated|smaller"),
-        Mistake("units", "noise of distances in nm", stated("uncertainty", {"distance_um": 100.0}), TOLD,
-                "noise|less|as much as stated|smaller"),
+        Mistake(
+            "units", "time in minutes", of_columns("time_s", lambda v: v / 60.0), TOLD, "time_s|minute|reading.* s"
+        ),
+        Mistake(
+            "units",
+            "noise stated 10 times too small",
+            stated("uncertainty", {"distance_um": 0.01, "tilt_urad": 0.1}),
+            "named",
+            "noise|as much as stated|uncertaint",
+        ),
+        Mistake(
+            "units",
+            "noise stated 10 times too large",
+            stated("uncertainty", {"distance_um": 1.0, "tilt_urad": 10.0}),
+            TOLD,
+            "noise|less|as much as stated|as stated|smaller",
+        ),
+        Mistake(
+            "units",
+            "noise of distances in nm",
+            stated("uncertainty", {"distance_um": 100.0}),
+            TOLD,
+            "noise|less|as much as stated|smaller",
+        ),
     ]
     temperature = r"temperature.*(°F|fahrenheit)|°F|[Ff]ahrenheit"
     sensors: list[tuple[str, Change, str, str, str]] = [
         ("scales in °F", of_columns(TEMPERATURES, lambda v: 1.8 * v + 32.0), "named", temperature, ""),
         ("scales in K", of_columns(TEMPERATURES, lambda v: v + 273.15), "named", r"\bK\b|kelvin", ""),
         ("scales in tenths of °C", of_columns(TEMPERATURES, lambda v: 10.0 * v), "named", "tenth", ""),
-        ("scales' columns 0", of_columns(TEMPERATURES, lambda v: 0.0), "named", "temperature.*(sensor|says nothing|0 in)", ""),
+        (
+            "scales' columns 0",
+            of_columns(TEMPERATURES, lambda v: 0.0),
+            "named",
+            "temperature.*(sensor|says nothing|0 in)",
+            "",
+        ),
         ("one scale's column 0", of_columns("temperature_x_c", lambda v: 0.0), "named", "temperature_x|of X", ""),
         ("scales 85 °C", of_columns(TEMPERATURES, lambda v: 85.0), "named", "temperature.*85|85.*temperature", ""),
         ("one scale 85 °C", of_columns("temperature_y_c", lambda v: 85.0), "named", "temperature_y|of Y", ""),
-        ("scales -127 °C", of_columns(TEMPERATURES, lambda v: -127.0), "named", "temperature.*-127|-127.*temperature", ""),
-        ("one reading of a scale 85 °C", lambda case: case.rows[40].update(temperature_x_c="85.0"), "named",
-         "temperature_x|of X", ""),
-        ("one axis' sensor in the sun (+12 K)", of_columns("temperature_z_c", lambda v: v + 12.0), TOLD,
-         "temperature_z|of Z|sensors", ""),
-        ("one axis' sensor 4 K off", of_columns("temperature_z_c", lambda v: v + 4.0), LISTED, "temperature_z", "25[.]5"),
-        ("one axis' column empty", lambda case: [row.update(temperature_y_c="") for row in case.rows] and None,
-         LISTED, "temperature_y", "temperature.*24[.]5"),
-        ("sensors of X and Y exchanged", exchanged_columns("temperature_x_c", "temperature_y_c"), LISTED, "temperature_",
-         "24[.]5.*23"),
+        (
+            "scales -127 °C",
+            of_columns(TEMPERATURES, lambda v: -127.0),
+            "named",
+            "temperature.*-127|-127.*temperature",
+            "",
+        ),
+        (
+            "one reading of a scale 85 °C",
+            lambda case: case.rows[40].update(temperature_x_c="85.0"),
+            "named",
+            "temperature_x|of X",
+            "",
+        ),
+        (
+            "one axis' sensor in the sun (+12 K)",
+            of_columns("temperature_z_c", lambda v: v + 12.0),
+            TOLD,
+            "temperature_z|of Z|sensors",
+            "",
+        ),
+        (
+            "one axis' sensor 4 K off",
+            of_columns("temperature_z_c", lambda v: v + 4.0),
+            LISTED,
+            "temperature_z",
+            "25[.]5",
+        ),
+        (
+            "one axis' column empty",
+            lambda case: [row.update(temperature_y_c="") for row in case.rows] and None,
+            LISTED,
+            "temperature_y",
+            "temperature.*24[.]5",
+        ),
+        (
+            "sensors of X and Y exchanged",
+            exchanged_columns("temperature_x_c", "temperature_y_c"),
+            LISTED,
+            "temperature_",
+            "24[.]5.*23",
+        ),
         ("air in mmHg", of_columns(P, lambda v: v * 0.750062), "named", "mmHg", ""),
         ("air in inHg", of_columns(P, lambda v: v * 0.0295300), "named", "inHg", ""),
         ("air in kPa", of_columns(P, lambda v: v / 10.0), "named", "kPa", ""),
@@ -324,14 +379,22 @@ def mistakes() -> list[Mistake]:
         ("expansion 11.5e-6 (1/K)", stated(EXPANSION, 11.5e-6), "named", "expansion", ""),
         ("expansion 115", stated(EXPANSION, 115.0), "named", "expansion", ""),
         ("expansion 1.15", stated(EXPANSION, 1.15), LISTED, "expansion", r"stated 1[.]15\b|scales 1[.]15\b"),
-        ("expansion 23.1 (of aluminium)", stated(EXPANSION, 23.1), LISTED, "expansion", r"stated 23[.]1\b|scales 23[.]1\b"),
+        (
+            "expansion 23.1 (of aluminium)",
+            stated(EXPANSION, 23.1),
+            LISTED,
+            "expansion",
+            r"stated 23[.]1\b|scales 23[.]1\b",
+        ),
         ("expansion left out", stated("temperature", None), TOLD, "as found", ""),
         ("reference_c 68", stated("temperature.reference_c", 68.0), "named", "reference", ""),
         ("reference_c 293.15", stated("temperature.reference_c", 293.15), "named", "reference", ""),
         ("reference_c 0", stated("temperature.reference_c", 0.0), "named", "reference", ""),
         ("reference_c 23", stated("temperature.reference_c", 23.0), TOLD, "reference", "referred to 23"),
     ]
-    found += [Mistake("sensors", name, change, required, words, listed) for name, change, required, words, listed in sensors]
+    found += [
+        Mistake("sensors", name, change, required, words, listed) for name, change, required, words, listed in sensors
+    ]
 
     swap_xy = {"npp": "pnp", "pnp": "npp", "p00": "0p0", "0p0": "p00", "p0p": "0pp", "0pp": "p0p"}
     labels: list[tuple[str, Change, str, str]] = [
@@ -343,103 +406,300 @@ def mistakes() -> list[Mistake]:
         ("alpha with the wrong sign", of_columns("alpha_urad", lambda v: -v), "named", "wrong sign"),
         ("alpha with the wrong sign on npp", of_columns("alpha_urad", lambda v: -v, "npp"), "named", "wrong sign"),
         ("alpha and beta exchanged", exchanged_columns("alpha_urad", "beta_urad"), "named", "exchanged"),
-        ("head turned by 90° on all lines", all_of(exchanged_columns("alpha_urad", "beta_urad"),
-                                                   of_columns("beta_urad", lambda v: -v)), "named", "turned by"),
+        (
+            "head turned by 90° on all lines",
+            all_of(exchanged_columns("alpha_urad", "beta_urad"), of_columns("beta_urad", lambda v: -v)),
+            "named",
+            "turned by",
+        ),
         ("distances with the wrong sign", of_columns(DISTANCES, lambda v: -v), "named", "wrong sign"),
     ]
     found += [Mistake("labels", name, change, required, words) for name, change, required, words in labels]
     found += [
-        Mistake("labels", "backward run labelled forward", forward_labels, TOLD, "backward|direction|reversed", "", backward),
-        Mistake("labels", "beams d1 and d2 exchanged", exchanged_columns("d1_mm", "d2_mm"), "named", "exchanged", "",
-                head("multi_beam")),
-        Mistake("labels", "spot_x and spot_y exchanged", exchanged_columns("spot_x_mm", "spot_y_mm"), "named",
-                "exchanged", "", head("psd")),
+        Mistake(
+            "labels", "backward run labelled forward", forward_labels, TOLD, "backward|direction|reversed", "", backward
+        ),
+        Mistake(
+            "labels",
+            "beams d1 and d2 exchanged",
+            exchanged_columns("d1_mm", "d2_mm"),
+            "named",
+            "exchanged",
+            "",
+            head("multi_beam"),
+        ),
+        Mistake(
+            "labels",
+            "spot_x and spot_y exchanged",
+            exchanged_columns("spot_x_mm", "spot_y_mm"),
+            "named",
+            "exchanged",
+            "",
+            head("psd"),
+        ),
     ]
     places: list[tuple[str, Change, str, str, str]] = [
-        ("tool 50 mm too short", stated("machine.tool_mm", [30.0, -20.0, -100.0]), LISTED, "tool", r"tool offset \(30, -20, -100"),
-        ("tool forgotten", stated("machine.tool_mm", None), LISTED, "tool offset must", r"tool offset.*\(0, 0, 0|no tool|tool offset 0"),
-        ("tool with the wrong sign", stated("machine.tool_mm", [-30.0, 20.0, 150.0]), LISTED, "tool ", r"tool offset \(-30, 20, 150"),
-        ("volume X and Y exchanged", stated("volume", {"x_mm": 600.0, "y_mm": 800.0, "z_mm": 500.0}), "named", "the row says|x_mm|volume", ""),
-        ("x_mm 810, positions of the plan", all_of(stated("volume.x_mm", 810.0), of_columns("x_mm", lambda v: v * 810.0 / 800.0)),
-         "named", "x_mm = 800", ""),
+        (
+            "tool 50 mm too short",
+            stated("machine.tool_mm", [30.0, -20.0, -100.0]),
+            LISTED,
+            "tool",
+            r"tool offset \(30, -20, -100",
+        ),
+        (
+            "tool forgotten",
+            stated("machine.tool_mm", None),
+            LISTED,
+            "tool offset must",
+            r"tool offset.*\(0, 0, 0|no tool|tool offset 0",
+        ),
+        (
+            "tool with the wrong sign",
+            stated("machine.tool_mm", [-30.0, 20.0, 150.0]),
+            LISTED,
+            "tool ",
+            r"tool offset \(-30, 20, 150",
+        ),
+        (
+            "volume X and Y exchanged",
+            stated("volume", {"x_mm": 600.0, "y_mm": 800.0, "z_mm": 500.0}),
+            "named",
+            "the row says|x_mm|volume",
+            "",
+        ),
+        (
+            "x_mm 810, positions of the plan",
+            all_of(stated("volume.x_mm", 810.0), of_columns("x_mm", lambda v: v * 810.0 / 800.0)),
+            "named",
+            "x_mm = 800",
+            "",
+        ),
         ("steps 5 for 10", stated("plan.steps", 5), "named", "point|step|position", ""),
         ("order XZY", all_of(stated("plan.order", "XZY")), "named", "order|the row says", ""),
-        ("chain in another order", stated("machine.chain", "[w Y' b X Z t]"), "named", "order Y X Z|order X Y Z|chain", ""),
-        ("b elsewhere in the chain", stated("machine.chain", "[w b X Y Z t]"), LISTED, "place of b must", r"place of b in the chain \[w b X Y Z t"),
+        (
+            "chain in another order",
+            stated("machine.chain", "[w Y' b X Z t]"),
+            "named",
+            "order Y X Z|order X Y Z|chain",
+            "",
+        ),
+        (
+            "b elsewhere in the chain",
+            stated("machine.chain", "[w b X Y Z t]"),
+            LISTED,
+            "place of b must",
+            r"place of b in the chain \[w b X Y Z t",
+        ),
         ("standoff 50 for 150", stated("head.standoff_mm", 50.0), LISTED, "standoff must", "standoff 50"),
         ("positions from another origin", of_columns("x_mm", lambda v: v + 100.0), "named", "the row says|x_mm", ""),
-        ("constants fixed that are not", stated("adjustment.distance_constant_mm", "fixed"), TOLD, "constant|standoff", ""),
-        ("fixed point of a scale at its far end", stated("temperature.fixed_point_mm", [800.0, 600.0, 500.0]), LISTED,
-         "fixed point", "fixed point"),
+        (
+            "constants fixed that are not",
+            stated("adjustment.distance_constant_mm", "fixed"),
+            TOLD,
+            "constant|standoff",
+            "",
+        ),
+        (
+            "fixed point of a scale at its far end",
+            stated("temperature.fixed_point_mm", [800.0, 600.0, 500.0]),
+            LISTED,
+            "fixed point",
+            "fixed point",
+        ),
     ]
-    found += [Mistake("places", name, change, required, words, listed) for name, change, required, words, listed in places]
     found += [
-        Mistake("places", "psd_distance_mm 300 for 100", stated("head.psd_distance_mm", 300.0), "named", "psd_distance", "",
-                head("psd")),
-        Mistake("places", "beam offsets in inches", stated("head.beam_offsets_mm", [[0.0, 1.9685], [-1.7047, -0.9843], [1.7047, -0.9843]]),
-                "named", "beam_offsets|inch", "", head("multi_beam")),
+        Mistake("places", name, change, required, words, listed) for name, change, required, words, listed in places
+    ]
+    found += [
+        Mistake(
+            "places",
+            "psd_distance_mm 300 for 100",
+            stated("head.psd_distance_mm", 300.0),
+            "named",
+            "psd_distance",
+            "",
+            head("psd"),
+        ),
+        Mistake(
+            "places",
+            "beam offsets in inches",
+            stated("head.beam_offsets_mm", [[0.0, 1.9685], [-1.7047, -0.9843], [1.7047, -0.9843]]),
+            "named",
+            "beam_offsets|inch",
+            "",
+            head("multi_beam"),
+        ),
     ]
     yesterday = all_of(stated("noise.seed", 7), stated("machine.random.squareness_urad", 80.0))
     other_machine = stated("machine.random.seed", 77)
     files: list[tuple[str, Change, str, str, str]] = [
         ("yesterday's file for one line", simulated_otherwise(yesterday, "pnp"), TOLD, "pnp", ""),
         ("same file for two lines", lines_named({"npp": "ppp"}), TOLD, "npp|ppp|same readings", ""),
-        ("readings of two rows exchanged", readings_from(lambda rows: [*rows[:9], rows[10], rows[9], *rows[11:]], "pnp"),
-         TOLD, "point 9|point 10|exchanged", ""),
+        (
+            "readings of two rows exchanged",
+            readings_from(lambda rows: [*rows[:9], rows[10], rows[9], *rows[11:]], "pnp"),
+            TOLD,
+            "point 9|point 10|exchanged",
+            "",
+        ),
         ("readings one row too low", readings_from(shifted, "pnp"), "named", "row|read twice|skipped", ""),
         ("last row missing", of_rows(lambda rows: rows[:-1]), "named", "1 point|without a row|00p", ""),
         ("file of another machine for one line", simulated_otherwise(other_machine, "nnp"), TOLD, "nnp", ""),
         ("file of another machine, same plan", simulated_otherwise(other_machine, ".*"), "silent", "machine", ""),
         ("rows hidden by a filter", hide, "named", "hidden", ""),
-        ("decimal commas", in_file(lambda t: t.replace(",", ";").replace(".", ",").encode()), "named", "decimal comma", ""),
-        ("decimal commas, imported", in_file(lambda t: t.replace(",", ";").replace(".", ",").encode(), True), TOLD, "-----", ""),
-        ("points numbered from 1", lambda case: [row.update(point=str(int(row["point"]) + 1)) for row in case.rows] and None,
-         "named", "point|position", ""),
-        ("file cut in a row", in_file(lambda t: t[: 2 * len(t) // 3].encode()), "named", "line \\d+|fields|complete", ""),
+        (
+            "decimal commas",
+            in_file(lambda t: t.replace(",", ";").replace(".", ",").encode()),
+            "named",
+            "decimal comma",
+            "",
+        ),
+        (
+            "decimal commas, imported",
+            in_file(lambda t: t.replace(",", ";").replace(".", ",").encode(), True),
+            TOLD,
+            "-----",
+            "",
+        ),
+        (
+            "points numbered from 1",
+            lambda case: [row.update(point=str(int(row["point"]) + 1)) for row in case.rows] and None,
+            "named",
+            "point|position",
+            "",
+        ),
+        (
+            "file cut in a row",
+            in_file(lambda t: t[: 2 * len(t) // 3].encode()),
+            "named",
+            "line \\d+|fields|complete",
+            "",
+        ),
         ("file cut after a row", of_rows(lambda rows: rows[:120]), "named", "without a row|nnp|lost|missing", ""),
         ("rows pasted twice", of_rows(lambda rows: [*rows[:30], *rows[20:]]), "named", "twice|given|row", ""),
-        ("a digit mistyped (1 mm)", lambda case: case.rows[40].update(distance_mm=repr(float(case.rows[40]["distance_mm"]) + 1.0)),
-         "named", "npp|point", ""),
+        (
+            "a digit mistyped (1 mm)",
+            lambda case: case.rows[40].update(distance_mm=repr(float(case.rows[40]["distance_mm"]) + 1.0)),
+            "named",
+            "npp|point",
+            "",
+        ),
         ("lost beam as 0 0 0", lost_as("0"), "named", "pnp.*(12|lost)|lost", ""),
         ("lost beam as 9999.999", lost_as("9999.999"), "named", "pnp.*12|9999.999", ""),
-        ("lost beams as the last value", readings_from(lambda rows: [*rows[:25], *[rows[25]] * (len(rows) - 25)], "pnp"),
-         TOLD, "pnp", ""),
-        ("rows sorted by text", of_rows(lambda rows: sorted(rows, key=lambda row: (row["line"], row["point"]))), TOLD, "-----", ""),
+        (
+            "lost beams as the last value",
+            readings_from(lambda rows: [*rows[:25], *[rows[25]] * (len(rows) - 25)], "pnp"),
+            TOLD,
+            "pnp",
+            "",
+        ),
+        (
+            "rows sorted by text",
+            of_rows(lambda rows: sorted(rows, key=lambda row: (row["line"], row["point"]))),
+            TOLD,
+            "-----",
+            "",
+        ),
     ]
-    found += [Mistake("files", name, change, required, words, listed) for name, change, required, words, listed in files]
+    found += [
+        Mistake("files", name, change, required, words, listed) for name, change, required, words, listed in files
+    ]
 
     later = "pnp|nnp|0pp|00p"
     days: list[tuple[str, Change, str, str, str]] = [
-        ("two days, temperature of the first", all_of(simulated_otherwise(warm, later), no_columns), TOLD, "temperature", ""),
-        ("two days, columns of the first", all_of(
-            simulated_otherwise(warm, later), of_columns(TEMPERATURES, lambda v: v - 3.0, later)), TOLD, "temperature", ""),
+        (
+            "two days, temperature of the first",
+            all_of(simulated_otherwise(warm, later), no_columns),
+            TOLD,
+            "temperature",
+            "",
+        ),
+        (
+            "two days, columns of the first",
+            all_of(simulated_otherwise(warm, later), of_columns(TEMPERATURES, lambda v: v - 3.0, later)),
+            TOLD,
+            "temperature",
+            "",
+        ),
         ("air of another day", of_columns(P, lambda v: v + 25.0), LISTED, "air_pressure", "1023"),
-        ("air of another day for half the lines", of_columns(P, lambda v: v + 25.0, later), TOLD, "pressure|factor", ""),
+        (
+            "air of another day for half the lines",
+            of_columns(P, lambda v: v + 25.0, later),
+            TOLD,
+            "pressure|factor",
+            "",
+        ),
         ("summer time during the run", of_columns("time_s", lambda v: v + 3600.0, later), TOLD, "time", ""),
-        ("winter time within a line", lambda case: [row.update(time_s=repr(float(row["time_s"]) - 3600.0))
-                                                   for row in case.rows[45:]] and None, "named", "time", ""),
-        ("squareness changed between two lines", simulated_otherwise(stated("machine.random.squareness_urad", 75.0), later),
-         TOLD, "squareness|pnp|nnp|0pp", ""),
-        ("temperature stated, not measured: 20 for 23", all_of(no_columns, stated("temperature.axes_c", 20.0)), LISTED,
-         "axes_c", r"scales.*\b20\b.*°C.*(stated|axes_c)|temperature of the scales.*20"),
+        (
+            "winter time within a line",
+            lambda case: [row.update(time_s=repr(float(row["time_s"]) - 3600.0)) for row in case.rows[45:]] and None,
+            "named",
+            "time",
+            "",
+        ),
+        (
+            "squareness changed between two lines",
+            simulated_otherwise(stated("machine.random.squareness_urad", 75.0), later),
+            TOLD,
+            "squareness|pnp|nnp|0pp",
+            "",
+        ),
+        (
+            "temperature stated, not measured: 20 for 23",
+            all_of(no_columns, stated("temperature.axes_c", 20.0)),
+            LISTED,
+            "axes_c",
+            r"scales.*\b20\b.*°C.*(stated|axes_c)|temperature of the scales.*20",
+        ),
     ]
     found += [Mistake("days", name, change, required, words, listed) for name, change, required, words, listed in days]
     index: list[tuple[str, Change, str, str, str]] = [
         ("wavelength 633 for 1530", stated("head.wavelength_nm", 633.0), LISTED, "wavelength must", "wavelength 633"),
         ("wavelength in µm", stated("head.wavelength_nm", 1.53), "named", "wavelength", ""),
-        ("index 1.0 for the assumed air", stated("environment.assumed", {"refractive_index": 1.0}), LISTED, "index must",
-         "index.*1[.]0*\\b.*|vacuum"),
-        ("index 1.27 for 1.00027", stated("environment.assumed", {"refractive_index": 1.27}), "named", "refractive_index|index", ""),
-        ("index on the scale lines alone", of_columns(DISTANCES, lambda v: v * 1.000268, "p00|0p0|00p"), "named", "scale lines", ""),
-        ("compensated, stated as counted with an index", stated("environment.readings", None), LISTED, "readings must",
-         "compensated|instrument has (used|reduced)"),
+        (
+            "index 1.0 for the assumed air",
+            stated("environment.assumed", {"refractive_index": 1.0}),
+            LISTED,
+            "index must",
+            "index.*1[.]0*\\b.*|vacuum",
+        ),
+        (
+            "index 1.27 for 1.00027",
+            stated("environment.assumed", {"refractive_index": 1.27}),
+            "named",
+            "refractive_index|index",
+            "",
+        ),
+        (
+            "index on the scale lines alone",
+            of_columns(DISTANCES, lambda v: v * 1.000268, "p00|0p0|00p"),
+            "named",
+            "scale lines",
+            "",
+        ),
+        (
+            "compensated, stated as counted with an index",
+            stated("environment.readings", None),
+            LISTED,
+            "readings must",
+            "compensated|instrument has (used|reduced)",
+        ),
         ("assumed air left out", stated("environment.assumed", None), LISTED, "assumed", "assumed"),
     ]
-    found += [Mistake("index", name, change, required, words, listed) for name, change, required, words, listed in index]
+    found += [
+        Mistake("index", name, change, required, words, listed) for name, change, required, words, listed in index
+    ]
     compensated = stated("environment.readings", None)
     found.append(
-        Mistake("index", "constant_index for an instrument that compensates", stated("environment.readings", "constant_index"),
-                LISTED, "readings must", "constant index", all_of(compensated, recorded_air))
+        Mistake(
+            "index",
+            "constant_index for an instrument that compensates",
+            stated("environment.readings", "constant_index"),
+            LISTED,
+            "readings must",
+            "constant index",
+            all_of(compensated, recorded_air),
+        )
     )
     return found
 
@@ -477,7 +737,9 @@ def workbook(case: Case, path: Path) -> None:
     sheet = book.active
     sheet.append(list(case.rows[0]))
     for row in case.rows:
-        sheet.append([value if name in ("line", "direction") or not value else float(value) for name, value in row.items()])
+        sheet.append(
+            [value if name in ("line", "direction") or not value else float(value) for name, value in row.items()]
+        )
     for number in case.hidden:
         sheet.row_dimensions[number + 2].hidden = True
     book.save(path)
@@ -526,7 +788,9 @@ def evaluated(case: Case, truth: sd.Machine, volume: list[float]) -> Found:
                 return Found(status, out, told, "", np.nan, np.nan)
         status, out, err = commanded("evaluate", str(scenario), str(run), "-o", str(calibration))
         before, _, after = out.partition("\nmethod: ")
-        verdict = "\n".join(re.findall(r"^(?!note:).*", before, re.MULTILINE) + re.findall(r"\n((?:fault|lost).*)", after))
+        verdict = "\n".join(
+            re.findall(r"^(?!note:).*", before, re.MULTILINE) + re.findall(r"\n((?:fault|lost).*)", after)
+        )
         # Names of files say nothing.
         messages = (told + err + verdict).replace(name, "")
         fit = re.search(r"^fit: (\w+)", out, re.MULTILINE)
@@ -594,7 +858,9 @@ def main() -> int:
     start, counts, worse, unsound = time.monotonic(), Counter[str](), list[str](), list[str]()
     chosen = [(n, m) for n, m in enumerate(mistakes()) if given.only in f"{m.kind}: {m.name}"]
     print(f"stepdiag {sd.__version__}\n")
-    print("| kind | mistake | outcome | required | exit | left, µm | by the right run | other tool, µm | first message |")
+    print(
+        "| kind | mistake | outcome | required | exit | left, µm | by the right run | other tool, µm | first message |"
+    )
     print("|---|---|---|---|---|---|---|---|---|")
     with multiprocessing.get_context("fork").Pool(given.workers) as pool:
         results = pool.imap(functools.partial(one, given.seed), [n for n, _ in chosen])
