@@ -153,9 +153,7 @@ def main() -> int:
     seconds = dict.fromkeys(PLANS, 0.0)
     outcomes: list[str] = []
     with multiprocessing.get_context("fork").Pool(given.workers) as pool:
-        for plan, fit, reasons, spent, refusal in pool.imap(
-            functools.partial(one, given.runs), range(given.runs), chunksize=9
-        ):
+        for plan, fit, reasons, spent, refusal in pool.imap(one, range(given.runs), chunksize=9):
             fits[plan][fit] += 1
             outcomes.append(fit)
             codes[plan].update(f"{fit}: {code}" for code in reasons)
