@@ -10,7 +10,6 @@ where more than 0.2 % more are doubtful, or any more are rejected or refused.
 from __future__ import annotations
 
 import argparse
-import functools
 import json
 import math
 import multiprocessing
@@ -127,7 +126,7 @@ def scenario(plan: str, number: int) -> sd.Scenario:
     return sd.parse_scenario(toml(sections))
 
 
-def one(runs: int, number: int) -> tuple[str, str, list[str], float, str]:
+def one(number: int) -> tuple[str, str, list[str], float, str]:
     """Plan, fit ("refused": no result), codes of the reasons, processor seconds of the evaluation, what was refused."""
     plan = list(PLANS)[number % len(PLANS)]
     described = scenario(plan, number)
@@ -154,9 +153,7 @@ def main() -> int:
     seconds = dict.fromkeys(PLANS, 0.0)
     outcomes: list[str] = []
     with multiprocessing.get_context("fork").Pool(given.workers) as pool:
-        for plan, fit, reasons, spent, refusal in pool.imap(
-            functools.partial(one, given.runs), range(given.runs), chunksize=9
-        ):
+        for plan, fit, reasons, spent, refusal in pool.imap(one, range(given.runs), chunksize=9):
             fits[plan][fit] += 1
             outcomes.append(fit)
             codes[plan].update(f"{fit}: {code}" for code in reasons)
@@ -164,10 +161,8 @@ def main() -> int:
             if refusal:
                 print(refusal[:300].replace("\n", " "), file=sys.stderr)
     names = ["accepted", "doubtful", "rejected", "unchecked", "refused"]
-    print(
-        f"stepdiag {sd.__version__}\n\n| plan and head | {' | '.join(names)} | ms a run | reasons |\n"
-        f"|{'---|' * (len(names) + 3)}"
-    )
+    print(f"stepdiag {sd.__version__}\n")
+    print(f"| plan and head | {' | '.join(names)} | ms a run | reasons |\n|{'---|' * (len(names) + 3)}")
     for plan, counted in fits.items():
         reasons = ", ".join(f"{code} {n}" for code, n in codes[plan].most_common())
         shares = " | ".join(str(counted[name]) for name in names)
