@@ -48,10 +48,10 @@ from rechecked import (
 )
 
 import stepdiag as sd
+from stepdiag.parameters import FUNCTIONS, KINDS, NATIVE_UNIT, SQUARENESSES, kind_of
 from stepdiag.rechecking.recheck import Judged
 from stepdiag.rechecking.verification import ALPHA
 from stepdiag.report.verification import agrees
-from stepdiag.parameters import FUNCTIONS, KINDS, NATIVE_UNIT, SQUARENESSES, kind_of
 from stepdiag.units import report_value
 
 ALPHAS = (0.05, 0.01, 0.001)

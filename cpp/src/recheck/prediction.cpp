@@ -374,7 +374,8 @@ Eigen::MatrixXd Prediction::information(Eigen::Index begin, Eigen::Index count) 
 
 ChiSquare Prediction::fit(Eigen::Index begin, Eigen::Index count) const {
     constexpr double told = 1e-2;  // below, what a prior allows changes the square sum by less, be it there or not
-    constexpr double near = 20.0;  // priors, and 4 standard uncertainties: no change farther away is near the calibration
+    constexpr double near =
+        20.0;  // priors, and 4 standard uncertainties: no change farther away is near the calibration
     ChiSquare test{chi_square(), used_};
     if (count > 0) {
         const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(information(begin, count));
@@ -387,7 +388,8 @@ ChiSquare Prediction::fit(Eigen::Index begin, Eigen::Index count) const {
                 --test.freedom;
             }
     }
-    double free = 0.0;  // of the free unknowns, those that the readings tell  // of the free unknowns, those that the readings tell
+    double free = 0.0;  // of the free unknowns, those that the readings tell  // of the free unknowns, those that the
+                        // readings tell
     for (std::size_t k = 0; k < setups_.size(); ++k) {
         const LineSetup& setup = problem_.setups()[k];
         const SetupRows& rows = setups_[k];

@@ -28,9 +28,9 @@ public:
     // would take set-ups that must explain it far away from where anything is linear.
     void drop_changes();
     double chi_square() const;
-    // After solve(). Of the test whether all readings go with what is known: nothing is known of `count` components of z
-    // from `begin` on, as far as the readings tell them. Their priors say how far they may be from 0, so that with them
-    // the square sum would be too small by one for each that is 0.
+    // After solve(). Of the test whether all readings go with what is known: nothing is known of `count` components of
+    // z from `begin` on, as far as the readings tell them. Their priors say how far they may be from 0, so that with
+    // them the square sum would be too small by one for each that is 0.
     ChiSquare fit(Eigen::Index begin, Eigen::Index count) const;
 
     // A sum of readings, in native units.
@@ -65,8 +65,8 @@ private:
         Eigen::VectorXd stiffness;  // 1/u^2 of what is usual of s
         Eigen::MatrixXd by_setup, by_baseline;
         Eigen::VectorXd residual;
-        Eigen::VectorXd value;     // s
-        Eigen::VectorXd gradient;  // by s
+        Eigen::VectorXd value;                       // s
+        Eigen::VectorXd gradient;                    // by s
         Eigen::MatrixXd curvature, curved_coupling;  // by s, and by s and z
         // At the last factorisation: A = S^T S + P, T = A^-1 S^T Z, and L^-1 T^T with the factor L of z.
         Eigen::LDLT<Eigen::MatrixXd> factor;
@@ -89,10 +89,10 @@ private:
     const AdjustmentProblem& problem_;
     const Baseline& baseline_;
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> root_;  // of the baseline
-    std::vector<double> sigma_;  // by reading
-    int used_ = 0;               // readings; the others stay out
-    std::vector<int> place_;     // by reading: row in its set-up
-    std::vector<int> setup_of_;  // by reading
+    std::vector<double> sigma_;                                                    // by reading
+    int used_ = 0;                                                                 // readings; the others stay out
+    std::vector<int> place_;                                                       // by reading: row in its set-up
+    std::vector<int> setup_of_;                                                    // by reading
     std::vector<double> missed_;
     std::vector<SetupRows> setups_;
     Eigen::VectorXd z_;

@@ -63,7 +63,8 @@ std::vector<LineDeviation> line_deviations(const Measurement& measurement, const
     return lines;
 }
 
-Judgement<Verification> verified(const Measurement& measurement, const AdjustmentProblem& problem, const Baseline& baseline) {
+Judgement<Verification> verified(const Measurement& measurement, const AdjustmentProblem& problem,
+                                 const Baseline& baseline) {
     Prediction prediction(problem, baseline);
     prediction.solve();
     prediction.drop_changes();

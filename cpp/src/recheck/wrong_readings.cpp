@@ -15,10 +15,9 @@ std::vector<Misfit> largest_misfits(const AdjustmentProblem& problem, const Pred
             misfits.push_back({r, value, uncertainty});
         }
     count = std::min(count, misfits.size());
-    std::partial_sort(misfits.begin(), misfits.begin() + std::ptrdiff_t(count), misfits.end(),
-                      [](const Misfit& a, const Misfit& b) {
-                          return std::abs(a.by_uncertainty()) > std::abs(b.by_uncertainty());
-                      });
+    std::partial_sort(
+        misfits.begin(), misfits.begin() + std::ptrdiff_t(count), misfits.end(),
+        [](const Misfit& a, const Misfit& b) { return std::abs(a.by_uncertainty()) > std::abs(b.by_uncertainty()); });
     misfits.resize(count);
     return misfits;
 }
@@ -67,8 +66,15 @@ Fault wrong_reading(const Run& run, const AdjustmentProblem& problem, const Misf
     const Station& station = run.measurement.stations()[reading.row];
     const double own = reading.standard_uncertainty;
     const double uncertainty = own * own / before.standard_uncertainty;
-    return {FaultKind::reading, reading.row, station.run, station.line.name(), station.point,
-            problem.channel_name(reading), after, uncertainty, gain};
+    return {FaultKind::reading,
+            reading.row,
+            station.run,
+            station.line.name(),
+            station.point,
+            problem.channel_name(reading),
+            after,
+            uncertainty,
+            gain};
 }
 
 }  // namespace stepdiag

@@ -34,12 +34,12 @@ struct Run {
     const AdjustmentOptions& options;
 };
 
-// The faults that an adjustment of the run by itself finds, with a machine that is not known: a change of the machine is
-// none of them. None where there is no such adjustment.
+// The faults that an adjustment of the run by itself finds, with a machine that is not known: a change of the machine
+// is none of them. None where there is no such adjustment.
 std::vector<FaultClass> faults_of(const Run& run);  // as they are left out
 
-// Leaves out the readings that the faults may have spoilt: of a slip those of its channel from there on, of a factor all
-// on its line. Where a slip may as well be a single reading, leaving that out removes the slip, too.
+// Leaves out the readings that the faults may have spoilt: of a slip those of its channel from there on, of a factor
+// all on its line. Where a slip may as well be a single reading, leaving that out removes the slip, too.
 void leave_out(const std::vector<FaultClass>& faults, AdjustmentProblem& problem);
 
 // A wrong reading that is left out, from the judgement before and after.
@@ -51,8 +51,8 @@ struct Judgement {
     ChiSquare fit;
     double probability;  // of the fit
     bool is_asked;       // whether readings may be wrong
-    // If the readings do not fit: the largest misfits where the machine may have changed, which leaves the least of what
-    // is not wrong, and the square sum there.
+    // If the readings do not fit: the largest misfits where the machine may have changed, which leaves the least of
+    // what is not wrong, and the square sum there.
     std::vector<Misfit> misfits;
     double square_sum;
     std::vector<double> missed;  // by reading: Prediction::missed

@@ -284,10 +284,10 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     out. If the rest does not agree, or readings were left out, the command ends with a warning and
     exit code 3.
     """
+    from stepdiag.calibration.finding_text import fault_text
     from stepdiag.config.toml_text import located
     from stepdiag.io.data_files import read_calibration, read_measurement
     from stepdiag.io.whole_files import check_input
-    from stepdiag.calibration.finding_text import fault_text
     from stepdiag.rechecking.verification import check_other_run, verify_scenario
     from stepdiag.report.verification import agrees, verification_report
     from stepdiag.scenario.description import read_scenario

@@ -94,14 +94,16 @@ def after(event: str, layout: str, seed: int, steps: int = 8) -> Eventful:
     uncertainty = sd.ReadingUncertainty(distance=distance, tilt=1e-2 * distance, spot=10.0 * distance)
     drawn = dataclasses.replace(drawn, uncertainty=uncertainty)
     baseline = coverage_cases.evaluated(case, drawn, coverage_cases.measured(drawn, rng))
-    diagonals, scale_lines = ((*((lines, ()) for lines in LINES), (DIAGONALS, SCALE_LINES))[seed % 4])
+    diagonals, scale_lines = (*((lines, ()) for lines in LINES), (DIAGONALS, SCALE_LINES))[seed % 4]
     plan = sd.Plan(drawn.plan.volume, diagonals, steps // (1 + seed // 4 % 2), scale_lines=scale_lines)
     machine = drawn.machine
     if event in ("screw", "cubic bow"):
         machine = _with_shape(machine, event, rng)
     lines = [*plan.lines, *plan.scale_lines]
     misalignment = {str(line): coverage_cases.setup_of(case, rng, str(line)) for line in lines}
-    run = coverage_cases.measured(dataclasses.replace(drawn, machine=machine, plan=plan, misalignment=misalignment), rng)
+    run = coverage_cases.measured(
+        dataclasses.replace(drawn, machine=machine, plan=plan, misalignment=misalignment), rng
+    )
     hit = None
     if event in ("wrong reading", "slip"):
         run, hit = _spoilt(run, event, rng)
