@@ -373,17 +373,18 @@ Eigen::MatrixXd Prediction::information(Eigen::Index begin, Eigen::Index count) 
 }
 
 ChiSquare Prediction::fit(Eigen::Index begin, Eigen::Index count) const {
-    constexpr double told = 1e-2;   // below, what a prior allows changes the square sum by less, be it there or not
-    constexpr double near = 400.0;  // square of 20 priors: farther away no change is near the calibration
+    constexpr double told = 1e-2;  // below, what a prior allows changes the square sum by less, be it there or not
+    constexpr double near =
+        20.0;  // priors, and 4 standard uncertainties: no change farther away is near the calibration
     ChiSquare test{chi_square(), used_};
     if (count > 0) {
         const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(information(begin, count));
         const Eigen::VectorXd drawn = parts.eigenvectors().transpose() * z_.segment(begin, count);
         for (Eigen::Index k = 0; k < count; ++k)
             if (const double information = parts.eigenvalues()[k]; information >= told) {
-                const double by_prior = drawn[k] * drawn[k] * (1.0 + information) / information;
-                if (by_prior > near) continue;
-                test.square_sum -= by_prior;
+                const double estimate = drawn[k] * (1.0 + information) / information;
+                if (std::abs(estimate) > near + 4.0 / std::sqrt(information)) continue;
+                test.square_sum -= estimate * drawn[k];
                 --test.freedom;
             }
     }

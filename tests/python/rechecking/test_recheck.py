@@ -7,8 +7,10 @@ import pytest
 import rechecked
 from json_objects import printed
 from refusal import refused
+from usual import DIAGONALS, SCALE_LINES
 
 import stepdiag as sd
+from stepdiag._core import with_covariance
 from stepdiag.cli import main
 from stepdiag.rechecking.recheck import Judged
 from stepdiag.rechecking.verification import ALPHA
@@ -38,9 +40,9 @@ gain = "fixed"
 
 [plan]
 """
-DIAGONALS = 'lines = ["ppp", "npp", "pnp", "nnp"]\n'
-CALIBRATED = KNOWN.format(seed=1) + DIAGONALS + 'steps = 6\nscale_lines = ["p00", "0p0", "00p"]\n'
-SHORT = KNOWN.format(seed=2) + DIAGONALS + "steps = 3\n"
+LINES = 'lines = ["ppp", "npp", "pnp", "nnp"]\n'
+CALIBRATED = KNOWN.format(seed=1) + LINES + 'steps = 6\nscale_lines = ["p00", "0p0", "00p"]\n'
+SHORT = KNOWN.format(seed=2) + LINES + "steps = 3\n"
 HIT = 40e-6  # of C0Y, rad
 
 
@@ -115,7 +117,7 @@ def test_what_priors_rule_out_is_no_change(folder: Path) -> None:
 
 
 def test_one_diagonal_tells_one_number_of_scales_and_squarenesses(folder: Path) -> None:
-    Path("one.toml").write_text(SHORT.replace(DIAGONALS, 'lines = ["ppp"]\n'))
+    Path("one.toml").write_text(SHORT.replace(LINES, 'lines = ["ppp"]\n'))
     assert main(["simulate", "one.toml", "-o", "one.csv"]) == 0
     baseline = sd.read_calibration("calibration.nc")
     found = sd.recheck_scenario(baseline, sd.read_scenario("one.toml"), sd.read_measurement("one.csv"))
@@ -304,3 +306,41 @@ def test_square_sum_of_the_fit_is_that_of_generalised_least_squares(folder: Path
     assert found.fit_degrees_of_freedom == len(values) - 20 - len(change)
     # Second order of the change, and differences for derivatives, are below this.
     assert found.fit_chi_square == pytest.approx(residual @ residual, rel=2e-3)
+
+
+@pytest.mark.parametrize(("size", "noise"), [(10.0, 1e-7), (1000.0, 1e-6)])
+def test_readings_of_a_billionth_of_their_distance_are_judged(size: float, noise: float) -> None:
+    """A baseline as good as its readings would make it: of readings without noise, its covariance that of coarse ones
+    scaled down."""
+    volume, coarse, tilt = (size, 0.8 * size, 0.6 * size), 1e4, noise / size
+    errors = sd.random_error_map(volume, seed=1, translation=1e-5 * size, rotation=2e-5, squareness=2e-5, intervals=6)
+    chain, head = sd.Chain("[w X' b Y Z t]"), sd.Head(standoff=0.2 * size)
+
+    def read(squareness: float, plan: sd.Plan, times: float) -> sd.Measurement:
+        hit = sd.ErrorMap(errors.functions, {**errors.squareness, "C0Y": errors.squareness["C0Y"] + squareness})
+        drawn = sd.Noise(distance=times * noise, tilt=times * tilt, seed=1)
+        return sd.simulate(sd.Machine(chain, hit), plan, head, noise=drawn)
+
+    def known_to(times: float) -> sd.AdjustmentOptions:
+        return sd.AdjustmentOptions(
+            uncertainty=sd.ReadingUncertainty(distance=times * noise, tilt=times * tilt), full_covariance=True
+        )
+
+    plan = sd.Plan(volume, DIAGONALS, 6, scale_lines=SCALE_LINES)
+    found = sd.adjust(read(0.0, plan, 0.0), plan, head, chain, options=known_to(coarse)).calibration
+    assert found.covariance is not None
+    baseline = with_covariance(found, found.covariance / coarse**2)
+    short = sd.Plan(volume, DIAGONALS, 3)
+
+    def rechecked_run(run: sd.Measurement) -> sd.Recheck:
+        return sd.recheck(baseline, run, short, head, chain, options=known_to(1.0))
+
+    same = rechecked_run(read(0.0, short, 1.0))
+    assert min(same.probability, same.fit_probability) > 1e-3
+    hit = rechecked_run(read(100.0 * tilt, short, 1.0))
+    assert hit.probability < 1e-12
+    assert hit.fit_probability > 1e-3
+    wrong = rechecked_run(with_wrong_distance(read(0.0, short, 1.0), 5, 1e-4 * size))
+    assert [fault.row for left_out in wrong.left_out for fault in left_out.members] == [5]
+    assert wrong.left_out[0].members[0].size == pytest.approx(1e-4 * size, rel=1e-4)
+    assert min(wrong.probability, wrong.fit_probability) > 1e-3
