@@ -92,6 +92,7 @@ std::string name(FitFinding finding) {
         case FitFinding::alternatives: return "alternatives";
         case FitFinding::scaled: return "scaled";
         case FitFinding::mistake: return "mistake";
+        case FitFinding::implausible_input: return "implausible_input";
     }
     return "";
 }

@@ -301,8 +301,8 @@ void bind_result(py::module_& m) {
             "\"prior\": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); \"fault\": what "
             "a fault that was not corrected takes off chi-square; \"alternatives\": by how much alternative faults "
             "differ in `parameter`; \"scaled\": what the uncertainties were multiplied by; \"mistake\": `parameter` "
-            "says "
-            "which one would explain the readings.")
+            "says which one would explain the readings; \"implausible_input\": `parameter` says what no workshop "
+            "has.")
         .def_readonly("value", &FitReason::value, "Of a trend mm or rad.")
         .def_readonly(
             "limit", &FitReason::limit,
@@ -314,7 +314,7 @@ void bind_result(py::module_& m) {
                       "Of an uneven misfit or a trend; empty: all. Of a prior or prior_scatter the set-up quantity.")
         .def_readonly("component", &FitReason::component, "Of a prior: as of SetupEstimate.")
         .def_readonly("fault", &FitReason::fault, "Of a fault or alternatives: its class, from 1; else 0.")
-        .def_readonly("parameter", &FitReason::parameter, "Of alternatives, and of a mistake its sentence; else empty.")
+        .def_readonly("parameter", &FitReason::parameter, "Of alternatives; of a mistake or an input its sentence; else empty.")
         .def_readonly("run", &FitReason::run, "Of an uneven misfit: the run; -1: all.")
         .def_property_readonly(
             "aspect", [](const FitReason& r) { return name(r.aspect); },
@@ -495,6 +495,23 @@ void bind_result(py::module_& m) {
                 return found;
             },
             py::arg("mistake"), "The same, rejected because this mistake would explain the readings.")
+        .def(
+            "with_implausible_inputs",
+            [](Result found, const std::vector<std::string>& inputs) {
+                Verdict& verdict = found.adjustment.verdict;
+                const bool is_rejected = verdict.fit == Fit::rejected;
+                if (!inputs.empty() && !is_rejected) verdict.fit = Fit::doubtful;
+                auto place = is_rejected ? verdict.reasons.end() : verdict.reasons.begin();
+                for (const std::string& input : inputs) {
+                    FitReason reason{FitFinding::implausible_input, 0.0, 0.0};
+                    reason.parameter = input;
+                    place = std::next(verdict.reasons.insert(place, reason));
+                }
+                found.adjustment.calibration.fit = verdict.fit;
+                found.adjustment.calibration.fit_reasons = in_words(verdict.reasons);
+                return found;
+            },
+            py::arg("inputs"), "The same, at best doubtful where there are inputs that no workshop has, a sentence each.")
         .def_property_readonly(
             "smoothness",
             [](const Result& r) {

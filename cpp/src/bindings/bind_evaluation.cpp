@@ -280,7 +280,7 @@ void bind_evaluation(py::module_& m) {
         py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("assumed_environment"),
         "The run of an instrument that counted with the constant index of the assumed air, with distances in the air "
         "that the run's channels air_temperature, air_pressure and air_humidity recorded. Raises InvalidArgument for a "
-        "run without any of them, an assumed air that is no state, and air out of the equation's range.");
+        "run without any of them, a quantity that nothing states, and air out of the equation's range.");
     m.def("evaluate", &evaluate, py::arg("measurement"), py::arg("plan"), py::arg("head"), py::arg("chain"),
           py::arg("tool") = zeros(3), py::kw_only(), py::arg("method") = "adjustment",
           py::arg("uncertainty") = ReadingUncertainty{}, py::arg("full_covariance") = false,

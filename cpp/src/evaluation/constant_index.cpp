@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "evaluation/measurement_rows.hpp"
@@ -22,9 +23,14 @@ constexpr std::array<Recorded, 3> quantities = {{{"air_temperature", &Air::tempe
 // By row of the pass.
 std::vector<double> indices(const Measurement& measurement, const std::vector<std::size_t>& rows,
                             const Environment& assumed, double wavelength) {
-    std::vector<Environment> air(rows.size(), assumed);
+    const bool is_state = std::holds_alternative<Air>(assumed.air);
+    std::vector<Environment> air(rows.size(), is_state ? assumed : Environment{Air{}, assumed.equation});
     for (const Recorded& of : quantities) {
         const std::vector<double> values = recorded(measurement, measurement.find(of.channel), rows);
+        if (values.empty() && !is_state)
+            throw InvalidArgument("readings of a constant index: expected " + std::string(of.channel) +
+                                  " recorded on line " + measurement.stations()[rows.front()].line.name() +
+                                  ", got none; an assumed index says nothing of it");
         for (std::size_t k = 0; k < values.size(); ++k) std::get<Air>(air[k].air).*of.quantity = values[k];
     }
     std::vector<double> index;
@@ -46,10 +52,6 @@ Measurement in_recorded_air(const Measurement& measurement, const Plan& plan,
         throw InvalidArgument(
             "readings of a constant index: expected a column air_temperature_c, air_pressure_hpa or "
             "air_humidity_percent, got none");
-    if (!std::holds_alternative<Air>(assumed.air))
-        throw InvalidArgument(
-            "readings of a constant index: expected a state of the air as what the instrument "
-            "assumed, got an index");
     std::vector<Channel> channels = measurement.channels();
     for (const auto& [pass, rows] : rows_by_pass(measurement)) {
         const Station& first = measurement.stations()[rows.front()];

@@ -321,6 +321,8 @@ def reason_text(reason: FitReason) -> str:
             )
         case "mistake":
             return mistake_reason(reason.parameter)
+        case "implausible_input":
+            return reason.parameter
         case "no_noise":
             return UNCHECKED["no_noise"]
         case _:

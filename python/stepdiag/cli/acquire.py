@@ -9,7 +9,7 @@ import click
 
 from stepdiag._core import InvalidArgument
 from stepdiag.cli.interrupts import unwinding
-from stepdiag.cli.options import PATH, Grouped, Writes, in_flags, out_file, tell
+from stepdiag.cli.options import PATH, Grouped, Writes, in_flags, out_file, tell, tell_inputs
 from stepdiag.cli.terminal import plain
 from stepdiag.interruption import at_end
 from stepdiag.io.outputs import MEASUREMENT, RAW, OutputFile
@@ -200,6 +200,7 @@ def _take(scenario: Path, output: OutputFile, given: dict[str, Any]) -> None:
     from stepdiag.scenario.description import read_scenario
 
     described = read_scenario(scenario)
+    tell_inputs(described)
     raw: OutputFile = given["raw"] or OutputFile(raw_path(output.path), (RAW,))
     # acquire() refuses outputs made from other raw files, and raw files that are not resumed.
     inputs = [scenario] if given["temperatures"] is None else [scenario, given["temperatures"]]

@@ -290,7 +290,7 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     from stepdiag.io.whole_files import check_input
     from stepdiag.rechecking.verification import check_other_run, verify_scenario
     from stepdiag.report.verification import agrees, verification_report
-    from stepdiag.scenario.description import read_scenario
+    from stepdiag.scenario.description import implausible_inputs, read_scenario
 
     if not 0.0 < alpha < 1.0:
         raise InvalidArgument(f"--alpha: expected a probability between 0 and 1, got {alpha:g}")
@@ -303,6 +303,7 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     with located(f"{calibration}, {run}"), Progress("verify"):
         verification = verify_scenario(tested, known, measurement)
     warnings = fit_warnings(calibration, tested.fit)
+    warnings += [f"{run}: {sentence}" for sentence in implausible_inputs(known, measurement)]
     if not agrees(verification, alpha):
         warnings = [
             f"{run}: does not agree with {calibration}: do not use the calibration until you know why",
@@ -372,7 +373,7 @@ def recheck(
     from stepdiag.rechecking.recheck import Judged, recheck_scenario
     from stepdiag.rechecking.verification import check_other_run
     from stepdiag.report.verification import recheck_report
-    from stepdiag.scenario.description import read_scenario
+    from stepdiag.scenario.description import implausible_inputs, read_scenario
     from stepdiag.scenario.provenance import provenance_of
 
     if not 0.0 < alpha < 1.0:
@@ -391,6 +392,7 @@ def recheck(
     if target is not None:
         write_calibration(judged.updated, target, provenance=provenance_of(known, run))
     warnings = fit_warnings(baseline, before.fit)
+    warnings += [f"{run}: {sentence}" for sentence in implausible_inputs(known, measurement)]
     if judged.verdict == "unexplained":
         warnings.append(
             f"{run}: the machine has changed, unexplained: no change of low order explains these readings; "

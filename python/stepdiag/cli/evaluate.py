@@ -6,7 +6,17 @@ from typing import Final, Literal
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, Grouped, Writes, fit_warnings, json_option, out_file, tell, tell_fit
+from stepdiag.cli.options import (
+    PATH,
+    Grouped,
+    Writes,
+    fit_warnings,
+    json_option,
+    out_file,
+    tell,
+    tell_fit,
+    tell_inputs,
+)
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES
@@ -80,6 +90,7 @@ def evaluate(
         JudgedEvaluation,
         adjust_scenario,
         evaluate_beside_adjustment,
+        implausible_inputs,
         read_scenario,
     )
     from stepdiag.scenario.provenance import provenance_of
@@ -99,6 +110,7 @@ def evaluate(
     measurement = read_measurement(run)
     provenance = provenance_of(known, run, method=method)
     with located(str(run)), Progress("evaluate"):
+        of_inputs = [f"{run}: {sentence}" for sentence in implausible_inputs(known, measurement)]
         search = searchable(known, measurement)
         mistakes = search.before() if search else []
         try:
@@ -131,17 +143,17 @@ def evaluate(
         provenance=provenance,
         between_nodes=known.between_nodes,
     )
-    of_temperature = temperature_warnings(written, measurement)
+    of_inputs += temperature_warnings(written, measurement)
     if as_json:
         from stepdiag.objects.evaluation import evaluated_files, evaluation_object
         from stepdiag.objects.writer import json_text
 
-        files, warnings = evaluated_files(scenario, run, path), [*of_temperature, *fit_warnings(path, written.fit)]
+        files, warnings = evaluated_files(scenario, run, path), [*of_inputs, *fit_warnings(path, written.fit)]
         click.echo(json_text(evaluation_object(result, written, files, measurement, known, warnings, mistakes)))
     else:
         for line in evaluation_report(result, measurement, known, mistakes):
             say(line)
-    for warning in of_temperature:
+    for warning in of_inputs:
         tell("warning", warning)
     tell_fit(context, path, written.fit)
 
@@ -187,6 +199,7 @@ def observe(scenario: Path, steps: tuple[int, ...] | None, output: OutputFile | 
     from stepdiag.scenario.description import read_scenario
 
     described = read_scenario(scenario)
+    tell_inputs(described)
     path = None if output is None else output.claim(scenario, error_map=described.truth.error_map)
     known = described.known
     with Progress("observe"):

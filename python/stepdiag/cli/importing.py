@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from stepdiag.cli.options import PATH, out_file
+from stepdiag.cli.options import PATH, out_file, tell
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import MEASUREMENT, OutputFile
 from stepdiag.progress import Progress
@@ -45,6 +45,7 @@ def import_(
     from stepdiag.importing.run import import_files
     from stepdiag.io.data_files import write_measurement
     from stepdiag.scenario.description import read_scenario
+    from stepdiag.scenario.plausible_inputs import odd_columns
 
     described = read_scenario(scenario) if scenario is not None else None
     path = output.claim(
@@ -65,4 +66,6 @@ def import_(
     write_measurement(found.measurement, path)
     for line in found.text:
         say(line)
+    for warning in odd_columns(found.measurement, described and described.known.keys):
+        tell("warning", f"{path}: {warning}")
     click.echo(f"wrote {path}")

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from stepdiag.cli.options import PATH, out_file, tell
+from stepdiag.cli.options import PATH, out_file, tell, tell_inputs
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import PROGRAM, OutputFile
 
@@ -87,6 +87,7 @@ def nc(scenario: Path, output: OutputFile, **given: Any) -> None:
     from stepdiag.scenario.description import read_scenario
 
     described = read_scenario(scenario)
+    tell_inputs(described)
     path = output.claim(scenario, error_map=described.truth.error_map)
     program = measuring_program(
         described.known, Options(**{name: value for name, value in given.items() if value is not None})

@@ -4,13 +4,16 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
 
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import FileKind, OutputFile
+
+if TYPE_CHECKING:
+    from stepdiag.scenario.description import Scenario
 
 Command = TypeVar("Command", bound=Callable[..., None])
 NOT_TO_BE_TRUSTED: Final = 3  # exit code: done and written, but not to be used
@@ -88,6 +91,12 @@ def tell(what: str, message: str) -> None:
     """Write to standard error. A warning begins with "warning:", which scripts can search."""
     line = " ".join(in_flags(message).split())
     say(f"warning: {line}" if what == "warning" else f"stepdiag: {what}: {line}", err=True)
+
+
+def tell_inputs(scenario: "Scenario") -> None:
+    """Warn of what a scenario states and no workshop has."""
+    for sentence in scenario.known.implausible:
+        tell("warning", f"{scenario.path}: {sentence}")
 
 
 def json_option(command: Command) -> Command:

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, Writes, fit_warnings, tell
+from stepdiag.cli.options import PATH, Writes, fit_warnings, tell, tell_inputs
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import FIGURE, PLANS, OutputFile
 from stepdiag.progress import Progress
@@ -106,6 +106,7 @@ def plan(
     from stepdiag.scenario.description import read_scenario
 
     described = read_scenario(scenario)
+    tell_inputs(described)
     path = None if output is None else output.claim(scenario, error_map=described.truth.error_map)
     available = described.known.keys.plan_by_time.minutes if minutes is None else minutes
     near = own_spacing(described.known) if spacing is None else spacing
@@ -145,6 +146,7 @@ def _plan_recheck(
 
     check_input(baseline)
     described = read_scenario(scenario)
+    tell_inputs(described)
     path = None if output is None else output.claim(scenario, baseline, error_map=described.truth.error_map)
     before = read_calibration(baseline)
     available = described.known.keys.plan_by_time.minutes if minutes is None else minutes

@@ -172,6 +172,12 @@ class KnownEnvironmentKeys(Section):
         "`air_pressure_hpa`, `air_humidity_percent`: docs/temperature.md.",
         "compensated",
     )
+    altitude_m: Annotated[float, Field(ge=-500.0, le=6000.0)] | None = key(
+        "a height from -500 to 6000, in m",
+        "Height of the place above sea level, which says what air pressures are plausible; by default 0 to 500.",
+        None,
+        300.0,
+    )
 
 
 class EnvironmentSection(KnownEnvironmentKeys, AirKeys):
@@ -180,7 +186,7 @@ class EnvironmentSection(KnownEnvironmentKeys, AirKeys):
     Without any key, the air is that of 20 °C for a described head, and the index is 1 for a head given by its layout.
     With a key in `[environment.assumed]`, the air is that of 20 °C for every head.
 
-    Used by `simulate` only, except `readings`, and the assumed air with `constant_index`. The equations hold for
+    Used by `simulate` only, except `readings`, `altitude_m`, and the assumed air with `constant_index`. The equations hold for
     wavelengths of 300 to 1700 nm."""
 
     assumed: AssumedAirKeys | None = None

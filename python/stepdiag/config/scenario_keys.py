@@ -10,6 +10,7 @@ from pydantic import Field
 
 from stepdiag._core import Plan, largest_repeat_count
 from stepdiag.config.adjustment_keys import AdjustmentSection, SmoothnessSection
+from stepdiag.config.input_limit_keys import InputLimitsSection
 from stepdiag.config.key_errors import BY_HEAD, BY_LINE
 from stepdiag.config.key_types import (
     AMPLITUDE,
@@ -235,6 +236,7 @@ class PlausibleSection(Section):
     )
     translation_um: Positive = key(POSITIVE, "Limit of a positioning error or a straightness.", 2000.0, 2000.0)
     rotation_urad: Positive = key(POSITIVE, "Limit of an angular error or a squareness.", 5000.0, 5000.0)
+    inputs: InputLimitsSection = InputLimitsSection.model_construct()
 
 
 class ChangeSection(Section):

@@ -35,6 +35,12 @@ class KnownTemperatureKeys(Section):
         "Standard uncertainty of the constant deviation of each temperature sensor.",
         example=0.1,
     )
+    low_expansion: bool = key(
+        "true or false",
+        "true: the scales are of a glass ceramic, Invar or another material that hardly expands. Coefficients below "
+        "`plausible.inputs.expansion_um_per_m_k` are refused otherwise.",
+        False,
+    )
     fixed_point_mm: Triple = key(THREE_LENGTHS, "Positions of X, Y, Z from which their scales expand.", (0.0, 0.0, 0.0))
     reference_c: Celsius = key("a temperature in °C", "Temperature that results are referred to.", 20.0)
     axes_c: Celsius | tuple[Celsius, Celsius, Celsius] | None = key(

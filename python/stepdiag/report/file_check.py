@@ -15,6 +15,7 @@ from stepdiag.io.file_kind import NETCDF_BEGINS, head_of, kind_of_text
 from stepdiag.io.refused_files import import_hint
 from stepdiag.io.whole_files import check_input, read_beginning
 from stepdiag.positions.readings import read_positions
+from stepdiag.scenario.plausible_inputs import odd_columns
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,8 @@ def _measurement(path: Path) -> Finding:
     channels = measurement.channels
     lost = int(np.count_nonzero(np.any([np.isnan(values) for values in channels.values()], axis=0))) if channels else 0
     summary = f"{len(measurement)} points on {len(set(measurement.line))} lines, {', '.join(channels)}"
-    return Finding("measurement", summary, (f"{lost} points lack a reading",) if lost else ())
+    of_readings = (f"{lost} points lack a reading",) if lost else ()
+    return Finding("measurement", summary, (*of_readings, *odd_columns(measurement)))
 
 
 def _positions(path: Path) -> Finding:

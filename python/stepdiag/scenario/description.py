@@ -4,7 +4,7 @@ docs/scenario.md lists every key. What an evaluation may know, and the truth beh
 evaluates takes a scenario's known half, and has no way from there to the other.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -26,6 +26,7 @@ from stepdiag.memory import check_memory, for_evaluation
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 from stepdiag.scenario.heads import describe_heads, make_heads, of_run
 from stepdiag.scenario.known import Known, known_of, runs_of
+from stepdiag.scenario.plausible_inputs import implausible_air, implausible_columns, limits_of
 from stepdiag.scenario.planned_readings import only, with_channels
 from stepdiag.scenario.setup import counted_with
 from stepdiag.scenario.temperature import scales_of
@@ -94,7 +95,26 @@ def _with_air(run: _core.Measurement, scenario: Scenario) -> _core.Measurement:
 
 def reduced_run(known: Known, measurement: _core.Measurement) -> _core.Measurement:
     """A run as evaluations take it: with the channels that the scenario's head has, distances in the air of the run
-    where the instrument counted with a constant index."""
+    where the instrument counted with a constant index. Raises InvalidArgument for temperatures, air and times that no
+    workshop has."""
+    implausible_inputs(known, measurement)
+    return _reduced(known, measurement)
+
+
+def implausible_inputs(scenario: Scenario | Known, measurement: _core.Measurement) -> list[str]:
+    """What scenario and run say that no workshop has, a sentence each: such a fit is at best doubtful. Raises
+    InvalidArgument for what is beyond the outer limits of [plausible.inputs]."""
+    known = scenario.known
+    return [*known.implausible, *implausible_columns(limits_of(known.keys), measurement)]
+
+
+def implausible_truth(truth: Truth, known: Known) -> Iterator[str]:
+    """The same of the air that a run is simulated in."""
+    if truth.environment is not None:
+        yield from implausible_air(limits_of(known.keys), "environment", truth.environment)
+
+
+def _reduced(known: Known, measurement: _core.Measurement) -> _core.Measurement:
     run = only(measurement, known.signals)
     if known.assumed_air is None:
         return run
@@ -114,9 +134,17 @@ def evaluate_scenario(
     if method == "adjustment":
         adjustment = adjust_scenario(known, measurement, full_covariance=full_covariance)
         return adjustment.calibration.with_between_nodes(known.between_nodes)
+    implausible = implausible_inputs(known, measurement)
+    found = _evaluated(known, measurement, method, full_covariance)
+    return _at_best_doubtful(found, found.fit or "unchecked", [], implausible)
+
+
+def _evaluated(
+    known: Known, measurement: _core.Measurement, method: Literal["conventional", "enhanced"], full_covariance: bool
+) -> _core.Calibration:
     _check_memory(known, measurement, full_covariance)
     found = _core.evaluate(
-        reduced_run(known, measurement),
+        _reduced(known, measurement),
         known.plan,
         of_run(known.heads),
         known.chain,
@@ -128,6 +156,14 @@ def evaluate_scenario(
         expansion=known.expansion,
     )
     return found.with_between_nodes(known.between_nodes)
+
+
+def _at_best_doubtful(
+    calibration: _core.Calibration, fit: str, reasons: list[str], implausible: list[str]
+) -> _core.Calibration:
+    if not reasons and not implausible:
+        return calibration
+    return calibration.judged(max(fit, "doubtful", key=FITS.index) if implausible else fit, reasons + implausible)
 
 
 @dataclass(frozen=True)
@@ -162,11 +198,13 @@ def evaluate_beside_adjustment(
     search_faults: bool = True,
 ) -> JudgedEvaluation:
     """Evaluates a run by a linear method, and adjusts it for its verdict. `search_faults`: as of adjust_scenario."""
-    calibration = evaluate_scenario(scenario, measurement, method=method, full_covariance=full_covariance)
+    known = scenario.known
+    implausible = implausible_inputs(known, measurement)
+    calibration = _evaluated(known, measurement, method, full_covariance)
     own = calibration.fit or "unchecked"
     adjustment, refusal = None, ""
     try:
-        adjustment = adjust_scenario(scenario, measurement, search_faults=search_faults)
+        adjustment = _adjusted(known, measurement, search_faults=search_faults)
     except InvalidArgument as error:
         refusal = str(error)
     other = adjustment.verdict.fit if adjustment is not None else "unchecked"
@@ -175,7 +213,10 @@ def evaluate_beside_adjustment(
         reasons.append(f"adjustment of the same readings: {' '.join(refusal.split())}")
     if adjustment is not None:
         reasons += [f"adjustment of the same readings: {reason}" for reason in adjustment.calibration.fit_reasons]
-    return JudgedEvaluation(calibration.judged(max(own, other, key=FITS.index), reasons), own, adjustment, refusal)
+    worse = max(own, other, key=FITS.index)
+    return JudgedEvaluation(
+        _at_best_doubtful(calibration.judged(worse, reasons), worse, reasons, implausible), own, adjustment, refusal
+    )
 
 
 def adjust_scenario(
@@ -191,9 +232,28 @@ def adjust_scenario(
     also which faults the readings control. `search_faults` False: it is known already what is wrong with the run as a
     whole; no faults of single readings are looked for."""
     known = scenario.known
+    implausible = implausible_inputs(known, measurement)
+    adjustment = _adjusted(
+        known,
+        measurement,
+        full_covariance=full_covariance,
+        reliability=reliability,
+        search_faults=search_faults,
+    )
+    return adjustment.with_implausible_inputs(implausible) if implausible else adjustment
+
+
+def _adjusted(
+    known: Known,
+    measurement: _core.Measurement,
+    *,
+    full_covariance: bool = False,
+    reliability: bool = False,
+    search_faults: bool = True,
+) -> _core.Adjustment:
     _check_memory(known, measurement, full_covariance)
     return _core.adjust(
-        reduced_run(known, measurement),
+        _reduced(known, measurement),
         known.plan,
         of_run(known.heads),
         known.chain,
@@ -307,4 +367,7 @@ def _build(keys: ScenarioKeys, path: Path) -> Scenario:
         for line in getattr(keys, section).by_line:
             if line not in lines:
                 raise InvalidArgument(f"{path}: {section}.{line}: not a line of the plan; {suggest(line, lines)}")
-    return Scenario(known, truth_of(narrowed(keys, TruthKeys), pose_errors, known))
+    truth = truth_of(narrowed(keys, TruthKeys), pose_errors, known)
+    with located(str(path)):
+        list(implausible_truth(truth, known))
+    return Scenario(known, truth)

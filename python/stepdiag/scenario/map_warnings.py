@@ -1,16 +1,19 @@
-"""What is odd about an error map that is used as given."""
+"""What is odd about a scenario, and about an error map that is used as given."""
 
 import math
 from collections.abc import Iterator, Sequence
 
 from stepdiag._core import Chain, ErrorMap, InvalidArgument
 from stepdiag.calibration.finding_text import frame_deviation_texts, implausible_texts
-from stepdiag.scenario.description import Scenario
+from stepdiag.scenario.description import Scenario, implausible_truth
 from stepdiag.scenario.known import Known
 
 
 def scenario_warnings(scenario: Scenario) -> Iterator[str]:
-    """One sentence for each oddity of the error map that a scenario names, with the map's path in front."""
+    """What is stated and no workshop has, and the oddities of the error map that a scenario names: one sentence each,
+    with the file's path in front."""
+    for warning in (*scenario.known.implausible, *implausible_truth(scenario.truth, scenario.known)):
+        yield f"{scenario.path}: {warning}"
     file = scenario.truth.error_map
     if file is None:
         return

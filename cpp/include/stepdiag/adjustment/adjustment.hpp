@@ -195,6 +195,7 @@ enum class FitFinding {
     alternatives,   // what alternative faults make of one parameter differs by this much, mm or rad
     scaled,         // root of the variance factor, by which the uncertainties were multiplied (scale_uncertainty)
     mistake,        // one in the whole run or its scenario would explain the readings; adjust() looks for none
+    implausible_input,  // a temperature, coefficient, ... that no workshop has; adjust() looks at none
 };
 std::string name(FitFinding finding);  // "no_redundancy", ...
 
@@ -221,7 +222,7 @@ struct FitReason {
     FitAspect aspect = FitAspect::whole;
     bool alternative = false;    // of a trend: instead of the one before; the readings do not tell which
     int fault = 0;               // of a fault and of alternatives: number of the class, from 1
-    std::string parameter = {};  // of alternatives: "EXX", ...; of a mistake what it is
+    std::string parameter = {};  // of alternatives: "EXX", ...; of a mistake, an implausible_input what it is
 };
 
 // Whether the readings of an adjustment agree with each other, with their uncertainties and with the priors. It does

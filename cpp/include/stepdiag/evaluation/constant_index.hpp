@@ -21,8 +21,9 @@ struct CountingHead {
 };
 
 // The run with distances in its recorded air. A quantity of the air that a pass does not record is as assumed; its
-// equation and carbon dioxide are. Throws InvalidArgument for a run without any channel of the air, an assumed air that
-// is no state, air out of the equation's range, and a row that is not in the plan.
+// equation and carbon dioxide are. Where the instrument assumed an index (1: it counted vacuum wavelengths), all
+// quantities must be recorded, and carbon dioxide is that of Air. Throws InvalidArgument for a run without any channel
+// of the air, a quantity that nothing states, air out of the equation's range, and a row that is not in the plan.
 Measurement in_recorded_air(const Measurement& measurement, const Plan& plan,
                             const std::map<std::string, CountingHead>& head_of_line, const Environment& assumed);
 
