@@ -186,7 +186,7 @@ class EnvironmentSection(KnownEnvironmentKeys, AirKeys):
     Without any key, the air is that of 20 °C for a described head, and the index is 1 for a head given by its layout.
     With a key in `[environment.assumed]`, the air is that of 20 °C for every head.
 
-    Used by `simulate` only, except `readings`, `altitude_m`, and the assumed air with `constant_index`. The equations hold for
-    wavelengths of 300 to 1700 nm."""
+    Used by `simulate` only, except `readings`, `altitude_m`, and the assumed air with `constant_index`. The equations
+    hold for wavelengths of 300 to 1700 nm."""
 
     assumed: AssumedAirKeys | None = None

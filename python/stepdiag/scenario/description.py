@@ -26,8 +26,8 @@ from stepdiag.memory import check_memory, for_evaluation
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES
 from stepdiag.scenario.heads import describe_heads, make_heads, of_run
 from stepdiag.scenario.known import Known, known_of, runs_of
-from stepdiag.scenario.plausible_inputs import implausible_air, implausible_columns, limits_of
 from stepdiag.scenario.planned_readings import only, with_channels
+from stepdiag.scenario.plausible_inputs import implausible_air, implausible_columns, limits_of
 from stepdiag.scenario.setup import counted_with
 from stepdiag.scenario.temperature import scales_of
 from stepdiag.scenario.truth import Truth, errors_of, truth_of

@@ -128,12 +128,12 @@ class InputLimitsInForce:
         if _within(number, inner):
             return
         if name == "expansion_um_per_m_k" and inner and number < inner[0]:
-            if not self.low_expansion:
-                raise InvalidArgument(
-                    f"{place}: expected {_text(inner)}{unit}, got {shown}{more}{self._looks(name, number)}; scales that "
-                    "hardly expand need temperature.low_expansion = true"
-                )
-            return
+            if self.low_expansion:
+                return
+            raise InvalidArgument(
+                f"{place}: expected {_text(inner)}{unit}, got {shown}{self._looks(name, number)}; scales that hardly "
+                "expand need temperature.low_expansion = true"
+            )
         yield f"{place} is {shown}{more}, where {_text(inner)}{unit} is plausible{self._looks(name, number)}"
 
     def _looks(self, name: str, number: float) -> str:

@@ -106,7 +106,7 @@ def test_a_run_without_air_is_refused() -> None:
     run = sd.simulate_scenario(parse_scenario(PERFECT))
     with pytest.raises(sd.InvalidArgument, match=r"environment.readings: .*expected a column air_temperature_c"):
         sd.adjust_scenario(scenario, run)
-    with pytest.raises(sd.InvalidArgument, match="expected air_pressure recorded on line .*, got none; an assumed"):
+    with pytest.raises(sd.InvalidArgument, match=r"expected air_pressure recorded on line .*, got none; an assumed"):
         _core.in_recorded_air(
             with_channels(run, {"air_temperature": np.full(len(run), 20.0)}),
             scenario.known.plan,

@@ -165,7 +165,7 @@ def test_stated_limits_take_the_place_of_the_default_ones() -> None:
     assert implausible_inputs(*run_with({"temperature": 0.0}, cold)) == []
     assert implausible_inputs(*run_with({"temperature": -15.0}, cold)) == []
     narrow = PLAIN + "\n[plausible.inputs]\nscale_temperature_c = {outer = [18, 22], inner = [19, 21]}\n"
-    with pytest.raises(sd.InvalidArgument, match="expected 18 to 22 °C, got 22.5 °C"):
+    with pytest.raises(sd.InvalidArgument, match=r"expected 18 to 22 °C, got 22\.5 °C"):
         sd.adjust_scenario(*run_with({"temperature": 22.5}, narrow))
     dry = PLAIN + "\n[plausible.inputs]\nair_humidity_percent = {inner = [0, 100]}\n"
     assert implausible_inputs(*run_with({"air_humidity": 0.0062}, dry)) == []
