@@ -108,7 +108,7 @@ def known_of(
     signals = signals_of(keys, head, path)
     setup, setup_by_line = setup_priors(keys, head.layout, path)
     with located(str(path)):
-        implausible = tuple(implausible_keys(keys, heads, assumed_air))
+        implausible = tuple(implausible_keys(keys, described_heads, heads, assumed_air))
     return Known(
         path=path,
         keys=keys,

@@ -13,6 +13,7 @@ from stepdiag import _core
 from stepdiag._core import InvalidArgument, Measurement
 from stepdiag.config.input_limit_keys import InputLimits, InputLimitsSection, Range
 from stepdiag.config.scenario_keys import KnownKeys
+from stepdiag.scenario.heads import DescribedHead
 from stepdiag.units import HECTOPASCAL, HOUR, PERCENT, PPM
 
 AXES: Final = "xyz"
@@ -113,6 +114,10 @@ class InputLimitsInForce:
     def is_inner(self, name: str, number: float) -> bool:
         return _within(number, self._limits[name].inner)
 
+    def is_fraction(self, name: str, number: float) -> bool:
+        """Whether a humidity, the largest of its column, looks like a fraction of 1."""
+        return name == "air_humidity_percent" and 0.0 < number <= 1.0 and not self.is_humidity_stated
+
     def judge(self, name: str, place: str, number: float, more: str = "") -> Iterator[str]:
         """A sentence where `number` is beyond the inner limits; `place` names it, `more` completes the sentence. Raises
         InvalidArgument beyond the outer ones."""
@@ -187,7 +192,10 @@ def height_of(pressure: float) -> float:
 
 
 def implausible_keys(
-    keys: KnownKeys, heads: Mapping[str, _core.Head], assumed_air: _core.Environment | None
+    keys: KnownKeys,
+    described: Mapping[str, DescribedHead],
+    heads: Mapping[str, _core.Head],
+    assumed_air: _core.Environment | None,
 ) -> Iterator[str]:
     """What the known half of a scenario says."""
     limits, temperature = limits_of(keys), keys.temperature
@@ -200,8 +208,12 @@ def implausible_keys(
             numbers = value if isinstance(value, tuple) else () if value is None else (value,)
             for number in dict.fromkeys(numbers):
                 yield from limits.judge(name, f"temperature.{of}", number)
-    for wavelength in dict.fromkeys(head.wavelength for head in heads.values()):
-        yield from limits.judge("wavelength_nm", "head.wavelength_nm", wavelength)
+    wavelengths = {
+        head.wavelength: "head.wavelength_nm" if described[line].design is None else f"the wavelength on line {line}"
+        for line, head in heads.items()
+    }
+    for wavelength, place in wavelengths.items():
+        yield from limits.judge("wavelength_nm", place, wavelength)
     if assumed_air is not None:  # of the instrument, wherever it stands
         anywhere = InputLimitsInForce(keys.plausible.inputs)
         yield from implausible_air(anywhere, "the assumed air of environment", assumed_air)
@@ -218,7 +230,10 @@ def implausible_air(limits: InputLimitsInForce, place: str, air: _core.Environme
         ("relative_humidity", "air_humidity_percent"),
     ):
         number = air.state[name] / QUANTITIES[key].native
-        yield from limits.judge(key, f"{place}: {key.removeprefix('air_')}", number)
+        where = f"{place}: {key.removeprefix('air_')}"
+        if limits.is_fraction(key, number):
+            yield f"{where} is {number:g} %, which looks like a fraction ({number * 100.0:g} %)"
+        yield from limits.judge(key, where, number)
 
 
 def implausible_columns(limits: InputLimitsInForce, run: Measurement) -> Iterator[str]:
@@ -275,7 +290,7 @@ def _of_column(
     if not finite.size:
         return
     low, high, unit = float(finite.min()), float(finite.max()), QUANTITIES[key].unit
-    if key == "air_humidity_percent" and 0.0 < high <= 1.0 and not limits.is_humidity_stated:
+    if limits.is_fraction(key, high):
         raise InvalidArgument(
             f"column {column}: expected percent, got numbers that nowhere exceed {high:.4g}: they look like a fraction "
             f"({high * 100.0:.4g} %); air that is so dry needs plausible.inputs.{key}"

@@ -146,6 +146,13 @@ def test_scales_that_hardly_expand_say_so() -> None:
     assert parse_scenario(PLAIN + SCALES.replace("11.5", "30.0")).known.implausible[0].startswith("temperature.expans")
 
 
+def test_an_assumed_humidity_that_looks_like_a_fraction_is_told() -> None:
+    air = '\n[environment]\nreadings = "constant_index"\n[environment.assumed]\nhumidity_percent = {}\n'
+    (sentence,) = parse_scenario(PLAIN + air.format(0.62)).known.implausible
+    assert "humidity_percent is 0.62 %, which looks like a fraction (62 %)" in sentence
+    assert parse_scenario(PLAIN + air.format(62.0)).known.implausible == ()
+
+
 def test_an_index_of_exactly_one_counts_in_vacuum_wavelengths() -> None:
     assert parse_scenario(PLAIN + "\n[environment]\nrefractive_index = 1.0\n").known.implausible == ()
 
