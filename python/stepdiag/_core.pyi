@@ -1839,7 +1839,7 @@ class FitReason:
     @property
     def finding(self) -> str:
         """
-        "no_redundancy"; "no_noise": rms of the residuals in units of their rounding; "noise_factor", "misfit", "no_misfit": root of the variance factor, not credible, or larger or smaller than chance explains; "uneven_misfit": noise factor of one group of readings, and as the limit that of the others; "trend": what residuals of one channel run by, from the first reading to the last (mm or rad); "prior": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); "fault": what a fault that was not corrected takes off chi-square; "alternatives": by how much alternative faults differ in `parameter`; "scaled": what the uncertainties were multiplied by; "mistake": `parameter` says which one would explain the readings.
+        "no_redundancy"; "no_noise": rms of the residuals in units of their rounding; "noise_factor", "misfit", "no_misfit": root of the variance factor, not credible, or larger or smaller than chance explains; "uneven_misfit": noise factor of one group of readings, and as the limit that of the others; "trend": what residuals of one channel run by, from the first reading to the last (mm or rad); "prior": distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2); "fault": what a fault that was not corrected takes off chi-square; "alternatives": by how much alternative faults differ in `parameter`; "scaled": what the uncertainties were multiplied by; "mistake": `parameter` says which one would explain the readings; "implausible_input": `parameter` says what no workshop has.
         """
     @property
     def limit(self) -> float:
@@ -1854,7 +1854,7 @@ class FitReason:
     @property
     def parameter(self) -> str:
         """
-        Of alternatives, and of a mistake its sentence; else empty.
+        Of alternatives; of a mistake or an input its sentence; else empty.
         """
     @property
     def run(self) -> int:
@@ -2017,6 +2017,10 @@ class Adjustment:
         ...
     def _repr_html_(self) -> str:
         ...
+    def with_implausible_inputs(self, inputs: collections.abc.Sequence[str]) -> Adjustment:
+        """
+        The same, at best doubtful where there are inputs that no workshop has, a sentence each.
+        """
     def with_mistake(self, mistake: str) -> Adjustment:
         """
         The same, rejected because this mistake would explain the readings.
@@ -3512,7 +3516,7 @@ def head_sensitivities(head: Head, *, distance: typing.SupportsFloat | typing.Su
     """
 def in_recorded_air(measurement: Measurement, plan: Plan, head: Head | collections.abc.Mapping[str, Head], assumed_environment: Environment) -> Measurement:
     """
-    The run of an instrument that counted with the constant index of the assumed air, with distances in the air that the run's channels air_temperature, air_pressure and air_humidity recorded. Raises InvalidArgument for a run without any of them, an assumed air that is no state, and air out of the equation's range.
+    The run of an instrument that counted with the constant index of the assumed air, with distances in the air that the run's channels air_temperature, air_pressure and air_humidity recorded. Raises InvalidArgument for a run without any of them, a quantity that nothing states, and air out of the equation's range.
     """
 def instruction_set() -> str:
     """

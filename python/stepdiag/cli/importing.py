@@ -66,6 +66,6 @@ def import_(
     write_measurement(found.measurement, path)
     for line in found.text:
         say(line)
-    for warning in odd_columns(found.measurement, described and described.known.keys):
+    for warning in odd_columns(found.measurement, described.known.keys if described else None):
         tell("warning", f"{path}: {warning}")
     click.echo(f"wrote {path}")
