@@ -269,14 +269,14 @@ def odd_columns(run: Measurement, keys: KnownKeys | None = None) -> list[str]:
 
 
 class _Rows:
-    """Names of rows, and rows by pass."""
+    """Names of rows, and rows by pass, in the order of their points: a file's rows may be sorted otherwise."""
 
     def __init__(self, run: Measurement) -> None:
         self.line, self.point, self.run = run.line, run.point, run.run
         places: dict[tuple[int, str], list[int]] = {}
         for row, (number, line) in enumerate(zip(self.run, self.line, strict=True)):
             places.setdefault((number, line), []).append(row)
-        self.passes = [np.array(rows) for rows in places.values()]
+        self.passes = [np.array(sorted(rows, key=self.point.__getitem__)) for rows in places.values()]
 
     def name(self, row: int) -> str:
         run = f" (run {self.run[row]})" if self.run[row] else ""
@@ -333,7 +333,7 @@ def _of_times(limits: InputLimitsInForce, times: NDArray[np.float64], rows: _Row
         if not steps.size:
             continue
         if (steps <= 0.0).all() and (steps < 0.0).any():
-            steps = -steps  # rows of a backward run in the order of its points
+            steps = -steps  # of a backward run
         span = float(np.ptp(times[read])) / HOUR
         longest = max(longest, (span, int(read[0])))
         shortest = min(shortest, (float(steps.min()), int(read[1:][steps.argmin()])))

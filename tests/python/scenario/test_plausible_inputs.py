@@ -113,6 +113,18 @@ def test_a_clock_that_goes_back_is_told() -> None:
     assert "is -3596 s" in sentence
 
 
+def test_the_order_of_rows_is_not_that_of_time() -> None:
+    scenario, run = run_with({"time": 4.0 * np.arange(len(run_with({})[1]))})
+    rows = np.argsort([f"{line} {point}" for line, point in zip(run.line, run.point, strict=True)], kind="stable")
+    mixed = sd.Measurement(
+        [run.line[row] for row in rows],
+        [run.point[row] for row in rows],
+        run.position[rows],
+        {name: values[rows] for name, values in run.channels.items()},
+    )
+    assert implausible_inputs(scenario, mixed) == []
+
+
 @pytest.mark.parametrize(
     ("section", "words"),
     [
