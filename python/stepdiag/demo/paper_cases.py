@@ -30,7 +30,7 @@ SCREW_AMPLITUDE: Final = 0.003  # mm
 # The traced head of case 3; what its nominal calibration says of the PSD and of the laser beside the interferometer; by
 # how much its window of 5 mm N-BK7 (n = 1.5009) is shorter for the angle. In mm.
 HEAD: Final = "beam_and_psd"
-PSD_DISTANCE: Final = 31.501488
+PSD_DISTANCE: Final = 31.501425
 LASER_OFFSET: Final = 25.0
 WINDOW_SHORTENS: Final = 5.0 * (1.0 - 1.0 / 1.5009)
 

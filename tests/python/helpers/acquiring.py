@@ -39,6 +39,8 @@ seed = 7
 reflector_urad = [100.0, 300.0]
 [noise]
 {noise}
+[plausible.inputs]
+reading_s = {{inner = [0.0, 60.0]}} # nothing has to settle
 """
 LINES = 'lines = ["ppp", "npp", "pnp", "nnp"]\nscale_lines = ["p00", "0p0", "00p"]\nsteps = 4'
 SMALL = 'lines = ["ppp", "npp"]\nsteps = 2\nbackward = true'  # visits 1 and 2, 3 and 4, of 7 points each
