@@ -99,8 +99,8 @@ Calibration make_calibration(const AdjustmentProblem& problem, const AdjustmentT
     return calibration;
 }
 
-Eigen::MatrixXd full_covariance(const AdjustmentProblem& problem, const CalibratedForms& forms,
-                                const BorderedFactor& factor) {
+void add_covariance(const AdjustmentProblem& problem, const CalibratedForms& forms, const BorderedFactor& factor,
+                    Calibration& calibration) {
     const std::vector<const LinearForm*> list = forms.in_order();
     const Eigen::Index size = Eigen::Index(list.size());
     if (size > largest_covariance)
@@ -113,7 +113,19 @@ Eigen::MatrixXd full_covariance(const AdjustmentProblem& problem, const Calibrat
         factor.solve(column);
         for (Eigen::Index i = 0; i < size; ++i) covariance(i, j) = list[i]->value(column);
     }
-    return 0.5 * (covariance + covariance.transpose());
+    calibration.covariance = 0.5 * (covariance + covariance.transpose());
+    Eigen::Index next = 0;
+    const auto next_uncertainty = [&] {
+        double& variance = calibration.covariance(next, next);
+        variance = std::max(0.0, variance);  // rounding may leave -1e-30 of what is known exactly
+        ++next;
+        return std::sqrt(variance);
+    };
+    for (auto& function : calibration.functions)
+        if (function)
+            for (double& u : function->standard_uncertainty) u = next_uncertainty();
+    for (auto& squareness : calibration.squarenesses)
+        if (squareness) squareness->standard_uncertainty = next_uncertainty();
 }
 
 std::vector<bool> known_unknowns(const AdjustmentProblem& problem, std::vector<bool> known,
