@@ -17,9 +17,10 @@ namespace {
 
 bool is_distance(const Channel& channel) { return channel.name == "distance" || is_beam_channel(channel.name); }
 
-// As in a file.
+// As in a file, without ".0".
 std::string text_of(const Channel& channel, std::size_t row) {
-    return format_decimal(*channel.value[row], -channel_column(channel.name)->exponent_shift);
+    const std::string text = format_decimal(*channel.value[row] + 0.0, -channel_column(channel.name)->exponent_shift);
+    return text.substr(0, text.rfind(".0") == text.size() - 2 ? text.size() - 2 : text.size());
 }
 
 bool is_nines(const std::string& text) {
