@@ -113,19 +113,17 @@ void add_covariance(const AdjustmentProblem& problem, const CalibratedForms& for
         factor.solve(column);
         for (Eigen::Index i = 0; i < size; ++i) covariance(i, j) = list[i]->value(column);
     }
-    calibration.covariance = 0.5 * (covariance + covariance.transpose());
+    Eigen::VectorXd to_stated(size);  // of each value: its standard uncertainty over that of the solutions
     Eigen::Index next = 0;
-    const auto next_uncertainty = [&] {
-        double& variance = calibration.covariance(next, next);
-        variance = std::max(0.0, variance);  // rounding may leave -1e-30 of what is known exactly
-        ++next;
-        return std::sqrt(variance);
+    const auto take = [&](double u) {
+        const double variance = covariance(next, next);
+        to_stated[next++] = variance > 0.0 ? u / std::sqrt(variance) : 0.0;  // rounding may leave -1e-30 of what is exact
     };
-    for (auto& function : calibration.functions)
-        if (function)
-            for (double& u : function->standard_uncertainty) u = next_uncertainty();
-    for (auto& squareness : calibration.squarenesses)
-        if (squareness) squareness->standard_uncertainty = next_uncertainty();
+    for (const auto& function : calibration.functions)
+        if (function) std::for_each(function->standard_uncertainty.begin(), function->standard_uncertainty.end(), take);
+    for (const auto& squareness : calibration.squarenesses)
+        if (squareness) take(squareness->standard_uncertainty);
+    calibration.covariance = to_stated.asDiagonal() * (0.5 * (covariance + covariance.transpose())) * to_stated.asDiagonal();
 }
 
 std::vector<bool> known_unknowns(const AdjustmentProblem& problem, std::vector<bool> known,

@@ -20,9 +20,9 @@ CalibratedForms choose_forms(const AdjustmentTables& tables);
 
 Calibration make_calibration(const AdjustmentProblem& problem, const AdjustmentTables& tables,
                              const CalibratedForms& forms, const Eigen::VectorXd& x, const BorderedBand& inverse);
-// The full covariance, by solutions with the factor, and the standard uncertainties of its diagonal in place of those
-// of the selected inverse: its recurrence loses as many digits as what is assumed of open set-ups is worse known than
-// the values, squared (4e-5 of a variance at 1 nm; solutions lose 2e-8 there), so that the two would disagree.
+// The full covariance of the values of a calibration: correlations by solutions with the factor, standard uncertainties
+// those of the calibration. These come from the selected inverse, whose recurrence loses more digits where a set-up
+// is open: 4e-5 of a variance, 2e-8 with solutions, where distances are known to 1 nm and a laser's angle to 2 mrad.
 void add_covariance(const AdjustmentProblem& problem, const CalibratedForms& forms, const BorderedFactor& factor,
                     Calibration& calibration);
 // `determined`, less the unknowns of set-ups of which the readings tell hardly more than that "free" has its limits.
