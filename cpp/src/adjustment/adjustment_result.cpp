@@ -115,15 +115,18 @@ void add_covariance(const AdjustmentProblem& problem, const CalibratedForms& for
     }
     Eigen::VectorXd to_stated(size);  // of each value: its standard uncertainty over that of the solutions
     Eigen::Index next = 0;
+    Eigen::VectorXd stated(size);
     const auto take = [&](double u) {
         const double variance = covariance(next, next);
-        to_stated[next++] = variance > 0.0 ? u / std::sqrt(variance) : 0.0;  // rounding may leave -1e-30 of what is exact
+        to_stated[next] = variance > 0.0 ? u / std::sqrt(variance) : 0.0;  // rounding may leave -1e-30 of what is exact
+        stated[next++] = u * u;
     };
     for (const auto& function : calibration.functions)
         if (function) std::for_each(function->standard_uncertainty.begin(), function->standard_uncertainty.end(), take);
     for (const auto& squareness : calibration.squarenesses)
         if (squareness) take(squareness->standard_uncertainty);
     calibration.covariance = to_stated.asDiagonal() * (0.5 * (covariance + covariance.transpose())) * to_stated.asDiagonal();
+    calibration.covariance.diagonal() = stated;
 }
 
 std::vector<bool> known_unknowns(const AdjustmentProblem& problem, std::vector<bool> known,
