@@ -125,7 +125,8 @@ void add_covariance(const AdjustmentProblem& problem, const CalibratedForms& for
         if (function) std::for_each(function->standard_uncertainty.begin(), function->standard_uncertainty.end(), take);
     for (const auto& squareness : calibration.squarenesses)
         if (squareness) take(squareness->standard_uncertainty);
-    calibration.covariance = to_stated.asDiagonal() * (0.5 * (covariance + covariance.transpose())) * to_stated.asDiagonal();
+    calibration.covariance =
+        to_stated.asDiagonal() * (0.5 * (covariance + covariance.transpose())) * to_stated.asDiagonal();
     calibration.covariance.diagonal() = stated;
 }
 

@@ -338,6 +338,7 @@ TEST(Measurement, OtherMarksOfALostBeamAreRefusedWithTheirRow) {
     // Once, it may be a slip of a hand: what the adjustment leaves out.
     EXPECT_EQ(lost(parse_measurement(marked({{4, "500.5,1,2"}}), "run.csv"), "distance").size(), 0u);
     // Where the line is, a number is a reading.
-    const std::string near = "line,point,x_mm,y_mm,z_mm,distance_mm\np00,0,0,0,0,989\np00,1,10,0,0,999\np00,2,20,0,0,1009\n";
+    const std::string near =
+        "line,point,x_mm,y_mm,z_mm,distance_mm\np00,0,0,0,0,989\np00,1,10,0,0,999\np00,2,20,0,0,1009\n";
     EXPECT_EQ(lost(parse_measurement(near, "run.csv"), "distance").size(), 0u);
 }

@@ -40,7 +40,9 @@ def adjusted(distance: float) -> tuple[sd.Measurement, sd.Adjustment]:
 def uncertainties(calibration: sd.Calibration) -> list[float]:
     """By parameter, in the order of the covariance."""
     functions, squareness = calibration.functions, calibration.squareness
-    order = dict.fromkeys(name for name, _ in calibration.covariance_labels or [(n, 0) for n in (*functions, *squareness)])
+    order = dict.fromkeys(
+        name for name, _ in calibration.covariance_labels or [(n, 0) for n in (*functions, *squareness)]
+    )
     return [u for name in order for u in (functions[name][2] if name in functions else [squareness[name][1]])]
 
 

@@ -73,7 +73,9 @@ def repeated(rows: str, columns: str, number: str = "1") -> str:
 
 SOUND: dict[str, Callable[[Path], Path]] = {
     "empty cell with a style far away": lambda path: xlsx(path, with_end(FAR % b' s="0">')),
-    "dimension of the whole sheet": lambda path: xlsx(path, lambda s: s.replace(b'ref="A1:F3"', b'ref="A1:XFD1048576"')),
+    "dimension of the whole sheet": lambda path: xlsx(
+        path, lambda s: s.replace(b'ref="A1:F3"', b'ref="A1:XFD1048576"')
+    ),
     "rest of an .ods sheet": lambda path: ods(path, repeated("1048573", "16384", "")),
     "absurd rest of an .ods sheet": lambda path: ods(path, repeated("900000000", "900000000", "")),
 }
@@ -109,7 +111,10 @@ REFUSED: dict[str, tuple[Callable[[Path], Path], str]] = {
         lambda path: ods(path, repeated("9" * 30, "1")),
         "table:number-rows-repeated: expected a number of cells, got",
     ),
-    "bomb": (lambda path: xlsx(path, bomb=b"<a>" + b" " * (65 * 2**20) + b"</a>"), "larger than 64 MiB when it is unpacked"),
+    "bomb": (
+        lambda path: xlsx(path, bomb=b"<a>" + b" " * (65 * 2**20) + b"</a>"),
+        "larger than 64 MiB when it is unpacked",
+    ),
     "entities": (
         lambda path: xlsx(path, lambda s: b'<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">]>' + s),
         f"{SHEET} defines entities",
@@ -117,7 +122,10 @@ REFUSED: dict[str, tuple[Callable[[Path], Path], str]] = {
     "torn sheet": (lambda path: xlsx(path, lambda s: s[:200]), f"not a workbook that can be read: {SHEET}: "),
     "two parts of one name": (lambda path: xlsx(path, **{"WORKBOOK": b"<a/>"}), "two parts of one name"),
     "another archive": (lambda path: archive(path, "letter.txt"), "not a workbook that can be read: save it as .xlsx"),
-    "binary workbook": (lambda path: archive(path, "xl/workbook.bin"), "not a workbook that can be read: save it as .xlsx"),
+    "binary workbook": (
+        lambda path: archive(path, "xl/workbook.bin"),
+        "not a workbook that can be read: save it as .xlsx",
+    ),
 }
 
 

@@ -65,10 +65,11 @@ private:
     std::vector<Channel> channels_;
 };
 
-// What loggers write in place of a reading whose beam was lost. A distance of exactly 0 that is not where the other distances of its pass put it is lost, and with it the tilts or
-// spots of its row that are 0. Another number that is not there either, and repeats along the line, fills all fields of
-// its row or is all nines, may be a mark or a mistake: throws InvalidArgument, which names the row. A counter that is
-// zeroed at its line's first point reads 0 there as it should.
+// What loggers write in place of a reading whose beam was lost. A distance of exactly 0 that is not where the other
+// distances of its pass put it is lost, and with it the tilts or spots of its row that are 0. Another number that is
+// not there either, and repeats along the line, fills all fields of its row or is all nines, may be a mark or a
+// mistake: throws InvalidArgument, which names the row. A counter that is zeroed at its line's first point reads 0
+// there as it should.
 Measurement without_lost_marks(const Measurement& measurement);
 
 // Both throw InvalidArgument, which names file and line, for invalid content, and are without_lost_marks().
