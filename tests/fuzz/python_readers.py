@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import acquisition_readers as acquisition
+import workbooks
 
 import stepdiag as sd
 from stepdiag.head.description import read_head_design
@@ -66,6 +67,7 @@ class Reader:
     seeds: Callable[[], list[bytes]]
     ending: str
     is_text: bool = True
+    spoil: Callable[[bytes, random.Random], bytes] | None = None  # other than below
 
 
 def scenarios() -> list[bytes]:
@@ -86,6 +88,7 @@ READERS = {
     "replies": Reader(acquisition.read_replies, acquisition.replies, ".json"),
     "lines": Reader(acquisition.read_lines, acquisition.lines, ".jsonl"),
     "wishes": Reader(acquisition.read_wishes, acquisition.wishes, ".txt"),
+    "workbook": Reader(workbooks.read, workbooks.seeds, ".xlsx", False, workbooks.spoiled),
 }
 
 
@@ -140,7 +143,8 @@ def main(name: str, seconds: float, failures: Path) -> int:
     inputs = read = 0
     end = time.monotonic() + seconds
     while time.monotonic() < end:
-        path.write_bytes(spoiled(chance.choice(seeds), chance, reader.is_text))
+        seed = chance.choice(seeds)
+        path.write_bytes(reader.spoil(seed, chance) if reader.spoil else spoiled(seed, chance, reader.is_text))
         faulthandler.dump_traceback_later(30.0, exit=True)
         signal.alarm(10)
         try:

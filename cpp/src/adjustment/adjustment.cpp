@@ -138,7 +138,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     if (!is_anything_determined(result.calibration)) throw NothingDetermined("adjustment", result.calibration.findings);
     result.faults = faults.classes(*solution, forms, measurement);
     refuse_implausible(result.calibration, measurement, plan, options.plausible);
-    if (options.full_covariance) result.calibration.covariance = full_covariance(problem, forms, solver.factor());
+    if (options.full_covariance) add_covariance(problem, forms, solver.factor(), result.calibration);
     result.setup = setup_estimates(problem, known, x, inverse);
     result.expansion = expansion_estimates(problem, x, inverse);
     result.machine_drift = drift_estimates(problem, x, inverse);

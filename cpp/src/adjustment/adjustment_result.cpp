@@ -99,8 +99,8 @@ Calibration make_calibration(const AdjustmentProblem& problem, const AdjustmentT
     return calibration;
 }
 
-Eigen::MatrixXd full_covariance(const AdjustmentProblem& problem, const CalibratedForms& forms,
-                                const BorderedFactor& factor) {
+void add_covariance(const AdjustmentProblem& problem, const CalibratedForms& forms, const BorderedFactor& factor,
+                    Calibration& calibration) {
     const std::vector<const LinearForm*> list = forms.in_order();
     const Eigen::Index size = Eigen::Index(list.size());
     if (size > largest_covariance)
@@ -113,7 +113,21 @@ Eigen::MatrixXd full_covariance(const AdjustmentProblem& problem, const Calibrat
         factor.solve(column);
         for (Eigen::Index i = 0; i < size; ++i) covariance(i, j) = list[i]->value(column);
     }
-    return 0.5 * (covariance + covariance.transpose());
+    Eigen::VectorXd to_stated(size);  // of each value: its standard uncertainty over that of the solutions
+    Eigen::Index next = 0;
+    Eigen::VectorXd stated(size);
+    const auto take = [&](double u) {
+        const double variance = covariance(next, next);
+        to_stated[next] = variance > 0.0 ? u / std::sqrt(variance) : 0.0;  // rounding may leave -1e-30 of what is exact
+        stated[next++] = u * u;
+    };
+    for (const auto& function : calibration.functions)
+        if (function) std::for_each(function->standard_uncertainty.begin(), function->standard_uncertainty.end(), take);
+    for (const auto& squareness : calibration.squarenesses)
+        if (squareness) take(squareness->standard_uncertainty);
+    calibration.covariance =
+        to_stated.asDiagonal() * (0.5 * (covariance + covariance.transpose())) * to_stated.asDiagonal();
+    calibration.covariance.diagonal() = stated;
 }
 
 std::vector<bool> known_unknowns(const AdjustmentProblem& problem, std::vector<bool> known,

@@ -151,6 +151,9 @@ void bind_measurement(py::module_& m) {
     m.def(
         "read_measurement", [](const PathLike& path) { return read_measurement(to_path(path)); }, py::arg("path"),
         "Reads a measurement CSV. Raises InvalidArgument naming file and line.");
+    m.def("without_lost_marks", &without_lost_marks, py::arg("measurement"),
+          "The measurement without distances of 0 that stand for a lost beam, as read_measurement gives it. Raises "
+          "InvalidArgument naming the row of another such mark.");
 }
 
 }  // namespace stepdiag::bindings

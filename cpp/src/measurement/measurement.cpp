@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "measurement/channel_column.hpp"
+#include "measurement/row_name.hpp"
 #include "stepdiag/core/error.hpp"
 
 namespace stepdiag {
@@ -37,11 +38,6 @@ void check_names(const std::vector<Channel>& channels) {
         throw InvalidArgument(
             "channels: expected distance alone, distance with alpha and beta, distance with spot_x and spot_y, or d1 "
             "... dn (n >= 3)");
-}
-
-std::string row_name(const Station& station, std::size_t row) {
-    return "row " + std::to_string(row + 1) + " (run " + std::to_string(station.run) + ", line " + station.line.name() +
-           ", point " + std::to_string(station.point) + ")";
 }
 
 }  // namespace

@@ -41,7 +41,7 @@ public:
         if (stations.empty()) throw InvalidArgument(file_name_ + ": has a header but no rows");
         reject_repeated_keys(stations);
         try {
-            return Measurement(std::move(stations), std::move(channels_));
+            return without_lost_marks(Measurement(std::move(stations), std::move(channels_)));
         } catch (const InvalidArgument& error) {
             throw InvalidArgument(file_name_ + ": " + error.what());
         }

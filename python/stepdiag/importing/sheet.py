@@ -2,17 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from io import BytesIO
 from pathlib import Path
 from typing import Final
 
 from stepdiag._core import InvalidArgument
 from stepdiag.importing.columns import Mapped, find_heads, plain, split_head
+from stepdiag.importing.workbook import check_workbook
 from stepdiag.io.sheet_text import ARCHIVE, OLD_WORKBOOK, SEPARATORS, decode, fields_of
 from stepdiag.io.whole_files import LARGEST_TEXT, read_bytes
 
 Cell = str | float
 _LAST_HEAD: Final = 50  # rows in which the heads are looked for
-_LARGEST_WORKBOOK: Final = LARGEST_TEXT
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def read_sheet(path: Path, mappings: Sequence[Mapped], separator: str | None = N
         raise InvalidArgument(f"{path}: is no workbook, and has no `sheet`")
     if is_workbook and separator is not None:
         raise InvalidArgument(f"{path}: is a workbook, and has no `separator`")
-    found = _pages(path, page) if is_workbook else _texts(path, content, separator)
+    found = _pages(path, content, page) if is_workbook else _texts(path, content, separator)
     sheets = [sheet for form, rows in found if (sheet := _below_heads(path, form, rows, mappings))]
     if not sheets:
         raise InvalidArgument(f"{path}: {_no_heads(found)}")
@@ -86,13 +87,17 @@ def _texts(path: Path, content: bytes, separator: str | None) -> list[tuple[str,
     return found
 
 
-def _pages(path: Path, page: str | None) -> list[tuple[str, Rows]]:
+def _pages(path: Path, content: bytes, page: str | None) -> list[tuple[str, Rows]]:
     try:
         from python_calamine import CalamineError, CalamineWorkbook
     except ImportError:
         raise InvalidArgument(f"{path}: workbooks need python-calamine: pip install 'stepdiag[import]'") from None
     try:
-        with CalamineWorkbook.from_path(str(path)) as book:
+        check_workbook(content)
+    except InvalidArgument as error:
+        raise InvalidArgument(f"{path}: {error}") from None
+    try:
+        with CalamineWorkbook.from_filelike(BytesIO(content)) as book:
             names = book.sheet_names
             if not names:
                 raise InvalidArgument(f"{path}: the workbook has no sheets; it may be damaged")

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from stepdiag._core import Calibration, InvalidArgument, Measurement
+from stepdiag._core import Calibration, InvalidArgument, Measurement, without_lost_marks
 from stepdiag.config.toml_text import located
 from stepdiag.io.labelled_tables import channel_units
 from stepdiag.io.netcdf import NetcdfFile, open_dataset
@@ -54,8 +54,10 @@ def read_measurement_netcdf(path: Path) -> Measurement:
         run = file.integers("run", rows) if "run" in file else None
         direction = file.texts("direction", rows) if "direction" in file else None
     with located(str(path)):
-        return Measurement(
-            line, point, position, channels, run=run, direction=direction, standard_uncertainty=uncertainties
+        return without_lost_marks(
+            Measurement(
+                line, point, position, channels, run=run, direction=direction, standard_uncertainty=uncertainties
+            )
         )
 
 

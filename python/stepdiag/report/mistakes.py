@@ -44,7 +44,7 @@ def with_mistake(
         found = search.after(None, refused=True)
     if not found:
         return error
-    return InvalidArgument("\n".join([str(error), mistake_reason(mistake_text(found)), *change_rows(found)]))
+    return InvalidArgument("; ".join([str(error), mistake_reason(mistake_text(found)), *change_rows(found)]))
 
 
 def unchecked_row(known: Known) -> str:

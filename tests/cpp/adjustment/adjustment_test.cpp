@@ -182,12 +182,12 @@ TEST(Adjustment, CovarianceHasTheVariancesOfTheTables) {
     Eigen::Index i = 0;
     for (const auto& function : calibration.functions)
         for (const double u : function->standard_uncertainty) {
-            EXPECT_NEAR(std::sqrt(calibration.covariance(i, i)), u, 1e-9 * u);  // condition squared times rounding
+            EXPECT_NEAR(std::sqrt(calibration.covariance(i, i)), u, 1e-15 * u);  // roundings of one product
             ++i;
         }
     for (const auto& squareness : calibration.squarenesses) {
         EXPECT_NEAR(std::sqrt(calibration.covariance(i, i)), squareness->standard_uncertainty,
-                    1e-9 * squareness->standard_uncertainty);
+                    1e-15 * squareness->standard_uncertainty);
         ++i;
     }
     EXPECT_EQ(i, calibration.covariance.rows());

@@ -7,7 +7,10 @@
 #include <cstring>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "support/refuses.hpp"
 #include "support/spoil.hpp"
@@ -273,4 +276,69 @@ TEST(Measurement, ArraysThatMakeNoMeasurementAreRefused) {
 TEST(Measurement, SamePointOfAnotherRunOrLineIsAnotherRow) {
     const Measurement m({station(0), station(0, "ppp", 1), station(0, "npp")}, {{"distance", {1.0, 2.0, 3.0}, {}}});
     EXPECT_EQ(m.size(), 3u);
+}
+
+// Rows of a run of 10 steps of 10 mm along X, with tilts; those of `fields` have other readings.
+std::string marked(const std::map<int, std::string>& fields) {
+    std::string text = "line,point,x_mm,y_mm,z_mm,distance_mm,alpha_urad,beta_urad\n";
+    for (int k = 0; k <= 10; ++k) {
+        const auto other = fields.find(k);
+        text += "p00," + std::to_string(k) + "," + std::to_string(10 * k) + ",0,0," +
+                (other != fields.end() ? other->second : std::to_string(100 + 10 * k) + ".25,1.5,-2.5") + "\n";
+    }
+    return text;
+}
+
+std::vector<int> lost(const Measurement& measurement, std::string_view channel) {
+    std::vector<int> points;
+    for (std::size_t i = 0; i < measurement.size(); ++i)
+        if (!measurement.find(channel)->value[i]) points.push_back(measurement.stations()[i].point);
+    return points;
+}
+
+TEST(Measurement, DistancesOfZeroThatAreNotWhereTheLineIsAreLostWithTheZerosOfTheirRow) {
+    const Measurement some = parse_measurement(marked({{0, "0,0,0"}, {4, "0.0,0,-0.0"}, {7, "0,3,0"}}), "run.csv");
+    EXPECT_EQ(lost(some, "distance"), (std::vector<int>{0, 4, 7}));
+    EXPECT_EQ(lost(some, "alpha"), (std::vector<int>{0, 4}));
+    EXPECT_EQ(lost(some, "beta"), (std::vector<int>{0, 4, 7}));
+    std::map<int, std::string> dark;
+    for (int k = 0; k <= 10; ++k) dark[k] = "0,0,0";
+    EXPECT_EQ(lost(parse_measurement(marked(dark), "run.csv"), "distance").size(), 11u);
+    const std::string beams =
+        "line,point,x_mm,y_mm,z_mm,d1_mm,d2_mm,d3_mm\np00,0,0,0,0,10,10.5,11\np00,1,50,0,0,60,0,61\n"
+        "p00,2,100,0,0,110,110.5,111\n";
+    EXPECT_EQ(lost(parse_measurement(beams, "run.csv"), "d2"), std::vector<int>{1});
+    EXPECT_TRUE(lost(parse_measurement(beams, "run.csv"), "d3").empty());
+    const std::string ends =
+        "line,point,x_mm,y_mm,z_mm,distance_mm\n0p0,0,0,0,0,100\n0p0,1,0,600,0,0\np00,0,0,0,0,0\np00,1,800,0,0,800\n";
+    EXPECT_EQ(lost(parse_measurement(ends, "run.csv"), "distance"), std::vector<int>{1});
+}
+
+TEST(Measurement, ZerosOfACounterThatIsZeroedAtTheFirstPointAndTiltsOfZeroAreReadings) {
+    std::map<int, std::string> zeroed;
+    for (int k = 0; k <= 10; ++k) zeroed[k] = std::to_string(10 * k) + ",0,0";
+    for (const int first : {0, 10}) {
+        if (first == 10)  // the head at the far end
+            for (int k = 0; k <= 10; ++k) zeroed[k] = std::to_string(10 * k - 100) + ",0,0";
+        const Measurement run = parse_measurement(marked(zeroed), "run.csv");
+        for (const char* channel : {"distance", "alpha", "beta"}) EXPECT_TRUE(lost(run, channel).empty()) << channel;
+    }
+}
+
+TEST(Measurement, OtherMarksOfALostBeamAreRefusedWithTheirRow) {
+    for (const char* mark : {"9999.999,1,2", "999,1,2", "-9999,1,2", "5000,5000,5000", "65.535,65.535,65.535"}) {
+        SCOPED_TRACE(mark);
+        const std::string number = std::string(mark).substr(0, std::string(mark).find(','));
+        expect_refused([&] { parse_measurement(marked({{4, mark}}), "run.csv"); },
+                       "run.csv: row 5 (run 0, line p00, point 4): distance " + number + " mm is ");
+    }
+    expect_refused([&] { parse_measurement(marked({{4, "500.5,1,2"}, {6, "500.5,3,4"}}), "run.csv"); },
+                   "row 5 (run 0, line p00, point 4): distance 500.5 mm is 360 mm from where its neighbours put it; if "
+                   "it marks a lost beam, leave the field empty");
+    // Once, it may be a slip of a hand: what the adjustment leaves out.
+    EXPECT_EQ(lost(parse_measurement(marked({{4, "500.5,1,2"}}), "run.csv"), "distance").size(), 0u);
+    // Where the line is, a number is a reading.
+    const std::string near =
+        "line,point,x_mm,y_mm,z_mm,distance_mm\np00,0,0,0,0,989\np00,1,10,0,0,999\np00,2,20,0,0,1009\n";
+    EXPECT_EQ(lost(parse_measurement(near, "run.csv"), "distance").size(), 0u);
 }

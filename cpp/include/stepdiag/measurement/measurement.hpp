@@ -65,7 +65,14 @@ private:
     std::vector<Channel> channels_;
 };
 
-// Both throw InvalidArgument, which names file and line, for invalid content.
+// What loggers write in place of a reading whose beam was lost. A distance of exactly 0 that is not where the other
+// distances of its pass put it is lost, and with it the tilts or spots of its row that are 0. Another number that is
+// not there either, and repeats along the line, fills all fields of its row or is all nines, may be a mark or a
+// mistake: throws InvalidArgument, which names the row. A counter that is zeroed at its line's first point reads 0
+// there as it should.
+Measurement without_lost_marks(const Measurement& measurement);
+
+// Both throw InvalidArgument, which names file and line, for invalid content, and are without_lost_marks().
 Measurement read_measurement(const std::string& path);
 Measurement parse_measurement(std::string_view text, const std::string& file_name);
 // Writes to a temporary file beside `path`, then renames it. Reading the file gives the same bits.
