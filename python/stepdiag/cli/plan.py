@@ -7,7 +7,7 @@ from typing import Any, Literal
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, Writes, fit_warnings, tell
+from stepdiag.cli.options import PATH, Writes, tell, trust_warnings
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import FIGURE, PLANS, OutputFile
 from stepdiag.progress import Progress
@@ -156,7 +156,7 @@ def _plan_recheck(
         *recheck_advice(found, available, matters),
     ):
         say(line)
-    for warning in fit_warnings(baseline, before.fit):
+    for warning in trust_warnings(baseline, before):
         tell("warning", warning)
     suffix = "" if path is None else path.suffix.lower().lstrip(".")
     if path is not None and suffix == "csv":

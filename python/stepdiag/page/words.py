@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from stepdiag._core import Calibration
-from stepdiag.calibration.finding_text import MEANING, NOISE_ALONE, NOT_SEEN, PROVENANCE, mistake_reason
+from stepdiag.calibration.finding_text import MEANING, NOISE_ALONE, NOT_SEEN, PROVENANCE, UNVERIFIED, mistake_reason
 from stepdiag.calibration.largest_by_kind import largest_entries, largest_uncertainties
 from stepdiag.calibration.temperature_text import temperature_text
 from stepdiag.calibration.volume import VolumeErrors
@@ -102,6 +102,8 @@ def verdict_block(contents: Contents) -> Markup:
         edits = [mistake.edit for mistake in contents.mistakes]
         parts.append(element("p", element("strong", "To change:" if len(edits) == 1 else "To change if so:")))
         parts.append(listed(map(_sentence, edits)))
+    if calibration.unverified:
+        parts.append(element("p", element("strong", _sentence(UNVERIFIED))))
     notes = []
     if calibration.uncertainty_scaled is not None:
         notes.append(f"All standard uncertainties were multiplied by {calibration.uncertainty_scaled:.3g}.")
