@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
+#include "controller/vector3.hpp"
 #include "core/text_file.hpp"
 #include "machine/table_header.hpp"
 #include "stepdiag/core/error.hpp"
@@ -16,21 +18,26 @@ constexpr double node_slack = 1e-6;     // mm; accepts rounding of the positions
 
 constexpr double coldest = -100.0, hottest = 200.0;  // degrees Celsius; detects kelvin
 
-bool states_temperatures(const CompensatorOptions& options) {
-    return !(options.temperatures[0] == 0.0 && options.temperatures[1] == 0.0);
-}
-
-// Quiet: comparison of a NaN by <= raises FE_INVALID.
 bool is_within(double lowest, double number, double highest) {
-    return std::isgreaterequal(number, lowest) && std::islessequal(number, highest);
+    return are_moderate<1>(&number) && lowest <= number && number <= highest;
 }
 
-std::string text(double number) { return format_decimal(number, 0); }
+bool states_temperatures(const CompensatorOptions& options) {
+    const auto [lowest, highest] = options.temperatures;
+    return !(is_within(0.0, lowest, 0.0) && is_within(0.0, highest, 0.0));
+}
+
+std::string text(double number) {
+    if (are_moderate<1>(&number)) return format_decimal(number, 0);
+    char characters[32];
+    std::snprintf(characters, sizeof characters, "%g", number);
+    return characters;
+}
 
 void require(bool holds, const std::string& what, const std::string& expected, double got) {
     if (!holds)
         throw InvalidArgument(what + ": expected " + expected + ", got " +
-                              (std::isfinite(got) ? text(got) : std::to_string(got)));
+                              text(got));
 }
 
 template <class Call>

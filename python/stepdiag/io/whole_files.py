@@ -50,7 +50,7 @@ def read_bytes(path: Path) -> bytes:
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         raise InvalidArgument(f"{path}: cannot be read: {reason(error)}") from None
     if not stat.S_ISREG(status.st_mode):
-        raise InvalidArgument(f"{path}: expected a file, got a folder or a device")
+        raise InvalidArgument(f"{path}: expected a file, got a folder, a pipe or a device")
     if status.st_size > LARGEST_BINARY:
         raise InvalidArgument(f"{path}: larger than {LARGEST_BINARY // 2**30} GiB")
     content = _read(path, status.st_size)
