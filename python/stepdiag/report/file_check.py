@@ -21,7 +21,7 @@ from stepdiag.positions.readings import read_positions
 class Finding:
     """What a sound file is, in a few words, and what is odd about it all the same.
 
-    `unverified`: it is an unverified calibration, or the export of one."""
+    `unverified`: it is an unverified calibration, or was made from one."""
 
     kind: str
     summary: str
@@ -143,7 +143,9 @@ def _error_map(path: Path) -> Finding:
     errors = _core.read_error_map(path)
     check_angles(errors, str(path))
     count = len(errors.functions) + len(errors.squareness)
-    return Finding("error map", f"{count} of 21 parameters", tuple(_warnings(errors)))
+    unverified = "unverified" in errors.header  # made from such a calibration
+    warnings = (*_warnings(errors), *([UNVERIFIED] if unverified else []))
+    return Finding("error map", f"{count} of 21 parameters", warnings, unverified=unverified)
 
 
 def _calibration(path: Path) -> Finding:

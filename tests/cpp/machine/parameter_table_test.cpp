@@ -303,7 +303,7 @@ TEST(ParameterTable, CalibrationWithoutItsChecksumIsUnverifiedAndSoAreItsCopies)
 
 TEST(ParameterTable, ErrorMapNeedsNoChecksum) {
     for (const std::string leading :
-         {"", "# chain=[w X' b Y Z t]\n", "# format=stepdiag error map 1\n# chain=[w X' b Y Z t]\n"})
+         {"", "# chain=[w X' b Y Z t]\n", "# format=stepdiag error map 1\n# method=adjustment\n"})
         EXPECT_EQ(parse_parameter_table(leading + header + "EXX,0.0,0.0,um,\n", "t.csv")
                       .header.count(stepdiag::unverified_key),
                   0u);

@@ -98,16 +98,12 @@ def test_command_says_it_and_ends_with_status_3(
 
 
 @pytest.mark.parametrize("command", ON_NETCDF)
-def test_command_that_needs_a_covariance_says_it(
-    here: Path, capsys: pytest.CaptureFixture[str], command: str
-) -> None:
+def test_command_that_needs_a_covariance_says_it(here: Path, capsys: pytest.CaptureFixture[str], command: str) -> None:
     warned = warnings_of(command, "edited.nc", capsys, 3)
     assert any(line.startswith("warning: edited.nc: unverified: ") for line in warned)
 
 
-@pytest.mark.parametrize(
-    "command", [command for command in (*COMMANDS, *ON_NETCDF) if re.search(r"out\S*$", command)]
-)
+@pytest.mark.parametrize("command", [command for command in (*COMMANDS, *ON_NETCDF) if re.search(r"out\S*$", command)])
 def test_what_is_written_says_it(here: Path, capsys: pytest.CaptureFixture[str], command: str) -> None:
     warnings_of(command, "edited.nc", capsys, 3)
     (out,) = here.glob("out*")
@@ -195,6 +191,14 @@ def test_calibration_of_an_earlier_version_is_unverified(here: Path, capsys: pyt
     Path("old.csv").write_text(f"# rows={rows}\n{text}")
     assert sd.read_calibration("old.csv").unverified
     assert any("unverified" in line for line in warnings_of("check {edited}", "old.csv", capsys, 3))
+
+
+def test_error_map_made_from_it_says_it(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sd.read_calibration(EDITED).to_error_map().write("map.csv")
+    for command in ("check map.csv", "compare sound.csv map.csv", "export map.csv --to linuxcnc-kins -o t.csv"):
+        assert any(": unverified: " in line for line in warnings_of(command, EDITED, capsys, 3))
+    with pytest.raises(sd.InvalidArgument, match="map.csv: unverified"):
+        sd.Compensator("map.csv", CHAIN)
 
 
 def test_error_map_needs_no_checksum(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -50,7 +50,7 @@ inline constexpr const char* calibration_format = "stepdiag calibration 1";
 inline constexpr const char* unverified_key = "unverified";
 inline constexpr const char* unverified_because = "a checksum was absent when this calibration was read";
 
-// A calibration (its format, or a method, says so) without the leading line "# sha256=" gets the key unverified_key in
+// A calibration (its format says so or, in a file without one, a method) without the leading line "# sha256=" gets the key unverified_key in
 // its header. A hand-written error map needs no checksum.
 // Columns may be in any order. Values given for one direction only apply to both directions. Throws InvalidArgument,
 // which names file and line, for:
