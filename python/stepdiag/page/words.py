@@ -377,7 +377,7 @@ def comparison_section(contents: Contents) -> Markup | None:
         for one in change.effects[:MOST_EFFECTS]
     ]
     notes = [f"no verdict: {change.no_verdict_because}"] if change.no_verdict_because else []
-    notes += [note.replace("A and B", "before and after") for note in comparison.notes]
+    notes += [_of_before_and_after(note) for note in comparison.notes]
     if comparison.only_in_a:
         notes.append(f"only before: {', '.join(comparison.only_in_a)}")
     if comparison.only_in_b:
@@ -407,6 +407,17 @@ def comparison_section(contents: Contents) -> Markup | None:
         ),
         listed([_sentence(note) for note in notes]) if notes else None,
     )
+
+
+def _of_before_and_after(note: str) -> str:
+    """A note of a comparison of A and B, in the words of the page."""
+    for theirs, ours in (
+        ("A and B", "before and after"),
+        ("A is unverified", "the earlier calibration is unverified"),
+        ("B is unverified", "this calibration is unverified"),
+    ):
+        note = note.replace(theirs, ours)
+    return note
 
 
 def _verdict_of(change: VolumeChange, fits: Collection[str | None]) -> str:

@@ -77,7 +77,8 @@ def test_worker_and_its_files_do_not_get_the_streams_numbers(here: Path) -> None
         "import os; from stepdiag.cli import open_standard_streams; open_standard_streams(); "
         "handle = os.open('opened', os.O_CREAT | os.O_WRONLY); assert handle > 2; "
         "assert all(os.get_inheritable(number) for number in (0, 1, 2)); "
-        "import sys; print('lost'); print('lost', file=sys.stderr); assert sys.stdin.read() == ''; os.write(handle, b'kept')"
+        "import sys; print('lost'); print('lost', file=sys.stderr); assert sys.stdin.read() == ''; "
+        "os.write(handle, b'kept')"
     )
     done = subprocess.run(
         ["bash", "-c", f"{shlex.quote(sys.executable)} -c {shlex.quote(program)} <&- >&- 2>&-"], check=False

@@ -197,7 +197,7 @@ def test_error_map_made_from_it_says_it(here: Path, capsys: pytest.CaptureFixtur
     sd.read_calibration(EDITED).to_error_map().write("map.csv")
     for command in ("check map.csv", "compare sound.csv map.csv", "export map.csv --to linuxcnc-kins -o t.csv"):
         assert any(": unverified: " in line for line in warnings_of(command, EDITED, capsys, 3))
-    with pytest.raises(sd.InvalidArgument, match="map.csv: unverified"):
+    with pytest.raises(sd.InvalidArgument, match=r"map\.csv: unverified"):
         sd.Compensator("map.csv", CHAIN)
 
 
