@@ -52,7 +52,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (std::string& argument : given)
         if (std::string line; std::getline(lines, line) && line != "-") argument = line;  // "-": as it is
     const char** const arguments[] = {
-        &chain, &origin,      &outside, &margin,          &largest_correction, &largest_tool,    &approach,
+        &chain, &origin,      &outside, &margin,          &largest_correction, &largest_tool,     &approach,
         &ramp,  &coordinates, &units,   &accept_rejected, &temperatures,       &temperature_rate, &accept_unverified};
     for (std::size_t i = 0; i < given.size(); ++i) *arguments[i] = given[i].c_str();
     const fuzzing::FileInMemory file(good_table);

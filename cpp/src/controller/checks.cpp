@@ -29,15 +29,14 @@ bool states_temperatures(const CompensatorOptions& options) {
 
 std::string text(double number) {
     if (are_moderate<1>(&number)) return format_decimal(number, 0);
+    if (is_nan(number)) return "nan";  // to print a signalling one raises FE_INVALID
     char characters[32];
     std::snprintf(characters, sizeof characters, "%g", number);
     return characters;
 }
 
 void require(bool holds, const std::string& what, const std::string& expected, double got) {
-    if (!holds)
-        throw InvalidArgument(what + ": expected " + expected + ", got " +
-                              text(got));
+    if (!holds) throw InvalidArgument(what + ": expected " + expected + ", got " + text(got));
 }
 
 template <class Call>

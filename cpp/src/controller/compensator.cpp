@@ -105,8 +105,8 @@ std::unique_ptr<CompensatorTables> make_tables(const ParameterTable& table, cons
         array(tool),
         stepdiag::fingerprint(own, edges, tool, table, expansion_of(table, name)),
         check_fit(table, options, name),
-        check_verified(table, options, name),
-        not_told(table, edges, name)});
+        not_told(table, edges, name),
+        check_verified(table, options, name)});
 }
 
 Compensator::Compensator(const ParameterTable& table, const std::string& name, const std::string& chain,

@@ -77,8 +77,8 @@ struct CompensatorTables {
     std::array<double, 3> volume, tool;
     std::uint64_t fingerprint;
     std::string fit;
-    bool unverified;
     std::vector<std::string> uncompensated;
+    bool unverified;
 
     // The correction for e. Shortening vectors and clamping positions never increase a distance, so the iteration of a
     // contracting table remains contracting.

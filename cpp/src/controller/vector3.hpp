@@ -90,6 +90,12 @@ STEPDIAG_INLINED bool are_moderate(const double* v) noexcept {
     }
     return (carry & sign) == 0;
 }
+// Likewise by its bits.
+inline bool is_nan(double number) noexcept {
+    std::uint64_t bits;
+    std::memcpy(&bits, &number, sizeof bits);
+    return bits << 1 > std::uint64_t(0x7ff) << 53;
+}
 STEPDIAG_INLINED Vector3 read(const double* v) noexcept { return {v[0], v[1], v[2]}; }
 STEPDIAG_INLINED void write(const Vector3& v, double* out) noexcept { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
 

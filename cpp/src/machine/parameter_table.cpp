@@ -73,8 +73,8 @@ private:
             table_.header[key] = given;
         }
         const auto format = table_.header.find("format");
-        const bool is_calibration = format == table_.header.end() ? table_.header.count("method") > 0
-                                                                  : format->second == calibration_format;
+        const bool is_calibration =
+            format == table_.header.end() ? table_.header.count("method") > 0 : format->second == calibration_format;
         if (is_calibration && !has_checksum) table_.header.emplace(unverified_key, unverified_because);
     }
 

@@ -150,7 +150,7 @@ def test_objects_say_it(here: Path, capsys: pytest.CaptureFixture[str], edited: 
         ("volume {edited} --json", lambda said: said["fit"]),
         ("check {edited} --json", lambda said: said["files"][0]["fit"]),
         ("compare sound.nc {edited} --json", lambda said: said["b"]["fit"]),
-        ("positions {edited} --json", lambda said: said["fit"]),
+        ("positions {edited} --json", lambda said: said["predicted"]["fit"]),
         ("export {edited} --to squareness -o out.csv --json", lambda said: said["fit"]),
     ):
         capsys.readouterr()

@@ -50,10 +50,9 @@ inline constexpr const char* calibration_format = "stepdiag calibration 1";
 inline constexpr const char* unverified_key = "unverified";
 inline constexpr const char* unverified_because = "a checksum was absent when this calibration was read";
 
-// A calibration (its format says so or, in a file without one, a method) without the leading line "# sha256=" gets the key unverified_key in
-// its header. A hand-written error map needs no checksum.
-// Columns may be in any order. Values given for one direction only apply to both directions. Throws InvalidArgument,
-// which names file and line, for:
+// A calibration (its format says so or, in a file without one, a method) without the leading line "# sha256=" gets the
+// key unverified_key in its header. A hand-written error map needs no checksum. Columns may be in any order. Values
+// given for one direction only apply to both directions. Throws InvalidArgument, which names file and line, for:
 //   - a file that is unreadable, binary or of another format
 //   - format, chain, volume_mm or tool_mm given twice
 //   - rows that do not have the checksum of the leading line "# sha256=" (a truncated or changed file), or not the
