@@ -71,6 +71,8 @@ def _read(path: Path, size: int) -> bytes:
             begun = _first_byte(file.fileno(), path) if stat.S_ISFIFO(mode) else b""
             os.set_blocking(file.fileno(), True)
             return begun + file.read(size - len(begun))
+    except InvalidArgument:  # is a ValueError
+        raise
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         raise InvalidArgument(f"{path}: cannot be read: {reason(error)}") from None
 

@@ -4,6 +4,7 @@ for."""
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from refusal import refused
 from small_scenario import SCENARIO
 
 import stepdiag as sd
+from stepdiag.acquisition.temperature_file import TemperatureFile
 from stepdiag.cli import main
 
 NO_WRITER = "expected a file, got a pipe into which no program writes"
@@ -66,16 +68,20 @@ def test_reader_refuses_a_pipe_without_a_writer(here: Path, reader: Callable[[st
         "import pipe.csv --scenario scenario.toml -o m.csv",
         "import pipe.xlsx --scenario scenario.toml -o m.csv",
         "simulate pipe.toml -o r.csv",
-        "acquire scenario.toml --instrument simulated --temperatures pipe.csv -o a.csv",
-        "head draw pipe.toml -o h.png",
-        "uncertainty scenario.toml --resume --checkpoint pipe.checkpoint -o u.nc",
+        "head check pipe.toml",
+        "uncertainty scenario.toml -n 100 --resume --checkpoint pipe.checkpoint -o u.nc",
     ],
 )
 def test_command_names_the_pipe_and_ends_with_status_2(here: Path, command: str) -> None:
     done = ended(f"{STEPDIAG} {command}")
     assert done.returncode == 2, done.stderr
     (line,) = done.stderr.splitlines()
-    assert "pipe" in line
+    assert re.match(r"stepdiag: error: (?:\S*: )?pipe\S*: (?:expected|cannot be written:) ", line), line
+    assert line.count("pipe.") <= 1
+
+
+def test_file_of_temperatures_is_no_pipe(here: Path) -> None:
+    refused(TemperatureFile, Path("pipe.csv"), age=60.0, tell=print, names="pipe.csv: expected a file")
 
 
 @pytest.mark.parametrize(
