@@ -22,6 +22,7 @@ from stepdiag.acquisition.temperature_file import TemperatureFile
 from stepdiag.cli import main
 
 NO_WRITER = "expected a file, got a pipe into which no program writes"
+STEPDIAG = f"{shlex.quote(sys.executable)} -m stepdiag"
 CSV_READERS = (sd.read_measurement, sd.read_error_map, sd.read_calibration)
 
 
@@ -38,9 +39,6 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def ended(command: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60, check=False)
-
-
-STEPDIAG = f"{shlex.quote(sys.executable)} -m stepdiag"
 
 
 @pytest.mark.parametrize("reader", [*CSV_READERS, sd.read_scenario, sd.read_head_design])
@@ -88,7 +86,8 @@ def test_file_of_temperatures_is_no_pipe(here: Path) -> None:
     "command",
     [
         "evaluate scenario.toml <(cat run.csv) -o c.csv",
-        "evaluate <(cat scenario.toml) run.csv -o c.csv",
+        "simulate <(cat scenario.toml) -o again.csv && cmp again.csv run.csv && "
+        f"{STEPDIAG} evaluate scenario.toml again.csv -o c.csv",
         "evaluate scenario.toml /dev/stdin -o c.csv <run.csv",
         "evaluate /dev/stdin run.csv -o c.csv <scenario.toml",
     ],
