@@ -41,6 +41,8 @@ static char* approach = "mean";
 RTAPI_MP_STRING(approach, "of a table with reversal: mean, positive or negative");
 static char* accept_rejected = "0";
 RTAPI_MP_STRING(accept_rejected, "1: takes a calibration whose fit was rejected");
+static char* accept_unverified = "0";
+RTAPI_MP_STRING(accept_unverified, "1: takes a calibration whose checksum was absent when it was read");
 static char* temperatures = "";
 RTAPI_MP_STRING(temperatures, "lowest and highest temperature of the scales, degrees Celsius: 10,35; none: no pins");
 static char* temperature_rate = "0.1";
@@ -93,7 +95,7 @@ static int tool_of_pins(double tool[3]) {
         tool[i] = -*pin->tool_offset[i] * mm_per_unit;
         square += tool[i] * tool[i];
     }
-    return square <= tool_limit * tool_limit;  // false for a NaN
+    return islessequal(square, tool_limit * tool_limit);  // false for a NaN, without an exception
 }
 
 static int same(const setting* a, const setting* b) { return memcmp(a, b, sizeof *a) == 0; }
@@ -111,7 +113,7 @@ static unsigned advance_temperatures(long long time) {
         double asked = reference;
         if (*pin->temperature_enable) {
             asked = *pin->temperature[i];
-            if (!(coldest <= asked && asked <= warmest)) {
+            if (!(isgreaterequal(asked, coldest) && islessequal(asked, warmest))) {
                 asked = in_force[i];
                 flags = STEPDIAG_TEMPERATURE;
             }
@@ -172,7 +174,7 @@ static unsigned advance(void) {
 static unsigned joints_of(const double world[3], double joints[3]) {
     const unsigned status =
         stepdiag_command_at_temperature(compensator, world, now.tool, temperature_in_force(), joints);
-    if (now.share < 1.0)
+    if (now.share < 1.0 && !(status & STEPDIAG_REFUSED))  // refused numbers may be none
         for (int i = 0; i < 3; ++i) joints[i] = world[i] + now.share * (joints[i] - world[i]);
     return status;
 }
@@ -185,6 +187,7 @@ static unsigned world_of(const double joints[3], double world[3]) {
     const double* const temperature = temperature_in_force();
     unsigned status = stepdiag_forward_at_temperature(compensator, joints, now.tool, temperature, world);
     if (now.share == 1.0) return status;
+    if (!isfinite(joints[0]) || !isfinite(joints[1]) || !isfinite(joints[2])) return status;  // they are the world
     if (now.share == 0.0) {
         memcpy(world, joints, 3 * sizeof *world);
         return stepdiag_error_at_temperature(compensator, joints, now.tool, temperature, NULL, NULL);
@@ -210,7 +213,7 @@ static void publish(const double joints[3], const double world[3], unsigned stat
     stepdiag_error_at_temperature(compensator, joints, now.tool, temperature_in_force(), error, NULL);
     for (int i = 0; i < 3; ++i) {
         *pin->error[i] = error[i] / mm_per_unit;
-        *pin->correction[i] = (joints[i] - world[i]) / mm_per_unit;
+        *pin->correction[i] = status & STEPDIAG_REFUSED ? 0.0 : (joints[i] - world[i]) / mm_per_unit;
     }
     *pin->status = status;
     *pin->inside = !(status & (STEPDIAG_OUTSIDE | STEPDIAG_REFUSED));

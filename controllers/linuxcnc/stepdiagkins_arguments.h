@@ -80,6 +80,7 @@ static int read_arguments(void) {
         read_choice("outside", outside, outsides, &options.outside) ||
         read_choice("approach", approach, approaches, &options.approach) ||
         read_choice("accept_rejected", accept_rejected, switches, &options.accept_rejected) ||
+        read_choice("accept_unverified", accept_unverified, switches, &options.accept_unverified) ||
         read_choice("units", units, lengths, &inch))
         return -1;
     if (!(seconds >= 0.0 && seconds <= 60.0)) {
@@ -119,6 +120,11 @@ static int read_arguments(void) {
     const char* const fit = stepdiag_fit(compensator);
     if (*fit && strcmp(fit, "accepted") != 0)
         rtapi_print_msg(RTAPI_MSG_WARN, "stepdiagkins: warning: %s: fit=%s, not accepted\n", table, fit);
+    if (stepdiag_is_unverified(compensator))
+        rtapi_print_msg(RTAPI_MSG_WARN,
+                        "stepdiagkins: warning: %s: unverified: its checksum was absent, its values may have been "
+                        "changed\n",
+                        table);
     stepdiag_calibration_tool(compensator, own_tool);
     mm_per_unit = inch ? 25.4 : 1.0;
     ramp_ns = seconds * 1e9;

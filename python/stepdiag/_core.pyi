@@ -1242,7 +1242,7 @@ class Calibration:
             Of a function these are arrays (n,), of a squareness numbers without a position. Raises KeyError naming the
             parameters that there are.
         """
-    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None, provenance: collections.abc.Mapping[str, str] = {}, unseen_faults: collections.abc.Sequence[str] = [], between_nodes: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_reference: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_as_found: numpy.typing.ArrayLike | None = None, expansion: numpy.typing.ArrayLike | None = None, fixed_point: numpy.typing.ArrayLike | None = None) -> None:
+    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None, provenance: collections.abc.Mapping[str, str] = {}, unseen_faults: collections.abc.Sequence[str] = [], between_nodes: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_reference: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_as_found: numpy.typing.ArrayLike | None = None, expansion: numpy.typing.ArrayLike | None = None, fixed_point: numpy.typing.ArrayLike | None = None, unverified: bool = False) -> None:
         """
         A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises InvalidArgument naming the parameter for what is none: nodes that do not ascend, values that are not finite, a covariance that is not one of these values.
         """
@@ -1410,6 +1410,11 @@ class Calibration:
     def unseen_faults(self) -> list[str]:
         """
         How large faults of readings may be in it unseen, and what they then do, a sentence each.
+        """
+    @property
+    def unverified(self) -> bool:
+        """
+        Whether it, or one that it was made from, was read from a file without a checksum: nothing tells whether its values are those that were written.
         """
     @property
     def variance_factor(self) -> float | None:
@@ -3385,9 +3390,9 @@ class Compensator:
     """
     Volumetric compensation as a controller does it (the C++ library stepdiag::controller): forward(c) = c + error(c) is where the tool is when the axes stand at c, command(t) where they must stand for it to be at t. Positions (n, 3) are axis positions in the controller's coordinates, mm; tool: offset of the functional point (3,), mm, by default that of the calibration; temperature: of the scales of X, Y, Z (3,), degrees Celsius, by default none: the error is that of the table. NaN where there is no answer: outside with "refuse", beyond the margin, a position that is not finite, a tool longer than largest_tool, a temperature outside `temperatures`.
     """
-    def __init__(self, table: str | os.PathLike[str] | Calibration | ErrorMap, chain: Chain | str, *, origin: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), outside: str = 'hold', margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, largest_correction: typing.SupportsFloat | typing.SupportsIndex = 1.0, approach: str = 'mean', largest_tool: typing.SupportsFloat | typing.SupportsIndex = 1000.0, accept_rejected: bool = False, temperatures: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(2)"] | None = None) -> None:
+    def __init__(self, table: str | os.PathLike[str] | Calibration | ErrorMap, chain: Chain | str, *, origin: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), outside: str = 'hold', margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, largest_correction: typing.SupportsFloat | typing.SupportsIndex = 1.0, approach: str = 'mean', largest_tool: typing.SupportsFloat | typing.SupportsIndex = 1000.0, accept_rejected: bool = False, accept_unverified: bool = False, temperatures: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(2)"] | None = None) -> None:
         """
-        table: a file, a Calibration or an ErrorMap that carries chain, volume and tool. chain: the controller's. origin: home in the controller's coordinates. outside the calibrated volume: "hold" the error of its nearest point, go on "linear" up to `margin`, or "refuse". largest_correction: command and forward shorten a longer error to this length. approach: "mean", "positive" or "negative", of a table with reversal. accept_rejected: take a table whose fit was rejected. temperatures: lowest and highest of a scale that calls may state, degrees Celsius; needs a table that is referred to a temperature by a known expansion. Warns (UserWarning) of a fit that is not accepted. Raises InvalidArgument for a table or options that a controller should not use.
+        table: a file, a Calibration or an ErrorMap that carries chain, volume and tool. chain: the controller's. origin: home in the controller's coordinates. outside the calibrated volume: "hold" the error of its nearest point, go on "linear" up to `margin`, or "refuse". largest_correction: command and forward shorten a longer error to this length. approach: "mean", "positive" or "negative", of a table with reversal. accept_rejected: take a table whose fit was rejected. accept_unverified: take a calibration whose checksum was absent when it was read. temperatures: lowest and highest of a scale that calls may state, degrees Celsius; needs a table that is referred to a temperature by a known expansion. Warns (UserWarning) of a fit that is not accepted, and of an unverified table. Raises InvalidArgument for a table or options that a controller should not use.
         """
     def __repr__(self) -> str:
         ...
@@ -3442,6 +3447,11 @@ class Compensator:
     def uncompensated(self) -> list[str]:
         """
         What the table does not tell: "EXX", "EYX (slope)", "EXX (above 784.0 mm)" ...
+        """
+    @property
+    def unverified(self) -> bool:
+        """
+        Whether the table is a calibration whose checksum was absent when it was read.
         """
     @property
     def volume(self) -> numpy.typing.NDArray[numpy.float64]:

@@ -12,6 +12,7 @@ namespace {
 
 CompensatorOptions any_options(FuzzedDataProvider& bytes) {
     CompensatorOptions options;
+    options.accept_unverified = true;  // no table of a fuzzer has its checksum
     if (!bytes.ConsumeBool()) return options;
     options.outside = Outside(bytes.ConsumeIntegralInRange(0, 3));  // 3 is none
     options.approach = CompensatedApproach(bytes.ConsumeIntegralInRange(0, 3));

@@ -26,7 +26,7 @@ void print(const char* format, ...) {
 
 // What stepdiagkins.c declares before it includes its arguments.
 const char *table, *chain, *origin, *outside, *margin, *largest_correction, *largest_tool, *approach, *ramp,
-    *coordinates, *units, *accept_rejected, *temperatures, *temperature_rate;
+    *coordinates, *units, *accept_rejected, *temperatures, *temperature_rate, *accept_unverified;
 enum { MAX_JOINTS = 16 };
 const char LETTERS[] = "XYZABCUVW";
 stepdiag_compensator* compensator;
@@ -48,12 +48,12 @@ const char* const good_table =
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     std::istringstream lines{std::string(fuzzing::text_before_nul(data, size))};
     std::vector<std::string> given = {"wX'bYZt", "0,0,0", "hold", "0", "1", "1000", "mean",
-                                      "1",       "XYZ",   "mm",   "0", "",  "0.1"};
+                                      "1",       "XYZ",   "mm",   "0", "",  "0.1",  "0"};
     for (std::string& argument : given)
         if (std::string line; std::getline(lines, line) && line != "-") argument = line;  // "-": as it is
     const char** const arguments[] = {
-        &chain, &origin,      &outside, &margin,          &largest_correction, &largest_tool,    &approach,
-        &ramp,  &coordinates, &units,   &accept_rejected, &temperatures,       &temperature_rate};
+        &chain, &origin,      &outside, &margin,          &largest_correction, &largest_tool,     &approach,
+        &ramp,  &coordinates, &units,   &accept_rejected, &temperatures,       &temperature_rate, &accept_unverified};
     for (std::size_t i = 0; i < given.size(); ++i) *arguments[i] = given[i].c_str();
     const fuzzing::FileInMemory file(good_table);
     table = file.path().c_str();

@@ -74,6 +74,17 @@ def test_a_bad_table_is_refused_with_the_reason(name: str, table: Path, tmp_path
     assert re.search(reason, start(bad))
 
 
+def test_a_calibration_without_its_checksum_is_refused_unless_told(table: Path, tmp_path: Path) -> None:
+    """A table with a method is a calibration; an error map needs no checksum."""
+    unverified = tmp_path / "unverified.csv"
+    unverified.write_bytes(b"# method=adjustment\n" + without_checksum(table.read_bytes()))
+    said = start(unverified)
+    assert "unverified: a checksum was absent when this calibration was read" in said
+    assert "accept_unverified" in said
+    with LinuxcncSession(table=unverified, chain=CHAIN, options={"accept_unverified": 1}):
+        pass
+
+
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
@@ -84,6 +95,7 @@ def test_a_bad_table_is_refused_with_the_reason(name: str, table: Path, tmp_path
         ({"largest_correction": "nan"}, "largest_correction: expected a number"),
         ({"ramp": -1}, "ramp: expected 0 to 60 s"),
         ({"coordinates": "XYA"}, "coordinates: expected X, Y and Z among them"),
+        ({"accept_unverified": "yes"}, 'accept_unverified: expected 0 or 1, got "yes"'),
         ({"units": "furlong"}, 'units: expected mm or inch, got "furlong"'),
     ],
 )

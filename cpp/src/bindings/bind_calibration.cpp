@@ -64,7 +64,7 @@ Calibration make_calibration(
     const Names& fit_reasons, const std::optional<double>& uncertainty_scaled, const Texts& provenance,
     const Names& unseen_faults, const std::optional<double>& between_nodes,
     const std::optional<double>& temperature_reference, const std::optional<ArrayLike>& temperature_as_found,
-    const std::optional<ArrayLike>& expansion, const std::optional<ArrayLike>& fixed_point) {
+    const std::optional<ArrayLike>& expansion, const std::optional<ArrayLike>& fixed_point, bool unverified) {
     Calibration calibration{method, to_chain(chain), to_vector3(volume, "volume"), to_vector3(tool, "tool"), {}, {},
                             {},     undetermined};
     for (const auto& [name, table] : functions)
@@ -105,6 +105,7 @@ Calibration make_calibration(
         calibration.temperature_as_found = to_vector3(*temperature_as_found, "temperature_as_found");
     if (expansion) calibration.expansion = to_vector3(*expansion, "expansion");
     if (fixed_point) calibration.fixed_point = to_vector3(*fixed_point, "fixed_point");
+    calibration.unverified = unverified;
     check(calibration);
     return calibration;
 }
@@ -131,7 +132,7 @@ void bind_calibration(py::module_& m) {
              py::arg("provenance") = Texts{}, py::arg("unseen_faults") = Names{},
              py::arg("between_nodes") = std::nullopt, py::arg("temperature_reference") = std::nullopt,
              py::arg("temperature_as_found") = std::nullopt, py::arg("expansion") = std::nullopt,
-             py::arg("fixed_point") = std::nullopt,
+             py::arg("fixed_point") = std::nullopt, py::arg("unverified") = false,
              "A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: "
              "name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises "
              "InvalidArgument naming the parameter for what is none: nodes that do not "
@@ -141,6 +142,9 @@ void bind_calibration(py::module_& m) {
             "fit", [](const Calibration& c) { return c.fit ? std::optional(name(*c.fit)) : std::nullopt; },
             "Verdict of the fit: \"accepted\", \"doubtful\", \"rejected\" (not to be used) or \"unchecked\" (nothing "
             "controls the readings); None where it is not known.")
+        .def_readonly("unverified", &Calibration::unverified,
+                      "Whether it, or one that it was made from, was read from a file without a checksum: nothing "
+                      "tells whether its values are those that were written.")
         .def_readonly("variance_factor", &Calibration::variance_factor,
                       "Of the fit: 1 is expected; None where nothing controls the readings, or it is not known.")
         .def_readonly("fit_reasons", &Calibration::fit_reasons, "Why that verdict, a sentence each.")

@@ -41,17 +41,21 @@ Choice one_of(const char* argument, const std::string& name, const std::vector<s
 
 Position to_position(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-void warn_of_fit(const Compensator& compensator) {
-    const std::string& fit = compensator.fit();
-    if (fit.empty() || fit == "accepted") return;
-    const std::string text = "the compensation's table has a fit that is " + fit;
+void warn(const std::string& text) {
     if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) < 0) throw py::error_already_set();
+}
+
+void warn_of_table(const Compensator& compensator) {
+    const std::string& fit = compensator.fit();
+    if (!fit.empty() && fit != "accepted") warn("the compensation's table has a fit that is " + fit);
+    if (compensator.is_unverified())
+        warn("the compensation's table is unverified: its checksum was absent, its values may have been changed");
 }
 
 Compensator make_compensator(const TableLike& table, const ChainLike& chain, const ArrayLike& origin,
                              const std::string& outside, double margin, double largest_correction,
                              const std::string& approach, double largest_tool, bool accept_rejected,
-                             const std::optional<std::array<double, 2>>& temperatures) {
+                             bool accept_unverified, const std::optional<std::array<double, 2>>& temperatures) {
     CompensatorOptions options;
     options.origin = to_position(to_vector3(origin, "origin"));
     options.outside = one_of<Outside>(
@@ -64,6 +68,7 @@ Compensator make_compensator(const TableLike& table, const ChainLike& chain, con
                                                     {"negative", CompensatedApproach::negative}});
     options.largest_tool = largest_tool;
     options.accept_rejected = accept_rejected;
+    options.accept_unverified = accept_unverified;
     if (temperatures) options.temperatures = *temperatures;
     const std::string name = to_chain(chain).name();
     const auto made = [&] {
@@ -74,7 +79,7 @@ Compensator make_compensator(const TableLike& table, const ChainLike& chain, con
         return Compensator::load(to_path(py::reinterpret_borrow<PathLike>(table)), name, options);
     };
     Compensator compensator = made();
-    warn_of_fit(compensator);
+    warn_of_table(compensator);
     return compensator;
 }
 
@@ -145,15 +150,17 @@ void bind_controller(py::module_& m) {
              py::arg("origin") = zeros(3), py::arg("outside") = "hold", py::arg("margin") = CompensatorOptions{}.margin,
              py::arg("largest_correction") = CompensatorOptions{}.largest_correction, py::arg("approach") = "mean",
              py::arg("largest_tool") = CompensatorOptions{}.largest_tool, py::arg("accept_rejected") = false,
-             py::arg("temperatures") = std::nullopt,
+             py::arg("accept_unverified") = false, py::arg("temperatures") = std::nullopt,
              "table: a file, a Calibration or an ErrorMap that carries chain, volume and tool. chain: the "
              "controller's. origin: home in the controller's coordinates. outside the calibrated volume: \"hold\" the "
              "error of its nearest point, go on \"linear\" up to `margin`, or \"refuse\". largest_correction: command "
              "and forward shorten a longer error to this length. approach: \"mean\", \"positive\" or \"negative\", of "
-             "a table with reversal. accept_rejected: take a table whose fit was rejected. "
+             "a table with reversal. accept_rejected: take a table whose fit was rejected. accept_unverified: take a "
+             "calibration whose checksum was absent when it was read. "
              "temperatures: lowest and highest of a scale that calls may state, degrees Celsius; needs a table that "
              "is referred to a temperature by a known expansion. Warns (UserWarning) of "
-             "a fit that is not accepted. Raises InvalidArgument for a table or options that a controller should not "
+             "a fit that is not accepted, and of an unverified table. Raises InvalidArgument for a table or options "
+             "that a controller should not "
              "use.")
         .def(
             "error",
@@ -232,6 +239,8 @@ void bind_controller(py::module_& m) {
             [](const Compensator& c) { return c.fit().empty() ? std::nullopt : std::optional<std::string>(c.fit()); },
             "Verdict of the table's fit: \"accepted\", \"doubtful\", \"rejected\", \"unchecked\"; None where it has "
             "none.")
+        .def_property_readonly("unverified", &Compensator::is_unverified,
+                               "Whether the table is a calibration whose checksum was absent when it was read.")
         .def_property_readonly("uncompensated", &Compensator::uncompensated,
                                "What the table does not tell: \"EXX\", \"EYX (slope)\", \"EXX (above 784.0 mm)\" ...");
 }

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
+#include "controller/vector3.hpp"
 #include "core/text_file.hpp"
 #include "machine/table_header.hpp"
 #include "stepdiag/core/error.hpp"
@@ -16,16 +18,25 @@ constexpr double node_slack = 1e-6;     // mm; accepts rounding of the positions
 
 constexpr double coldest = -100.0, hottest = 200.0;  // degrees Celsius; detects kelvin
 
-bool states_temperatures(const CompensatorOptions& options) {
-    return !(options.temperatures[0] == 0.0 && options.temperatures[1] == 0.0);
+bool is_within(double lowest, double number, double highest) {
+    return are_moderate<1>(&number) && lowest <= number && number <= highest;
 }
 
-std::string text(double number) { return format_decimal(number, 0); }
+bool states_temperatures(const CompensatorOptions& options) {
+    const auto [lowest, highest] = options.temperatures;
+    return !(is_within(0.0, lowest, 0.0) && is_within(0.0, highest, 0.0));
+}
+
+std::string text(double number) {
+    if (are_moderate<1>(&number)) return format_decimal(number, 0);
+    if (is_nan(number)) return "nan";  // to print a signalling one raises FE_INVALID
+    char characters[32];
+    std::snprintf(characters, sizeof characters, "%g", number);
+    return characters;
+}
 
 void require(bool holds, const std::string& what, const std::string& expected, double got) {
-    if (!holds)
-        throw InvalidArgument(what + ": expected " + expected + ", got " +
-                              (std::isfinite(got) ? text(got) : std::to_string(got)));
+    if (!holds) throw InvalidArgument(what + ": expected " + expected + ", got " + text(got));
 }
 
 template <class Call>
@@ -43,19 +54,19 @@ void check(const CompensatorOptions& options) {
     enumerator("outside", int(options.outside));
     enumerator("approach", int(options.approach));
     for (const double origin : options.origin)
-        require(std::abs(origin) <= farthest_position, "origin", "three lengths within 100 m", origin);
-    require(options.margin >= 0.0 && options.margin <= farthest_position, "margin", "a length from 0 to 100 m",
-            options.margin);
+        require(is_within(-farthest_position, origin, farthest_position), "origin", "three lengths within 100 m",
+                origin);
+    require(is_within(0.0, options.margin, farthest_position), "margin", "a length from 0 to 100 m", options.margin);
     if (options.margin > 0.0 && options.outside != Outside::linear)
         throw InvalidArgument("margin: expected 0 unless outside is linear, got " + text(options.margin));
-    require(options.largest_correction > 0.0 && options.largest_correction <= farthest_position, "largest_correction",
-            "a positive length of at most 100 m", options.largest_correction);
-    require(options.largest_tool >= 0.0 && options.largest_tool <= farthest_position, "largest_tool",
-            "a length from 0 to 100 m", options.largest_tool);
+    require(is_within(0.0, options.largest_correction, farthest_position) && options.largest_correction > 0.0,
+            "largest_correction", "a positive length of at most 100 m", options.largest_correction);
+    require(is_within(0.0, options.largest_tool, farthest_position), "largest_tool", "a length from 0 to 100 m",
+            options.largest_tool);
     if (!states_temperatures(options)) return;
     const auto [lowest, highest] = options.temperatures;
     for (const double temperature : options.temperatures)
-        require(temperature >= coldest && temperature <= hottest, "temperatures",
+        require(is_within(coldest, temperature, hottest), "temperatures",
                 "two from " + text(coldest) + " to " + text(hottest) + " degrees Celsius", temperature);
     require(lowest < highest, "temperatures", "the lowest below the highest, " + text(highest), lowest);
 }
@@ -98,6 +109,15 @@ std::string check_fit(const ParameterTable& table, const CompensatorOptions& opt
                               ": fit=rejected: the readings of this calibration contradict each other or the "
                               "scenario; measure again, or accept it with accept_rejected");
     return fit ? stepdiag::name(*fit) : "";
+}
+
+bool check_verified(const ParameterTable& table, const CompensatorOptions& options, const std::string& name) {
+    const bool is_unverified = table.header.count(unverified_key) > 0;
+    if (is_unverified && !options.accept_unverified)
+        throw InvalidArgument(name + ": unverified: " + unverified_because +
+                              ": its values may have been changed; evaluate the run again, or accept it with "
+                              "accept_unverified");
+    return is_unverified;
 }
 
 void check_nodes(const ParameterTable& table, const Eigen::Vector3d& volume, const std::string& name) {

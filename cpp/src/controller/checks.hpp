@@ -24,6 +24,8 @@ std::optional<Expansion> check_temperatures(const ParameterTable& table, const C
                                             const std::string& name);
 // Verdict of the table's fit; empty if the table has none.
 std::string check_fit(const ParameterTable& table, const CompensatorOptions& options, const std::string& name);
+// Whether the table is unverified.
+bool check_verified(const ParameterTable& table, const CompensatorOptions& options, const std::string& name);
 // Checks that the nodes match the volume. This detects tables in metres or micrometres, or of another machine.
 void check_nodes(const ParameterTable& table, const Eigen::Vector3d& volume, const std::string& name);
 

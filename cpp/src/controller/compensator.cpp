@@ -105,7 +105,8 @@ std::unique_ptr<CompensatorTables> make_tables(const ParameterTable& table, cons
         array(tool),
         stepdiag::fingerprint(own, edges, tool, table, expansion_of(table, name)),
         check_fit(table, options, name),
-        not_told(table, edges, name)});
+        not_told(table, edges, name),
+        check_verified(table, options, name)});
 }
 
 Compensator::Compensator(const ParameterTable& table, const std::string& name, const std::string& chain,
@@ -224,6 +225,7 @@ double Compensator::temperature_reference() const noexcept {
     return tables_->scales.is_empty() ? std::numeric_limits<double>::quiet_NaN() : tables_->scales.reference;
 }
 const std::string& Compensator::fit() const noexcept { return tables_->fit; }
+bool Compensator::is_unverified() const noexcept { return tables_->unverified; }
 const std::vector<std::string>& Compensator::uncompensated() const noexcept { return tables_->uncompensated; }
 
 }  // namespace stepdiag

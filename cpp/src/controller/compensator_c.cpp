@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <exception>
 
@@ -26,6 +27,10 @@ static_assert(int(stepdiag::compensation_outside) == STEPDIAG_OUTSIDE &&
               int(stepdiag::compensation_refused) == STEPDIAG_REFUSED &&
               int(stepdiag::compensation_temperature) == STEPDIAG_TEMPERATURE);
 
+// accept_unverified has the place of padding in 1.0, so that programs compiled for 1.0 still run.
+static_assert(alignof(double) != 8 ||
+              (sizeof(stepdiag_options) == 88 && offsetof(stepdiag_options, temperatures) == 72));
+
 std::array<double, 3> array(const double v[3]) { return {v[0], v[1], v[2]}; }
 
 stepdiag::CompensatorOptions options_of(const stepdiag_options& given) {
@@ -36,6 +41,7 @@ stepdiag::CompensatorOptions options_of(const stepdiag_options& given) {
             stepdiag::CompensatedApproach(given.approach),
             given.largest_tool,
             given.accept_rejected != 0,
+            given.accept_unverified == 1,  // of programs compiled before it was there, anything
             {given.temperatures[0], given.temperatures[1]}};
 }
 
@@ -72,6 +78,7 @@ stepdiag_options stepdiag_default_options(void) {
             int(own.approach),
             own.largest_tool,
             own.accept_rejected,
+            own.accept_unverified,
             {own.temperatures[0], own.temperatures[1]}};
 }
 
@@ -159,6 +166,10 @@ void stepdiag_calibration_tool(const stepdiag_compensator* compensator, double t
 
 const char* stepdiag_fit(const stepdiag_compensator* compensator) {
     return compensator ? compensator->compensator.fit().c_str() : "";
+}
+
+int stepdiag_is_unverified(const stepdiag_compensator* compensator) {
+    return compensator && compensator->compensator.is_unverified();
 }
 
 const char* stepdiag_uncompensated(const stepdiag_compensator* compensator, size_t index) {

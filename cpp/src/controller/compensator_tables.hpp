@@ -42,9 +42,10 @@ struct ScaleRange {
     Vector3 fixed_point = {0.0, 0.0, 0.0};                // mm, in the volume's coordinates
 
     bool is_empty() const noexcept { return lowest > highest; }
-    STEPDIAG_INLINED bool holds(const double* temperature) const noexcept {  // never NaN
+    STEPDIAG_INLINED bool holds(const double* temperature) const noexcept {
         const auto inside = [this](double t) { return lowest <= t && t <= highest; };
-        return inside(temperature[0]) && inside(temperature[1]) && inside(temperature[2]);
+        return are_moderate<3>(temperature) && inside(temperature[0]) && inside(temperature[1]) &&
+               inside(temperature[2]);
     }
     STEPDIAG_INLINED ExpandedScales at(const double* temperature) const noexcept {
         return {{coefficient.x * (temperature[0] - reference), coefficient.y * (temperature[1] - reference),
@@ -77,6 +78,7 @@ struct CompensatorTables {
     std::uint64_t fingerprint;
     std::string fit;
     std::vector<std::string> uncompensated;
+    bool unverified;
 
     // The correction for e. Shortening vectors and clamping positions never increase a distance, so the iteration of a
     // contracting table remains contracting.
@@ -87,7 +89,8 @@ struct CompensatorTables {
         return largest_correction / std::sqrt(length2) * e;
     }
 
-    STEPDIAG_INLINED bool is_usable(const Vector3& p, const Vector3& tool_offset) const noexcept {  // never NaN
+    // Of moderate numbers, as all below.
+    STEPDIAG_INLINED bool is_usable(const Vector3& p, const Vector3& tool_offset) const noexcept {
         return everywhere.holds(p) && dot(tool_offset, tool_offset) <= largest_tool2;
     }
     // Status of a position outside `inside`, in the volume's coordinates.
@@ -98,7 +101,7 @@ struct CompensatorTables {
     }
     // Whether a position in the volume is requested, for a tool of the permitted length. Such a position is its own
     // nearest point, and its status is 0. Most are, so this test comes first.
-    STEPDIAG_INLINED bool is_usual(const Vector3& p, const Vector3& tool_offset) const noexcept {  // never NaN
+    STEPDIAG_INLINED bool is_usual(const Vector3& p, const Vector3& tool_offset) const noexcept {
         return within.holds(p) && dot(tool_offset, tool_offset) <= largest_tool2;
     }
     STEPDIAG_INLINED bool are_usual(const Vector3Of<Four>& p, const Vector3& tool_offset) const noexcept {
@@ -115,16 +118,18 @@ template <class Order, class Scales>
 STEPDIAG_INLINED unsigned answer_error(Order order, const Scales& scales, const CompensatorTables& t,
                                        const double* position, const double* tool, double* error,
                                        double* orientation) noexcept {
+    const auto refuse = [&](unsigned status) {
+        write({0.0, 0.0, 0.0}, error);
+        if (orientation) write({0.0, 0.0, 0.0}, orientation);
+        return status;
+    };
+    if (!are_moderate<3>(position) || !are_moderate<3>(tool)) return refuse(compensation_refused);
     const Vector3 offset = read(tool);
     Vector3 p = read(position) - t.origin;
     unsigned status = 0;
     if (!t.is_usual(p, offset)) {
         status = t.status(p, offset);
-        if (status & compensation_refused) {
-            write({0.0, 0.0, 0.0}, error);
-            if (orientation) write({0.0, 0.0, 0.0}, orientation);
-            return status;
-        }
+        if (status & compensation_refused) return refuse(status);
         p = t.known.nearest(p);
     }
     const ErrorModel::Cell cell = t.model.cell(p);
@@ -144,6 +149,7 @@ STEPDIAG_INLINED unsigned answer_error(Order order, const Scales& scales, const 
 template <class Order, class Scales>
 STEPDIAG_INLINED unsigned answer_command(Order order, const Scales& scales, const CompensatorTables& t,
                                          const double* target, const double* tool, double* command) noexcept {
+    if (!are_moderate<3>(target) || !are_moderate<3>(tool)) return write(read(target), command), compensation_refused;
     const Vector3 asked = read(target), offset = read(tool), p = asked - t.origin;
     Vector3 nearest = p;
     unsigned status = 0;
@@ -174,8 +180,8 @@ STEPDIAG_INLINED unsigned answer_command(Order order, const Scales& scales, cons
 template <class Order, class Scales>
 STEPDIAG_INLINED unsigned answer_forward(Order order, const Scales& scales, const CompensatorTables& t,
                                          const double* command, const double* tool, double* actual) noexcept {
-    const Vector3 asked = read(command), offset = read(tool);
-    const Vector3 p = asked - t.origin;
+    if (!are_moderate<3>(command) || !are_moderate<3>(tool)) return write(read(command), actual), compensation_refused;
+    const Vector3 asked = read(command), offset = read(tool), p = asked - t.origin;
     if (!t.is_usable(p, offset)) return write(asked, actual), compensation_refused;
     const Vector3 nearest = t.known.nearest(p);
     unsigned capped = 0;
@@ -194,12 +200,20 @@ STEPDIAG_INLINED unsigned answer_errors(Order order, const Scales& scales, const
                                         std::size_t count, const double* positions, const double* tool, double* errors,
                                         double* orientations, unsigned* statuses, One&& one) noexcept {
     const Vector3 offset = read(tool);
+    const bool is_tool_moderate = are_moderate<3>(tool);
     unsigned flags = 0;
     std::size_t i = 0;
+    const auto one_by_one = [&] {
+        for (std::size_t j = i; j < i + 4; ++j) flags |= one(j);
+    };
     for (; i + 4 <= count; i += 4) {
+        if (!is_tool_moderate || !are_moderate<12>(positions + 3 * i)) {
+            one_by_one();
+            continue;
+        }
         const Vector3Of<Four> p = read_four(positions + 3 * i) - broadcast<Four>(t.origin);
         if (!t.are_usual(p, offset)) {
-            for (std::size_t j = i; j < i + 4; ++j) flags |= one(j);
+            one_by_one();
             continue;
         }
         const auto cell = t.model.cell(p);
@@ -223,12 +237,20 @@ STEPDIAG_INLINED unsigned answer_commands(Order order, const Scales& scales, con
                                           std::size_t count, const double* targets, const double* tool,
                                           double* commands, unsigned* statuses, One&& one) noexcept {
     const Vector3 offset = read(tool);
+    const bool is_tool_moderate = are_moderate<3>(tool);
     unsigned flags = 0;
     std::size_t i = 0;
+    const auto one_by_one = [&] {
+        for (std::size_t j = i; j < i + 4; ++j) flags |= one(j);
+    };
     for (; i + 4 <= count; i += 4) {
+        if (!is_tool_moderate || !are_moderate<12>(targets + 3 * i)) {
+            one_by_one();
+            continue;
+        }
         const Vector3Of<Four> asked = read_four(targets + 3 * i), p = asked - broadcast<Four>(t.origin);
         if (!t.are_usual(p, offset)) {
-            for (std::size_t j = i; j < i + 4; ++j) flags |= one(j);
+            one_by_one();
             continue;
         }
         const auto cell = t.model.cell(p);

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <type_traits>
 
 // Inlines whole evaluations, so that the compiler can use the known values of their arguments.
@@ -75,6 +77,25 @@ STEPDIAG_INLINED Vector3Of<N> cross_unit(const Vector3Of<N>& v) noexcept {
     else if constexpr (axis == 1) return {-v.z, N{}, v.x};
     else return {v.y, -v.x, N{}};
 }
+// Whether all `count` numbers are below 2^500 in magnitude: finite, and so are their squares. By their bits, because
+// arithmetic with a NaN or an infinity, and comparison with a NaN, raise FE_INVALID: a program that traps it would end.
+template <std::size_t count>
+STEPDIAG_INLINED bool are_moderate(const double* v) noexcept {
+    constexpr std::uint64_t sign = std::uint64_t(1) << 63, limit = std::uint64_t(1023 + 500) << 52;
+    std::uint64_t carry = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        std::uint64_t bits;
+        std::memcpy(&bits, v + i, sizeof bits);
+        carry |= (bits & ~sign) + (sign - limit);
+    }
+    return (carry & sign) == 0;
+}
+// Likewise by its bits.
+inline bool is_nan(double number) noexcept {
+    std::uint64_t bits;
+    std::memcpy(&bits, &number, sizeof bits);
+    return bits << 1 > std::uint64_t(0x7ff) << 53;
+}
 STEPDIAG_INLINED Vector3 read(const double* v) noexcept { return {v[0], v[1], v[2]}; }
 STEPDIAG_INLINED void write(const Vector3& v, double* out) noexcept { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
 
@@ -108,11 +129,11 @@ STEPDIAG_INLINED bool all(const FourTruths& truths) noexcept {
 struct Box {
     Vector3 lowest, highest;
 
-    STEPDIAG_INLINED bool holds(const Vector3& v) const noexcept {  // never NaN
+    STEPDIAG_INLINED bool holds(const Vector3& v) const noexcept {
         return lowest.x <= v.x && v.x <= highest.x && lowest.y <= v.y && v.y <= highest.y && lowest.z <= v.z &&
                v.z <= highest.z;
     }
-    STEPDIAG_INLINED bool holds(const Vector3Of<Four>& v) const noexcept {  // all; never NaN
+    STEPDIAG_INLINED bool holds(const Vector3Of<Four>& v) const noexcept {  // all
         return all((lowest.x <= v.x) & (v.x <= highest.x) & (lowest.y <= v.y) & (v.y <= highest.y) & (lowest.z <= v.z) &
                    (v.z <= highest.z));
     }

@@ -2,6 +2,7 @@
 
 #include <csv.h>
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -12,7 +13,6 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <new>
 #include <utility>
 
@@ -23,6 +23,7 @@ namespace stepdiag {
 namespace {
 
 constexpr std::size_t largest_file = std::size_t(1) << 30;
+constexpr int patience = 2000;  // ms, for a program that opens a pipe for writing
 // Some spreadsheet programs write it before the header.
 constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 
@@ -39,6 +40,13 @@ std::vector<std::string> parse_record(std::string_view line, const std::string& 
     if (!read) throw InvalidArgument(where + ": not a CSV record (RFC 4180): a quote is misplaced or not closed");
     return fields;
 }
+
+struct ReadableFile {
+    int handle;
+    ~ReadableFile() {
+        if (handle >= 0) ::close(handle);
+    }
+};
 
 bool write_all(int file, std::string_view text) {
     while (!text.empty()) {
@@ -123,18 +131,31 @@ std::size_t first_broken_character(std::string_view text) {
 }  // namespace
 
 std::string read_text_file(const std::string& path) {
+    const auto fail = [&] { throw InvalidArgument(path + ": cannot be read: " + std::strerror(errno)); };
     struct stat status = {};
-    if (::stat(path.c_str(), &status) != 0) throw InvalidArgument(path + ": cannot be read: " + std::strerror(errno));
+    if (::stat(path.c_str(), &status) != 0) fail();
     if (!S_ISREG(status.st_mode) && !S_ISFIFO(status.st_mode))
         throw InvalidArgument(path + ": expected a file, got a folder or a device");
-    std::ifstream stream(path, std::ios::binary);
+    // The opening of a pipe without a writer blocks without O_NONBLOCK.
+    const ReadableFile file{::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)};
+    if (file.handle < 0) fail();
+    pollfd polled = {file.handle, POLLIN, 0};
+    const bool is_ready = !S_ISFIFO(status.st_mode) || ::poll(&polled, 1, patience) != 0;
     std::string text;
     std::vector<char> chunk(1 << 16);
-    while (stream.read(chunk.data(), std::streamsize(chunk.size())) || stream.gcount() > 0) {
-        text.append(chunk.data(), std::size_t(stream.gcount()));
+    for (;;) {
+        const ssize_t count = ::read(file.handle, chunk.data(), chunk.size());
+        if (count < 0 && errno == EAGAIN) {  // a writer that takes its time
+            if (::fcntl(file.handle, F_SETFL, ::fcntl(file.handle, F_GETFL) & ~O_NONBLOCK) != 0) fail();
+            continue;
+        }
+        if (count < 0 && errno != EINTR) fail();
+        if (count == 0 && text.empty() && !is_ready)
+            throw InvalidArgument(path + ": expected a file, got a pipe into which no program writes");
+        if (count == 0) break;
+        if (count > 0) text.append(chunk.data(), std::size_t(count));
         if (text.size() > largest_file) throw InvalidArgument(path + ": larger than 1 GiB");
     }
-    if (!stream.eof()) throw InvalidArgument(path + ": cannot be read: " + std::strerror(errno));
     if (text.empty()) throw InvalidArgument(path + ": the file is empty");
     if (text.find('\0') != std::string::npos) throw InvalidArgument(path + ": expected a text file, got binary data");
     if (const auto broken = first_broken_character(text); broken != std::string::npos) {

@@ -9,7 +9,7 @@
 namespace stepdiag {
 
 // Reads the whole file. Throws InvalidArgument if it cannot be read, is empty, is larger than 1 GiB, contains NUL
-// bytes, or is not UTF-8.
+// bytes, is not UTF-8, or is a pipe that no program opens for writing within two seconds.
 std::string read_text_file(const std::string& path);
 
 // Writes to a temporary file in the same folder, then renames it. `path` is never a partly written file. Throws

@@ -252,6 +252,7 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
     table.header["straightness_reference"] = straightness_reference(calibration.chain, calibration.tool);
     if (!calibration.date.empty()) table.header["date"] = calibration.date;
     table.header.insert(calibration.provenance.begin(), calibration.provenance.end());
+    if (calibration.unverified) table.header[unverified_key] = unverified_because;
     if (calibration.fit) table.header["fit"] = name(*calibration.fit);
     for (const auto& [key, number] : numbers(calibration))
         if (number) table.header[key] = format_decimal(*number, 0);
@@ -299,6 +300,7 @@ Calibration read_calibration(const std::string& path) {
     calibration.date = optional_value("date");
     for (const char* key : provenance_keys)
         if (std::string text = optional_value(key); !text.empty()) calibration.provenance[key] = std::move(text);
+    calibration.unverified = table.header.count(unverified_key) > 0;
     calibration.fit = fit_of(table.header, path);
     for (auto& [key, number] : numbers(calibration)) {
         const std::string given = optional_value(key);

@@ -55,12 +55,14 @@ private:
 
     void read_header() {
         check_format(csv_, file_name_, {error_map_format, calibration_format});
+        bool has_checksum = false;
         for (const CsvRow& comment : csv_.comments) {
             const std::string_view text = comment.fields.front();
             const auto equals = text.find('=');
             if (equals == std::string_view::npos) continue;  // a remark without a key
             const std::string key = trimmed(text.substr(0, equals)), given = trimmed(text.substr(equals + 1));
             if (key == rows_key || key == checksum_key) {
+                has_checksum |= key == checksum_key;
                 expect(key, comment.line, given,
                        key == rows_key ? std::to_string(csv_.rows.size()) : checksum(csv_.body));
                 continue;
@@ -70,13 +72,17 @@ private:
                 fail(comment.line, "the leading line " + quoted(key) + " is given twice");
             table_.header[key] = given;
         }
+        const auto format = table_.header.find("format");
+        const bool is_calibration =
+            format == table_.header.end() ? table_.header.count("method") > 0 : format->second == calibration_format;
+        if (is_calibration && !has_checksum) table_.header.emplace(unverified_key, unverified_because);
     }
 
     // A file that was cut between two rows, or within the digits of its last number, is otherwise valid.
     void expect(const std::string& key, int line, const std::string& given, const std::string& found) const {
         if (given != found)
             fail(line, key + ": expected " + quoted(given) + ", got " + found +
-                           "; the file was cut or changed: without this line it is read as it is");
+                           "; the file was cut or changed: without this line it is read as it is, as unverified");
     }
 
     void find_columns() {

@@ -43,6 +43,8 @@ class TemperatureFile:
         self._newest: dict[str, datetime] = {}  # by column, of all rows
         self._old: set[str] = set()  # columns that no value holds of, as was told
         self._unreadable = False
+        if path.exists() and not path.is_file():
+            raise InvalidArgument(f"{path}: expected a file that can be read again, got a folder, a pipe or a device")
         try:
             self._first = list(self._look())
         except OSError as error:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stepdiag._core import Calibration, ErrorMap, InvalidArgument
+from stepdiag.calibration.finding_text import UNVERIFIED
 from stepdiag.calibration.table_sums import FloatArray, TableValues, Term
 from stepdiag.calibration.temperature_text import temperature_mark
 from stepdiag.calibration.truth import TRUTH, TruthAgreement, agreement_with_truth, truth_as_calibration
@@ -181,6 +182,7 @@ def compare_calibrations(a: Calibration | ErrorMap, b: Calibration | ErrorMap, *
         notes.append(
             f"temperatures differ: A {marks[0]}, B {marks[1]}; so positioning differs by the scales' expansion"
         )
+    notes += [f"{which} is {UNVERIFIED}" for which, one in (("A", a), ("B", b)) if one.unverified]
     run = a.provenance.get("run_sha256")
     if run is not None and run == b.provenance.get("run_sha256"):
         notes.append("A and B are evaluations of the same run: they are not independent")

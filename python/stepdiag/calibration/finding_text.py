@@ -99,6 +99,11 @@ UNCHECKED: Final = {
     "do; the uncertainties are of the stated noise",
 }
 
+UNVERIFIED: Final = (
+    "unverified: a checksum was absent when this calibration was read; its values may have been changed since they "
+    "were written"
+)
+
 # The better first.
 FITS: Final = ("accepted", "unchecked", "doubtful", "rejected")
 # Of calibrations by linear methods, whose uncertainties know of nothing else.
@@ -223,9 +228,20 @@ def fit_row(calibration: Calibration) -> str:
     return f"fit: {_shown(calibration.fit)}: {MEANING[calibration.fit]}{figures}"
 
 
+def trust_rows(calibration: Calibration) -> list[str]:
+    """The same, and whether the calibration is unverified."""
+    return [fit_row(calibration), *([UNVERIFIED] if calibration.unverified else [])]
+
+
+def unverified_key(calibration: Calibration) -> dict[str, str]:
+    """The key of a file that says that its calibration is unverified."""
+    key, text = UNVERIFIED.split(": ")
+    return {key: text} if calibration.unverified else {}
+
+
 def fit_rows(calibration: Calibration) -> Iterator[str]:
-    """The same with its reasons, and what no verdict tells."""
-    yield fit_row(calibration)
+    """The same with the reasons of the fit, and what no verdict tells."""
+    yield from trust_rows(calibration)
     yield from (f"{calibration.fit} because {reason}" for reason in calibration.fit_reasons)
     if calibration.uncertainty_scaled is not None:
         yield f"note: all standard uncertainties were multiplied by {calibration.uncertainty_scaled:.3g}"

@@ -55,6 +55,7 @@ def truth_as_calibration(truth: ErrorMap, like: Calibration) -> tuple[Calibratio
         {name: (truth.squareness.get(name, 0.0), 0.0) for name in SQUARENESSES if name in like.squareness},
         reversal=reversal,
         reversal_negative_uncertainty={name: np.zeros_like(table[0]) for name, table in reversal.items()},
+        unverified="unverified" in truth.header,
     )
     return calibration, [f"error map: {text}" for text in frame_deviation_texts(truth, like.volume)]
 

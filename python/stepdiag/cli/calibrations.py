@@ -12,10 +12,11 @@ from stepdiag.cli.options import (
     Command,
     Grouped,
     Writes,
-    fit_warnings,
+    is_untrusted,
     json_option,
     tell,
-    tell_fit,
+    tell_trust,
+    trust_warnings,
 )
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import CALIBRATION, COMPARISON, FUNCTIONAL_POINT, PAGE, PDF, OutputFile
@@ -140,7 +141,7 @@ def report(
         from stepdiag.objects.report import report_object
         from stepdiag.objects.writer import json_text
 
-        click.echo(json_text(report_object(read, calibration, fit_warnings(calibration, read.fit))))
+        click.echo(json_text(report_object(read, calibration, trust_warnings(calibration, read))))
     else:
         for line in calibration_report(read):
             say(line)
@@ -148,10 +149,10 @@ def report(
             for line in workpiece_rows(read, workpiece_expansion, workpiece_temperature):
                 say(line)
     if before is not None:
-        for warning in fit_warnings(calibrations[0], before.fit):
+        for warning in trust_warnings(calibrations[0], before):
             tell("warning", warning)
-    tell_fit(context, calibration, read.fit)
-    if before is not None and before.fit == "rejected":
+    tell_trust(context, calibration, read)
+    if before is not None and is_untrusted(before):
         context.exit(NOT_TO_BE_TRUSTED)
 
 
@@ -242,8 +243,7 @@ def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None,
         from stepdiag.report.comparison import write_comparison
 
         write_comparison(comparison, written)
-    fits = comparison.a.fit, comparison.b.fit
-    warnings = [*fit_warnings(a, fits[0]), *fit_warnings(b, fits[1])]
+    warnings = [*trust_warnings(a, comparison.a), *trust_warnings(b, comparison.b)]
     if as_json:
         from stepdiag.objects.comparison import comparison_object
         from stepdiag.objects.writer import json_text
@@ -254,7 +254,7 @@ def compare(context: click.Context, a: Path, b: Path, output: OutputFile | None,
             say(line)
     for warning in warnings:
         tell("warning", warning)
-    if "rejected" in fits:
+    if is_untrusted(comparison.a, comparison.b):
         context.exit(NOT_TO_BE_TRUSTED)
 
 
@@ -302,7 +302,7 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     measurement = read_measurement(run)
     with located(f"{calibration}, {run}"), Progress("verify"):
         verification = verify_scenario(tested, known, measurement)
-    warnings = fit_warnings(calibration, tested.fit)
+    warnings = trust_warnings(calibration, tested)
     warnings += [f"{run}: {sentence}" for sentence in implausible_inputs(known, measurement)]
     if not agrees(verification, alpha):
         warnings = [
@@ -321,7 +321,7 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
             say(line)
     for warning in warnings:
         tell("warning", warning)
-    if not agrees(verification, alpha) or verification.left_out or tested.fit == "rejected":
+    if not agrees(verification, alpha) or verification.left_out or is_untrusted(tested):
         context.exit(NOT_TO_BE_TRUSTED)
 
 
@@ -391,7 +391,7 @@ def recheck(
         volume = volume_errors(judged.updated, ranking=False)
     if target is not None:
         write_calibration(judged.updated, target, provenance=provenance_of(known, run))
-    warnings = fit_warnings(baseline, before.fit)
+    warnings = trust_warnings(baseline, before)
     warnings += [f"{run}: {sentence}" for sentence in implausible_inputs(known, measurement)]
     if judged.verdict == "unexplained":
         warnings.append(
@@ -411,5 +411,5 @@ def recheck(
             say(line)
     for warning in warnings:
         tell("warning", warning)
-    if not judged.is_sound or before.fit == "rejected":
+    if not judged.is_sound or is_untrusted(before):
         context.exit(NOT_TO_BE_TRUSTED)

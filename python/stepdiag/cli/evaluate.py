@@ -10,12 +10,12 @@ from stepdiag.cli.options import (
     PATH,
     Grouped,
     Writes,
-    fit_warnings,
     json_option,
     out_file,
     tell,
-    tell_fit,
     tell_inputs,
+    tell_trust,
+    trust_warnings,
 )
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import CALIBRATION, OBSERVATION, OutputFile
@@ -148,14 +148,14 @@ def evaluate(
         from stepdiag.objects.evaluation import evaluated_files, evaluation_object
         from stepdiag.objects.writer import json_text
 
-        files, warnings = evaluated_files(scenario, run, path), [*of_inputs, *fit_warnings(path, written.fit)]
+        files, warnings = evaluated_files(scenario, run, path), [*of_inputs, *trust_warnings(path, written)]
         click.echo(json_text(evaluation_object(result, written, files, measurement, known, warnings, mistakes)))
     else:
         for line in evaluation_report(result, measurement, known, mistakes):
             say(line)
     for warning in of_inputs:
         tell("warning", warning)
-    tell_fit(context, path, written.fit)
+    tell_trust(context, path, written)
 
 
 def _step_counts(context: click.Context, option: click.Parameter, text: str | None) -> tuple[int, ...] | None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from stepdiag.cli.options import PATH, Writes, fit_warnings, json_option, tell, tell_fit
+from stepdiag.cli.options import PATH, Writes, json_option, tell, tell_trust, trust_warnings
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import (
     COMP_FILE,
@@ -129,10 +129,10 @@ def export(
         from stepdiag.objects.export import export_object
         from stepdiag.objects.writer import json_text
 
-        click.echo(json_text(export_object(done, read, to, calibration, fit_warnings(calibration, read.fit))))
+        click.echo(json_text(export_object(done, read, to, calibration, trust_warnings(calibration, read))))
     for line in done.told:
         if line.startswith("warning: "):
             tell("warning", line.removeprefix("warning: "))
         elif not as_json:
             say(line)
-    tell_fit(context, calibration, read.fit)
+    tell_trust(context, calibration, read)

@@ -28,8 +28,10 @@ def check(context: click.Context, files: tuple[Path, ...], as_json: bool) -> Non
     map. If there is one scenario among the files, each measurement is adjusted with it. The command
     reports whether lines, points and distances belong to that plan, and the verdict of the fit.
 
-    Exit code 2 if a file is invalid or two do not belong together, 3 if a fit is rejected.
+    Exit code 2 if a file is invalid or two do not belong together, 3 if a fit is rejected or a
+    calibration is unverified (without a checksum).
     """
+    from stepdiag.calibration.finding_text import UNVERIFIED
     from stepdiag.report.file_check import Finding, examine
     from stepdiag.report.scenario_and_run import FoundTogether, adjust_run
 
@@ -59,8 +61,10 @@ def check(context: click.Context, files: tuple[Path, ...], as_json: bool) -> Non
                     tell_found(f"{run} with {scenario}: {line}")
     results = [result for _, result in (*found, *runs)]
     sound = not any(isinstance(result, InvalidArgument) for result in results)
-    untrusted = any(isinstance(r, Finding | FoundTogether) and r.fit == "rejected" for r in results)
-    warnings = ["a fit is rejected: do not use results from it"] if sound and untrusted else []
+    judged = [result for result in results if isinstance(result, Finding | FoundTogether)]
+    warnings = ["a fit is rejected: do not use results from it"] if any(r.fit == "rejected" for r in judged) else []
+    warnings += [f"{path}: {UNVERIFIED}" for path, r in found if isinstance(r, Finding) and r.unverified]
+    warnings = warnings if sound else []
     if as_json:
         from stepdiag.objects.check import check_object
         from stepdiag.objects.writer import json_text
@@ -70,7 +74,7 @@ def check(context: click.Context, files: tuple[Path, ...], as_json: bool) -> Non
         tell("warning", warning)
     if not sound:
         context.exit(2)
-    if untrusted:
+    if warnings:
         context.exit(NOT_TO_BE_TRUSTED)
 
 

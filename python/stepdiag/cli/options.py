@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
@@ -105,21 +105,39 @@ def json_option(command: Command) -> Command:
     return option(command)
 
 
-def fit_warnings(path: Path, fit: str | None) -> list[str]:
-    """What to warn of if the fit of a calibration is not accepted."""
+class Judged(Protocol):
+    """A calibration, or what stands for one in a result."""
+
+    @property
+    def fit(self) -> str | None: ...
+    @property
+    def unverified(self) -> bool: ...
+
+
+def is_untrusted(*calibrations: Judged) -> bool:
+    """Whether one of them is not to be used: its fit is rejected, or it is unverified."""
+    return any(one.fit == "rejected" or one.unverified for one in calibrations)
+
+
+def trust_warnings(path: Path, calibration: Judged) -> list[str]:
+    """What to warn of if the fit of a calibration is not accepted, or if it is unverified."""
+    from stepdiag.calibration.finding_text import UNVERIFIED
+
+    fit = calibration.fit
     meaning = {
         "rejected": "do not use this calibration",
         "doubtful": "do not rely on the stated uncertainties",
         "unchecked": "the readings do not test this calibration",
     }
-    return [f"{path}: the fit is {fit}: {meaning[fit]}"] if fit in meaning else []
+    warnings = [f"{path}: the fit is {fit}: {meaning[fit]}"] if fit in meaning else []
+    return [*warnings, f"{path}: {UNVERIFIED}"] if calibration.unverified else warnings
 
 
-def tell_fit(context: click.Context, path: Path, fit: str | None) -> None:
-    """Warn if the fit of a calibration is not accepted.
+def tell_trust(context: click.Context, path: Path, calibration: Judged) -> None:
+    """Warn of a calibration as `trust_warnings` does.
 
-    A rejected fit ends the command with code 3."""
-    for warning in fit_warnings(path, fit):
+    One that is not to be used ends the command with code 3."""
+    for warning in trust_warnings(path, calibration):
         tell("warning", warning)
-    if fit == "rejected":
+    if is_untrusted(calibration):
         context.exit(NOT_TO_BE_TRUSTED)

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, Writes, fit_warnings, tell, tell_inputs
+from stepdiag.cli.options import PATH, Writes, tell, tell_inputs, tell_trust
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import FIGURE, PLANS, OutputFile
 from stepdiag.progress import Progress
@@ -158,8 +158,6 @@ def _plan_recheck(
         *recheck_advice(found, available, matters),
     ):
         say(line)
-    for warning in fit_warnings(baseline, before.fit):
-        tell("warning", warning)
     suffix = "" if path is None else path.suffix.lower().lstrip(".")
     if path is not None and suffix == "csv":
         write_whole(path, recheck_plan_csv(found, matters))
@@ -167,3 +165,4 @@ def _plan_recheck(
         from stepdiag.figures.recheck_plans import draw_powers
 
         write_whole(path, draw_powers(found, choose(found, available, matters), available, suffix))
+    tell_trust(click.get_current_context(), baseline, before)

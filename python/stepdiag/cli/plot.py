@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, fit_warnings, tell
+from stepdiag.cli.options import NOT_TO_BE_TRUSTED, PATH, Writes, is_untrusted, tell, trust_warnings
 from stepdiag.io.outputs import FIGURE, PNG, OutputFile
 from stepdiag.progress import Progress
 
@@ -60,14 +60,15 @@ def plot(
     path = claim_beside(files[0], PNG) if output is None else output.claim(*everything)
     _check_options(files, truth, scenario)
     with Progress("plot"):
-        figure, fits = draw_files(everything, volume=volume)
+        figure, drawn = draw_files(everything, volume=volume)
         with own_style():
             content = save(figure, path.suffix.lower().removeprefix("."))
     write_whole(path, content)
     click.echo(f"wrote {path}")
-    for warning in (warning for file, fit in fits.items() for warning in fit_warnings(file, fit)):
-        tell("warning", warning)
-    if "rejected" in fits.values():
+    for file, calibration in drawn.items():
+        for warning in trust_warnings(file, calibration):
+            tell("warning", warning)
+    if is_untrusted(*drawn.values()):
         context.exit(NOT_TO_BE_TRUSTED)
 
 

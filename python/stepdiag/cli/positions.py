@@ -6,7 +6,7 @@ from typing import Final
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, PointInMm, fit_warnings, json_option, tell, tell_fit
+from stepdiag.cli.options import PATH, PointInMm, json_option, tell, tell_trust, trust_warnings
 from stepdiag.cli.terminal import say
 from stepdiag.progress import Progress
 
@@ -94,11 +94,11 @@ def positions(
         from stepdiag.objects.positions import predicted_object
         from stepdiag.objects.writer import json_text
 
-        click.echo(json_text(predicted_object(calibration, predicted, file, fit_warnings(file, calibration.fit))))
+        click.echo(json_text(predicted_object(calibration, predicted, file, trust_warnings(file, calibration))))
     else:
         for text in predicted_report(calibration, predicted):
             say(text)
-    tell_fit(context, file, calibration.fit)
+    tell_trust(context, file, calibration)
 
 
 def _evaluate(file: Path, as_json: bool) -> None:

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import click
 
-from stepdiag.cli.options import PATH, PointInMm, fit_warnings, json_option, tell_fit
+from stepdiag.cli.options import PATH, PointInMm, json_option, tell_trust, trust_warnings
 from stepdiag.cli.terminal import say
 from stepdiag.progress import Progress
 from stepdiag.units import MICROMETRE
@@ -100,8 +100,8 @@ def volume(
         from stepdiag.objects.volume import volume_object
         from stepdiag.objects.writer import json_text
 
-        click.echo(json_text(volume_object(found, calibration, fit_warnings(calibration, read.fit))))
+        click.echo(json_text(volume_object(found, calibration, trust_warnings(calibration, read))))
     else:
         for line in volume_report(found):
             say(line)
-    tell_fit(context, calibration, read.fit)
+    tell_trust(context, calibration, read)

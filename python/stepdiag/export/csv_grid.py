@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
-from stepdiag.calibration.finding_text import fit_row
+from stepdiag.calibration.finding_text import trust_rows, unverified_key
 from stepdiag.calibration.temperature_text import temperature_text
 from stepdiag.export.common import (
     ExportOptions,
@@ -56,6 +56,7 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
     leading = {
         "format": GRID_FORMAT,
         "fit": calibration.fit or "",
+        **unverified_key(calibration),
         "chain": calibration.chain.name,
         "volume_mm": lengths(calibration.volume),
         "tool_mm": lengths(tool),
@@ -73,7 +74,7 @@ def csv_grid(calibration: Calibration, output: Path, options: ExportOptions) -> 
     }
     text = csv_text(_header(bool(options.orientation)), [], leading) + "".join(_rows(axes, origin, values))
     report = _report(leading, axes, error, loss, place, missing)
-    said = [fit_row(calibration), temperature_row(calibration), *report]
+    said = [*trust_rows(calibration), temperature_row(calibration), *report]
     return Export({output: text}, said, coverage_of(calibration, [*FUNCTIONS, *SQUARENESSES]))
 
 

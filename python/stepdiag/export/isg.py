@@ -21,7 +21,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, Chain, ErrorMap, InvalidArgument, Machine
-from stepdiag.calibration.finding_text import fit_row, provenance_rows
+from stepdiag.calibration.finding_text import provenance_rows, trust_rows
 from stepdiag.export.common import (
     APPROACH_WORDS,
     ExportOptions,
@@ -72,7 +72,7 @@ def isg(calibration: Calibration, output: Path, options: ExportOptions) -> Expor
     angles = ", ".join(f"{name} = {angle * 1e6:.6g} µrad" for name, angle in errors.squareness.items())
     where = "as parameters" if apart else "in the straightnesses: EXY - C0Y y, EXZ + B0Z z, EYZ - A0Z z"
     lines = [
-        fit_row(calibration),
+        *trust_rows(calibration),
         temperature_row(calibration),
         *provenance_rows(calibration),
         UNTRIED,

@@ -20,7 +20,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, Machine
-from stepdiag.calibration.finding_text import fit_row, provenance_rows
+from stepdiag.calibration.finding_text import provenance_rows, trust_rows
 from stepdiag.export.common import (
     ExportOptions,
     FloatArray,
@@ -144,7 +144,7 @@ def _what_the_files_are(
     calibration: Calibration, at: FloatArray, tool: FloatArray, origin: FloatArray, missing: list[str]
 ) -> list[str]:
     return [
-        fit_row(calibration),
+        *trust_rows(calibration),
         temperature_row(calibration),
         *provenance_rows(calibration),
         f"chain {calibration.chain}, volume {words(calibration.volume)} mm, home at {words(origin)} mm in the "

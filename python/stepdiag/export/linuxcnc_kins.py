@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from stepdiag._core import Calibration, Compensator
-from stepdiag.calibration.finding_text import fit_row
+from stepdiag.calibration.finding_text import trust_rows
 from stepdiag.export.common import (
     ExportOptions,
     FloatArray,
@@ -38,6 +38,7 @@ def linuxcnc_kins(calibration: Calibration, output: Path, options: ExportOptions
             origin=origin,
             approach=options.approach or "mean",
             accept_rejected=options.accept_rejected,
+            accept_unverified=True,  # the module decides
         )
     # INI files do not pass on quotes; the module derives the primes from the place of the bed.
     arguments = f"table={output.absolute()} chain={''.join(c for c in calibration.chain.name if c.isalpha())}"
@@ -48,7 +49,7 @@ def linuxcnc_kins(calibration: Calibration, output: Path, options: ExportOptions
     if calibration.fit == "rejected":
         arguments += " accept_rejected=1"
     lines = [
-        fit_row(calibration),
+        *trust_rows(calibration),
         temperature_row(calibration),
         f"chain {calibration.chain}, volume {words(calibration.volume)} mm, tool offset {words(tool)} mm, home at "
         f"{words(origin)} mm in the controller's coordinates",
@@ -59,6 +60,8 @@ def linuxcnc_kins(calibration: Calibration, output: Path, options: ExportOptions
         *missing,
         f"INI file: [KINS] KINEMATICS = stepdiagkins {arguments}",
     ]
+    if calibration.unverified:
+        lines.append("unverified: the module refuses this table unless accept_unverified=1 is in that line")
     if calibration.expansion is not None:
         lines.append(
             "scales: with temperatures=LOWEST,HIGHEST (°C) in that line the module takes their temperatures from pins"
@@ -101,5 +104,6 @@ def _with_tool(calibration: Calibration, tool: FloatArray) -> Calibration:
         temperature_as_found=calibration.temperature_as_found,
         expansion=calibration.expansion,
         fixed_point=calibration.fixed_point,
+        unverified=calibration.unverified,
         provenance=calibration.provenance,
     )

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from stepdiag._core import Calibration
-from stepdiag.calibration.finding_text import fit_row
+from stepdiag.calibration.finding_text import trust_rows, unverified_key
 from stepdiag.export.common import (
     APPROACH_WORDS,
     ExportOptions,
@@ -68,7 +68,7 @@ def heading(calibration: Calibration, options: ExportOptions, *, approach: bool 
     """Sentences that every export begins with. `approach`: whether it takes one direction of approach."""
     direction = f", direction of approach {APPROACH_WORDS[options.approach or 'mean']}" if approach else ""
     return [
-        fit_row(calibration),
+        *trust_rows(calibration),
         temperature_row(calibration),
         f"chain {calibration.chain}, volume {words(calibration.volume)} mm, tool offset "
         f"{words(tool_of(calibration, options))} mm, home at {words(origin_of(options))} mm in the controller's "
@@ -89,6 +89,7 @@ def csv_leading(
     return {
         "format": format_,
         "fit": calibration.fit or "",
+        **unverified_key(calibration),
         "chain": calibration.chain.name,
         "volume_mm": lengths(calibration.volume),
         "tool_mm": lengths(tool_of(calibration, options)),

@@ -70,6 +70,7 @@ def read_what_is_exported(path: Path) -> Calibration:
         temperature_as_found=calibration.temperature_as_found,
         expansion=calibration.expansion,
         fixed_point=calibration.fixed_point,
+        unverified=calibration.unverified,
     )
 
 

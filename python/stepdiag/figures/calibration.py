@@ -70,7 +70,7 @@ def _heading(calibration: Calibration, name: str) -> Heading:
     factor = calibration.variance_factor
     fit = [] if factor is None else [f"variance factor {factor:.3g}"]
     reasons = calibration.fit_reasons or ([MEANING[calibration.fit]] if calibration.fit in FITS else [])
-    return Heading(name, ", ".join([*made, *machine, *fit]), calibration.fit, reasons)
+    return Heading(name, ", ".join([*made, *machine, *fit]), calibration.fit, reasons, calibration.unverified)
 
 
 def undetermined_notes(calibration: Calibration) -> list[str]:

@@ -29,8 +29,8 @@ _COMBINATIONS = {
 }
 
 
-def draw_files(files: Sequence[Path], *, volume: bool = False) -> tuple[Figure, dict[Path, str | None]]:
-    """Draw what files contain: the figure, and the verdict of the fit of each calibration in it.
+def draw_files(files: Sequence[Path], *, volume: bool = False) -> tuple[Figure, dict[Path, Calibration]]:
+    """Draw what files contain: the figure, and each calibration in it, by its file.
 
     The order counts for two calibrations alone: B - A. `volume`: the error in the volume of a
     calibration in place of its parameters. Raises InvalidArgument naming the file."""
@@ -76,7 +76,7 @@ def draw_files(files: Sequence[Path], *, volume: bool = False) -> tuple[Figure, 
     return _draw_observation(files[0])
 
 
-def _draw_calibration(file: Path, truth: Path | None, *, volume: bool) -> tuple[Figure, dict[Path, str | None]]:
+def _draw_calibration(file: Path, truth: Path | None, *, volume: bool) -> tuple[Figure, dict[Path, Calibration]]:
     calibration = read_calibration(file)
     if volume:
         if truth is not None:
@@ -85,28 +85,28 @@ def _draw_calibration(file: Path, truth: Path | None, *, volume: bool) -> tuple[
         from stepdiag.figures.volume import draw_volume
 
         with located(str(file)):
-            return draw_volume(volume_errors(calibration, ranking=False), file.name), {file: calibration.fit}
+            return draw_volume(volume_errors(calibration, ranking=False), file.name), {file: calibration}
     from stepdiag.figures.calibration import draw_calibration
 
     errors: ErrorMap | None = None if truth is None else read_error_map(truth)
-    return draw_calibration(calibration, errors, file.name), {file: calibration.fit}
+    return draw_calibration(calibration, errors, file.name), {file: calibration}
 
 
-def _draw_difference(a: Path, b: Path) -> tuple[Figure, dict[Path, str | None]]:
+def _draw_difference(a: Path, b: Path) -> tuple[Figure, dict[Path, Calibration]]:
     from stepdiag.calibration.comparison import compare_calibrations
     from stepdiag.figures.comparison import draw_comparison
 
     one, other = _both(a, b)
     with located(f"{a}, {b}"):
         comparison = compare_calibrations(one, other)
-    return draw_comparison(comparison, f"{a.name}, {b.name}"), {a: one.fit, b: other.fit}
+    return draw_comparison(comparison, f"{a.name}, {b.name}"), {a: one, b: other}
 
 
 def _both(a: Path, b: Path) -> tuple[Calibration, Calibration]:
     return read_calibration(a), read_calibration(b)
 
 
-def _draw_measurement(file: Path, scenario: Path | None) -> tuple[Figure, dict[Path, str | None]]:
+def _draw_measurement(file: Path, scenario: Path | None) -> tuple[Figure, dict[Path, Calibration]]:
     from stepdiag.figures.measurement import draw_measurement
 
     measurement = read_measurement(file)
@@ -118,10 +118,10 @@ def _draw_measurement(file: Path, scenario: Path | None) -> tuple[Figure, dict[P
     known = read_scenario(scenario).known
     with located(str(file)):
         adjustment = adjust_scenario(known, measurement)
-        return draw_measurement(measurement, adjustment, file.name), {file: adjustment.verdict.fit}
+        return draw_measurement(measurement, adjustment, file.name), {file: adjustment.calibration}
 
 
-def _draw_observation(file: Path) -> tuple[Figure, dict[Path, str | None]]:
+def _draw_observation(file: Path) -> tuple[Figure, dict[Path, Calibration]]:
     from stepdiag.figures.uncertainty import draw_observation
     from stepdiag.planning.observation import USUAL_STEPS, observe, prospects
     from stepdiag.scenario.description import read_scenario

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Rectangle
 
+from stepdiag.calibration.finding_text import UNVERIFIED
 from stepdiag.style import COLOUR, own_style, plain, save
 
 LEFT, RIGHT = 0.72, 0.25
@@ -37,6 +38,7 @@ class Heading:
     facts: str = ""
     fit: str | None = None
     reasons: Sequence[str] = ()
+    unverified: bool = False
 
 
 class Page:
@@ -46,6 +48,7 @@ class Page:
 
     def __init__(self, heading: Heading, width: float, height: float, notes: Sequence[str] = ()) -> None:
         reasons = [] if heading.fit in (None, "accepted") else _wrapped(heading.reasons, width, 3)
+        reasons += _wrapped([UNVERIFIED], width, 2) if heading.unverified else []
         below = _wrapped(notes, width, MOST_NOTES)
         top = 0.66 + LINE * len(reasons)
         bottom = 0.36 + LINE * len(below)

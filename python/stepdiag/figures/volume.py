@@ -37,7 +37,8 @@ def draw_volume(found: VolumeErrors, name: str = "calibration") -> Figure:
     widths = [float(edges[u]) for u, _ in PLANES]
     scale = min((WIDTH - FREE) / sum(widths), TALLEST / float(max(edges[1], edges[2])))  # inches on a mm
     with own_style():
-        heading = Heading(f"{name}: error in the volume", _facts(found), found.fit)
+        unverified = isinstance(found.source, Calibration) and found.source.unverified
+        heading = Heading(f"{name}: error in the volume", _facts(found), found.fit, unverified=unverified)
         note = "planes through the point with the largest error (cross); arrows: error in the plane, enlarged"
         if isinstance(found.source, Calibration):
             note += f"; positioning errors {temperature_mark(found.source)}"

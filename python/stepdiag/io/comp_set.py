@@ -18,13 +18,16 @@ def fingerprint_rows(tables: Mapping[str, str]) -> Iterator[str]:
         yield f"# sha256 of {name}: {hashlib.sha256(text.encode()).hexdigest()}"
 
 
-def check_set(companion: Path) -> int:
-    """Compare the tables beside a companion with the fingerprints in it. Returns their number.
+def check_set(companion: Path) -> tuple[int, bool]:
+    """Compare the tables beside a companion with the fingerprints in it.
+
+    Returns their number, and whether they were made from an unverified calibration.
 
     Raises InvalidArgument for one that is missing or is not of the same export."""
-    fingerprints = re.findall(r"(?m)^# sha256 of (joint\d\.comp): ([0-9a-f]{64})$", read_text(companion))
+    text = read_text(companion)
+    fingerprints = re.findall(r"(?m)^# sha256 of (joint\d\.comp): ([0-9a-f]{64})$", text)
     for name, expected in fingerprints:
         table = companion.parent / name
         if hashlib.sha256(read_bytes(table)).hexdigest() != expected:
             raise InvalidArgument(f"{table}: is not the table that {companion.name} was written with: export again")
-    return len(fingerprints)
+    return len(fingerprints), bool(re.search("(?m)^# unverified: ", text))

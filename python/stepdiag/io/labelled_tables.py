@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from stepdiag._core import Calibration, Measurement
+from stepdiag.calibration.finding_text import unverified_key
 from stepdiag.calibration.functional_point import functional_point_straightness
 from stepdiag.parameters import COMPONENT_MEANING, units_of
 
@@ -136,6 +137,7 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
         variables,
         coordinates,
         verdict
+        | unverified_key(calibration)
         | calibration.provenance
         | {
             "title": "calibration of a three-axis machine",

@@ -125,6 +125,10 @@ class NetcdfFile:
         if given != expected:
             raise self.fail("attribute format", f'expected "{expected}", got "{given}"{newer_format(expected, given)}')
 
+    @property
+    def has_checksum(self) -> bool:
+        return _CHECKSUM in self._dataset.attrs
+
     def check(self) -> None:
         """Compare the content with the checksum of the file, if it has one. Raises InvalidArgument."""
         expected = self._dataset.attrs.get(_CHECKSUM)
@@ -136,7 +140,7 @@ class NetcdfFile:
             raise self.fail(
                 f"attribute {_CHECKSUM}",
                 f"expected {_show(expected)}, got {_checksum(self._dataset)}; the file was damaged or changed: "
-                "without this attribute it is read as it is",
+                "without this attribute it is read as it is, a calibration as unverified",
             )
 
     def __contains__(self, name: str) -> bool:

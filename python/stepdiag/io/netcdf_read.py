@@ -87,6 +87,7 @@ def read_calibration_netcdf(path: Path) -> Calibration:
             ],
             "date": file.text("date", ""),
             "provenance": {key: text for key in Calibration.provenance_keys() if (text := file.text(key, ""))},
+            "unverified": not file.has_checksum or bool(file.text("unverified", "")),
             "fit": file.text("fit", "") or None,
             "variance_factor": file.number("variance_factor"),
             "fit_reasons": list(filter(None, file.text("fit_reasons", "").split("\n"))),

@@ -2,6 +2,7 @@
 
 import glob
 import os
+import select
 import stat
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -15,6 +16,8 @@ from stepdiag.interruption import at_end, uninterrupted
 LARGEST_TEXT = 16 * 2**20
 # The full covariance for a thousand steps has 2.6 GB.
 LARGEST_BINARY = 8 * 2**30
+# How long to wait for a program that opens a pipe for writing, s. The core has the same (core/text_file.cpp).
+PATIENCE = 2.0
 
 
 def read_text(path: Path) -> str:
@@ -47,7 +50,7 @@ def read_bytes(path: Path) -> bytes:
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         raise InvalidArgument(f"{path}: cannot be read: {reason(error)}") from None
     if not stat.S_ISREG(status.st_mode):
-        raise InvalidArgument(f"{path}: expected a file, got a folder or a device")
+        raise InvalidArgument(f"{path}: expected a file, got a folder, a pipe or a device")
     if status.st_size > LARGEST_BINARY:
         raise InvalidArgument(f"{path}: larger than {LARGEST_BINARY // 2**30} GiB")
     content = _read(path, status.st_size)
@@ -57,13 +60,37 @@ def read_bytes(path: Path) -> bytes:
 
 
 def _read(path: Path, size: int) -> bytes:
+    """At most so many bytes of a regular file or of a pipe into which a program writes."""
     try:
-        with open(path, "rb") as file:
-            return file.read(size)
-    except IsADirectoryError:
-        raise InvalidArgument(f"{path}: expected a file, got a folder") from None
+        mode = path.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise InvalidArgument(f"{path}: expected a file, got a folder")
+        check_input(path)
+        # The opening of a pipe without a writer blocks without O_NONBLOCK.
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
+            begun = _first_byte(file.fileno(), path) if stat.S_ISFIFO(mode) else b""
+            os.set_blocking(file.fileno(), True)
+            return begun + file.read(size - len(begun))
+    except InvalidArgument:  # is a ValueError
+        raise
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         raise InvalidArgument(f"{path}: cannot be read: {reason(error)}") from None
+
+
+def _first_byte(pipe: int, path: Path) -> bytes:
+    """The first byte of a pipe; none if its writer takes its time, or wrote nothing.
+
+    Raises InvalidArgument if no program opens the pipe for writing within PATIENCE."""
+    polled = select.poll()
+    polled.register(pipe, select.POLLIN)
+    ready = polled.poll(PATIENCE * 1e3)
+    try:
+        first = os.read(pipe, 1)
+    except BlockingIOError:
+        return b""
+    if not ready and not first:
+        raise InvalidArgument(f"{path}: expected a file, got a pipe into which no program writes")
+    return first
 
 
 def check_input(path: Path) -> None:

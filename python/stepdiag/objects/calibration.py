@@ -32,6 +32,8 @@ class Fit(TypedDict):
     """How large faults of readings may be in it unseen, and what they then do, a sentence each."""
     noise_alone: bool
     """Whether the standard uncertainties are of noise alone, as those of linear methods are."""
+    unverified: bool
+    """Whether a checksum was absent when the calibration was read: its values may have been changed."""
 
 
 class Temperature(TypedDict):
@@ -169,6 +171,7 @@ def fit_of(calibration: Calibration) -> Fit:
         "uncertainties_multiplied_by": number(calibration.uncertainty_scaled),
         "unseen_faults": list(calibration.unseen_faults),
         "noise_alone": calibration.method in NOISE_ALONE,
+        "unverified": calibration.unverified,
     }
 
 

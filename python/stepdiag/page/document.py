@@ -113,6 +113,7 @@ def report_values(contents: Contents, found: ErrorInVolume, before: ErrorInVolum
 def _title(contents: Contents) -> str:
     machine = contents.header.words.get("machine", "three-axis machine tool")
     words = f"Calibration report: {machine}"
+    words = f"Unverified. {words}" if contents.calibration.unverified else words
     return words if contents.calibration.fit == "accepted" else f"{HEADLINE[contents.calibration.fit]}. {words}"
 
 
@@ -164,9 +165,11 @@ def _whole(title: str, calibration: Calibration, body: list[Markup], plotly: str
 
 def _running_words(calibration: Calibration) -> str:
     """On every printed page, of a calibration that is not to be relied on."""
-    if calibration.fit not in ("rejected", "doubtful"):
+    said = [HEADLINE[calibration.fit]] if calibration.fit in ("rejected", "doubtful") else []
+    said += ["Unverified"] if calibration.unverified else []
+    if not said:
         return ""
-    words, colour = HEADLINE[calibration.fit], COLOUR["rejected"]
+    words, colour = ". ".join(said), COLOUR["rejected"]
     return f"@page {{ @top-left {{ content: '{words}'; color: {colour}; font-weight: 700; }} }}\n"
 
 

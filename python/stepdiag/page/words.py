@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from stepdiag._core import Calibration
-from stepdiag.calibration.finding_text import MEANING, NOISE_ALONE, NOT_SEEN, PROVENANCE, mistake_reason
+from stepdiag.calibration.finding_text import MEANING, NOISE_ALONE, NOT_SEEN, PROVENANCE, UNVERIFIED, mistake_reason
 from stepdiag.calibration.largest_by_kind import largest_entries, largest_uncertainties
 from stepdiag.calibration.temperature_text import temperature_text
 from stepdiag.calibration.volume import VolumeErrors
@@ -102,6 +102,8 @@ def verdict_block(contents: Contents) -> Markup:
         edits = [mistake.edit for mistake in contents.mistakes]
         parts.append(element("p", element("strong", "To change:" if len(edits) == 1 else "To change if so:")))
         parts.append(listed(map(_sentence, edits)))
+    if calibration.unverified:
+        parts.append(element("p", element("strong", _sentence(UNVERIFIED))))
     notes = []
     if calibration.uncertainty_scaled is not None:
         notes.append(f"All standard uncertainties were multiplied by {calibration.uncertainty_scaled:.3g}.")
@@ -375,7 +377,7 @@ def comparison_section(contents: Contents) -> Markup | None:
         for one in change.effects[:MOST_EFFECTS]
     ]
     notes = [f"no verdict: {change.no_verdict_because}"] if change.no_verdict_because else []
-    notes += [note.replace("A and B", "before and after") for note in comparison.notes]
+    notes += [_of_before_and_after(note) for note in comparison.notes]
     if comparison.only_in_a:
         notes.append(f"only before: {', '.join(comparison.only_in_a)}")
     if comparison.only_in_b:
@@ -405,6 +407,17 @@ def comparison_section(contents: Contents) -> Markup | None:
         ),
         listed([_sentence(note) for note in notes]) if notes else None,
     )
+
+
+def _of_before_and_after(note: str) -> str:
+    """A note of a comparison of A and B, in the words of the page."""
+    for theirs, ours in (
+        ("A and B", "before and after"),
+        ("A is unverified", "the earlier calibration is unverified"),
+        ("B is unverified", "this calibration is unverified"),
+    ):
+        note = note.replace(theirs, ours)
+    return note
 
 
 def _verdict_of(change: VolumeChange, fits: Collection[str | None]) -> str:

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration
-from stepdiag.calibration.finding_text import fit_rows, provenance_rows
+from stepdiag.calibration.finding_text import fit_rows, provenance_rows, unverified_key
 from stepdiag.calibration.functional_point import functional_point_straightness
 from stepdiag.calibration.largest_by_kind import LargestEntry, largest_entries
 from stepdiag.calibration.temperature_text import temperature_rows
@@ -73,6 +73,7 @@ def functional_point_csv(calibration: Calibration) -> str:
         "tool_mm": lengths(calibration.tool),
         "method": calibration.method,
         "date": calibration.date,
+        **unverified_key(calibration),
         **calibration.provenance,
         "straightness_reference": calibration.straightness_reference,
         "covariance": "counted" if counted else "not known: straightness and rotations are taken as independent",

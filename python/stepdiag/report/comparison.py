@@ -9,6 +9,7 @@ import numpy as np
 
 from stepdiag._core import Calibration
 from stepdiag.calibration.comparison import Comparison, Difference, made_of
+from stepdiag.calibration.finding_text import unverified_key
 from stepdiag.calibration.truth import TruthAgreement
 from stepdiag.calibration.volume_change import VolumeChange
 from stepdiag.io.comparison_read import COMPARISON_FORMAT
@@ -179,7 +180,7 @@ def comparison_csv(comparison: Comparison) -> str:
 
 def _made(a: Calibration, b: Calibration) -> dict[str, str]:
     """How and from what both calibrations were made."""
-    facts = {which: made_of(c) | c.provenance for which, c in (("a", a), ("b", b))}
+    facts = {which: made_of(c) | c.provenance | unverified_key(c) for which, c in (("a", a), ("b", b))}
     return {f"{key}_{which}": text for which, own in facts.items() for key, text in own.items()}
 
 

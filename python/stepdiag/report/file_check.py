@@ -9,7 +9,7 @@ import numpy as np
 
 from stepdiag import _core
 from stepdiag._core import Calibration, InvalidArgument
-from stepdiag.calibration.finding_text import check_angles, frame_deviation_texts, implausible_texts
+from stepdiag.calibration.finding_text import UNVERIFIED, check_angles, frame_deviation_texts, implausible_texts
 from stepdiag.io.data_files import is_netcdf, read_calibration, read_measurement
 from stepdiag.io.file_kind import NETCDF_BEGINS, head_of, kind_of_text
 from stepdiag.io.refused_files import import_hint
@@ -20,12 +20,15 @@ from stepdiag.scenario.plausible_inputs import odd_columns
 
 @dataclass(frozen=True)
 class Finding:
-    """What a sound file is, in a few words, and what is odd about it all the same."""
+    """What a sound file is, in a few words, and what is odd about it all the same.
+
+    `unverified`: it is an unverified calibration, or was made from one."""
 
     kind: str
     summary: str
     warnings: tuple[str, ...] = ()
     calibration: Calibration | None = None
+    unverified: bool = False
 
     @property
     def fit(self) -> str | None:
@@ -142,7 +145,9 @@ def _error_map(path: Path) -> Finding:
     errors = _core.read_error_map(path)
     check_angles(errors, str(path))
     count = len(errors.functions) + len(errors.squareness)
-    return Finding("error map", f"{count} of 21 parameters", tuple(_warnings(errors)))
+    unverified = "unverified" in errors.header  # made from such a calibration
+    warnings = (*_warnings(errors), *([UNVERIFIED] if unverified else []))
+    return Finding("error map", f"{count} of 21 parameters", warnings, unverified=unverified)
 
 
 def _calibration(path: Path) -> Finding:
@@ -153,15 +158,17 @@ def _calibration(path: Path) -> Finding:
     summary += f", slopes of {', '.join(slopes)} open" if slopes else " determined"
     if calibration.fit is not None:
         summary += f", fit {calibration.fit}"
-    return Finding("calibration", summary, tuple(calibration.undetermined), calibration)
+    warnings = (*calibration.undetermined, *([UNVERIFIED] if calibration.unverified else []))
+    return Finding("calibration", summary, warnings, calibration, calibration.unverified)
 
 
 def _compensation(path: Path) -> Finding:
     from stepdiag.io.comp_set import check_set
 
-    tables = check_set(path)
-    known = "" if tables else "no fingerprints of its tables: an export of an earlier version"
-    return Finding("compensation.ini", f"{tables} tables of the same export", (known,) if known else ())
+    tables, unverified = check_set(path)
+    known = [] if tables else ["no fingerprints of its tables: an export of an earlier version"]
+    warnings = (*known, *([UNVERIFIED] if unverified else []))
+    return Finding("compensation.ini", f"{tables} tables of the same export", warnings, unverified=unverified)
 
 
 def _warnings(errors: _core.ErrorMap) -> Iterator[str]:

@@ -24,6 +24,8 @@ class FoundTogether:
     calibration: Calibration | None = None
     mistakes: tuple[FoundMistake, ...] = ()
 
+    unverified = False  # it comes from readings
+
     @property
     def fit(self) -> str | None:
         """Verdict of the adjustment."""

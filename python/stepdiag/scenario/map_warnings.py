@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from stepdiag._core import Chain, ErrorMap, InvalidArgument
-from stepdiag.calibration.finding_text import frame_deviation_texts, implausible_texts
+from stepdiag.calibration.finding_text import UNVERIFIED, frame_deviation_texts, implausible_texts
 from stepdiag.scenario.description import Scenario, implausible_truth
 from stepdiag.scenario.known import Known
 
@@ -26,6 +26,8 @@ def map_warnings(errors: ErrorMap, known: Known) -> Iterator[str]:
     yield from frame_deviation_texts(errors, known.plan.volume)
     yield from implausible_texts(errors, known.plan.volume, known.plausible)
     header = errors.header
+    if "unverified" in header:
+        yield UNVERIFIED
     chain = header.get("chain")
     if chain is not None and not _is_chain(chain, known.chain):
         yield f"is for the chain {chain}, the scenario has {known.chain.name}; used as given"

@@ -1,12 +1,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <cstring>
 
 #include "stepdiag/controller/compensator.h"
 #include "support/random_machine.hpp"
 
 extern "C" const char* stepdiag_c11_failure(const char* path, const char* chain);
+extern "C" const char* stepdiag_trap_failure(const char* path, const char* chain);
 
 namespace stepdiag {
 namespace {
@@ -25,6 +28,47 @@ struct Loaded {
 
 TEST(CompensatorC, ACompilerOfC11TakesItsHeaderAndAProgramInCWorks) {
     EXPECT_STREQ(stepdiag_c11_failure(written_table().c_str(), "wX'bYZt"), nullptr);
+}
+
+TEST(CompensatorC, WhatIsNoNumberIsRefusedAndRaisesNoFloatingPointException) {
+    ParameterTable table = random_table();
+    table.header["temperature_reference_c"] = "20.0";
+    table.header["expansion_per_k"] = "1e-05 1.1e-05 1.2e-05";
+    const std::string path = ::testing::TempDir() + "traps.csv";
+    write_parameter_table(table, path);
+    // In a process of its own: a trap ends it.
+    const auto end = [&] {
+        const char* const failure = stepdiag_trap_failure(path.c_str(), "wX'bYZt");
+        if (failure) std::fputs(failure, stderr);
+        std::_Exit(failure ? 1 : 0);
+    };
+    EXPECT_EXIT(end(), ::testing::ExitedWithCode(0), "");
+}
+
+TEST(CompensatorC, AnUnverifiedCalibrationIsRefusedUnlessAccepted) {
+    ParameterTable table = random_table();
+    table.header["method"] = "adjustment";
+    table.header[unverified_key] = unverified_because;
+    const std::string path = ::testing::TempDir() + "unverified.csv";
+    write_parameter_table(table, path);  // with a checksum of its own
+    char message[300];
+    EXPECT_EQ(stepdiag_compensator_load(path.c_str(), "wX'bYZt", nullptr, message, sizeof message), nullptr);
+    EXPECT_NE(std::strstr(message, "unverified.csv: unverified: a checksum was absent"), nullptr) << message;
+    EXPECT_NE(std::strstr(message, "accept_unverified"), nullptr) << message;
+    stepdiag_options options = stepdiag_default_options();
+    options.accept_rejected = 1;
+    EXPECT_EQ(stepdiag_compensator_load(path.c_str(), "wX'bYZt", &options, nullptr, 0), nullptr);
+    // What a program compiled for 1.0 may have in its padding.
+    options.accept_unverified = 0x5a5a5a5a;
+    EXPECT_EQ(stepdiag_compensator_load(path.c_str(), "wX'bYZt", &options, nullptr, 0), nullptr);
+    options.accept_unverified = 1;
+    stepdiag_compensator* compensator = stepdiag_compensator_load(path.c_str(), "wX'bYZt", &options, nullptr, 0);
+    EXPECT_EQ(stepdiag_is_unverified(compensator), 1);
+    stepdiag_compensator_free(compensator);
+
+    const Loaded verified;
+    EXPECT_EQ(stepdiag_is_unverified(verified.compensator), 0);
+    EXPECT_EQ(stepdiag_is_unverified(nullptr), 0);
 }
 
 TEST(CompensatorC, SaysWhatTheCppLibrarySays) {

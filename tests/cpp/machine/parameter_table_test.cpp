@@ -281,6 +281,34 @@ TEST(ParameterTable, FileThatWasCutAnywhereInItsRowsIsRefused) {
     expect_refused([&] { parse_parameter_table(cut, "t.csv"); }, "t.csv, line 2: sha256: expected \"");
 }
 
+TEST(ParameterTable, CalibrationWithoutItsChecksumIsUnverifiedAndSoAreItsCopies) {
+    ParameterTable table;
+    table.functions[0] = FunctionTable{{0.0, 1.0}, {0.0, 2.0}, {std::nullopt, std::nullopt}};
+    for (const auto& own : std::vector<std::map<std::string, std::string>>{
+             {{"format", stepdiag::calibration_format}}, {{"method", "adjustment"}}}) {  // before there was a format
+        table.header = own;
+        const std::string text = format_parameter_table(table);
+        EXPECT_EQ(parse_parameter_table(text, "t.csv").header.count(stepdiag::unverified_key), 0u);
+        const auto line = text.find("# sha256=");
+        const std::string without = text.substr(0, line) + text.substr(text.find('\n', line) + 1);
+        const ParameterTable read = parse_parameter_table(without, "t.csv");
+        EXPECT_EQ(read.header.at(stepdiag::unverified_key), stepdiag::unverified_because);
+        const std::string copy = format_parameter_table(read);
+        EXPECT_NE(copy.find("# sha256="), std::string::npos);
+        EXPECT_EQ(parse_parameter_table(copy, "t.csv").header.count(stepdiag::unverified_key), 1u);
+        const std::string counted = "# rows=2\n" + without;  // a count is no checksum
+        EXPECT_EQ(parse_parameter_table(counted, "t.csv").header.count(stepdiag::unverified_key), 1u);
+    }
+}
+
+TEST(ParameterTable, ErrorMapNeedsNoChecksum) {
+    for (const std::string leading :
+         {"", "# chain=[w X' b Y Z t]\n", "# format=stepdiag error map 1\n# method=adjustment\n"})
+        EXPECT_EQ(parse_parameter_table(leading + header + "EXX,0.0,0.0,um,\n", "t.csv")
+                      .header.count(stepdiag::unverified_key),
+                  0u);
+}
+
 TEST(ParameterTable, LineEndsDoNotChangeTheChecksum) {
     ParameterTable table;
     table.header = {{"format", stepdiag::calibration_format}};

@@ -1,4 +1,5 @@
-"""Texts of calibration files for the tests of the compensator: random ones of every kind, and edits of them."""
+"""Texts of error maps, which need no checksum, for the tests of the compensator: random ones of every kind, and edits
+of them."""
 
 from __future__ import annotations
 
@@ -50,7 +51,7 @@ class RandomTable:
 
 def leading_lines(chain: str, volume: tuple[float, ...], tool: tuple[float, ...]) -> list[str]:
     return [
-        "# format=stepdiag calibration 1",
+        "# format=stepdiag error map 1",
         f"# chain={chain}",
         "# volume_mm=" + " ".join(map(str, volume)),
         "# tool_mm=" + " ".join(map(str, tool)),

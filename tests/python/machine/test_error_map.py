@@ -16,12 +16,13 @@ def test_map_read_from_a_calibration_and_written_does_not_pass_for_one(tmp_path:
     file.write_text(CALIBRATION)
     sd.read_error_map(file).write(file)
     lines = file.read_text().splitlines()
-    assert lines[:5] + lines[6:7] == [
+    assert lines[:6] + lines[7:8] == [
         "# format=stepdiag error map 1",
         "# chain=[w X' b Y Z t]",
         "# volume_mm=80.0 60.0 50.0",
         "# tool_mm=0.0 0.0 0.0",
         "# note=kept",
+        "# unverified=a checksum was absent when this calibration was read",
         "parameter,position_mm,value,unit,standard_uncertainty",
     ]
 

@@ -214,7 +214,7 @@ def test_unreadable_content_is_refused(tmp_path: Path, content: bytes, message: 
         ("no.toml", "no.toml: cannot be read: No such file or directory"),
         (".", ".: expected a file, got a folder"),
         ("a\0b.toml", "cannot be read"),
-        ("/dev/zero", "/dev/zero: larger than 16 MiB"),
+        ("/dev/zero", "/dev/zero: expected a file, got a device"),
     ],
 )
 def test_path_that_is_no_file_is_refused(path: str, message: str) -> None:

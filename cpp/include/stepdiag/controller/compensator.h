@@ -28,6 +28,7 @@ typedef struct {
     int approach; /* enum stepdiag_approach */
     double largest_tool;
     int accept_rejected;    /* 1: accept a table whose fit was rejected */
+    int accept_unverified;  /* 1: accept a calibration that was read without a checksum, now or earlier */
     double temperatures[2]; /* lowest and highest that a call may state, degrees Celsius; both 0: none may */
 } stepdiag_options;
 
@@ -76,6 +77,8 @@ double stepdiag_inverse_bound(const stepdiag_compensator* compensator);
 void stepdiag_calibration_tool(const stepdiag_compensator* compensator, double tool[3]);
 /* Verdict of the table's fit: "accepted", "doubtful", "rejected" or "unchecked"; "" if the table has none. */
 const char* stepdiag_fit(const stepdiag_compensator* compensator);
+/* 1 if the table is unverified (see Compensator::is_unverified), else 0. */
+int stepdiag_is_unverified(const stepdiag_compensator* compensator);
 /* Parameters that the table does not determine, by index from 0: "EXX", "EYX (slope)", "C0Y". NULL after the last. */
 const char* stepdiag_uncompensated(const stepdiag_compensator* compensator, size_t index);
 

@@ -47,8 +47,9 @@ struct CompensatorOptions {
     double margin = 0.0;              // for Outside::linear, mm; at most the volume's shortest edge
     double largest_correction = 1.0;  // mm; command and forward shorten longer error vectors to this length
     CompensatedApproach approach = CompensatedApproach::mean;
-    double largest_tool = 1000.0;  // mm; longer tools are refused; inverse_bound() is valid for all shorter tools
-    bool accept_rejected = false;  // accept a table whose fit was rejected
+    double largest_tool = 1000.0;    // mm; longer tools are refused; inverse_bound() is valid for all shorter tools
+    bool accept_rejected = false;    // accept a table whose fit was rejected
+    bool accept_unverified = false;  // accept a calibration that was read without a checksum, now or earlier
     // Lowest and highest temperature of a scale that calls may state, degrees Celsius; both 0: none may be stated.
     std::array<double, 2> temperatures = {0.0, 0.0};
 };
@@ -81,6 +82,8 @@ public:
     // InvalidArgument, which names file, line and key, for:
     //   - a file that read_parameter_table() rejects
     //   - a table whose fit was rejected, unless accept_rejected is set
+    //   - a calibration whose checksum is absent, or was when it was read earlier (unverified_key), unless
+    //     accept_unverified is set
     //   - a table without chain, volume_mm or tool_mm, or with a chain other than `chain`
     //   - a table without parameters, or with nodes that do not match its volume
     //   - errors with slopes so large that the inverse has no bound
@@ -138,6 +141,8 @@ public:
     // Verdict of the table's fit: "accepted", "doubtful", "rejected" or "unchecked"; empty if the table has none. Warn
     // the user about a doubtful or unchecked table.
     const std::string& fit() const noexcept;
+    // Whether the table is unverified: nothing tells whether its values are those that were written. Warn the user.
+    bool is_unverified() const noexcept;
     // Parameters that the table does not determine. They are not compensated. Examples: "EXX", "EYX (slope)",
     // "EXX (above 784.0 mm)", "C0Y".
     const std::vector<std::string>& uncompensated() const noexcept;

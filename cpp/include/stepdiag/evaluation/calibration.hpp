@@ -68,6 +68,10 @@ struct Calibration {
     std::array<std::optional<CalibratedReversal>, function_count> reversal = {};  // where backward runs tell it
     std::string date = {};  // of the evaluation: ISO 8601, UTC; empty where it is not known
 
+    // Whether it, or one that it was made from, was read from a file without a checksum: nothing tells whether its
+    // values are those that were written (machine/parameter_table.hpp).
+    bool unverified = false;
+
     // Verdict of the fit; none where it is not known, as in files of earlier versions.
     std::optional<Fit> fit = {};
     std::optional<double> variance_factor = {};  // of that fit; none where nothing controls the readings
@@ -118,7 +122,7 @@ bool is_anything_determined(const Calibration& calibration);
 // - direction. A reversal error without its function has no place in a table.
 ParameterTable to_parameter_table(const Calibration& calibration);
 
-// CSV with format, chain, volume_mm, tool_mm, method, date, fit, variance_factor, uncertainty_scaled,
+// CSV with format, chain, volume_mm, tool_mm, method, date, unverified, fit, variance_factor, uncertainty_scaled,
 // between_nodes_mm, temperature_reference_c with expansion_per_k and fixed_point_mm, or temperature_as_found_c,
 // fit_reasons, unseen_faults, straightness_reference, provenance_keys, undetermined_slopes,
 // undetermined_reversal_constants and undetermined in the leading lines; not kept are the covariance and the

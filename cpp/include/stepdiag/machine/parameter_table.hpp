@@ -44,8 +44,15 @@ struct ParameterTable {
 inline constexpr const char* error_map_format = "stepdiag error map 1";
 inline constexpr const char* calibration_format = "stepdiag calibration 1";
 
-// Columns may be in any order. Values given for one direction only apply to both directions. Throws InvalidArgument,
-// which names file and line, for:
+// Key of the leading line of a table that is unverified: at some time a calibration was read whose checksum was absent,
+// so that nothing tells whether its values are those that were written. Writers carry the line on, beside a checksum of
+// their own.
+inline constexpr const char* unverified_key = "unverified";
+inline constexpr const char* unverified_because = "a checksum was absent when this calibration was read";
+
+// A calibration (its format says so or, in a file without one, a method) without the leading line "# sha256=" gets the
+// key unverified_key in its header. A hand-written error map needs no checksum. Columns may be in any order. Values
+// given for one direction only apply to both directions. Throws InvalidArgument, which names file and line, for:
 //   - a file that is unreadable, binary or of another format
 //   - format, chain, volume_mm or tool_mm given twice
 //   - rows that do not have the checksum of the leading line "# sha256=" (a truncated or changed file), or not the
