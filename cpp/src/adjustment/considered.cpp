@@ -56,8 +56,7 @@ std::vector<DeviationEffect> deviation_effects(const GaussNewton& solver, const 
         }
     for (const auto& [source, part] : {std::pair(UncertaintySource::scale, options.distance_scale_uncertainty),
                                        std::pair(UncertaintySource::air, options.air_index_uncertainty)})
-        if (part != 0.0)
-            add(source, false, solver.equations().gradient_of(longer_distances(problem, part)));
+        if (part != 0.0) add(source, false, solver.equations().gradient_of(longer_distances(problem, part)));
     return effects;
 }
 

@@ -63,9 +63,9 @@ Calibration make_calibration(
     const std::string& date, const std::optional<std::string>& fit, const std::optional<double>& variance_factor,
     const Names& fit_reasons, const std::optional<double>& uncertainty_scaled, const Texts& provenance,
     const Names& unseen_faults, const Names& conditions, const std::string& budget,
-    const std::optional<double>& between_nodes,
-    const std::optional<double>& temperature_reference, const std::optional<ArrayLike>& temperature_as_found,
-    const std::optional<ArrayLike>& expansion, const std::optional<ArrayLike>& fixed_point) {
+    const std::optional<double>& between_nodes, const std::optional<double>& temperature_reference,
+    const std::optional<ArrayLike>& temperature_as_found, const std::optional<ArrayLike>& expansion,
+    const std::optional<ArrayLike>& fixed_point) {
     Calibration calibration{method, to_chain(chain), to_vector3(volume, "volume"), to_vector3(tool, "tool"), {}, {},
                             {},     undetermined};
     for (const auto& [name, table] : functions)
@@ -131,11 +131,10 @@ void bind_calibration(py::module_& m) {
              py::arg("reversal_negative_uncertainty") = Arrays{}, py::arg("undetermined_reversal_constants") = Names{},
              py::arg("date") = "", py::arg("fit") = std::nullopt, py::arg("variance_factor") = std::nullopt,
              py::arg("fit_reasons") = Names{}, py::arg("uncertainty_scaled") = std::nullopt,
-             py::arg("provenance") = Texts{}, py::arg("unseen_faults") = Names{},
-             py::arg("conditions") = Names{}, py::arg("budget") = "",
-             py::arg("between_nodes") = std::nullopt, py::arg("temperature_reference") = std::nullopt,
-             py::arg("temperature_as_found") = std::nullopt, py::arg("expansion") = std::nullopt,
-             py::arg("fixed_point") = std::nullopt,
+             py::arg("provenance") = Texts{}, py::arg("unseen_faults") = Names{}, py::arg("conditions") = Names{},
+             py::arg("budget") = "", py::arg("between_nodes") = std::nullopt,
+             py::arg("temperature_reference") = std::nullopt, py::arg("temperature_as_found") = std::nullopt,
+             py::arg("expansion") = std::nullopt, py::arg("fixed_point") = std::nullopt,
              "A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: "
              "name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises "
              "InvalidArgument naming the parameter for what is none: nodes that do not "
@@ -150,9 +149,10 @@ void bind_calibration(py::module_& m) {
         .def_readonly("fit_reasons", &Calibration::fit_reasons, "Why that verdict, a sentence each.")
         .def_readonly("unseen_faults", &Calibration::unseen_faults,
                       "How large faults of readings may be in it unseen, and what they then do, a sentence each.")
-        .def_readonly("conditions", &Calibration::conditions,
-                      "Under which conditions it was evaluated, as they were used: temperatures, coefficients, the air, "
-                      "the instrument; a sentence each.")
+        .def_readonly(
+            "conditions", &Calibration::conditions,
+            "Under which conditions it was evaluated, as they were used: temperatures, coefficients, the air, "
+            "the instrument; a sentence each.")
         .def_readonly("budget", &Calibration::budget,
                       "What makes its largest positioning uncertainty: one line; empty where it is not known.")
         .def_property_readonly(

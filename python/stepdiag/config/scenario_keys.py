@@ -10,8 +10,8 @@ from pydantic import Field
 
 from stepdiag._core import Plan, largest_repeat_count
 from stepdiag.config.adjustment_keys import AdjustmentSection, SmoothnessSection
-from stepdiag.config.key_errors import BY_HEAD, BY_LINE
 from stepdiag.config.instrument_keys import InstrumentSection
+from stepdiag.config.key_errors import BY_HEAD, BY_LINE
 from stepdiag.config.key_types import (
     AMPLITUDE,
     ANGLES,

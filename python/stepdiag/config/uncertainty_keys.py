@@ -143,7 +143,8 @@ class UncertaintySection(SetupUncertaintyKeys):
         {"distribution": "rectangular", "half_width": 0.75, "expectation": -0.75},
     )
     temperature_c: Spread | None = _uncertain(
-        "True air beside the assumed one, as the next two; by default normal with `instrument.u_air_temperature_c`.", 0.2
+        "True air beside the assumed one, as the next two; by default normal with `instrument.u_air_temperature_c`.",
+        0.2,
     )
     pressure_hpa: Spread | None = _uncertain("Its pressure; by default with `instrument.u_air_pressure_hpa`.", 0.5)
     humidity_percent: Spread | None = _uncertain(

@@ -90,9 +90,6 @@ def conditions_object(known: Known, measurement: Measurement) -> Conditions:
     found = conditions_of(known, measurement)
     keys, temperature = known.keys.instrument, known.keys.temperature
 
-    def air(channel: str, unit: str) -> list[float] | None:
-        return _range(found.air.get(channel), unit)
-
     expansion: StatedExpansion | None = None
     if temperature is not None:
         expansion = {
@@ -108,9 +105,9 @@ def conditions_object(known: Known, measurement: Measurement) -> Conditions:
             if scale is not None
         ],
         "expansion": expansion,
-        "air_temperature_c": air("air_temperature", "c"),
-        "air_pressure_hpa": air("air_pressure", "hpa"),
-        "air_humidity_percent": air("air_humidity", "percent"),
+        "air_temperature_c": _range(found.air.get("air_temperature"), "c"),
+        "air_pressure_hpa": _range(found.air.get("air_pressure"), "hpa"),
+        "air_humidity_percent": _range(found.air.get("air_humidity"), "percent"),
         "air_used": known.assumed_air is not None,
         "refractive_index": None if found.index is None else list(found.index),
         "counted_refractive_index": found.counted,
@@ -144,4 +141,5 @@ def budget_object(calibration: Calibration, known: Known) -> Budget | None:
 
 
 def _range(values: Range | None, unit: str) -> Any:
+    """Lowest and highest value; None where there is none."""
     return None if values is None else [in_unit(unit, value) for value in values]

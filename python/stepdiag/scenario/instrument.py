@@ -1,5 +1,5 @@
-"""A scenario's `[instrument]` in native units: what its certificate says of the scale of distances and of its sensors of
-the air."""
+"""A scenario's `[instrument]` in native units: what its certificate says of the scale of distances and of its sensors
+of the air."""
 
 import math
 from collections.abc import Mapping
@@ -46,9 +46,7 @@ def times(run: _core.Measurement, factor: float) -> _core.Measurement:
     """The run with its distances times a factor."""
     if factor == 1.0:
         return run
-    return with_channels(
-        run, {name: values * factor for name, values in run.channels.items() if name.startswith("d")}
-    )
+    return with_channels(run, {name: values * factor for name, values in run.channels.items() if name.startswith("d")})
 
 
 def instrument_of(keys: InstrumentSection) -> Instrument:
@@ -84,9 +82,16 @@ def index_uncertainty(
     for quantity, u in uncertain.items():
         # At the ends of a range on the one side alone.
         step = _STEPS[quantity] if quantity != "relative_humidity" or state[quantity] < 0.5 else -_STEPS[quantity]
-        here, there = (
-            _core.Environment.from_air(**state | {quantity: state[quantity] + s}).refractive_index(wavelength)
-            for s in (0.0, step)
-        )
+        here, there = (_index(state | {quantity: state[quantity] + s}, wavelength) for s in (0.0, step))
         parts.append((there - here) / step / here * u)
     return math.hypot(*parts)
+
+
+def _index(state: Mapping[str, float], wavelength: float) -> float:
+    air = _core.Environment.from_air(
+        temperature=state["temperature"],
+        pressure=state["pressure"],
+        relative_humidity=state["relative_humidity"],
+        carbon_dioxide=state["carbon_dioxide"],
+    )
+    return air.refractive_index(wavelength)

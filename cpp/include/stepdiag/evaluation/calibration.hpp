@@ -94,8 +94,8 @@ struct Calibration {
     std::optional<Eigen::Vector3d> expansion = {};
     Eigen::Vector3d fixed_point = Eigen::Vector3d::Zero();  // from which the scales expand, by axis, mm
 
-    // Under which conditions it was evaluated, as they were used, and the budget of its largest positioning uncertainty:
-    // in words, a sentence each, as files hold them; an evaluation leaves the words to its caller.
+    // Under which conditions it was evaluated, as they were used, and the budget of its largest positioning
+    // uncertainty: in words, a sentence each, as files hold them; an evaluation leaves the words to its caller.
     std::vector<std::string> conditions = {};
     std::string budget = {};
     // Of an adjustment: how much of the standard uncertainties is made by each source that was stated, in the order of
