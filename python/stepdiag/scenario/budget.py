@@ -1,4 +1,5 @@
-"""What makes the largest standard uncertainty of a positioning error: noise, the instrument's scale, temperature, air."""
+"""What makes the largest standard uncertainty of a positioning error: noise, the instrument's scale, temperature and
+air."""
 
 import math
 from dataclasses import dataclass

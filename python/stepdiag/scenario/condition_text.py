@@ -13,8 +13,8 @@ AIR_UNITS = dict(zip(AIR, (("°C", 1.0), ("hPa", HECTOPASCAL), ("%", PERCENT)), 
 
 
 def condition_rows(conditions: Conditions, known: Known) -> Iterator[str]:
-    """Temperatures of the scales, their expansion, the air and its index, the instrument, the time; what was not recorded
-    or stated has no line."""
+    """Temperatures of the scales, their expansion, the air and its index, the instrument, the time; what was not
+    recorded or stated has no line."""
     scales = [
         f"{axis.upper()} {_range(scale.range, '°C')} ({scale.origin})"
         for axis, scale in zip(AXES, conditions.scales, strict=True)

@@ -30,7 +30,8 @@ class Conditions:
 
     scales: of X, Y, Z; None where nothing says the temperature. air: recorded ranges by channel; of an instrument that
     compensates, evaluations do not use them. index: of that air at the wavelength of the first line's head, where
-    evaluations use it; counted: that with which the instrument counted. span: from the first to the last reading used, s; None without times."""
+    evaluations use it; counted: that with which the instrument counted. span: from the first to the last reading used,
+    s; None without times."""
 
     scales: tuple[ScaleTemperature | None, ScaleTemperature | None, ScaleTemperature | None]
     air: dict[str, Range]

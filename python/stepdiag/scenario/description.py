@@ -256,8 +256,8 @@ def adjustment_options(
     reliability: bool = False,
     search_faults: bool = True,
 ) -> _core.AdjustmentOptions:
-    """What an adjustment of the scenario's runs takes for known and unknown. `measurement`: the run, for the mean of its
-    air; without one the uncertainty of the index is that in air of 20 °C. `of_samples`: of many simulated runs,
+    """What an adjustment of the scenario's runs takes for known and unknown. `measurement`: the run, for the mean of
+    its air; without one the uncertainty of the index is that in air of 20 °C. `of_samples`: of many simulated runs,
     whose noise is what is stated: none of their readings is left out, no uncertainty is scaled."""
     keys = known.keys.adjustment
     return _core.AdjustmentOptions(
