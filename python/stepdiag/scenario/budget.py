@@ -8,8 +8,8 @@ import numpy as np
 
 from stepdiag._core import Calibration
 from stepdiag.calibration.finding_text import NOISE_ALONE
-from stepdiag.calibration.largest_by_kind import largest_entries
 from stepdiag.calibration.volume import chord_variance
+from stepdiag.parameters import kind_of
 from stepdiag.scenario.known import Known
 from stepdiag.units import MICROMETRE
 
@@ -36,22 +36,23 @@ class PositioningBudget:
 
 def positioning_budget(calibration: Calibration, known: Known) -> PositioningBudget | None:
     """None where no positioning error is determined with an uncertainty."""
-    entry = largest_entries(calibration, uncertainty=True).get("positioning")
-    if entry is None or entry.position is None:
+    tables = {name: table for name, table in calibration.functions.items() if kind_of(name) == "positioning"}
+    if not tables:
         return None
-    name, total = entry.parameter, entry.standard_uncertainty
-    position, value, u = calibration.functions[name]
+    name = max(tables, key=lambda one: float(np.max(tables[one][2])))
+    position, value, u = tables[name]
+    worst = int(np.argmax(u))
     noise_alone = calibration.method in NOISE_ALONE
-    labels = calibration.covariance_labels
-    own = [k for k, (label, _) in enumerate(labels) if label == name]
-    parts = {source: part[own] for source, part in calibration.uncertainty_parts.items()}
+    parts = calibration.uncertainty_parts
+    if parts:
+        own = [k for k, (label, _) in enumerate(calibration.covariance_labels) if label == name]
+        parts = {source: part[own] for source, part in parts.items()}
     noise = np.sqrt(np.maximum(u**2 - sum(part**2 for part in parts.values()), 0.0))
     stated = {
         "scale": known.instrument.scale_uncertainty is not None,
         "temperature": known.expansion is not None,
         "air": bool(known.instrument.air),
     }
-    worst = int(np.argmin(np.abs(position - entry.position)))
     found = {
         source: float(parts[source][worst]) if source in parts else 0.0 if is_stated and not noise_alone else None
         for source, is_stated in stated.items()
@@ -61,8 +62,8 @@ def positioning_budget(calibration: Calibration, known: Known) -> PositioningBud
         between = math.sqrt(chord_variance(position, value, np.diag(noise**2)))
     return PositioningBudget(
         name,
-        entry.position,
-        total,
+        float(position[worst]),
+        float(u[worst]),
         float(noise[worst]),
         found["scale"],
         found["temperature"],
