@@ -129,7 +129,7 @@ class MistakeSearch:
     def __init__(self, scenario: Scenario | Known, measurement: _core.Measurement) -> None:
         known = scenario.known
         check_points(measurement, known.plan)
-        reduced = replace(known, assumed_air=None, instrument=known.instrument.corrected)
+        reduced = replace(known, assumed_air=None, instrument=known.instrument.corrected())
         self._copy = Copy(reduced, reduced_run(known, measurement))
         with np.errstate(all="ignore"):  # of readings that are no numbers of a machine
             self._ways = ways_of(known, self._copy.run)

@@ -13,7 +13,7 @@ from stepdiag.scenario.temperature import three
 from stepdiag.units import HOUR
 
 
-class ScaleTemperature(TypedDict):
+class UsedScale(TypedDict):
     """Of the scale of one axis, over the readings that were used."""
 
     axis: str
@@ -44,10 +44,10 @@ class StatedInstrument(TypedDict):
     u_air_humidity_percent: float | None
 
 
-class Conditions(TypedDict):
+class UsedConditions(TypedDict):
     """Temperatures, coefficients, air and index that were used, each with its lowest and highest value."""
 
-    scales: list[ScaleTemperature]
+    scales: list[UsedScale]
     """Axes of which the temperature is known."""
     expansion: StatedExpansion | None
     """null: positioning errors are as found"""
@@ -66,7 +66,7 @@ class Conditions(TypedDict):
     """From the first to the last reading; null: no times."""
 
 
-class Budget(TypedDict):
+class PositioningParts(TypedDict):
     """Of the largest standard uncertainty of positioning; null: not stated, or not counted by the method."""
 
     parameter: str
@@ -85,7 +85,7 @@ class Budget(TypedDict):
     """false: estimated from the table."""
 
 
-def conditions_object(known: Known, measurement: Measurement) -> Conditions:
+def conditions_object(known: Known, measurement: Measurement) -> UsedConditions:
     """What an evaluation of the run uses."""
     found = conditions_of(known, measurement)
     keys, temperature = known.keys.instrument, known.keys.temperature
@@ -122,7 +122,7 @@ def conditions_object(known: Known, measurement: Measurement) -> Conditions:
     }
 
 
-def budget_object(calibration: Calibration, known: Known) -> Budget | None:
+def budget_object(calibration: Calibration, known: Known) -> PositioningParts | None:
     """None where no positioning error has an uncertainty. `calibration`: of an evaluation, not from a file."""
     found = positioning_budget(calibration, known)
     if found is None:

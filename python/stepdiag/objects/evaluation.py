@@ -32,7 +32,7 @@ from stepdiag.objects.calibration import (
     tables_of,
     unit_key,
 )
-from stepdiag.objects.conditions import Budget, Conditions, budget_object, conditions_object
+from stepdiag.objects.conditions import PositioningParts, UsedConditions, budget_object, conditions_object
 from stepdiag.objects.writer import in_unit, measured, number
 from stepdiag.report.prior_effects import cosine_rows, drift_rows, rounding_rows
 from stepdiag.scenario.description import JudgedEvaluation
@@ -276,10 +276,10 @@ class EvaluationObject(TypedDict):
     warnings: list[str]
     files: EvaluatedFiles
     readings: Readings
-    conditions: Conditions
+    conditions: UsedConditions
     calibration: CalibrationTables
     largest_standard_uncertainties: list[LeastKnownLength | LeastKnownAngle]
-    budget: Budget | None
+    budget: PositioningParts | None
     """null: no positioning error is determined"""
     adjustment: AdjustmentPart | None
     """null: a linear method"""

@@ -28,7 +28,7 @@ _KEYS: Final = {
 
 
 @dataclass(frozen=True)
-class Instrument:
+class KnownInstrument:
     """`scale`: what all distances read too much, relative; `scale_uncertainty`: its standard uncertainty, None where
     none is stated. `air`: standard uncertainties of the air, by quantity, as far as they are stated."""
 
@@ -36,8 +36,7 @@ class Instrument:
     scale_uncertainty: float | None = None
     air: Mapping[str, float] = field(default_factory=dict)
 
-    @property
-    def corrected(self) -> "Instrument":
+    def corrected(self) -> "KnownInstrument":
         """The same for distances that are corrected by the scale."""
         return replace(self, scale=0.0)
 
@@ -49,10 +48,10 @@ def times(run: _core.Measurement, factor: float) -> _core.Measurement:
     return with_channels(run, {name: values * factor for name, values in run.channels.items() if name.startswith("d")})
 
 
-def instrument_of(keys: InstrumentSection) -> Instrument:
+def instrument_of(keys: InstrumentSection) -> KnownInstrument:
     """The section in native units."""
     stated = {quantity: getattr(keys, key) for quantity, key in _KEYS.items()}
-    return Instrument(
+    return KnownInstrument(
         native("scale_ppm", keys.scale_ppm),
         native("u_scale_ppm", keys.u_scale_ppm),
         {quantity: native(_KEYS[quantity], u) for quantity, u in stated.items() if u is not None},
@@ -71,7 +70,10 @@ def air_state(measurement: _core.Measurement | None, assumed: _core.Environment 
 
 
 def index_uncertainty(
-    instrument: Instrument, measurement: _core.Measurement | None, assumed: _core.Environment | None, wavelength: float
+    instrument: KnownInstrument,
+    measurement: _core.Measurement | None,
+    assumed: _core.Environment | None,
+    wavelength: float,
 ) -> float:
     """Relative standard uncertainty of the index of the air, by what is stated of its sensors, which all distances of a
     run have in common. `wavelength`: in vacuum, nm."""

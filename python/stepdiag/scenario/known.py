@@ -11,7 +11,7 @@ from stepdiag.config.toml_text import located
 from stepdiag.display import Displayed, Facts, lengths_text, point_text
 from stepdiag.scenario.adjustment import change_priors, machine_drift_of, plausible_limits, setup_priors, smoothness_of
 from stepdiag.scenario.heads import DescribedHead, check_alike, check_mirrors, heads_by_line, make_heads, signals_of
-from stepdiag.scenario.instrument import Instrument, instrument_of
+from stepdiag.scenario.instrument import KnownInstrument, instrument_of
 from stepdiag.scenario.setup import weights
 from stepdiag.scenario.temperature import known_expansion
 from stepdiag.scenario.uncertain_inputs import uncertain_inputs
@@ -50,7 +50,7 @@ class Known(Displayed):
     expansion: _core.KnownExpansion | None = field(compare=False)
     machine_drift: _core.MachineDrift | None = field(compare=False)
     uncertain: _core.UncertainInputs = field(compare=False)
-    instrument: Instrument = field(compare=False)
+    instrument: KnownInstrument = field(compare=False)
 
     @property
     def known(self) -> "Known":
