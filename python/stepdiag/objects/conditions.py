@@ -62,7 +62,7 @@ class UsedConditions(TypedDict):
     counted_refractive_index: float | None
     """With which the instrument counted; null: it compensates."""
     instrument: StatedInstrument
-    hours: float | None
+    span_h: float | None
     """From the first to the last reading; null: no times."""
 
 
@@ -118,7 +118,7 @@ def conditions_object(known: Known, measurement: Measurement) -> UsedConditions:
             "u_air_pressure_hpa": keys.u_air_pressure_hpa,
             "u_air_humidity_percent": keys.u_air_humidity_percent,
         },
-        "hours": None if found.span is None else found.span / HOUR,
+        "span_h": None if found.span is None else found.span / HOUR,
     }
 
 
