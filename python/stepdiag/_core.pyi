@@ -31,6 +31,11 @@ class Environment:
         Phase index at a vacuum wavelength (nm).
         """
     @property
+    def equation(self) -> str:
+        """
+        Of the index, as from_air takes it.
+        """
+    @property
     def state(self) -> dict[str, float] | None:
         """
         Arguments of from_air, without the equation; None of a constant index.
@@ -1242,7 +1247,7 @@ class Calibration:
             Of a function these are arrays (n,), of a squareness numbers without a position. Raises KeyError naming the
             parameters that there are.
         """
-    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None, provenance: collections.abc.Mapping[str, str] = {}, unseen_faults: collections.abc.Sequence[str] = [], between_nodes: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_reference: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_as_found: numpy.typing.ArrayLike | None = None, expansion: numpy.typing.ArrayLike | None = None, fixed_point: numpy.typing.ArrayLike | None = None, unverified: bool = False) -> None:
+    def __init__(self, method: str, chain: Chain | str, volume: numpy.typing.ArrayLike, tool: numpy.typing.ArrayLike, functions: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]], squareness: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]] = {}, *, undetermined_slopes: collections.abc.Sequence[str] = [], undetermined: collections.abc.Sequence[str] = [], covariance: numpy.typing.ArrayLike | None = None, reversal: collections.abc.Mapping[str, tuple[numpy.typing.ArrayLike, numpy.typing.ArrayLike, numpy.typing.ArrayLike]] = {}, reversal_negative_uncertainty: collections.abc.Mapping[str, numpy.typing.ArrayLike] = {}, undetermined_reversal_constants: collections.abc.Sequence[str] = [], date: str = '', fit: str | None = None, variance_factor: typing.SupportsFloat | typing.SupportsIndex | None = None, fit_reasons: collections.abc.Sequence[str] = [], uncertainty_scaled: typing.SupportsFloat | typing.SupportsIndex | None = None, provenance: collections.abc.Mapping[str, str] = {}, unseen_faults: collections.abc.Sequence[str] = [], conditions: collections.abc.Sequence[str] = [], budget: str = '', between_nodes: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_reference: typing.SupportsFloat | typing.SupportsIndex | None = None, temperature_as_found: numpy.typing.ArrayLike | None = None, expansion: numpy.typing.ArrayLike | None = None, fixed_point: numpy.typing.ArrayLike | None = None, unverified: bool = False) -> None:
         """
         A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises InvalidArgument naming the parameter for what is none: nodes that do not ascend, values that are not finite, a covariance that is not one of these values.
         """
@@ -1278,6 +1283,10 @@ class Calibration:
         """
         The same calibration with this standard uncertainty by errors between the nodes, mm. Raises InvalidArgument below 0.
         """
+    def with_conditions(self, conditions: collections.abc.Sequence[str], budget: str) -> Calibration:
+        """
+        The same calibration with these words. Raises InvalidArgument for a sentence of more than one line.
+        """
     def with_provenance(self, provenance: collections.abc.Mapping[str, str]) -> Calibration:
         """
         The same calibration with this provenance, by the keys of the property. Raises InvalidArgument for other keys, and for texts that are empty or of more than one line.
@@ -1292,9 +1301,19 @@ class Calibration:
         Standard uncertainty of the functional point by errors between the nodes, as it was stated, mm; None: nothing was stated. It is in no other uncertainty.
         """
     @property
+    def budget(self) -> str:
+        """
+        What makes its largest positioning uncertainty: one line; empty where it is not known.
+        """
+    @property
     def chain(self) -> Chain:
         """
         Of the machine.
+        """
+    @property
+    def conditions(self) -> list[str]:
+        """
+        Under which conditions it was evaluated, as they were used: temperatures, coefficients, the air, the instrument; a sentence each.
         """
     @property
     def covariance(self) -> numpy.typing.NDArray[numpy.float64] | None:
@@ -1387,6 +1406,11 @@ class Calibration:
         (3,) offset of the functional point, mm
         """
     @property
+    def uncertainty_parts(self) -> dict[str, numpy.typing.NDArray[numpy.float64]]:
+        """
+        Of an adjustment, by source ("scale" of the instrument, "temperature", "air"): what it makes of the standard uncertainties, mm or rad, in the order of covariance_labels. Sources that are not stated are absent; a file does not have them.
+        """
+    @property
     def uncertainty_scaled(self) -> float | None:
         """
         What all uncertainties were multiplied by, beyond what follows from those of the readings (scale_uncertainty); None: by nothing.
@@ -1473,12 +1497,18 @@ class MachineDrift:
         ...
 class AdjustmentOptions:
     """
-    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of a false alarm among a thousand tests for faults; 0: they are named and not corrected. slips: "report" rejects a run with a slip, "estimate" makes it an unknown and accepts that. scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best. plausible: what a machine can be. expansion: of the scales; coefficients that are uncertain are unknowns. machine_drift: of which the rates are unknowns. reliability: also which faults the readings control. search_faults: False: it is known already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not reached soon, values are those that were, and rejected.
+    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of a false alarm among a thousand tests for faults; 0: they are named and not corrected. slips: "report" rejects a run with a slip, "estimate" makes it an unknown and accepts that. scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best. plausible: what a machine can be. expansion: of the scales; coefficients that are uncertain are unknowns. machine_drift: of which the rates are unknowns. reliability: also which faults the readings control. search_faults: False: it is known already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not reached soon, values are those that were, and rejected. distance_scale_uncertainty, air_index_uncertainty: relative standard uncertainties of all distances in common, by the instrument's scale and by the index of the air; they count in the uncertainties only.
     """
-    def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.00012, slips: str = 'report', scale_uncertainty: bool = False, full_covariance: bool = False, plausible: PlausibleLimits = ..., expansion: KnownExpansion | None = None, machine_drift: MachineDrift | None = None, reliability: bool = False, search_faults: bool = True) -> None:
+    def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.00012, slips: str = 'report', scale_uncertainty: bool = False, full_covariance: bool = False, plausible: PlausibleLimits = ..., expansion: KnownExpansion | None = None, machine_drift: MachineDrift | None = None, reliability: bool = False, search_faults: bool = True, distance_scale_uncertainty: typing.SupportsFloat | typing.SupportsIndex = 0.0, air_index_uncertainty: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
         adjust() checks them.
         """
+    @property
+    def air_index_uncertainty(self) -> float:
+        ...
+    @property
+    def distance_scale_uncertainty(self) -> float:
+        ...
     @property
     def expansion(self) -> KnownExpansion | None:
         ...
@@ -2025,6 +2055,10 @@ class Adjustment:
     def with_implausible_inputs(self, inputs: collections.abc.Sequence[str]) -> Adjustment:
         """
         The same, at best doubtful where there are inputs that no workshop has, a sentence each.
+        """
+    def with_conditions(self, conditions: collections.abc.Sequence[str], budget: str) -> Adjustment:
+        """
+        The same, with these words in the calibration.
         """
     def with_mistake(self, mistake: str) -> Adjustment:
         """

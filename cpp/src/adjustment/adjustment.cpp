@@ -4,11 +4,11 @@
 #include <cmath>
 
 #include "adjustment/adjustment_result.hpp"
+#include "adjustment/considered.hpp"
 #include "adjustment/fault_search.hpp"
 #include "adjustment/fault_tests.hpp"
 #include "adjustment/prior_scatter.hpp"
 #include "adjustment/reliability.hpp"
-#include "adjustment/sensor_deviations.hpp"
 #include "adjustment/smoothness.hpp"
 #include "adjustment/verdict.hpp"
 #include "evaluation/fit_test.hpp"
@@ -34,6 +34,10 @@ void check_options(const AdjustmentOptions& options, const Plan& plan) {
         if (!drift->standard_uncertainty.allFinite() || drift->standard_uncertainty.minCoeff() < 0.0)
             throw InvalidArgument("adjustment machine_drift: expected three finite standard uncertainties, at least 0");
     }
+    for (const auto& [key, u] : {std::pair("distance_scale_uncertainty", options.distance_scale_uncertainty),
+                                 std::pair("air_index_uncertainty", options.air_index_uncertainty)})
+        if (!(u >= 0.0 && u < 1.0))
+            throw InvalidArgument(std::string("adjustment ") + key + ": expected a part of at least 0 and below 1");
     for (const auto& entry : options.setup_by_line)
         if (!plan.contains(Line::parse(entry.first)))
             throw InvalidArgument("adjustment: line \"" + entry.first + "\" is not in the plan");
@@ -166,7 +170,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     result.unseen = unseen_faults(*solution, faults.tests(*solution), forms, noise);
     if (options.reliability) result.reliability = reliability(*solution, forms, noise);
     if (options.scale_uncertainty) scale_uncertainties(result);
-    add_sensor_effects(sensor_effects(solver), problem, forms, observability, result);
+    add_deviation_effects(deviation_effects(solver, options), problem, forms, observability, result);
     state_temperature(measurement, options.expansion, result.calibration);
     for (const ExpansionEstimate& found : result.expansion)
         for (const int axis : found.axes) (*result.calibration.expansion)[axis] = found.value;

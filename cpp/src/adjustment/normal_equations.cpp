@@ -384,7 +384,7 @@ Eigen::VectorXd NormalEquations::gradient_of_shifts(
         const Eigen::Vector3d here = shift(point);
         for (int r = point.first_reading; r < point.end_reading; ++r) change[r] = by_shift_[r].dot(here);
     }
-    return transposed(change, Eigen::VectorXd::Zero(problem_->size()));
+    return gradient_of(change);
 }
 
 Eigen::VectorXd NormalEquations::image(const Eigen::VectorXd& v) const {

@@ -65,7 +65,11 @@ public:
     // Adds what the readings' second derivatives by the set-ups make of the residuals at x, the last linearise.
     void add_curvature(const Eigen::VectorXd& x, BorderedBand& matrix);
     Eigen::VectorXd gradient(const Eigen::VectorXd& x) const;  // J^T w - P x
-    // J^T of what the readings change by where each axis stands further along itself by shift(point), mm. Of a problem
+    // J^T of what the readings, used or not, change by, in units of their standard uncertainties.
+    Eigen::VectorXd gradient_of(const Eigen::VectorXd& change) const {
+        return transposed(change, Eigen::VectorXd::Zero(problem_->size()));
+    }
+    // The same of what they change by where each axis stands further along itself by shift(point), mm. Of a problem
     // with expansion.
     Eigen::VectorXd gradient_of_shifts(const std::function<Eigen::Vector3d(const AdjustedPoint&)>& shift) const;
     Eigen::VectorXd image(const Eigen::VectorXd& v) const;  // J v, of all readings

@@ -152,13 +152,16 @@ void bind_options(py::module_& m) {
         "known "
         "already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not "
         "reached "
-        "soon, values are those that were, and rejected.")
+        "soon, values are those that were, and rejected. distance_scale_uncertainty, air_index_uncertainty: relative "
+        "standard uncertainties of all distances in common, by the instrument's scale and by the index of the air; "
+        "they count in the uncertainties only.")
         .def(py::init([](const ReadingUncertainty& uncertainty, const Priors& setup,
                          const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
                          bool rotations, const std::optional<Smoothness>& smoothness, double outlier_probability,
                          const std::string& slips, bool scale_uncertainty, bool full_covariance,
                          const PlausibleLimits& plausible, const std::optional<KnownExpansion>& expansion,
-                         const std::optional<MachineDrift>& machine_drift, bool reliability, bool search_faults) {
+                         const std::optional<MachineDrift>& machine_drift, bool reliability, bool search_faults,
+                         double distance_scale_uncertainty, double air_index_uncertainty) {
                  AdjustmentOptions options{uncertainty,
                                            setup.value,
                                            {},
@@ -174,7 +177,9 @@ void bind_options(py::module_& m) {
                                            expansion,
                                            machine_drift,
                                            reliability,
-                                           search_faults};
+                                           search_faults,
+                                           distance_scale_uncertainty,
+                                           air_index_uncertainty};
                  for (const auto& [line, priors] : setup_by_line) options.setup_by_line[line] = priors.value;
                  return options;
              }),
@@ -186,7 +191,9 @@ void bind_options(py::module_& m) {
              py::arg("scale_uncertainty") = usual.scale_uncertainty, py::arg("full_covariance") = usual.full_covariance,
              py::arg("plausible") = usual.plausible, py::arg("expansion") = std::nullopt,
              py::arg("machine_drift") = std::nullopt, py::arg("reliability") = usual.reliability,
-             py::arg("search_faults") = usual.search_faults, "adjust() checks them.")
+             py::arg("search_faults") = usual.search_faults,
+             py::arg("distance_scale_uncertainty") = usual.distance_scale_uncertainty,
+             py::arg("air_index_uncertainty") = usual.air_index_uncertainty, "adjust() checks them.")
         .def_readonly("uncertainty", &AdjustmentOptions::uncertainty)
         .def_property_readonly("setup", [](const AdjustmentOptions& o) { return Priors{o.setup}; })
         .def_property_readonly("setup_by_line",
@@ -209,7 +216,9 @@ void bind_options(py::module_& m) {
         .def_readonly("expansion", &AdjustmentOptions::expansion)
         .def_readonly("machine_drift", &AdjustmentOptions::machine_drift)
         .def_readonly("reliability", &AdjustmentOptions::reliability)
-        .def_readonly("search_faults", &AdjustmentOptions::search_faults);
+        .def_readonly("search_faults", &AdjustmentOptions::search_faults)
+        .def_readonly("distance_scale_uncertainty", &AdjustmentOptions::distance_scale_uncertainty)
+        .def_readonly("air_index_uncertainty", &AdjustmentOptions::air_index_uncertainty);
 }
 
 void bind_result(py::module_& m) {
@@ -512,6 +521,14 @@ void bind_result(py::module_& m) {
                 return found;
             },
             py::arg("inputs"), "The same, at best doubtful where there are inputs that no workshop has, a sentence each.")
+        .def(
+            "with_conditions",
+            [](Result found, const std::vector<std::string>& conditions, const std::string& budget) {
+                found.adjustment.calibration.conditions = conditions;
+                found.adjustment.calibration.budget = budget;
+                return found;
+            },
+            py::arg("conditions"), py::arg("budget"), "The same, with these words in the calibration.")
         .def_property_readonly(
             "smoothness",
             [](const Result& r) {

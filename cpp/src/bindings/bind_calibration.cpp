@@ -62,9 +62,10 @@ Calibration make_calibration(
     const Tables& reversal, const Arrays& reversal_negative_uncertainty, const Names& undetermined_reversal_constants,
     const std::string& date, const std::optional<std::string>& fit, const std::optional<double>& variance_factor,
     const Names& fit_reasons, const std::optional<double>& uncertainty_scaled, const Texts& provenance,
-    const Names& unseen_faults, const std::optional<double>& between_nodes,
-    const std::optional<double>& temperature_reference, const std::optional<ArrayLike>& temperature_as_found,
-    const std::optional<ArrayLike>& expansion, const std::optional<ArrayLike>& fixed_point, bool unverified) {
+    const Names& unseen_faults, const Names& conditions, const std::string& budget,
+    const std::optional<double>& between_nodes, const std::optional<double>& temperature_reference,
+    const std::optional<ArrayLike>& temperature_as_found, const std::optional<ArrayLike>& expansion,
+    const std::optional<ArrayLike>& fixed_point, bool unverified) {
     Calibration calibration{method, to_chain(chain), to_vector3(volume, "volume"), to_vector3(tool, "tool"), {}, {},
                             {},     undetermined};
     for (const auto& [name, table] : functions)
@@ -99,6 +100,8 @@ Calibration make_calibration(
     calibration.uncertainty_scaled = uncertainty_scaled;
     calibration.provenance = provenance;
     calibration.unseen_faults = unseen_faults;
+    calibration.conditions = conditions;
+    calibration.budget = budget;
     calibration.between_nodes = between_nodes;
     calibration.temperature_reference = temperature_reference;
     if (temperature_as_found)
@@ -129,10 +132,10 @@ void bind_calibration(py::module_& m) {
              py::arg("reversal_negative_uncertainty") = Arrays{}, py::arg("undetermined_reversal_constants") = Names{},
              py::arg("date") = "", py::arg("fit") = std::nullopt, py::arg("variance_factor") = std::nullopt,
              py::arg("fit_reasons") = Names{}, py::arg("uncertainty_scaled") = std::nullopt,
-             py::arg("provenance") = Texts{}, py::arg("unseen_faults") = Names{},
-             py::arg("between_nodes") = std::nullopt, py::arg("temperature_reference") = std::nullopt,
-             py::arg("temperature_as_found") = std::nullopt, py::arg("expansion") = std::nullopt,
-             py::arg("fixed_point") = std::nullopt, py::arg("unverified") = false,
+             py::arg("provenance") = Texts{}, py::arg("unseen_faults") = Names{}, py::arg("conditions") = Names{},
+             py::arg("budget") = "", py::arg("between_nodes") = std::nullopt,
+             py::arg("temperature_reference") = std::nullopt, py::arg("temperature_as_found") = std::nullopt,
+             py::arg("expansion") = std::nullopt, py::arg("fixed_point") = std::nullopt, py::arg("unverified") = false,
              "A calibration from its parts, each as the property of its name gives it; reversal_negative_uncertainty: "
              "name -> (n,), of negative_functions. A standard uncertainty that is not known is NaN. Raises "
              "InvalidArgument naming the parameter for what is none: nodes that do not "
@@ -150,6 +153,23 @@ void bind_calibration(py::module_& m) {
         .def_readonly("fit_reasons", &Calibration::fit_reasons, "Why that verdict, a sentence each.")
         .def_readonly("unseen_faults", &Calibration::unseen_faults,
                       "How large faults of readings may be in it unseen, and what they then do, a sentence each.")
+        .def_readonly(
+            "conditions", &Calibration::conditions,
+            "Under which conditions it was evaluated, as they were used: temperatures, coefficients, the air, "
+            "the instrument; a sentence each.")
+        .def_readonly("budget", &Calibration::budget,
+                      "What makes its largest positioning uncertainty: one line; empty where it is not known.")
+        .def_property_readonly(
+            "uncertainty_parts",
+            [](const Calibration& c) {
+                std::map<std::string, DoubleArray> parts;
+                for (const auto& [source, part] : c.uncertainty_parts)
+                    parts.emplace(name(source), DoubleArray(py::ssize_t(part.size()), part.data()));
+                return parts;
+            },
+            "Of an adjustment, by source (\"scale\" of the instrument, \"temperature\", \"air\"): what it makes of the "
+            "standard uncertainties, mm or rad, in the order of covariance_labels. Sources that are not stated are "
+            "absent; a file does not have them.")
         .def_readonly("uncertainty_scaled", &Calibration::uncertainty_scaled,
                       "What all uncertainties were multiplied by, beyond what follows from those of the readings "
                       "(scale_uncertainty); None: by nothing.")
@@ -211,6 +231,16 @@ void bind_calibration(py::module_& m) {
             py::arg("between_nodes"),
             "The same calibration with this standard uncertainty by errors between the nodes, mm. Raises "
             "InvalidArgument below 0.")
+        .def(
+            "with_conditions",
+            [](Calibration c, const Names& conditions, const std::string& budget) {
+                c.conditions = conditions;
+                c.budget = budget;
+                check(c);
+                return c;
+            },
+            py::arg("conditions"), py::arg("budget"),
+            "The same calibration with these words. Raises InvalidArgument for a sentence of more than one line.")
         .def_static(
             "provenance_keys", [] { return Names(provenance_keys.begin(), provenance_keys.end()); },
             "The keys that a provenance may have.")

@@ -38,6 +38,13 @@ void bind_core(py::module_& m) {
                                                      {"carbon_dioxide", air->carbon_dioxide}};
             },
             "Arguments of from_air, without the equation; None of a constant index.")
+        .def_property_readonly(
+            "equation",
+            [](const Environment& environment) {
+                constexpr const char* names[] = {"ciddor", "modified_edlen", "edlen_1966"};
+                return std::string(names[static_cast<int>(environment.equation)]);
+            },
+            "Of the index, as from_air takes it.")
         .def(
             "refractive_index",
             [](const Environment& environment, double wavelength) { return refractive_index(environment, wavelength); },

@@ -115,6 +115,11 @@ auto numbers(AnyCalibration& calibration) {
 
 }  // namespace
 
+std::string name(UncertaintySource source) {
+    constexpr const char* names[] = {"scale", "temperature", "air"};
+    return names[static_cast<int>(source)];
+}
+
 void check(const Calibration& calibration) {
     if (!calibration.volume.allFinite() || !(calibration.volume.minCoeff() > 0.0))
         throw InvalidArgument("volume: expected three positive edges in mm");
@@ -133,6 +138,8 @@ void check(const Calibration& calibration) {
     for (const std::string& sentence : calibration.undetermined) check_one_line(sentence, "undetermined");
     for (const std::string& sentence : calibration.fit_reasons) check_one_line(sentence, "fit_reasons");
     for (const std::string& sentence : calibration.unseen_faults) check_one_line(sentence, "unseen_faults");
+    for (const std::string& sentence : calibration.conditions) check_one_line(sentence, "conditions");
+    check_one_line(calibration.budget, "budget");
     for (int i = 0; i < function_count; ++i) {
         const std::string name = FunctionId::at(i).name();
         if (const auto& f = calibration.functions[i])
@@ -267,6 +274,8 @@ ParameterTable to_parameter_table(const Calibration& calibration) {
     if (!calibration.fit_reasons.empty()) table.header["fit_reasons"] = join(calibration.fit_reasons, sentence_break);
     if (!calibration.unseen_faults.empty())
         table.header["unseen_faults"] = join(calibration.unseen_faults, sentence_break);
+    if (!calibration.conditions.empty()) table.header["conditions"] = join(calibration.conditions, sentence_break);
+    if (!calibration.budget.empty()) table.header["budget"] = calibration.budget;
     if (calibration.method == "conventional" || calibration.method == "enhanced")
         table.header["uncertainties"] = "of the noise of the readings alone";
     if (!slopes.empty()) table.header["undetermined_slopes"] = join(slopes, " ");
@@ -297,6 +306,8 @@ Calibration read_calibration(const std::string& path) {
     calibration.undetermined = split(optional_value("undetermined"), sentence_break);
     calibration.fit_reasons = split(optional_value("fit_reasons"), sentence_break);
     calibration.unseen_faults = split(optional_value("unseen_faults"), sentence_break);
+    calibration.conditions = split(optional_value("conditions"), sentence_break);
+    calibration.budget = optional_value("budget");
     calibration.date = optional_value("date");
     for (const char* key : provenance_keys)
         if (std::string text = optional_value(key); !text.empty()) calibration.provenance[key] = std::move(text);

@@ -45,6 +45,9 @@ Calibration with_change(const Baseline& baseline, const Prediction& prediction) 
     Calibration updated = baseline.calibration();
     updated.method += (updated.date.empty() ? "" : " of " + updated.date) + ", rechecked";
     updated.date.clear();
+    updated.conditions.clear();  // of the first evaluation, as the next two
+    updated.budget.clear();
+    updated.uncertainty_parts.clear();
     updated.covariance = 0.5 * (covariance + covariance.transpose());
     Eigen::Index entry = 0;
     const auto take = [&](double& value, double& uncertainty) {

@@ -432,11 +432,11 @@ def _between_nodes(calibration: Calibration, tool: FloatArray, point: FloatArray
     for name, (position, value, u) in calibration.functions.items():
         own = np.array([label == name for label in labels])
         block = np.diag(np.nan_to_num(u) ** 2) if covariance is None else covariance[np.ix_(own, own)]
-        variances.append(factors[name] ** 2 * _chord_variance(position, value, block))
+        variances.append(factors[name] ** 2 * chord_variance(position, value, block))
     return math.sqrt(sum(variances))
 
 
-def _chord_variance(position: FloatArray, value: FloatArray, covariance: FloatArray) -> float:
+def chord_variance(position: FloatArray, value: FloatArray, covariance: FloatArray) -> float:
     """Mean square of what a function deviates from its chords, estimated from its table; noise is taken off."""
     if len(position) < 3:
         return 0.0

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import click
 
 from stepdiag._core import InvalidArgument
-from stepdiag.cli.options import PATH, Writes, tell, tell_inputs, tell_trust
+from stepdiag.cli.options import PATH, Writes, tell_inputs, tell_trust
 from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import FIGURE, PLANS, OutputFile
 from stepdiag.progress import Progress

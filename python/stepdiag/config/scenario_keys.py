@@ -11,6 +11,7 @@ from pydantic import Field
 from stepdiag._core import Plan, largest_repeat_count
 from stepdiag.config.adjustment_keys import AdjustmentSection, SmoothnessSection
 from stepdiag.config.input_limit_keys import InputLimitsSection
+from stepdiag.config.instrument_keys import InstrumentSection
 from stepdiag.config.key_errors import BY_HEAD, BY_LINE
 from stepdiag.config.key_types import (
     AMPLITUDE,
@@ -261,6 +262,7 @@ class KnownKeys(Section):
     line: dict[str, LineKeys] = tables("LINE")
     temperature: KnownTemperatureKeys | None = None
     environment: KnownEnvironmentKeys = KnownEnvironmentKeys.model_construct()
+    instrument: InstrumentSection = InstrumentSection.model_construct()
     noise: NoiseKeys = NoiseKeys.model_construct()
     uncertainty: UncertaintySection = UncertaintySection.model_construct()
     adjustment: AdjustmentSection = AdjustmentSection.model_construct()

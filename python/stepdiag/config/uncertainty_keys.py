@@ -142,11 +142,20 @@ class UncertaintySection(SetupUncertaintyKeys):
         "chief ray, -1.5 a single-mode interferometer.",
         {"distribution": "rectangular", "half_width": 0.75, "expectation": -0.75},
     )
-    temperature_c: Spread | None = _uncertain("True air beside the assumed one, as the next two.", 0.2)
-    pressure_hpa: Spread | None = _uncertain("Its pressure.", 0.5)
-    humidity_percent: Spread | None = _uncertain("Its relative humidity.", 5.0)
+    temperature_c: Spread | None = _uncertain(
+        "True air beside the assumed one, as the next two; by default normal with `instrument.u_air_temperature_c`.",
+        0.2,
+    )
+    pressure_hpa: Spread | None = _uncertain("Its pressure; by default with `instrument.u_air_pressure_hpa`.", 0.5)
+    humidity_percent: Spread | None = _uncertain(
+        "Its relative humidity; by default with `instrument.u_air_humidity_percent`.", 5.0
+    )
     refractive_index_ppm: Spread | None = _uncertain("True index of the air, relative to that of its state.", 0.1)
-    wavelength_ppm: Spread | None = _uncertain("Vacuum wavelength of the lasers, relative.", 0.02)
+    wavelength_ppm: Spread | None = _uncertain(
+        "Vacuum wavelength of the lasers, relative, which is the scale of all distances; by default normal with "
+        "`instrument.u_scale_ppm`.",
+        0.02,
+    )
     head_walk_um_per_sqrt_h: Spread | None = _uncertain(
         "Random walk of the distances since a line's first reading (normal); as the next two it needs "
         "`plan.seconds_per_reading`.",

@@ -98,6 +98,8 @@ def _with_tool(calibration: Calibration, tool: FloatArray) -> Calibration:
         variance_factor=calibration.variance_factor,
         fit_reasons=calibration.fit_reasons,
         unseen_faults=calibration.unseen_faults,
+        conditions=calibration.conditions,
+        budget=calibration.budget,
         uncertainty_scaled=calibration.uncertainty_scaled,
         between_nodes=calibration.between_nodes,
         temperature_reference=calibration.temperature_reference,

@@ -133,6 +133,8 @@ def calibration_table(calibration: Calibration) -> xr.Dataset:
         verdict["fixed_point_mm"] = calibration.fixed_point
     verdict["fit_reasons"] = "\n".join(calibration.fit_reasons)
     verdict["unseen_faults"] = "\n".join(calibration.unseen_faults)
+    verdict["conditions"] = "\n".join(calibration.conditions)
+    verdict["budget"] = calibration.budget
     return xr.Dataset(
         variables,
         coordinates,

@@ -92,6 +92,8 @@ def read_calibration_netcdf(path: Path) -> Calibration:
             "variance_factor": file.number("variance_factor"),
             "fit_reasons": list(filter(None, file.text("fit_reasons", "").split("\n"))),
             "unseen_faults": list(filter(None, file.text("unseen_faults", "").split("\n"))),
+            "conditions": list(filter(None, file.text("conditions", "").split("\n"))),
+            "budget": file.text("budget", ""),
             "uncertainty_scaled": file.number("uncertainty_scaled"),
             "between_nodes": file.number("between_nodes_mm"),
             "temperature_reference": file.number("temperature_reference_c"),

@@ -129,7 +129,8 @@ class MistakeSearch:
     def __init__(self, scenario: Scenario | Known, measurement: _core.Measurement) -> None:
         known = scenario.known
         check_points(measurement, known.plan)
-        self._copy = Copy(replace(known, assumed_air=None), reduced_run(known, measurement))
+        reduced = replace(known, assumed_air=None, instrument=known.instrument.corrected())
+        self._copy = Copy(reduced, reduced_run(known, measurement))
         with np.errstate(all="ignore"):  # of readings that are no numbers of a machine
             self._ways = ways_of(known, self._copy.run)
             # However well they fit: no machine is off by so much.

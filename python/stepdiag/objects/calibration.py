@@ -127,6 +127,10 @@ class CalibrationTables(Temperature):
     reversal_errors: list[LengthReversal | AngleReversal]
     """Approached in + direction less in - direction."""
     squarenesses: list[Squareness]
+    conditions: list[str]
+    """Under which it was evaluated, as they were used, a sentence each; empty: not known."""
+    budget: str
+    """What makes its largest positioning uncertainty; empty: not known."""
     undetermined: list[str]
     """What is not determined, a sentence each."""
     findings: list[OpenFinding]
@@ -203,6 +207,8 @@ def tables_of(calibration: Calibration) -> CalibrationTables:
         "functions": _by_node(calibration.functions, "slope_determined", slopes),
         "reversal_errors": _by_node(calibration.reversal, "constant_determined", constants),
         "squarenesses": _squarenesses(calibration.squareness),
+        "conditions": list(calibration.conditions),
+        "budget": calibration.budget,
         "undetermined": list(calibration.undetermined),
         "findings": findings_of(calibration.findings, calibration.undetermined),
     }

@@ -32,6 +32,7 @@ from stepdiag.objects.calibration import (
     tables_of,
     unit_key,
 )
+from stepdiag.objects.conditions import PositioningParts, UsedConditions, budget_object, conditions_object
 from stepdiag.objects.writer import in_unit, measured, number
 from stepdiag.report.prior_effects import cosine_rows, drift_rows, rounding_rows
 from stepdiag.scenario.description import JudgedEvaluation
@@ -275,8 +276,11 @@ class EvaluationObject(TypedDict):
     warnings: list[str]
     files: EvaluatedFiles
     readings: Readings
+    conditions: UsedConditions
     calibration: CalibrationTables
     largest_standard_uncertainties: list[LeastKnownLength | LeastKnownAngle]
+    budget: PositioningParts | None
+    """null: no positioning error is determined"""
     adjustment: AdjustmentPart | None
     """null: a linear method"""
     linear: LinearPart | None
@@ -303,8 +307,10 @@ def evaluation_object(
         "warnings": list(warnings),
         "files": files,
         "readings": readings_of(measurement, known),
+        "conditions": conditions_object(known, measurement),
         "calibration": tables_of(written),
         "largest_standard_uncertainties": largest_of(written, uncertainty=True),
+        "budget": budget_object(written, known),
         "adjustment": _adjustment(result, known) if isinstance(result, Adjustment) else None,
         "linear": _linear(result) if isinstance(result, JudgedEvaluation) else None,
         "notes": [*rounding_rows(result.rounded), *cosine_rows(measurement, known), *drift_rows(measurement, known)]

@@ -132,6 +132,8 @@ def summary_section(contents: Contents, found: ErrorInVolume) -> Markup:
         *_within(found.figures),
         ("Largest errors", _sentence("; ".join(_largest(calibration)))),
         ("How well known", _how_well(calibration)),
+        *([("Uncertainty budget", _sentence(calibration.budget))] if calibration.budget else []),
+        *([("Conditions used", listed(map(_sentence, calibration.conditions)))] if calibration.conditions else []),
         ("Not determined", _open(calibration)),
     ]
     note = None

@@ -14,7 +14,7 @@ from stepdiag.calibration.unseen_text import unseen_rows
 from stepdiag.io.csv_text import csv_text, lengths
 from stepdiag.parameters import REPORT_UNIT, Kind, in_report_units
 from stepdiag.report.comparison import decimal
-from stepdiag.report.evaluation import reversal_rows, undetermined_rows
+from stepdiag.report.evaluation import budget_rows, reversal_rows, undetermined_rows
 
 FUNCTIONAL_POINT_FORMAT: Final = "stepdiag functional point 1"
 
@@ -31,6 +31,7 @@ def calibration_report(calibration: Calibration) -> Iterator[str]:
     )
     yield f"machine: chain {calibration.chain}, volume {volume} mm, tool offset {tool} mm"
     yield from temperature_rows(calibration)
+    yield from calibration.conditions
     yield f"{'':<14}{'largest value':<32}largest standard uncertainty"
     uncertain = largest_entries(calibration, uncertainty=True)
     for kind, entry in largest_entries(calibration).items():
@@ -39,6 +40,7 @@ def calibration_report(calibration: Calibration) -> Iterator[str]:
         if kind in uncertain:
             u = _entry_text(calibration, kind, uncertain[kind], uncertain[kind].standard_uncertainty)
         yield f"{kind:<14}{largest:<32}{u}"
+    yield from budget_rows(calibration)
     yield from unseen_rows(calibration)
     yield from reversal_rows(calibration)
     yield "signs: actual less commanded; rotations and squarenesses by the right-hand rule"

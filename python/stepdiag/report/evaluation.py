@@ -21,12 +21,10 @@ from stepdiag.calibration.unseen_text import unseen_rows
 from stepdiag.mistakes.copies import passes_of
 from stepdiag.mistakes.search import FoundMistake
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
-from stepdiag.report.conditions import condition_rows
 from stepdiag.report.fault_control import control_rows
 from stepdiag.report.mistakes import change_rows, unchecked_row
 from stepdiag.report.prior_effects import cosine_rows, drift_rows, rounding_rows
 from stepdiag.report.setup_table import NOTHING_LEARNT, setup_rows
-from stepdiag.scenario.conditions import conditions_of
 from stepdiag.scenario.description import JudgedEvaluation, reduced_run
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
@@ -63,6 +61,7 @@ def _published(
     yield from change_rows(mistakes)
     yield from _what_was_done(calibration, measurement, known)
     yield from uncertainty_rows(calibration)
+    yield from budget_rows(calibration)
     yield from undetermined_rows(calibration)
     yield f"reference: {straightness_reference(calibration.chain, calibration.tool)}"
     yield unchecked_row(known)
@@ -80,6 +79,7 @@ def _adjusted(
     yield from _what_was_done(calibration, measurement, known)
     yield from fault_rows(adjustment.faults)
     yield from uncertainty_rows(calibration)
+    yield from budget_rows(calibration)
     yield from unseen_rows(calibration)
     yield from reversal_rows(calibration)
     rows = list(setup_rows(adjustment.setup, [*known.plan.lines, *known.plan.scale_lines]))
@@ -102,7 +102,7 @@ def _what_was_done(calibration: Calibration, measurement: Measurement, known: Kn
     yield f"method: {calibration.method}, chain {calibration.chain.name}"
     yield f"readings: {len(measurement)} points on {len(set(measurement.line))} lines"
     yield from temperature_rows(calibration)
-    yield from condition_rows(conditions_of(known, measurement), known)
+    yield from calibration.conditions
     yield from air_rows(measurement, known)
     incomplete, missing = lost_readings(measurement, known.plan, known.signals)
     if incomplete or missing:
@@ -191,6 +191,12 @@ def reversal_rows(calibration: Calibration) -> Iterator[str]:
             if not math.isnan(uncertainty_of_it):
                 u = f"{in_report_units(kind, uncertainty_of_it):.2g} {unit}"
             yield f"  {kind:<13}{in_report_units(kind, error):9.3g} {unit:<5} ({where}; standard uncertainty {u})"
+
+
+def budget_rows(calibration: Calibration) -> Iterator[str]:
+    """One line, where it is known."""
+    if calibration.budget:
+        yield f"budget: {calibration.budget}"
 
 
 def uncertainty_rows(calibration: Calibration) -> Iterator[str]:

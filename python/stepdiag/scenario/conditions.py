@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stepdiag._core import Measurement
+from stepdiag._core import Environment, Measurement
+from stepdiag.scenario.instrument import CHANNELS
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.temperature import three
 
@@ -28,11 +29,15 @@ class Conditions:
     """What an evaluation used, in native units.
 
     scales: of X, Y, Z; None where nothing says the temperature. air: recorded ranges by channel; of an instrument that
-    compensates, evaluations do not use them. span: from the first to the last reading used, s; None without times."""
+    compensates, evaluations do not use them. index: of that air at the wavelength of the first line's head, where
+    evaluations use it; counted: that with which the instrument counted. span: from the first to the last reading used,
+    s; None without times."""
 
     scales: tuple[ScaleTemperature | None, ScaleTemperature | None, ScaleTemperature | None]
     air: dict[str, Range]
     span: float | None
+    index: Range | None = None
+    counted: float | None = None
 
 
 def conditions_of(known: Known, measurement: Measurement) -> Conditions:
@@ -43,6 +48,8 @@ def conditions_of(known: Known, measurement: Measurement) -> Conditions:
     lines = np.array(measurement.line)
     ranges = {name: _range(channels[name][used]) for name in (*AIR, "time") if name in channels}
     time = ranges.pop("time", None)
+    assumed, wavelength = known.assumed_air, known.head.wavelength
+    index = None if assumed is None else _range(_indices(assumed, channels, used, wavelength))
     return Conditions(
         (
             _scale(0, known, channels, lines, used),
@@ -51,6 +58,27 @@ def conditions_of(known: Known, measurement: Measurement) -> Conditions:
         ),
         {name: found for name, found in ranges.items() if found is not None},
         None if time is None else time[1] - time[0],
+        index,
+        None if assumed is None else assumed.refractive_index(wavelength),
+    )
+
+
+def _indices(
+    assumed: Environment, channels: dict[str, NDArray[np.float64]], used: NDArray[np.bool_], wavelength: float
+) -> NDArray[np.float64]:
+    """Of the recorded air; empty where the assumed one is an index."""
+    if assumed.state is None:
+        return np.empty(0)
+    recorded = {quantity: channels[channel][used] for quantity, channel in CHANNELS.items() if channel in channels}
+    states = np.unique(np.array(list(recorded.values())).T, axis=0) if recorded else np.empty((1, 0))
+    whole = states[np.all(np.isfinite(states), axis=1)]
+    return np.array(
+        [
+            Environment.from_air(
+                **assumed.state | dict(zip(recorded, map(float, state), strict=True)), equation=assumed.equation
+            ).refractive_index(wavelength)
+            for state in whole
+        ]
     )
 
 

@@ -24,7 +24,11 @@ from stepdiag.io.refused_files import explained
 from stepdiag.io.whole_files import read_text
 from stepdiag.memory import check_memory, for_evaluation
 from stepdiag.parameters import FUNCTIONS, SQUARENESSES
+from stepdiag.scenario.budget import budget_text, positioning_budget
+from stepdiag.scenario.condition_text import condition_rows
+from stepdiag.scenario.conditions import conditions_of
 from stepdiag.scenario.heads import describe_heads, make_heads, of_run
+from stepdiag.scenario.instrument import index_uncertainty, times
 from stepdiag.scenario.known import Known, known_of, runs_of
 from stepdiag.scenario.planned_readings import only, with_channels
 from stepdiag.scenario.plausible_inputs import implausible_air, implausible_columns, limits_of
@@ -68,7 +72,7 @@ def simulate_scenario(scenario: Scenario, errors: _core.ErrorMap | None = None) 
             of_run(heads),
             simulation_options(scenario),
         )
-    return only(_with_air(run, scenario), known.signals)
+    return only(times(_with_air(run, scenario), 1.0 + known.instrument.scale), known.signals)
 
 
 def air_of(scenario: Scenario) -> dict[str, float]:
@@ -94,9 +98,9 @@ def _with_air(run: _core.Measurement, scenario: Scenario) -> _core.Measurement:
 
 
 def reduced_run(known: Known, measurement: _core.Measurement) -> _core.Measurement:
-    """A run as evaluations take it: with the channels that the scenario's head has, distances in the air of the run
-    where the instrument counted with a constant index. Raises InvalidArgument for temperatures, air and times that no
-    workshop has."""
+    """A run as evaluations take it: with the channels that the scenario's head has, distances corrected by the scale of
+    the instrument, and in the air of the run where the instrument counted with a constant index. Raises InvalidArgument
+    for temperatures, air and times that no workshop has."""
     implausible_inputs(known, measurement)
     return _reduced(known, measurement)
 
@@ -115,7 +119,7 @@ def implausible_truth(truth: Truth, known: Known) -> Iterator[str]:
 
 
 def _reduced(known: Known, measurement: _core.Measurement) -> _core.Measurement:
-    run = only(measurement, known.signals)
+    run = times(only(measurement, known.signals), 1.0 / (1.0 + known.instrument.scale))
     if known.assumed_air is None:
         return run
     with located(f"{known.path}: environment.readings"):
@@ -155,7 +159,13 @@ def _evaluated(
         plausible=known.plausible,
         expansion=known.expansion,
     )
-    return found.with_between_nodes(known.between_nodes)
+    return found.with_between_nodes(known.between_nodes).with_conditions(*_words(found, known, measurement))
+
+
+def _words(calibration: _core.Calibration, known: Known, measurement: _core.Measurement) -> tuple[list[str], str]:
+    """The conditions of an evaluation, and the budget of its largest positioning uncertainty."""
+    conditions = list(condition_rows(conditions_of(known, measurement), known))
+    return conditions, budget_text(positioning_budget(calibration, known))
 
 
 def _at_best_doubtful(
@@ -252,16 +262,21 @@ def _adjusted(
     search_faults: bool = True,
 ) -> _core.Adjustment:
     _check_memory(known, measurement, full_covariance)
-    return _core.adjust(
+    found = _core.adjust(
         _reduced(known, measurement),
         known.plan,
         of_run(known.heads),
         known.chain,
         known.tool,
         adjustment_options(
-            known, full_covariance=full_covariance, reliability=reliability, search_faults=search_faults
+            known,
+            measurement,
+            full_covariance=full_covariance,
+            reliability=reliability,
+            search_faults=search_faults,
         ),
     )
+    return found.with_conditions(*_words(found.calibration, known, measurement))
 
 
 def _check_memory(known: Known, measurement: _core.Measurement, full_covariance: bool) -> None:
@@ -294,13 +309,15 @@ def simulation_options(scenario: Scenario) -> _core.SimulationOptions:
 
 def adjustment_options(
     known: Known,
+    measurement: _core.Measurement | None = None,
     *,
     full_covariance: bool = False,
     of_samples: bool = False,
     reliability: bool = False,
     search_faults: bool = True,
 ) -> _core.AdjustmentOptions:
-    """What an adjustment of the scenario's runs takes for known and unknown. `of_samples`: of many simulated runs,
+    """What an adjustment of the scenario's runs takes for known and unknown. `measurement`: the run, for the mean of
+    its air; without one the uncertainty of the index is that in air of 20 °C. `of_samples`: of many simulated runs,
     whose noise is what is stated: none of their readings is left out, no uncertainty is scaled."""
     keys = known.keys.adjustment
     return _core.AdjustmentOptions(
@@ -320,6 +337,10 @@ def adjustment_options(
         machine_drift=known.machine_drift,
         reliability=reliability,
         search_faults=search_faults,
+        distance_scale_uncertainty=known.instrument.scale_uncertainty or 0.0,
+        air_index_uncertainty=index_uncertainty(
+            known.instrument, measurement, known.assumed_air, known.head.wavelength
+        ),
     )
 
 

@@ -11,6 +11,7 @@ from stepdiag.config.toml_text import located
 from stepdiag.display import Displayed, Facts, lengths_text, point_text
 from stepdiag.scenario.adjustment import change_priors, machine_drift_of, plausible_limits, setup_priors, smoothness_of
 from stepdiag.scenario.heads import DescribedHead, check_alike, check_mirrors, heads_by_line, make_heads, signals_of
+from stepdiag.scenario.instrument import KnownInstrument, instrument_of
 from stepdiag.scenario.plausible_inputs import implausible_keys
 from stepdiag.scenario.setup import weights
 from stepdiag.scenario.temperature import known_expansion
@@ -27,9 +28,9 @@ class Known(Displayed):
     follow from the first four: chain, tool and plan; by line the head that measures it, as it is described and as it
     is by design; the channels of a run; weights of readings, priors of the set-up, smoothness and limits of what is
     plausible; how far the machine may change; what is known of the scales' expansion, None where the scenario has no
-    [temperature]; the drift of the functional point, None where it is no unknown; what is uncertain. `assumed_air`:
-    with whose constant index the instrument counts; None where it compensates for the air. `implausible`: what is
-    stated and no workshop has, a sentence each."""
+    [temperature]; the drift of the functional point, None where it is no unknown; what is uncertain; what is known of
+    the instrument's scale and its sensors of the air. `assumed_air`: with whose constant index the instrument counts;
+    None where it compensates for the air. `implausible`: what is stated and no workshop has, a sentence each."""
 
     path: Path
     keys: KnownKeys
@@ -51,6 +52,7 @@ class Known(Displayed):
     machine_drift: _core.MachineDrift | None = field(compare=False)
     uncertain: _core.UncertainInputs = field(compare=False)
     implausible: tuple[str, ...] = field(compare=False)
+    instrument: KnownInstrument = field(compare=False)
 
     @property
     def known(self) -> "Known":
@@ -130,6 +132,7 @@ def known_of(
         machine_drift=machine_drift_of(keys.adjustment, path),
         uncertain=uncertain_inputs(keys, described_heads, heads, path),
         implausible=implausible,
+        instrument=instrument_of(keys.instrument),
     )
 
 

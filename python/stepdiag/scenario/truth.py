@@ -17,7 +17,7 @@ from stepdiag.scenario.heads import PoseErrors
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.setup import environments, misalignments, noise_of
 from stepdiag.scenario.temperature import three, true_scales
-from stepdiag.scenario.uncertain_inputs import STATE_OF_AIR
+from stepdiag.scenario.uncertain_inputs import uncertain_air_key
 from stepdiag.units import MICROMETRE, MICRORADIAN, native
 
 
@@ -84,13 +84,12 @@ def _machine_drift(keys: TruthKeys, known: Known) -> tuple[float, float, float]:
 
 def _check_air(keys: TruthKeys, known: Known) -> None:
     """Whether air whose state is uncertain has one."""
-    for name in STATE_OF_AIR if "refractive_index" in keys.environment.model_fields_set else ():
-        stated = getattr(known.keys.uncertainty, name)
-        if stated is not None and not stated.is_certain:
-            raise InvalidArgument(
-                f"{known.path}: uncertainty.{name}: goes with a state of the air; [environment] has a "
-                "refractive_index, for which there is refractive_index_ppm"
-            )
+    uncertain = uncertain_air_key(known.keys) if "refractive_index" in keys.environment.model_fields_set else None
+    if uncertain is not None:
+        raise InvalidArgument(
+            f"{known.path}: {uncertain}: goes with a state of the air; [environment] has a "
+            "refractive_index, for which there is uncertainty.refractive_index_ppm"
+        )
 
 
 def errors_of(truth: Truth, known: Known) -> _core.ErrorMap:

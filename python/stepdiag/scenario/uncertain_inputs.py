@@ -22,6 +22,8 @@ from stepdiag.units import MICROMETRE, Unit, unit_of
 QUANTITIES: Final[Mapping[str, _core.UncertainQuantity]] = {q.key: q for q in _core.uncertain_quantities() if q.key}
 OF_SCALE_LINES: Final = ("scale_um", "scale_ppm")
 STATE_OF_AIR: Final = ("temperature_c", "pressure_hpa", "humidity_percent")
+# Keys of [instrument] that are the default of these.
+OF_INSTRUMENT: Final = {"wavelength_ppm": "u_scale_ppm"} | {name: f"u_air_{name}" for name in STATE_OF_AIR}
 
 
 def uncertain_inputs(
@@ -34,7 +36,7 @@ def uncertain_inputs(
     for line, own in section.by_line.items():
         if line in described:
             _check_fit(own, keys, {line: described[line]}, head, f"{place}.{line}")
-    inputs = [*_of_lines(keys, head), *_of_components(section, described, head, place), *_of_all(section, head)]
+    inputs = [*_of_lines(keys, head), *_of_components(section, described, head, place), *_of_all(keys, head)]
     inputs += _of_scales(keys, place)
     noise, correlations = list(_noise(keys, head, place)), list(_correlations(section, inputs, place))
     with located(place):
@@ -86,6 +88,17 @@ def _of_lines(keys: KnownKeys, head: _core.Head) -> Iterator[_core.UncertainInpu
             yield from _inputs(stated, name, head, line=line)
 
 
+def uncertain_air_key(keys: KnownKeys) -> str | None:
+    """The first key that says that the state of the air is uncertain, with its section; None: there is none."""
+    for name in STATE_OF_AIR:
+        stated, own = getattr(keys.uncertainty, name), OF_INSTRUMENT[name]
+        if stated is not None and not stated.is_certain:
+            return f"uncertainty.{name}"
+        if stated is None and getattr(keys.instrument, own):
+            return f"instrument.{own}"
+    return None
+
+
 def _of_components(
     section: UncertaintySection, described: Mapping[str, DescribedHead], head: _core.Head, place: str
 ) -> Iterator[_core.UncertainInput]:
@@ -99,10 +112,17 @@ def _of_components(
             yield from _inputs(getattr(own, name), name, head, part=part)
 
 
-def _of_all(section: UncertaintySection, head: _core.Head) -> Iterator[_core.UncertainInput]:
+def _of_all(keys: KnownKeys, head: _core.Head) -> Iterator[_core.UncertainInput]:
     for name, quantity in QUANTITIES.items():
         if quantity.of in ("head", "air", "machine"):
-            yield from _inputs(getattr(section, name), name, head)
+            yield from _inputs(getattr(keys.uncertainty, name) or _of_instrument(keys, name), name, head)
+
+
+def _of_instrument(keys: KnownKeys, name: str) -> StatedDistribution | None:
+    """What its certificate says of a quantity of the air or the wavelength."""
+    own = OF_INSTRUMENT.get(name)
+    stated = None if own is None else getattr(keys.instrument, own)
+    return None if stated is None else StatedDistribution("normal", stated)
 
 
 def _of_scales(keys: KnownKeys, place: str) -> Iterator[_core.UncertainInput]:

@@ -248,7 +248,11 @@ class TwinInstrument:
         seconds = self._scenario.known.keys.plan.seconds_per_reading or 0.0
         elapsed = max(0, self._row - self._setup_row) * seconds
         signals = self._readout().read(self._position, self._approach, row=self._row, elapsed=elapsed)
-        return [None if math.isnan(value) else float(value) for value in signals[: len(self._channels)]]
+        too_long = 1.0 + self._scenario.known.instrument.scale
+        return [
+            None if math.isnan(value) else float(value) * (too_long if channel.startswith("d") else 1.0)
+            for value, channel in zip(signals, self._channels, strict=False)
+        ]
 
     def _point(self) -> tuple[int, int] | None:
         if self._visit is None:

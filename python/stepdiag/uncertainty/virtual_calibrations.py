@@ -9,7 +9,7 @@ from stepdiag._core import InvalidArgument
 from stepdiag.config.toml_text import located
 from stepdiag.scenario.description import Scenario, adjustment_options, simulation_options
 from stepdiag.scenario.heads import of_run
-from stepdiag.scenario.uncertain_inputs import STATE_OF_AIR
+from stepdiag.scenario.uncertain_inputs import uncertain_air_key
 
 Method = Literal["conventional", "enhanced", "adjustment", "one_step"]
 METHODS: Final = ("adjustment", "enhanced", "conventional", "one_step")
@@ -45,12 +45,11 @@ def virtual_calibrations(
 
 def _air(scenario: Scenario) -> tuple[_core.Environment | None, _core.Environment | None]:
     """The true and the assumed air; where nothing is said of it, but its state is uncertain, that of 20 °C."""
-    section, truth = scenario.known.keys.uncertainty, scenario.truth
+    truth = scenario.truth
     if scenario.known.assumed_air is not None:  # whose readings are reduced with what is recorded
         air = truth.environment or scenario.known.assumed_air
         return air, air
-    is_uncertain = any(getattr(section, name) is not None for name in STATE_OF_AIR)
-    if truth.environment is None and is_uncertain:
+    if truth.environment is None and uncertain_air_key(scenario.known.keys) is not None:
         usual = _core.Environment.from_air()
         return usual, usual
     return truth.environment, truth.assumed_environment

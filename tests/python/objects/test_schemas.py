@@ -12,11 +12,27 @@ from jsonschema import Draft202012Validator
 from stepdiag.objects.schemas import OBJECTS, schema_text
 
 SCHEMAS = Path(__file__).parents[3] / "docs" / "json"
-UNITS = ("um", "mm", "urad", "ppm", "um_per_h", "um_per_k", "um_per_m", "um_per_m_k", "per_mm", "c", "minutes")
+UNITS = (
+    "um",
+    "mm",
+    "urad",
+    "ppm",
+    "um_per_h",
+    "um_per_k",
+    "um_per_m",
+    "um_per_m_k",
+    "per_mm",
+    "c",
+    "minutes",
+    "h",
+    "hpa",
+    "percent",
+)
 # Numbers that have no unit.
 OF_UNIT_ONE = {
     "allowed",
     "alpha",
+    *("refractive_index", "counted_refractive_index"),
     *("positioning", "straightness", "angle", "squareness"),  # exponents
     "chi_square",
     "chi_square_gain",

@@ -116,6 +116,12 @@ STEPS = "plan.steps: expected an integer from 1 to 2000, got "
 
 MALFORMED = [
     # keys
+    ("[plan]", "[instrument]\nscale = 1.0\n[plan]", "instrument.scale: unknown key; did you mean scale_ppm?"),
+    (
+        "[plan]",
+        "[instrument]\nu_scale_ppm = -0.1\n[plan]",
+        "instrument.u_scale_ppm: expected a number from 0 to 100, in ppm, got -0.1",
+    ),
     ("x_mm = 800.0", "", "volume.x_mm: missing; expected a length in mm from 0.001 to 1e6"),
     ("steps = 50", "step = 50", "plan.step: unknown key; did you mean steps? (and 1 more)"),
     ("[noise]", "[noises]", "noises: unknown section; did you mean noise?"),

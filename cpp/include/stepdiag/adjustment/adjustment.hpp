@@ -84,6 +84,10 @@ struct AdjustmentOptions {
     // false: where it is known already what is wrong with the run as a whole. No faults of readings are looked for, and
     // where the minimum is not reached soon, values are those that were, and rejected.
     bool search_faults = true;
+    // Relative standard uncertainties of all distances in common: by the scale of the instrument, and by the index of
+    // the air, as its sensors make it. As deviations of the scales' sensors they are uncertainty only.
+    double distance_scale_uncertainty = 0.0;
+    double air_index_uncertainty = 0.0;
 };
 
 // One set-up unknown, as it was found.

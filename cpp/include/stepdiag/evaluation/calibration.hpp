@@ -44,6 +44,10 @@ struct CalibratedSquareness {
     double standard_uncertainty;  // rad
 };
 
+// What makes standard uncertainties beside the noise of the readings.
+enum class UncertaintySource { scale, temperature, air };
+std::string name(UncertaintySource source);  // "scale", "temperature", "air"
+
 // What a calibration was made from, and with what: the keys of Calibration::provenance, and of leading lines of its
 // file. Fingerprints are SHA-256 in hexadecimal digits, of the bytes of the run, the scenario and the heads'
 // descriptions.
@@ -94,6 +98,14 @@ struct Calibration {
     std::optional<Eigen::Vector3d> expansion = {};
     Eigen::Vector3d fixed_point = Eigen::Vector3d::Zero();  // from which the scales expand, by axis, mm
 
+    // Under which conditions it was evaluated, as they were used, and the budget of its largest positioning
+    // uncertainty: in words, a sentence each, as files hold them; an evaluation leaves the words to its caller.
+    std::vector<std::string> conditions = {};
+    std::string budget = {};
+    // Of an adjustment: how much of the standard uncertainties is made by each source that was stated, in the order of
+    // the covariance, mm or rad. What is left is noise of the readings and what the set-up makes of it. In no file.
+    std::map<UncertaintySource, std::vector<double>> uncertainty_parts = {};
+
     std::map<std::string, std::string> provenance = {};  // by provenance_keys, as far as it is known
 };
 
@@ -124,7 +136,7 @@ ParameterTable to_parameter_table(const Calibration& calibration);
 
 // CSV with format, chain, volume_mm, tool_mm, method, date, unverified, fit, variance_factor, uncertainty_scaled,
 // between_nodes_mm, temperature_reference_c with expansion_per_k and fixed_point_mm, or temperature_as_found_c,
-// fit_reasons, unseen_faults, straightness_reference, provenance_keys, undetermined_slopes,
+// fit_reasons, unseen_faults, conditions, budget, straightness_reference, provenance_keys, undetermined_slopes,
 // undetermined_reversal_constants and undetermined in the leading lines; not kept are the covariance and the
 // uncertainty of a reversal error, which is not that of its two tables. Reading throws InvalidArgument naming file and
 // line, also where chain, volume or tool is missing.
