@@ -75,9 +75,10 @@ def test_a_bad_table_is_refused_with_the_reason(name: str, table: Path, tmp_path
 
 
 def test_a_calibration_without_its_checksum_is_refused_unless_told(table: Path, tmp_path: Path) -> None:
-    """A table with a method is a calibration; an error map needs no checksum."""
+    """The other tables here are error maps, which need none."""
     unverified = tmp_path / "unverified.csv"
-    unverified.write_bytes(b"# method=adjustment\n" + without_checksum(table.read_bytes()))
+    calibration = replaced("^# format=stepdiag error map 1", "# format=stepdiag calibration 1")
+    unverified.write_bytes(calibration(without_checksum(table.read_bytes())))
     said = start(unverified)
     assert "unverified: a checksum was absent when this calibration was read" in said
     assert "accept_unverified" in said

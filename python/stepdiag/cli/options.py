@@ -105,7 +105,7 @@ def json_option(command: Command) -> Command:
     return option(command)
 
 
-class Judged(Protocol):
+class HasFit(Protocol):
     """A calibration, or what stands for one in a result."""
 
     @property
@@ -114,12 +114,12 @@ class Judged(Protocol):
     def unverified(self) -> bool: ...
 
 
-def is_untrusted(*calibrations: Judged) -> bool:
+def is_untrusted(*calibrations: HasFit) -> bool:
     """Whether one of them is not to be used: its fit is rejected, or it is unverified."""
     return any(one.fit == "rejected" or one.unverified for one in calibrations)
 
 
-def trust_warnings(path: Path, calibration: Judged) -> list[str]:
+def trust_warnings(path: Path, calibration: HasFit) -> list[str]:
     """What to warn of if the fit of a calibration is not accepted, or if it is unverified."""
     from stepdiag.calibration.finding_text import UNVERIFIED
 
@@ -133,7 +133,7 @@ def trust_warnings(path: Path, calibration: Judged) -> list[str]:
     return [*warnings, f"{path}: {UNVERIFIED}"] if calibration.unverified else warnings
 
 
-def tell_trust(context: click.Context, path: Path, calibration: Judged) -> None:
+def tell_trust(context: click.Context, path: Path, calibration: HasFit) -> None:
     """Warn of a calibration as `trust_warnings` does.
 
     One that is not to be used ends the command with code 3."""
