@@ -112,8 +112,8 @@ def budget_section(budget: Budget | None, figures: Figures) -> Markup:
             title,
             element(
                 "p",
-                "No uncertainty result was given, so the uncertainties of this report are not broken down. They "
-                "are those of the calibration’s file: what the stated uncertainties of the readings make of each "
+                "No uncertainty result was given, so the uncertainties of this report are not broken down further than "
+                "in the summary. They are those of the calibration’s file: what the stated uncertainties make of each "
                 "value. To break them down:",
             ),
             element(
