@@ -2052,13 +2052,13 @@ class Adjustment:
         ...
     def _repr_html_(self) -> str:
         ...
-    def with_implausible_inputs(self, inputs: collections.abc.Sequence[str]) -> Adjustment:
-        """
-        The same, at best doubtful where there are inputs that no workshop has, a sentence each.
-        """
     def with_conditions(self, conditions: collections.abc.Sequence[str], budget: str) -> Adjustment:
         """
         The same, with these words in the calibration.
+        """
+    def with_implausible_inputs(self, inputs: collections.abc.Sequence[str]) -> Adjustment:
+        """
+        The same, at best doubtful where there are inputs that no workshop has, a sentence each.
         """
     def with_mistake(self, mistake: str) -> Adjustment:
         """
