@@ -1641,6 +1641,10 @@ class RoundedChannel:
     """
     What took the place of a channel's stated uncertainties, which were too small; mm or rad.
     """
+    def __repr__(self) -> str:
+        ...
+    def _repr_html_(self) -> str:
+        ...
     @property
     def cause(self) -> str:
         """

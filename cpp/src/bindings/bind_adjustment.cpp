@@ -323,7 +323,8 @@ void bind_result(py::module_& m) {
                       "Of an uneven misfit or a trend; empty: all. Of a prior or prior_scatter the set-up quantity.")
         .def_readonly("component", &FitReason::component, "Of a prior: as of SetupEstimate.")
         .def_readonly("fault", &FitReason::fault, "Of a fault or alternatives: its class, from 1; else 0.")
-        .def_readonly("parameter", &FitReason::parameter, "Of alternatives; of a mistake or an input its sentence; else empty.")
+        .def_readonly("parameter", &FitReason::parameter,
+                      "Of alternatives; of a mistake or an input its sentence; else empty.")
         .def_readonly("run", &FitReason::run, "Of an uneven misfit: the run; -1: all.")
         .def_property_readonly(
             "aspect", [](const FitReason& r) { return name(r.aspect); },
@@ -520,7 +521,8 @@ void bind_result(py::module_& m) {
                 found.adjustment.calibration.fit_reasons = in_words(verdict.reasons);
                 return found;
             },
-            py::arg("inputs"), "The same, at best doubtful where there are inputs that no workshop has, a sentence each.")
+            py::arg("inputs"),
+            "The same, at best doubtful where there are inputs that no workshop has, a sentence each.")
         .def(
             "with_conditions",
             [](Result found, const std::vector<std::string>& conditions, const std::string& budget) {

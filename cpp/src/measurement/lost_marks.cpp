@@ -15,6 +15,9 @@
 namespace stepdiag {
 namespace {
 
+// A number that a line has twice may be a point that was read twice.
+constexpr int most_repeats = 2;
+
 bool is_distance(const Channel& channel) { return channel.name == "distance" || is_beam_channel(channel.name); }
 
 // As in a file, without ".0".
@@ -56,16 +59,18 @@ struct PassDistances {
     std::vector<bool> fills_row;         // whether all readings of its row are this number
     std::vector<double> travel, offset;  // mm; offset: distance less travel
 
-    // The marks that are not where their neighbours are that are none, and how far from there: 0 for all of a pass of
-    // marks that do not grow.
+    // The marks that are not where their neighbours are that are none, and how far from there. A pass of nothing but
+    // marks has no neighbours: its distances do not grow, which evaluations refuse.
     std::vector<std::pair<std::size_t, double>> misplaced_marks(double tolerance) const {
         std::map<std::string, int> times;
         for (const std::string& one : text) ++times[one];
         std::vector<std::size_t> marks;
         std::vector<std::pair<double, double>> others;  // travel and offset
         for (std::size_t i = 0; i < row.size(); ++i)
-            if (text[i] == "0" || is_nines(text[i]) || times[text[i]] > 1 || fills_row[i]) marks.push_back(i);
+            if (text[i] == "0" || is_nines(text[i]) || times[text[i]] > most_repeats || fills_row[i])
+                marks.push_back(i);
             else others.emplace_back(travel[i], offset[i]);
+        if (others.empty()) return {};
         std::sort(others.begin(), others.end());
         std::vector<std::pair<std::size_t, double>> misplaced;
         for (const std::size_t i : marks) {
@@ -74,19 +79,9 @@ struct PassDistances {
             if (next != others.end()) far = offset[i] - next->second;
             if (next != others.begin() && std::abs(offset[i] - (next - 1)->second) < std::abs(far))
                 far = offset[i] - (next - 1)->second;
-            if (others.empty()) far = text[i] == "0" || is_nines(text[i]) ? spread(text[i]) : 0.0;
             if (std::abs(far) > tolerance) misplaced.emplace_back(i, far);
         }
         return misplaced;
-    }
-
-private:
-    // Of the travels at which this stands.
-    double spread(const std::string& mark) const {
-        double low = std::numeric_limits<double>::infinity(), high = -low;
-        for (std::size_t i = 0; i < row.size(); ++i)
-            if (text[i] == mark) low = std::min(low, travel[i]), high = std::max(high, travel[i]);
-        return high - low;
     }
 };
 

@@ -135,8 +135,9 @@ BeamSegment BeamSpot CalibrationEntry Camera ChangeCombination ChangePriors Chan
 DiagonalErrors Distribution DriftEstimate ErrorAtPoint Expansion ExpansionEstimate Fault FaultClass FaultControl
 FitReason GaussianMode HeadBeam HeadBody HeadCalibration HeadDesign Interferometer KnownCombination KnownExpansion
 LateralEffect LineDeviation MachineDrift Misalignment MonteCarloResult Noise Outlier PlausibleLimits Propagation
-ReadingNoise ReadingUncertainty Recheck ReturnedBeam ScaleTemperatures Sensitivity SetupEstimate Smoothness SpotSensor
-UncertainInput UncertainInputs Undetermined Validation Verification VirtualCalibrations VolumetricAccuracy
+ReadingNoise ReadingUncertainty Recheck ReturnedBeam RoundedChannel ScaleTemperatures Sensitivity SetupEstimate
+Smoothness SpotSensor UncertainInput UncertainInputs Undetermined Validation Verification VirtualCalibrations
+VolumetricAccuracy
 """
 
 

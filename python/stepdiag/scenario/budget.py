@@ -91,6 +91,8 @@ def budget_text(budget: PositioningBudget | None) -> str:
     if budget.between_nodes is not None:
         kind = "stated" if budget.between_nodes_stated else "estimated from the table"
         between = f"{_um(budget.between_nodes)} ({kind}), not included"
+        if budget.between_nodes == 0.0 and not budget.between_nodes_stated:
+            between = "not seen above the table's noise"
     return (
         f"largest standard uncertainty of positioning {_um(budget.total)} ({budget.parameter} at {budget.position:g} "
         f"mm): {', '.join(parts)}; between nodes {between}"

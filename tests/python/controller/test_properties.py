@@ -165,7 +165,7 @@ def test_calibration_of_a_run_compensates_the_machine_that_was_measured(tmp_path
         == 0
     )
     _, chain, volume, tool = with_leading_lines(case)
-    with pytest.warns(UserWarning, match="fit that is doubtful"):  # exact readings scatter less than stated
+    with pytest.warns(UserWarning, match="fit that is unchecked"):  # exact readings have no noise
         compensator = sd.Compensator(calibration, chain)
     assert compensator.uncompensated == []
     machine = sd.Machine(chain, sd.read_error_map(RUNS / case / "truth.csv"), tool)

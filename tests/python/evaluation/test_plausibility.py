@@ -63,7 +63,7 @@ def test_distances_in_another_unit_are_an_error_that_names_it(
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("size", [0.0, 1e6, 1e308, -1e308])
+@pytest.mark.parametrize("size", [1.0, 1e6, 1e308, -1e308])  # 0 is a lost beam
 def test_one_absurd_reading_is_named(
     run: sd.Measurement, method: str, size: float, capsys: pytest.CaptureFixture[str]
 ) -> None:

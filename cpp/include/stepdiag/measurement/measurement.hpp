@@ -67,7 +67,7 @@ private:
 
 // What loggers write in place of a reading whose beam was lost. A distance of exactly 0 that is not where the other
 // distances of its pass put it is lost, and with it the tilts or spots of its row that are 0. Another number that is
-// not there either, and repeats along the line, fills all fields of its row or is all nines, may be a mark or a
+// not there either, and stands there more than twice, fills all fields of its row or is all nines, may be a mark or a
 // mistake: throws InvalidArgument, which names the row. A counter that is zeroed at its line's first point reads 0
 // there as it should.
 Measurement without_lost_marks(const Measurement& measurement);
