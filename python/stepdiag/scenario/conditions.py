@@ -66,16 +66,14 @@ def conditions_of(known: Known, measurement: Measurement) -> Conditions:
 def _indices(
     assumed: Environment, channels: dict[str, NDArray[np.float64]], used: NDArray[np.bool_], wavelength: float
 ) -> NDArray[np.float64]:
-    """Of the recorded air; empty where the assumed one is an index."""
-    if assumed.state is None:
-        return np.empty(0)
+    """Of the recorded air."""
     recorded = {quantity: channels[channel][used] for quantity, channel in CHANNELS.items() if channel in channels}
     states = np.unique(np.array(list(recorded.values())).T, axis=0) if recorded else np.empty((1, 0))
     whole = states[np.all(np.isfinite(states), axis=1)]
     return np.array(
         [
             Environment.from_air(
-                **assumed.state | dict(zip(recorded, map(float, state), strict=True)), equation=assumed.equation
+                **(assumed.state or {}) | dict(zip(recorded, map(float, state), strict=True)), equation=assumed.equation
             ).refractive_index(wavelength)
             for state in whole
         ]

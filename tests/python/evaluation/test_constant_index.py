@@ -113,3 +113,10 @@ def test_a_run_without_air_is_refused() -> None:
             scenario.known.head,
             sd.Environment(1.0003),
         )
+
+
+def test_a_result_lists_the_index_of_the_air_where_the_instrument_counted_in_vacuum() -> None:
+    scenario = parse_scenario(IN_VACUUM)
+    rows = sd.evaluate_scenario(scenario, sd.simulate_scenario(scenario)).conditions
+    air = sd.Environment.from_air(temperature=26.0, pressure=99_000.0).refractive_index(scenario.known.head.wavelength)
+    assert f"index of that air: {air:.8f}, counted with 1.00000000" in rows
