@@ -682,9 +682,9 @@ def mistakes() -> list[Mistake]:
             stated("environment.readings", None),
             LISTED,
             "readings must",
-            "compensated|instrument has (used|reduced)",
+            "instrument compensates",
         ),
-        ("assumed air left out", stated("environment.assumed", None), LISTED, "assumed", "assumed"),
+        ("assumed air left out", stated("environment.assumed", None), LISTED, "assumed", "counted with"),
     ]
     found += [
         Mistake("index", name, change, required, words, listed) for name, change, required, words, listed in index
