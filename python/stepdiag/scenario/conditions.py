@@ -68,14 +68,14 @@ def _indices(
 ) -> NDArray[np.float64]:
     """Of the recorded air."""
     recorded = {quantity: channels[channel][used] for quantity, channel in CHANNELS.items() if channel in channels}
-    states = np.unique(np.array(list(recorded.values())).T, axis=0) if recorded else np.empty((1, 0))
-    whole = states[np.all(np.isfinite(states), axis=1)]
+    states = set(zip(*(values.tolist() for values in recorded.values()), strict=True)) if recorded else {()}
     return np.array(
         [
             Environment.from_air(
-                **(assumed.state or {}) | dict(zip(recorded, map(float, state), strict=True)), equation=assumed.equation
+                **(assumed.state or {}) | dict(zip(recorded, state, strict=True)), equation=assumed.equation
             ).refractive_index(wavelength)
-            for state in whole
+            for state in states
+            if np.all(np.isfinite(state))
         ]
     )
 
@@ -89,8 +89,8 @@ def _scale(
     origins = [f"column {name}_c"] if np.any(np.isfinite(recorded)) else []
     keys = known.keys.temperature
     if keys is not None and keys.axes_c is not None:
-        measured = np.unique(lines[used][np.isfinite(recorded)])
-        if not np.all(np.isin(lines[used], measured)):  # lines without any temperature have that of the scenario
+        # Sets: np.isin and np.unique would import numpy.ma, a twentieth of a small evaluation.
+        if set(lines[used]) - set(lines[used][np.isfinite(recorded)]):  # lines without any have that of the scenario
             recorded = np.append(recorded, three(keys.axes_c)[axis])
             origins.append("axes_c")
     found = _range(recorded)
