@@ -88,11 +88,11 @@ def _scale(
     recorded = channels[name][used] if name in channels else np.full(np.count_nonzero(used), np.nan)
     origins = [f"column {name}_c"] if np.any(np.isfinite(recorded)) else []
     keys = known.keys.temperature
-    if keys is not None and keys.axes_c is not None:
-        # Sets: np.isin and np.unique would import numpy.ma, a twentieth of a small evaluation.
-        if set(lines[used]) - set(lines[used][np.isfinite(recorded)]):  # lines without any have that of the scenario
-            recorded = np.append(recorded, three(keys.axes_c)[axis])
-            origins.append("axes_c")
+    # Sets: np.isin and np.unique would import numpy.ma, a twentieth of a small evaluation.
+    without = set(lines[used]) - set(lines[used][np.isfinite(recorded)])
+    if without and keys is not None and keys.axes_c is not None:  # such lines have the temperature of the scenario
+        recorded = np.append(recorded, three(keys.axes_c)[axis])
+        origins.append("axes_c")
     found = _range(recorded)
     return None if found is None else ScaleTemperature(found, " and ".join(origins))
 
