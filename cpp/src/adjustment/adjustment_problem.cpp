@@ -126,6 +126,8 @@ double usual_angle(const Plan& plan, const std::map<std::string, LineReadings>& 
 // equations still tell what only the worse one says from what none does (rank_decision.hpp): measured, with 8 and 50
 // steps, three heads.
 constexpr double widest_weights = 3e4;
+// Of beams with unknown constants: with more, steps crawl along a valley, and compilers decide whether they arrive.
+constexpr double widest_weights_of_beams = 2.3e4;
 
 // Beams whose constants are unknown say nothing of the mean tilt: that is known as well as the laser is.
 double weighable_beam(const LineSetup& setup) {
@@ -140,7 +142,7 @@ double weighable_beam(const LineSetup& setup) {
     }
     const PriorUncertainty laser = std::max(setup.prior[setup::laser], setup.prior[setup::laser + 1]);
     if (!unknown || laser == fixed_unknown) return 0.0;
-    return std::min(laser, record(SetupQuantity::laser).usual) * arm / widest_weights;
+    return std::min(laser, record(SetupQuantity::laser).usual) * arm / widest_weights_of_beams;
 }
 
 }  // namespace
