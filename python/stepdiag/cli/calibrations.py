@@ -12,6 +12,7 @@ from stepdiag.cli.options import (
     Command,
     Grouped,
     Writes,
+    input_warnings,
     is_untrusted,
     json_option,
     tell,
@@ -290,7 +291,7 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     from stepdiag.io.whole_files import check_input
     from stepdiag.rechecking.verification import check_other_run, verify_scenario
     from stepdiag.report.verification import agrees, verification_report
-    from stepdiag.scenario.description import implausible_inputs, read_scenario
+    from stepdiag.scenario.description import read_scenario
 
     if not 0.0 < alpha < 1.0:
         raise InvalidArgument(f"--alpha: expected a probability between 0 and 1, got {alpha:g}")
@@ -303,7 +304,7 @@ def verify(context: click.Context, calibration: Path, scenario: Path, run: Path,
     with located(f"{calibration}, {run}"), Progress("verify"):
         verification = verify_scenario(tested, known, measurement)
     warnings = trust_warnings(calibration, tested)
-    warnings += [f"{run}: {sentence}" for sentence in implausible_inputs(known, measurement)]
+    warnings += input_warnings(known, run, measurement)
     if not agrees(verification, alpha):
         warnings = [
             f"{run}: does not agree with {calibration}: do not use the calibration until you know why",
@@ -373,7 +374,7 @@ def recheck(
     from stepdiag.rechecking.recheck import Judged, recheck_scenario
     from stepdiag.rechecking.verification import check_other_run
     from stepdiag.report.verification import recheck_report
-    from stepdiag.scenario.description import implausible_inputs, read_scenario
+    from stepdiag.scenario.description import read_scenario
     from stepdiag.scenario.provenance import provenance_of
 
     if not 0.0 < alpha < 1.0:
@@ -392,7 +393,7 @@ def recheck(
     if target is not None:
         write_calibration(judged.updated, target, provenance=provenance_of(known, run))
     warnings = trust_warnings(baseline, before)
-    warnings += [f"{run}: {sentence}" for sentence in implausible_inputs(known, measurement)]
+    warnings += input_warnings(known, run, measurement)
     if judged.verdict == "unexplained":
         warnings.append(
             f"{run}: the machine has changed, unexplained: no change of low order explains these readings; "

@@ -10,6 +10,7 @@ from stepdiag.cli.options import (
     PATH,
     Grouped,
     Writes,
+    input_warnings,
     json_option,
     out_file,
     tell,
@@ -90,7 +91,6 @@ def evaluate(
         JudgedEvaluation,
         adjust_scenario,
         evaluate_beside_adjustment,
-        implausible_inputs,
         read_scenario,
     )
     from stepdiag.scenario.provenance import provenance_of
@@ -110,7 +110,7 @@ def evaluate(
     measurement = read_measurement(run)
     provenance = provenance_of(known, run, method=method)
     with located(str(run)), Progress("evaluate"):
-        of_inputs = [f"{run}: {sentence}" for sentence in implausible_inputs(known, measurement)]
+        of_inputs = input_warnings(known, run, measurement)
         search = searchable(known, measurement)
         mistakes = search.before() if search else []
         try:

@@ -13,7 +13,9 @@ from stepdiag.cli.terminal import say
 from stepdiag.io.outputs import FileKind, OutputFile
 
 if TYPE_CHECKING:
+    from stepdiag._core import Measurement
     from stepdiag.scenario.description import Scenario
+    from stepdiag.scenario.known import Known
 
 Command = TypeVar("Command", bound=Callable[..., None])
 NOT_TO_BE_TRUSTED: Final = 3  # exit code: done and written, but not to be used
@@ -97,6 +99,14 @@ def tell_inputs(scenario: "Scenario") -> None:
     """Warn of what a scenario states and no workshop has."""
     for sentence in scenario.known.implausible:
         tell("warning", f"{scenario.path}: {sentence}")
+
+
+def input_warnings(known: "Known", run: Path, measurement: "Measurement") -> list[str]:
+    """What scenario and run say that no workshop has, each with its file."""
+    from stepdiag.scenario.plausible_inputs import implausible_columns, limits_of
+
+    of_run = implausible_columns(limits_of(known.keys), measurement)
+    return [f"{known.path}: {said}" for said in known.implausible] + [f"{run}: {said}" for said in of_run]
 
 
 def json_option(command: Command) -> Command:

@@ -259,8 +259,8 @@ def implausible_columns(limits: InputLimitsInForce, run: Measurement) -> Iterato
 
 
 def odd_columns(run: Measurement, keys: KnownKeys | None = None) -> list[str]:
-    """A sentence for each finding, where a file is looked at or written and not used: by the default limits without a
-    scenario."""
+    """All findings as sentences, also those that evaluations refuse: for commands that do not use the run. Without the
+    keys of a scenario by the default limits."""
     limits = InputLimitsInForce(InputLimitsSection.model_construct()) if keys is None else limits_of(keys)
     try:
         return list(implausible_columns(limits, run))

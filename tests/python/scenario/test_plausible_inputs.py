@@ -224,6 +224,10 @@ def test_commands_warn_or_end_with_2(
     odd = PLAIN + SCALES + "reference_c = 22.0\n"
     Path("odd.toml").write_text(odd)
     Path("far.toml").write_text(odd.replace("22.0", "68.0"))
+    assert main(["evaluate", "odd.toml", "run.csv", "-o", "c.csv"]) == 0
+    said = capsys.readouterr()
+    assert "warning: odd.toml: temperature.reference_c is 22 °C" in said.err
+    assert "warning: run.csv: column temperature_c" in said.err
     for name, *others in (["check"], ["simulate", "-o", "r.csv"], ["observe", "--steps", "4"], ["nc", "-o", "p.ngc"]):
         assert main([name, "odd.toml", *others]) == 0
         said = capsys.readouterr()
