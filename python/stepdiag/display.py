@@ -80,3 +80,17 @@ def point_text(point: Any) -> str:
 def lengths_text(lengths: Any) -> str:
     """Edges: 800 x 600 x 500 mm."""
     return f"{' x '.join(f'{length:g}' for length in lengths)} mm"
+
+
+def scale_lines_text(plan: Any) -> str:
+    """The scale lines of a plan and where they are read: "p00, 0p0 at every step"; "none"."""
+    return ", ".join(plan.scale_lines) + _read_at(plan) if plan.scale_lines else "none"
+
+
+def lines_text(plan: Any) -> str:
+    """How many lines a plan has: "4 lines of 50 steps, 3 scale lines at every step"."""
+    return f"{len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines{_read_at(plan)}"
+
+
+def _read_at(plan: Any) -> str:
+    return " at every step" if plan.scale_points == "steps" else ""

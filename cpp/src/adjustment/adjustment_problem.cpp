@@ -237,7 +237,7 @@ void AdjustmentProblem::collect_points(const Measurement& measurement, const Adj
         const auto place = planned.try_emplace({station.line.name(), plan_.order(station.run)});
         if (place.second) place.first->second = planned_points(measurement, row, plan_);
         const std::vector<PlanPoint>& line = place.first->second;
-        check_station(measurement, row, line);
+        check_station(measurement, row, line, plan_);
 
         const LineSetup& setup = setups_[setup_of_row_[row]];
         AdjustedPoint point{setup_of_row_[row], {no_unknown, no_unknown, no_unknown}, {}, {}, int(readings_.size()), 0};

@@ -3,6 +3,7 @@
 #include "stepdiag/evaluation/constant_index.hpp"
 #include "stepdiag/evaluation/conventional.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"
+#include "stepdiag/evaluation/plausibility.hpp"
 
 namespace stepdiag::bindings {
 
@@ -267,6 +268,8 @@ void bind_evaluation(py::module_& m) {
     m.def(
         "read_calibration", [](const PathLike& path) { return read_calibration(to_path(path)); }, py::arg("path"),
         "Reads a calibration CSV. Raises InvalidArgument naming file and line.");
+    m.def("check_points", &check_points, py::arg("measurement"), py::arg("plan"),
+          "Raises InvalidArgument for a row whose point the plan does not have, or has more than 1 um elsewhere.");
     m.def(
         "in_recorded_air",
         [](const Measurement& measurement, const Plan& plan, const HeadLike& head, const Environment& assumed) {

@@ -88,24 +88,29 @@ void bind_plan(py::module_& m) {
                      "of X, Y, Z: three of p n 0.")
         .def(py::init([](const ArrayLike& volume, const std::vector<std::string>& lines, const IntegerLike& steps,
                          const std::variant<std::string, std::vector<std::string>>& order,
-                         const std::vector<std::string>& scale_lines, const CheckPoints& check_points) {
+                         const std::vector<std::string>& scale_lines, const CheckPoints& check_points,
+                         const std::string& scale_points) {
                  const int count = int(to_integer(steps, "steps", 1, Plan::largest_step_count));
                  return Plan(to_vector3(volume, "volume"), parse_lines(lines), count, parse_orders(order),
-                             parse_lines(scale_lines), check_points);
+                             parse_lines(scale_lines), check_points, parse_scale_points(scale_points));
              }),
              py::arg("volume"), py::arg("lines"), py::arg("steps"), py::arg("order") = "XYZ",
              py::arg("scale_lines") = std::vector<std::string>{}, py::kw_only(),
-             py::arg("check_points") = CheckPoints{},
+             py::arg("check_points") = CheckPoints{}, py::arg("scale_points") = "ends",
              "volume: edges in mm. steps: per axis. order: in which a step moves the axes, \"XYZ\" ...; of several, "
-             "run r goes in the order r modulo their number. Raises InvalidArgument for an unknown or doubled line, a "
-             "volume "
-             "without extent, steps outside 1 .. 2000, check points that are outside 0 .. steps.")
+             "run r goes in the order r modulo their number. scale_points: where scale lines are read, at their two "
+             "\"ends\" or after all \"steps\". Raises InvalidArgument for an unknown or doubled line, a volume "
+             "without extent, steps outside 1 .. 2000, check points that are outside 0 .. steps, \"steps\" without "
+             "scale lines.")
         .def_property_readonly_static("largest_step_count", [](const py::object&) { return Plan::largest_step_count; })
         .def_property_readonly("volume", [](const Plan& plan) { return to_numpy_vector(plan.volume()); })
         .def_property_readonly("lines", [](const Plan& plan) { return line_names(plan.lines()); })
         .def_property_readonly(
             "scale_lines", [](const Plan& plan) { return line_names(plan.scale_lines()); },
-            "Single-axis lines of two points.")
+            "Single-axis lines whose laser stands along the axis.")
+        .def_property_readonly(
+            "scale_points", [](const Plan& plan) { return name(plan.scale_points()); },
+            "Where scale lines are read: at their two \"ends\", or after all \"steps\".")
         .def_property_readonly("steps", &Plan::steps)
         .def_property_readonly("check_points", &Plan::check_points, "Returns that tell drift.")
         .def_property_readonly(

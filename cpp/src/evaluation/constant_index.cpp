@@ -63,7 +63,7 @@ Measurement in_recorded_air(const Measurement& measurement, const Plan& plan,
         const std::vector<double> index = indices(measurement, rows, assumed, head->second.wavelength);
         const Eigen::Vector3d direction = plan.frame(first.line).col(2);
         const auto nominal = [&](std::size_t row) {
-            check_station(measurement, row, planned);
+            check_station(measurement, row, planned, plan);
             const PlanPoint& point = planned[measurement.stations()[row].point];
             return head->second.standoff + direction.dot(point.commanded - planned.front().commanded);
         };

@@ -4,11 +4,25 @@
 #include <sstream>
 
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/evaluation/plausibility.hpp"
 
 namespace stepdiag {
 namespace {
 
 constexpr double position_tolerance = 1e-3;  // mm; many controllers write positions with three decimals
+
+bool is_at(const Station& station, const std::vector<PlanPoint>& planned) {
+    return station.point < int(planned.size()) &&
+           (station.commanded - planned[station.point].commanded).cwiseAbs().maxCoeff() <= position_tolerance;
+}
+
+// Of a row that is not where the plan has it: whether it is where its scale line would be read the other way.
+bool is_of_other_scale_points(const Station& station, const Plan& plan) {
+    if (!plan.is_scale_line(station.line)) return false;
+    const ScalePoints other = plan.scale_points() == ScalePoints::ends ? ScalePoints::steps : ScalePoints::ends;
+    const Plan as_read(plan.volume(), {}, plan.steps(), plan.order(), {station.line}, {}, other);
+    return is_at(station, as_read.points(station.line));
+}
 
 void check_head_fits(const HeadCalibration& head, int beams, bool has_spots) {
     if (beams > 0 && beams != int(head.beam_offsets.size()))
@@ -62,17 +76,31 @@ std::vector<PlanPoint> planned_points(const Measurement& measurement, std::size_
     }
 }
 
-void check_station(const Measurement& measurement, std::size_t row, const std::vector<PlanPoint>& planned) {
+void check_station(const Measurement& measurement, std::size_t row, const std::vector<PlanPoint>& planned,
+                   const Plan& plan) {
     const Station& station = measurement.stations()[row];
+    if (is_at(station, planned)) return;
+    if (is_of_other_scale_points(station, plan))
+        throw InvalidArgument(row_name(measurement, row) + ": this scale line was read " +
+                              (plan.scale_points() == ScalePoints::ends ? "after every step, the plan has its two ends "
+                                                                          "(expected scale_points = \"steps\")"
+                                                                        : "at its two ends, the plan has all steps "
+                                                                          "(expected scale_points = \"ends\")"));
     if (station.point >= int(planned.size()))
         throw InvalidArgument(row_name(measurement, row) + ": the line has the points 0 to " +
                               std::to_string(planned.size() - 1));
-    const Eigen::Vector3d &expected = planned[station.point].commanded, &commanded = station.commanded;
-    if ((commanded - expected).cwiseAbs().maxCoeff() <= position_tolerance) return;
     std::ostringstream text;
-    text << row_name(measurement, row) << ": the plan has this point at (" << expected.transpose()
-         << ") mm, the row says (" << commanded.transpose() << ") mm";
+    text << row_name(measurement, row) << ": the plan has this point at ("
+         << planned[station.point].commanded.transpose() << ") mm, the row says (" << station.commanded.transpose()
+         << ") mm";
     throw InvalidArgument(text.str());
+}
+
+void check_points(const Measurement& measurement, const Plan& plan) {
+    for (const auto& entry : rows_by_pass(measurement)) {
+        const auto planned = planned_points(measurement, entry.second.front(), plan);
+        for (const std::size_t row : entry.second) check_station(measurement, row, planned, plan);
+    }
 }
 
 }  // namespace stepdiag

@@ -29,6 +29,8 @@ std::map<std::pair<int, std::string>, std::vector<std::size_t>> rows_by_pass(con
 void check_uncertainty(const ReadingUncertainty& uncertainty);
 void check_heads_fit(const Measurement& measurement, const HeadCalibrations& heads, bool spots_count);
 std::vector<PlanPoint> planned_points(const Measurement& measurement, std::size_t row, const Plan& plan);
-void check_station(const Measurement& measurement, std::size_t row, const std::vector<PlanPoint>& planned);
+// One that is where the plan would have it with other points of scale lines is named as that.
+void check_station(const Measurement& measurement, std::size_t row, const std::vector<PlanPoint>& planned,
+                   const Plan& plan);
 
 }  // namespace stepdiag

@@ -180,7 +180,7 @@ std::vector<Pass> collect_passes(const Measurement& measurement, const Plan& pla
         const Eigen::Vector3d start = planned.front().commanded;
         for (const std::size_t row : members) {
             const Station& station = measurement.stations()[row];
-            check_station(measurement, row, planned);
+            check_station(measurement, row, planned, plan);
             if (!pass.place[station.point]) continue;
             PassPoint& point = pass.points[*pass.place[station.point]];
             // The position in the file only identifies the point, because it may have been rounded when it was written.

@@ -7,6 +7,14 @@
 
 namespace stepdiag {
 
+const char* name(ScalePoints points) { return points == ScalePoints::ends ? "ends" : "steps"; }
+
+ScalePoints parse_scale_points(std::string_view text) {
+    for (const ScalePoints points : {ScalePoints::ends, ScalePoints::steps})
+        if (text == name(points)) return points;
+    throw InvalidArgument("scale_points: expected \"ends\" or \"steps\", got \"" + std::string(text) + "\"");
+}
+
 StepOrder parse_order(std::string_view text) {
     std::string sorted(text);
     std::sort(sorted.begin(), sorted.end());
@@ -17,23 +25,26 @@ StepOrder parse_order(std::string_view text) {
 }
 
 Plan::Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, StepOrder order,
-           std::vector<Line> scale_lines, const CheckPoints& check_points)
-    : Plan(volume, std::move(lines), steps, std::vector{order}, std::move(scale_lines), check_points) {}
+           std::vector<Line> scale_lines, const CheckPoints& check_points, ScalePoints scale_points)
+    : Plan(volume, std::move(lines), steps, std::vector{order}, std::move(scale_lines), check_points, scale_points) {}
 
 Plan::Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::vector<StepOrder> orders,
-           std::vector<Line> scale_lines, const CheckPoints& check_points)
+           std::vector<Line> scale_lines, const CheckPoints& check_points, ScalePoints scale_points)
     : volume_(volume),
       lines_(std::move(lines)),
       steps_(steps),
       orders_(std::move(orders)),
       scale_lines_(std::move(scale_lines)),
-      check_points_(check_points) {
+      check_points_(check_points),
+      scale_points_(scale_points) {
     if (!volume_.allFinite() || volume_.minCoeff() < 1e-3 || volume_.maxCoeff() > 1e6)
         throw InvalidArgument("volume: expected three edges in mm, each from 0.001 to 1e6");
     if (steps_ < 1 || steps_ > largest_step_count)
         throw InvalidArgument("steps: expected 1 to " + std::to_string(largest_step_count) + ", got " +
                               std::to_string(steps_));
     if (lines_.empty() && scale_lines_.empty()) throw InvalidArgument("lines: expected at least one line");
+    if (scale_lines_.empty() && scale_points_ == ScalePoints::steps)
+        throw InvalidArgument("scale_points: expected scale_lines as well, got none");
     if (orders_.empty()) throw InvalidArgument("order: expected at least one permutation of XYZ");
     for (const auto& [key, value] : {std::pair("every", check_points_.every), std::pair("at", check_points_.at)})
         if (value < 0 || value > steps_)
@@ -82,7 +93,7 @@ std::vector<PlanPoint> Plan::points(const Line& line, int run) const {
     for (const Axis axis : all_axes) place(axis, line.sign(axis) < 0 ? steps_ : 0);
 
     std::vector<PlanPoint> points{point};
-    const int stride = scale ? steps_ : 1;
+    const int stride = scale && scale_points_ == ScalePoints::ends ? steps_ : 1;
     PlanPoint check = point;
     for (const Axis axis : all_axes)
         if (line.moves(axis)) {

@@ -77,9 +77,12 @@ RunModel::RunModel(const VirtualRun& given, std::uint64_t seed) : run(given), dr
         const LinePlace place = place_on_line(run.machine, run.plan, run.heads, pass.line);
         const bool forward = pass.direction == Direction::forward;
         const Eigen::Vector3d first = (forward ? pass.points.front() : pass.points.back()).commanded;
+        const Eigen::Vector3d last = (forward ? pass.points.back() : pass.points.front()).commanded;
         for (const PlanPoint& point : pass.points) {
-            RunRow row{double(rows.size() - pass.setup_row) * seconds, place.frame.col(2).dot(point.commanded - first),
-                       point.number + 1 == int(pass.points.size())};
+            const double travel = place.frame.col(2).dot(point.commanded - first);
+            const double share = run.plan.is_scale_line(pass.line) ? travel / (last - first).norm()
+                                                                   : point.number + 1 == int(pass.points.size());
+            RunRow row{double(rows.size() - pass.setup_row) * seconds, travel, share};
             if (const auto& scales = run.simulation.scales) {
                 row.warmth = scales->at(double(rows.size()) * seconds).array() - scales->expansion.reference;
                 row.from_fixed = point.commanded - scales->expansion.fixed_point;

@@ -115,7 +115,7 @@ Eigen::MatrixXd ScalarSampler::read(const Eigen::VectorXd& deviations, std::opti
             if (is_distance(model_.channels[c]))
                 value = (value + model_error) / (1.0 + shared[shared_field::wavelength]) +
                         numbers[setup::scale_factor] * row.travel +
-                        (row.is_last_point ? numbers[setup::scale_length] : 0.0);
+                        row.length_share * numbers[setup::scale_length];
             readings(Eigen::Index(k), Eigen::Index(c)) = value;
         }
     }

@@ -299,7 +299,7 @@ void correct(const SimdPass& pass, const SimdCorrection& c) {
         for (std::size_t row = 0; row < pass.rows; ++row) {
             Pair added = drift * all(c.elapsed[row]);
             if (pass.excess) added = mul_add(model, at(pass.excess[row], lane), added);
-            const Pair scaled = mul_add(factor, all(c.travel[row]), length * all(c.is_last[row]));
+            const Pair scaled = mul_add(factor, all(c.travel[row]), length * all(c.length_share[row]));
             for (std::size_t i = 0; i < pass.channels; ++i) {
                 double* const reading = pass.readings + (row * pass.channels + i) * lane_group + lane;
                 const Pair value = load(reading), constant = at(c.constant[i], lane);

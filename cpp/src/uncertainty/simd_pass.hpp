@@ -104,7 +104,7 @@ void define_pass(const SimdPass& pass, const SimdClosed& closed);
 struct SimdCorrection {
     const double* elapsed;
     const double* travel;
-    const double* is_last;
+    const double* length_share;
     const SimdRow* constant;  // a row each channel: constant, or zero
     const SimdRow* gain;      // 1 + gain of the channels that are no distances
     const SimdRow* drift;

@@ -53,7 +53,7 @@ std::unique_ptr<const SimdSampler> SimdSampler::make(const RunModel& model) {
     for (const RunRow& row : model.rows) {
         run->elapsed_.push_back(row.elapsed);
         run->travel_.push_back(row.travel);
-        run->is_last_.push_back(row.is_last_point ? 1.0 : 0.0);
+        run->length_share_.push_back(row.length_share);
     }
     for (const std::string& channel : model.channels) run->is_distance_.push_back(is_distance(channel));
     run->heads_vary_ = model.has_uncertain_air() || !model.moved_parts.empty() ||
@@ -143,7 +143,7 @@ void SimdSampler::correct(const RunPass& pass, const SimdPass& lanes, const Scra
         }
     }
     const std::size_t first = pass.first_row();
-    correct_pass(lanes, {&elapsed_[first], &travel_[first], &is_last_[first], constant.data(), &gain,
+    correct_pass(lanes, {&elapsed_[first], &travel_[first], &length_share_[first], constant.data(), &gain,
                          &fields[setup::drift], &scratch.shared[shared_field::reading_model], &wavelength,
                          &fields[setup::scale_factor], &fields[setup::scale_length], is_distance_.data()});
 }

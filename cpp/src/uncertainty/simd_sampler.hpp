@@ -73,7 +73,7 @@ private:
     std::vector<HeadPaths> heads_;
     std::vector<Line> lines_;
     std::vector<ToolPose> poses_;
-    std::vector<double> elapsed_, travel_, is_last_;
+    std::vector<double> elapsed_, travel_, length_share_;
     std::vector<std::uint8_t> is_distance_;
     bool heads_vary_, reads_excess_;
 };

@@ -4,7 +4,7 @@ One home for all of them: what is refused, what the error message says, the tabl
 comments of the file that `stepdiag init` writes are made from the models below.
 """
 
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
@@ -143,9 +143,16 @@ class PlanSection(Section):
     )
     scale_lines: tuple[str, ...] = key(
         'a list of single-axis lines such as "p00"',
-        "Lines measured at their two ends only; they fix the slopes of the positioning errors.",
+        "Lines along one axis whose laser is aligned with it; they fix the slopes of the positioning errors.",
         (),
         ["p00", "0p0", "00p"],
+    )
+    scale_points: Literal["ends", "steps"] = key(
+        '"ends" or "steps"',
+        "Where scale lines are read: at their two ends, or after every step. Steps take some minutes more and make "
+        "positioning several times better known (docs/plans.md).",
+        "ends",
+        "steps",
     )
     check_points: Annotated[int, Field(ge=0, le=LARGEST_STEPS)] = key(
         f"an integer from 0 to {LARGEST_STEPS}",

@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stepdiag._core import Adjustment, InvalidArgument, Measurement
+from stepdiag.display import lines_text
 from stepdiag.calibration.finding_text import combination_text
 from stepdiag.calibration.temperature_text import reference_mark
 from stepdiag.figures.calibration import undetermined_notes, with_gaps
@@ -86,7 +87,7 @@ def draw_observation(
     what other numbers of steps would give."""
     calibration, plan = found.calibration, known.plan
     facts = (
-        f"{len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines, {len(run)} points, "
+        f"{lines_text(plan)}, {len(run)} points, "
         f"{', '.join(known.signals)}; {found.degrees_of_freedom} readings more than unknowns"
     )
     facts += f", positioning {reference_mark(calibration.temperature_reference)}"

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 from stepdiag import _core
 from stepdiag._core import Adjustment, Calibration, ErrorMap, Head, Machine, Measurement, Plan, Verdict
-from stepdiag.display import Facts, facts_of_properties, html_table, lengths_text, one_line, point_text, text_of
+from stepdiag.display import Facts, facts_of_properties, html_table, lengths_text, one_line, point_text, scale_lines_text, text_of
 
 
 class ParameterValues(NamedTuple):
@@ -61,7 +61,7 @@ def _plan(plan: Plan) -> Facts:
         ("volume", lengths_text(plan.volume)),
         ("lines", ", ".join(plan.lines)),
         ("steps", str(plan.steps)),
-        ("scale lines", ", ".join(plan.scale_lines) or "none"),
+        ("scale lines", scale_lines_text(plan)),
         ("order", ", ".join(dict.fromkeys(plan.orders))),
         ("smallest mirror", lengths_text(plan.smallest_mirror())),
     ]

@@ -196,6 +196,7 @@ def with_plan(
             order=old.orders if order is None else list(order),
             scale_lines=[renamed.get(line, line) for line in old.scale_lines],
             check_points=old.check_points,
+            scale_points=old.scale_points,
         )
         lines = [renamed.get(line, line) for line in run.line]
         position = np.array(run.position)

@@ -19,14 +19,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from stepdiag import _core
-from stepdiag._core import InvalidArgument
+from stepdiag._core import InvalidArgument, check_points
 from stepdiag.mistakes.catalogue import CATALOGUE
 from stepdiag.mistakes.copies import Change, Copy, Family, Hypothesis, Rows, in_turn, of_rows, passes_of, without
 from stepdiag.mistakes.nominal_way import Way, distance_of, ways_of
 from stepdiag.scenario.description import Scenario, adjust_scenario, adjustment_options, reduced_run
 from stepdiag.scenario.heads import of_run
 from stepdiag.scenario.known import Known
-from stepdiag.scenario.planned_readings import check_points
 
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor

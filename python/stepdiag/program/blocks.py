@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stepdiag._core import __version__
+from stepdiag.display import scale_lines_text
 from stepdiag.planning.measuring_time import Times
 from stepdiag.program.gcode import HANDSHAKE, PULSE, Trigger, Writer
 from stepdiag.program.options import Options, writer_of
@@ -17,7 +18,7 @@ from stepdiag.units import MINUTE
 
 def header(known: Known, options: Options, space: Space, times: Times, visits: list[Visit]) -> Iterator[str]:
     plan, keys = known.plan, known.keys
-    scale = f", scale lines {' '.join(plan.scale_lines)}" if plan.scale_lines else ""
+    scale = f", scale lines {scale_lines_text(plan)}" if plan.scale_lines else ""
     runs = 1 + max(visit.run for visit in visits)
     step = plan.volume / plan.steps
     yield f"Measuring program of {known.path.name}, by stepdiag {__version__}"

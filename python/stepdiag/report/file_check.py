@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from stepdiag.display import lines_text
 from stepdiag import _core
 from stepdiag._core import Calibration, InvalidArgument
 from stepdiag.calibration.finding_text import UNVERIFIED, check_angles, frame_deviation_texts, implausible_texts
@@ -100,8 +101,7 @@ def _scenario(path: Path) -> Finding:
 
     scenario = read_scenario(path)
     known, plan = scenario.known, scenario.known.plan
-    lines = f"{len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines"
-    summary = f"{known.chain.name}, {lines}"
+    summary = f"{known.chain.name}, {lines_text(plan)}"
     scenario.machine()  # refuses an error map that is not sound
     scenario.actual_heads()  # and pose errors that push components into each other
     return Finding("scenario", summary, tuple(scenario_warnings(scenario)))

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from stepdiag.display import lines_text
 from stepdiag import _core
 from stepdiag._core import Adjustment
 from stepdiag.calibration.finding_text import combination_text
@@ -23,7 +24,7 @@ def observation_report(found: Adjustment, run: _core.Measurement, known: Known) 
     """What the scenario's own plan determines, with what would help for the rest."""
     plan, calibration = known.plan, found.calibration
     yield (
-        f"plan: {len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines; {len(run)} points, "
+        f"plan: {lines_text(plan)}; {len(run)} points, "
         f"{', '.join(known.signals)}; {found.degrees_of_freedom} readings more than unknowns"
     )
     incomplete, _ = lost_readings(run, plan, known.signals)

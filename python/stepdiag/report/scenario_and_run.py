@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement
+from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement, check_points
 from stepdiag.calibration.finding_text import verdict_rows
 from stepdiag.io.data_files import read_measurement
 from stepdiag.mistakes.search import FoundMistake
 from stepdiag.report.mistakes import change_rows, mistake_text, searchable, with_mistake
 from stepdiag.scenario.description import adjust_scenario, read_scenario
 from stepdiag.scenario.known import Known
-from stepdiag.scenario.planned_readings import check_points, lost_readings
+from stepdiag.scenario.planned_readings import lost_readings
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from stepdiag.display import lines_text
 from stepdiag import _core
 from stepdiag.calibration.temperature_text import reference_mark
 from stepdiag.report.text_columns import text_columns
@@ -44,8 +45,7 @@ def opening_rows(result: UncertaintyResult) -> Iterator[str]:
         yield f"not to be trusted: {result.warning}"
     derived = len(result.outputs) - result.entries
     yield (
-        f"virtual calibrations: method {result.method}, {len(plan.lines)} lines of {plan.steps} steps, "
-        f"{len(plan.scale_lines)} scale lines, readings {', '.join(known.signals)}"
+        f"virtual calibrations: method {result.method}, {lines_text(plan)}, readings {', '.join(known.signals)}"
     )
     yield (
         f"uncertain: {len(known.uncertain.inputs)} inputs, {len(known.uncertain.noise)} kinds of noise; "

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from stepdiag import _core
 from stepdiag.config.scenario_keys import KnownKeys, PlanSection
 from stepdiag.config.toml_text import located
-from stepdiag.display import Displayed, Facts, lengths_text, point_text
+from stepdiag.display import Displayed, Facts, lengths_text, point_text, scale_lines_text
 from stepdiag.scenario.adjustment import change_priors, machine_drift_of, plausible_limits, setup_priors, smoothness_of
 from stepdiag.scenario.heads import DescribedHead, check_alike, check_mirrors, heads_by_line, make_heads, signals_of
 from stepdiag.scenario.instrument import KnownInstrument, instrument_of
@@ -77,7 +77,7 @@ class Known(Displayed):
             ("chain", self.chain.name),
             ("volume", lengths_text(plan.volume)),
             ("lines", f"{', '.join(plan.lines)}, of {plan.steps} steps"),
-            ("scale lines", ", ".join(plan.scale_lines) or "none"),
+            ("scale lines", scale_lines_text(plan)),
             ("signals", ", ".join(self.signals)),
             ("tool offset", point_text(self.tool)),
             ("heads", ", ".join(dict.fromkeys(head.layout for head in self.heads.values()))),
@@ -99,6 +99,7 @@ def known_of(
             order=_orders(keys.plan),
             scale_lines=list(keys.plan.scale_lines),
             check_points=_core.CheckPoints(keys.plan.check_points, keys.plan.check_point),
+            scale_points=keys.plan.scale_points,
         )
     check_mirrors(described, plan, path)
     described_heads = heads_by_line(keys, plan, described, path)

@@ -19,7 +19,6 @@ RECORDS: Final = (
     "air_pressure",
     "air_humidity",
 )
-SAME_POINT: Final = 1e-3  # mm, as in the evaluations: positions in files may have been rounded
 
 
 def empty_sheet(plan: Plan, signals: Sequence[str], *, repeats: int = 1, backward: bool = False) -> Measurement:
@@ -82,12 +81,3 @@ def only(measurement: Measurement, signals: Sequence[str]) -> Measurement:
             name: values for name, values in measurement.standard_uncertainty.items() if name in kept
         },
     )
-
-
-def check_points(measurement: Measurement, plan: Plan) -> None:
-    """Raises InvalidArgument for a point that the plan does not have."""
-    run = measurement
-    for line, number, point, position in zip(run.line, run.run, run.point, run.position, strict=True):
-        points = plan.points(line, int(number)) if line in (*plan.lines, *plan.scale_lines) else ()
-        if point >= len(points) or np.max(np.abs(points[point] - position)) > SAME_POINT:
-            raise InvalidArgument(f"run {number}, line {line}, point {point}: is not in the plan, or not there")

@@ -89,6 +89,31 @@ TEST(Plan, BeamWandersElevenMillimetresOnTheMirrorForStepsOf16By12By10) {
     EXPECT_LE((plan.smallest_mirror() - 2.0 * Vector2d(9.6, 20.0 * 500.0 / D)).norm(), 2e-14);
 }
 
+TEST(Plan, ScaleLinesAreReadAtTheirEndsOrAtEveryStep) {
+    const auto plan = [](int steps, stepdiag::ScalePoints points) {
+        return Plan(volume, lines({"ppp"}), steps, stepdiag::all_axes, lines({"n00"}), {2, 1}, points);
+    };
+    const Line line = Line::parse("n00");
+    const auto ends = plan(4, stepdiag::ScalePoints::ends).points(line);
+    ASSERT_EQ(ends.size(), 2u);
+    EXPECT_EQ(ends[0].commanded, Vector3d(800.0, 0.0, 0.0));
+    EXPECT_EQ(ends[1].commanded, Vector3d(0.0, 0.0, 0.0));
+    EXPECT_EQ(ends[1].number, 1);
+    const auto steps = plan(4, stepdiag::ScalePoints::steps).points(line);
+    ASSERT_EQ(steps.size(), 5u);  // no returns to a check point
+    for (int k = 0; k <= 4; ++k) {
+        EXPECT_EQ(steps[std::size_t(k)].number, k);
+        EXPECT_EQ(steps[std::size_t(k)].node, (std::array{4 - k, 0, 0}));
+        EXPECT_EQ(steps[std::size_t(k)].commanded, Vector3d(800.0 - 200.0 * k, 0.0, 0.0));
+    }
+    EXPECT_EQ(plan(1, stepdiag::ScalePoints::steps).points(line).size(), 2u);
+    EXPECT_EQ(stepdiag::parse_scale_points("steps"), stepdiag::ScalePoints::steps);
+    expect_refused([] { stepdiag::parse_scale_points("step"); }, "scale_points: expected \"ends\" or \"steps\"");
+    expect_refused(
+        [] { Plan(volume, diagonals, 4, stepdiag::all_axes, {}, {}, stepdiag::ScalePoints::steps); },
+        "scale_points: expected scale_lines as well");
+}
+
 TEST(Plan, SmallestMirrorHoldsTheBeamOnEveryLine) {
     const auto names = {"ppp", "npp", "pnp", "nnp", "ppn", "nnn", "p0p", "0np", "pp0"};
     for (const char* order : {"XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"}) {

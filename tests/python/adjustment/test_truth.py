@@ -18,7 +18,7 @@ from adjusted import (
 from dense_adjustment import Knowledge
 from places import RUNS
 from reference_files import read_error_table, read_scenario
-from usual import DIAGONALS, FACES, SCALE_LINES
+from usual import ALL_CHAINS, DIAGONALS, FACES, SCALE_LINES
 from virtual_runs import head_of, measured, plan_of, random_scenario, random_table
 
 import stepdiag as sd
@@ -40,6 +40,17 @@ def test_fifty_steps_an_axis_are_recovered(layout: str) -> None:
     rng = np.random.default_rng(50)
     scenario = random_scenario(rng, layout=layout, steps=50)
     table = random_table(rng, scenario.volume, 50)
+    run = measured(reference.simulate(scenario, table))
+    assert_recovered(adjust(run, scenario, knowledge_of(layout)), table, LIMIT[layout])
+
+
+@pytest.mark.parametrize("chain", ALL_CHAINS)
+@pytest.mark.parametrize("layout", ["ideal", "psd", "multi_beam"])
+def test_scale_lines_read_at_every_step_are_recovered(layout: str, chain: str) -> None:
+    """In all chains, with the misaligned diagonals of a random machine."""
+    rng = np.random.default_rng(7000 + ALL_CHAINS.index(chain))
+    scenario = random_scenario(rng, layout=layout, chain=chain, steps=9, scale_points="steps")
+    table = random_table(rng, scenario.volume, scenario.steps)
     run = measured(reference.simulate(scenario, table))
     assert_recovered(adjust(run, scenario, knowledge_of(layout)), table, LIMIT[layout])
 

@@ -181,6 +181,7 @@ class Scenario:
     tool: tuple[float, float, float] = (0.0, 0.0, 0.0)
     order: str = "XYZ"
     scale_lines: list[str] = field(default_factory=list)
+    scale_points: str = "ends"  # or "steps"
     layout: str = "ideal"
     standoff: float = 100.0
     psd_distance: float = 0.0
@@ -196,7 +197,8 @@ class Scenario:
 
 
 def commanded_points(scenario: Scenario, line: str) -> list[tuple[float, float, float]]:
-    steps = 1 if line in scenario.scale_lines else scenario.steps
+    ends = line in scenario.scale_lines and scenario.scale_points == "ends"
+    steps = 1 if ends else scenario.steps
     node = [steps if s == "n" else 0 for s in line]
 
     def position() -> tuple[float, float, float]:

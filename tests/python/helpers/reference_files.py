@@ -62,6 +62,7 @@ def read_scenario(path: Path) -> Scenario:
         steps=plan["steps"],
         order=plan["order"],
         scale_lines=plan["scale_lines"],
+        scale_points=plan.get("scale_points", "ends"),
         layout=head["layout"],
         standoff=head["standoff_mm"],
         psd_distance=head.get("psd_distance_mm", 0.0),

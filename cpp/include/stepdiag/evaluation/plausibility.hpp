@@ -24,6 +24,9 @@ struct PlausibleLimits {
 // Throws InvalidArgument for limits that are not positive.
 void check(const PlausibleLimits& limits);
 
+// Throws InvalidArgument for a row whose point the plan does not have, or has more than 1 um elsewhere.
+void check_points(const Measurement& measurement, const Plan& plan);
+
 // Throws InvalidArgument, before the evaluation, where the distances of a line do not grow with the plan's travel: in
 // another unit, not at all, or the wrong way. Single wrong readings do not matter here.
 void refuse_foreign_distances(const Measurement& measurement, const Plan& plan);

@@ -30,7 +30,8 @@ enum class SetupQuantity {
     gain,               // tilts read 1 + gain times themselves; layout psd: spots; multi_beam: the beams' offsets
     drift,              // distances read too much by drift times the time since the set-up's first reading
     // No unknowns of an adjustment:
-    scale_length,  // what the distances of the line's last point read too much: a length standard's error
+    scale_length,  // what the distances of the line's last point read too much: a length standard's error;
+                   // the inner points of a scale line by their travel
     scale_factor,  // distances read too much by this times their travel from the line's first point
 };
 inline constexpr int setup_quantity_count = 11;

@@ -36,6 +36,11 @@ struct LateralExcursion {
     Eigen::Vector2d highest;
 };
 
+// Where scale lines are read: at their two ends, or after every step as other single-axis lines are.
+enum class ScalePoints { ends, steps };
+const char* name(ScalePoints points);            // "ends", "steps"
+ScalePoints parse_scale_points(std::string_view text);  // throws InvalidArgument for any other text
+
 // The axes in the order in which a step moves them.
 using StepOrder = std::array<Axis, 3>;
 
@@ -45,18 +50,22 @@ public:
     // axis already exceed any practical run.
     static constexpr int largest_step_count = 2'000;
 
-    // `volume`: edges X, Y, Z, mm. Scale lines are single-axis lines of two points. Throws InvalidArgument if there is
-    // no line, a line is given twice, an edge is outside 0.001 to 1e6 mm, `steps` is outside 1 to largest_step_count,
-    // a scale line moves more than one axis, there is no order, or check points are outside 0 to `steps`.
+    // `volume`: edges X, Y, Z, mm. Scale lines are single-axis lines whose laser stands along the axis. Throws
+    // InvalidArgument if there is no line, a line is given twice, an edge is outside 0.001 to 1e6 mm, `steps` is
+    // outside 1 to largest_step_count, a scale line moves more than one axis, there is no order, check points are
+    // outside 0 to `steps`, or the points of scale lines are stated without any.
     Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, StepOrder order = all_axes,
-         std::vector<Line> scale_lines = {}, const CheckPoints& check_points = {});
+         std::vector<Line> scale_lines = {}, const CheckPoints& check_points = {},
+         ScalePoints scale_points = ScalePoints::ends);
     // Run r uses orders[r modulo the number of orders].
     Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::vector<StepOrder> orders,
-         std::vector<Line> scale_lines = {}, const CheckPoints& check_points = {});
+         std::vector<Line> scale_lines = {}, const CheckPoints& check_points = {},
+         ScalePoints scale_points = ScalePoints::ends);
 
     const Eigen::Vector3d& volume() const { return volume_; }
     const std::vector<Line>& lines() const { return lines_; }
     const std::vector<Line>& scale_lines() const { return scale_lines_; }
+    ScalePoints scale_points() const { return scale_points_; }
     int steps() const { return steps_; }
     const std::vector<StepOrder>& orders() const { return orders_; }
     const StepOrder& order(int run = 0) const;
@@ -69,7 +78,7 @@ public:
     Eigen::Matrix3d frame(const Line& line) const { return line_frame(line, volume_); }
 
     // The points of a line in the order of travel. For N steps: 3N+1 on a body diagonal, 2N+1 on a face diagonal, N+1
-    // on a single-axis line, 2 on a scale line; and the returns to the check point where they are made, which have
+    // on a single-axis line, 2 on a scale line that is read at its ends; and the returns to the check point where they are made, which have
     // numbers of their own. Throws InvalidArgument for a line that is not in the plan.
     std::vector<PlanPoint> points(const Line& line, int run = 0) const;
 
@@ -85,6 +94,7 @@ private:
     std::vector<StepOrder> orders_;
     std::vector<Line> scale_lines_;
     CheckPoints check_points_;
+    ScalePoints scale_points_;
 };
 
 // Accepts a permutation of "XYZ"; throws InvalidArgument for any other text.

@@ -8,9 +8,9 @@
 //   tool poses   p + machine_drift t + walk + position noise, R = Exp(orientation noise) R of the machine's errors,
 //                t from the run's first reading
 // A distance d of simulate(), its set-up included, is read as
-//   (d + reading_model L tan^2 phi) / (1 + wavelength) + scale_factor s + (at the line's last point) scale_length +
-//   noise
-// with L and phi of the head's axis, s the commanded travel from the line's first point, the walk of the head counting
+//   (d + reading_model L tan^2 phi) / (1 + wavelength) + scale_factor s + share scale_length + noise
+// with L and phi of the head's axis, s the commanded travel from the line's first point, the share 1 at its
+// last point (on a scale line it grows with s, elsewhere it is 0 before), the walk of the head counting
 // from a set-up's first reading. What does not matter is left out: dispersion over the wavelength's error. A sample in
 // which a reading is lost, or whose air is out of the equation's range, has no result.
 // Counters of random numbers: RandomBlock{sample, item, draw} of the stream `virtual_calibration`; items: see
