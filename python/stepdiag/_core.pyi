@@ -10,7 +10,7 @@ import os
 import stepdiag.io.displays
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'ChangeCombination', 'ChangePriors', 'ChangeTerm', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'PredictedReading', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'Recheck', 'ReplayMismatch', 'ReturnedBeam', 'RoundedChannel', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'newer_format', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'recheck', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'without_lost_marks', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'ChangeCombination', 'ChangePriors', 'ChangeTerm', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'PredictedReading', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'Recheck', 'ReplayMismatch', 'ReturnedBeam', 'RoundedChannel', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'check_points', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'newer_format', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'recheck', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'without_lost_marks', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -221,9 +221,9 @@ class Plan:
     The lines measured through a volume, in single-axis steps. Lines are named by the travel signs of X, Y, Z: three of p n 0.
     """
     largest_step_count: typing.ClassVar[int] = 2000
-    def __init__(self, volume: numpy.typing.ArrayLike, lines: collections.abc.Sequence[str], steps: typing.SupportsIndex, order: str | collections.abc.Sequence[str] = 'XYZ', scale_lines: collections.abc.Sequence[str] = [], *, check_points: CheckPoints = ...) -> None:
+    def __init__(self, volume: numpy.typing.ArrayLike, lines: collections.abc.Sequence[str], steps: typing.SupportsIndex, order: str | collections.abc.Sequence[str] = 'XYZ', scale_lines: collections.abc.Sequence[str] = [], *, check_points: CheckPoints = ..., scale_points: str = 'ends') -> None:
         """
-        volume: edges in mm. steps: per axis. order: in which a step moves the axes, "XYZ" ...; of several, run r goes in the order r modulo their number. Raises InvalidArgument for an unknown or doubled line, a volume without extent, steps outside 1 .. 2000, check points that are outside 0 .. steps.
+        volume: edges in mm. steps: per axis. order: in which a step moves the axes, "XYZ" ...; of several, run r goes in the order r modulo their number. scale_points: where scale lines are read, at their two "ends" or after all "steps". Raises InvalidArgument for an unknown or doubled line, a volume without extent, steps outside 1 .. 2000, check points that are outside 0 .. steps, "steps" without scale lines.
         """
     def __repr__(self) -> str:
         ...
@@ -276,7 +276,12 @@ class Plan:
     @property
     def scale_lines(self) -> list[str]:
         """
-        Single-axis lines of two points.
+        Single-axis lines whose laser stands along the axis.
+        """
+    @property
+    def scale_points(self) -> str:
+        """
+        Where scale lines are read: at their two "ends", or after all "steps".
         """
     @property
     def steps(self) -> int:
@@ -3501,6 +3506,10 @@ def adjust(measurement: Measurement, plan: Plan, head: Head | collections.abc.Ma
 def beam_radius(mode: GaussianMode, reduced_length: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     Radius (1/e^2 of power, mm) of a beam after a reduced length (sum of t/n, mm) from the collimator's plane.
+    """
+def check_points(measurement: Measurement, plan: Plan) -> None:
+    """
+    Raises InvalidArgument for a row whose point the plan does not have, or has more than 1 um elsewhere.
     """
 def choose_instruction_set(name: str) -> None:
     """

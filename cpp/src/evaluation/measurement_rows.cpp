@@ -81,11 +81,8 @@ void check_station(const Measurement& measurement, std::size_t row, const std::v
     const Station& station = measurement.stations()[row];
     if (is_at(station, planned)) return;
     if (is_of_other_scale_points(station, plan))
-        throw InvalidArgument(row_name(measurement, row) + ": this scale line was read " +
-                              (plan.scale_points() == ScalePoints::ends ? "after every step, the plan has its two ends "
-                                                                          "(expected scale_points = \"steps\")"
-                                                                        : "at its two ends, the plan has all steps "
-                                                                          "(expected scale_points = \"ends\")"));
+        throw InvalidArgument(row_name(measurement, row) + ": " +
+                              (plan.scale_points() == ScalePoints::ends ? read_at_every_step : read_at_its_ends));
     if (station.point >= int(planned.size()))
         throw InvalidArgument(row_name(measurement, row) + ": the line has the points 0 to " +
                               std::to_string(planned.size() - 1));

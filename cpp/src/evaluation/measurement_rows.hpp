@@ -10,6 +10,12 @@
 
 namespace stepdiag {
 
+// Of scale lines whose points are not those of the plan.
+inline constexpr const char* read_at_its_ends =
+    "this scale line was read at its two ends, the plan has every step (expected scale_points = \"ends\")";
+inline constexpr const char* read_at_every_step =
+    "this scale line was read after every step, the plan has its two ends (expected scale_points = \"steps\")";
+
 // "data row 7 (run 0, line ppp, point 6)"
 std::string row_name(const Measurement& measurement, std::size_t row);
 

@@ -92,10 +92,22 @@ std::string volume_like(const Calibration& calibration, const PlausibleLimits& l
     return edges.empty() ? edges : "the readings fit a travel of " + edges + ": is the volume right?";
 }
 
+constexpr double tolerance = 0.05;  // of growth: ten times the effect of a misalignment of 0.1 rad
+
+// Of points 0 and 1 of a scale line whose positions are those of the plan, as an import fills them in.
+void refuse_ends_as_steps(const Measurement& measurement, const Plan& plan) {
+    if (plan.scale_points() == ScalePoints::ends || plan.steps() == 1) return;
+    for (const auto& entry : rows_by_pass(measurement)) {
+        if (!plan.is_scale_line(measurement.stations()[entry.second.front()].line)) continue;
+        const LineDistances line = distances_of(measurement, entry.second, plan);
+        if (line.row.size() == 2 && std::abs(line.growth() / plan.steps() - 1.0) < tolerance)
+            throw InvalidArgument(row_name(measurement, entry.second.front()) + ": " + read_at_its_ends);
+    }
+}
+
 // A sentence about the first line with at least so many readings whose distances do not grow with the plan's travel;
 // empty if there is none.
 std::string foreign_distances(const Measurement& measurement, const Plan& plan, std::size_t fewest) {
-    constexpr double tolerance = 0.05;  // ten times the effect of a misalignment of 0.1 rad
     for (const auto& entry : rows_by_pass(measurement)) {
         const LineDistances line = distances_of(measurement, entry.second, plan);
         if (line.row.size() < fewest) continue;
@@ -143,6 +155,7 @@ void check(const PlausibleLimits& limits) {
 
 void refuse_foreign_distances(const Measurement& measurement, const Plan& plan) {
     constexpr std::size_t enough = 8;  // readings, of which two may be wrong
+    refuse_ends_as_steps(measurement, plan);
     const std::string sentence = foreign_distances(measurement, plan, enough);
     if (!sentence.empty()) throw InvalidArgument(sentence);
 }

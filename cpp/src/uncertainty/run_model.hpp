@@ -52,8 +52,8 @@ struct MovedPart {
 };
 
 struct RunRow {
-    double elapsed;  // s, since the first reading of its set-up
-    double travel;   // mm, commanded, along the line from its first point
+    double elapsed;       // s, since the first reading of its set-up
+    double travel;        // mm, commanded, along the line from its first point
     double length_share;  // of a length standard's error: 1 at the last point, along a scale line as the travel
     // By axis: kelvins above the reference temperature, and mm from the scale's fixed point.
     Eigen::Vector3d warmth = Eigen::Vector3d::Zero(), from_fixed = Eigen::Vector3d::Zero();

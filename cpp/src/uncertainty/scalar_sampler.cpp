@@ -114,8 +114,7 @@ Eigen::MatrixXd ScalarSampler::read(const Eigen::VectorXd& deviations, std::opti
             double value = *signals[k][c];
             if (is_distance(model_.channels[c]))
                 value = (value + model_error) / (1.0 + shared[shared_field::wavelength]) +
-                        numbers[setup::scale_factor] * row.travel +
-                        row.length_share * numbers[setup::scale_length];
+                        numbers[setup::scale_factor] * row.travel + row.length_share * numbers[setup::scale_length];
             readings(Eigen::Index(k), Eigen::Index(c)) = value;
         }
     }

@@ -12,9 +12,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stepdiag._core import Adjustment, InvalidArgument, Measurement
-from stepdiag.display import lines_text
 from stepdiag.calibration.finding_text import combination_text
 from stepdiag.calibration.temperature_text import reference_mark
+from stepdiag.display import lines_text
 from stepdiag.figures.calibration import undetermined_notes, with_gaps
 from stepdiag.figures.growth import OWN, draw_growth_panels
 from stepdiag.figures.page import SMALL, Heading, Page

@@ -184,7 +184,10 @@ def _planned(rows: _Rows, start: int, plan: Plan) -> dict[str, list[float]]:
         line, point = rows.line[k], rows.point[k]
         points = plan.points(line, rows.run[k]) if line in (*plan.lines, *plan.scale_lines) else ()
         if point >= len(points):
-            raise InvalidArgument(f"{rows.places[k]}: line {line}, point {point} is not in the plan of the scenario")
+            where = f"{rows.places[k]}: line {line}, point {point} is not in the plan of the scenario"
+            if line in plan.scale_lines and plan.scale_points == "ends" and point <= plan.steps:
+                where += ', which reads this scale line at its two ends (expected scale_points = "steps")'
+            raise InvalidArgument(where)
         found.append(points[point])
     return {axis: [float(position[a]) for position in found] for a, axis in enumerate(POSITIONS)}
 

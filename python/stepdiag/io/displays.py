@@ -10,7 +10,16 @@ from typing import Any, Final, NamedTuple
 
 from stepdiag import _core
 from stepdiag._core import Adjustment, Calibration, ErrorMap, Head, Machine, Measurement, Plan, Verdict
-from stepdiag.display import Facts, facts_of_properties, html_table, lengths_text, one_line, point_text, scale_lines_text, text_of
+from stepdiag.display import (
+    Facts,
+    facts_of_properties,
+    html_table,
+    lengths_text,
+    one_line,
+    point_text,
+    scale_lines_text,
+    text_of,
+)
 
 
 class ParameterValues(NamedTuple):

@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from stepdiag.display import lines_text
 from stepdiag import _core
 from stepdiag.calibration.temperature_text import reference_mark
+from stepdiag.display import lines_text
 from stepdiag.report.text_columns import text_columns
 from stepdiag.scenario.uncertain_inputs import key_unit
 from stepdiag.uncertainty.result import FloatArray, UncertaintyResult, label, volume_units
@@ -44,9 +44,7 @@ def opening_rows(result: UncertaintyResult) -> Iterator[str]:
     if result.warning is not None:
         yield f"not to be trusted: {result.warning}"
     derived = len(result.outputs) - result.entries
-    yield (
-        f"virtual calibrations: method {result.method}, {lines_text(plan)}, readings {', '.join(known.signals)}"
-    )
+    yield (f"virtual calibrations: method {result.method}, {lines_text(plan)}, readings {', '.join(known.signals)}")
     yield (
         f"uncertain: {len(known.uncertain.inputs)} inputs, {len(known.uncertain.noise)} kinds of noise; "
         f"outputs: {result.entries} values of the 21 parameters" + (f", {derived} derived" if derived else "")

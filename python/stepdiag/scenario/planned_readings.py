@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from stepdiag._core import InvalidArgument, Measurement, Plan
+from stepdiag._core import Measurement, Plan
 
 # Channels that are no readings of the head.
 RECORDS: Final = (

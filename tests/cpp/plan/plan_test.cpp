@@ -109,9 +109,8 @@ TEST(Plan, ScaleLinesAreReadAtTheirEndsOrAtEveryStep) {
     EXPECT_EQ(plan(1, stepdiag::ScalePoints::steps).points(line).size(), 2u);
     EXPECT_EQ(stepdiag::parse_scale_points("steps"), stepdiag::ScalePoints::steps);
     expect_refused([] { stepdiag::parse_scale_points("step"); }, "scale_points: expected \"ends\" or \"steps\"");
-    expect_refused(
-        [] { Plan(volume, diagonals, 4, stepdiag::all_axes, {}, {}, stepdiag::ScalePoints::steps); },
-        "scale_points: expected scale_lines as well");
+    expect_refused([] { Plan(volume, diagonals, 4, stepdiag::all_axes, {}, {}, stepdiag::ScalePoints::steps); },
+                   "scale_points: expected scale_lines as well");
 }
 
 TEST(Plan, SmallestMirrorHoldsTheBeamOnEveryLine) {

@@ -87,6 +87,8 @@ std::vector<TestRun> runs() {
         {"three_diagonals", Plan(volume, lines({"ppp", "npp", "pnp"}), 5, all_axes, scale_lines), {}},
         {"reversed_lines", Plan(volume, lines({"ppn", "pnp", "nnn", "npp"}), 4, all_axes, scale_lines), spots},
         {"without_scale_lines", Plan(volume, diagonals, 4), {}},
+        {"scale_lines_at_every_step", Plan(volume, diagonals, 5, all_axes, scale_lines, {}, ScalePoints::steps), spots,
+         2, true},
         {"faces",
          Plan(volume, lines({"ppp", "npp", "pnp", "nnp", "pp0", "np0", "p0p", "n0p", "0pp", "0np"}), 4, all_axes,
               scale_lines),

@@ -218,7 +218,9 @@ class Sample:
         constant = self.constants.get(name, 0.0)  # what electronics read too much is no path in air
         distance = ((row[name] - constant) * air + constant + model) / (1.0 + self._of("wavelength"))
         distance += self._of("scale_factor", line) * travel
-        if point == len(points) - 1:
-            distance += self._of("scale_length", line)
+        # Of a length standard along a scale line, a part of it; elsewhere of the last point.
+        part = travel / float(along @ np.subtract(points[-1][1], points[0][1]))
+        if line in self.scenario.scale_lines or point == len(points) - 1:
+            distance += part * self._of("scale_length", line)
         noise = self._noise("channel", index, channel=name) + self._noise("common", index)
         row[name] = distance + head_walk + noise

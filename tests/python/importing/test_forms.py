@@ -275,8 +275,9 @@ def test_lines_in_files_of_their_own_are_joined(folder: Path) -> None:
     same_bits(sd.read_measurement("run.csv"), sd.read_measurement("truth.csv"))
 
 
-def test_scenario_gives_the_positions(folder: Path) -> None:
-    Path("scenario.toml").write_text(SCENARIO)
+@pytest.mark.parametrize("scale_points", ["ends", "steps"])
+def test_scenario_gives_the_positions(folder: Path, scale_points: str) -> None:
+    Path("scenario.toml").write_text(SCENARIO.replace("[head]", f'scale_points = "{scale_points}"\n[head]'))
     assert main(["simulate", "scenario.toml", "--overwrite", "-o", "truth.csv"]) == 0
     rows = list(csv.reader(Path("truth.csv").read_text().splitlines()))
     Path("s.csv").write_text("".join(";".join([*row[:2], *row[5:]]) + "\n" for row in rows))

@@ -45,6 +45,7 @@ PLANS = [
     (FACES, "backward = true\nrepeats = 2"),
     (BODY, "repeats = 3"),
     (BODY, "check_points = 3"),
+    (BODY, 'scale_points = "steps"\nbackward = true'),
     (FACES, "check_points = 2\ncheck_point = 1\nbackward = true"),
 ]
 CASES = pytest.mark.parametrize(("lines", "plan"), PLANS)

@@ -81,12 +81,10 @@ def assert_readings_are(found: np.ndarray, rows: list[dict[str, Any]], channels:
 
 
 @pytest.mark.parametrize("layout", ["ideal", "psd", "multi_beam"])
-@pytest.mark.parametrize("backward", [False, True])
-def test_readings_of_a_sample_are_those_of_the_closed_forms(layout: str, backward: bool) -> None:
+@pytest.mark.parametrize("plan", [{}, {"backward": True}, {"backward": True, "scale_points": "steps"}])
+def test_readings_of_a_sample_are_those_of_the_closed_forms(layout: str, plan: dict[str, Any]) -> None:
     air = Air(21.0, 99_000.0, 0.4)
-    scenario, table = scenario_of(layout, 2)
-    if backward:
-        scenario = replace(scenario, backward=True)
+    scenario, table = scenario_of(layout, 2, **plan)
     channels = channel_names(scenario)
     inputs = _core.UncertainInputs(all_inputs(scenario), all_noise(channels))
     calibrations = calibrations_of(scenario, table, inputs, air=air)
@@ -119,8 +117,9 @@ def test_every_input_acts_by_itself(layout: str) -> None:
 
 @pytest.mark.parametrize("method", ["enhanced", "adjustment"])
 @pytest.mark.parametrize("layout", ["ideal", "psd", "multi_beam"])
-def test_outputs_are_those_of_an_evaluation_of_the_readings(layout: str, method: str) -> None:
-    scenario, table = scenario_of(layout, 4)
+@pytest.mark.parametrize("scale_points", ["ends", "steps"])
+def test_outputs_are_those_of_an_evaluation_of_the_readings(layout: str, method: str, scale_points: str) -> None:
+    scenario, table = scenario_of(layout, 4, scale_points=scale_points)
     channels = channel_names(scenario)
     if method == "enhanced":
         # Linear evaluations weigh all samples as the nominal run. That does not matter as far as their model holds; a

@@ -38,7 +38,7 @@ struct LateralExcursion {
 
 // Where scale lines are read: at their two ends, or after every step as other single-axis lines are.
 enum class ScalePoints { ends, steps };
-const char* name(ScalePoints points);            // "ends", "steps"
+const char* name(ScalePoints points);                   // "ends", "steps"
 ScalePoints parse_scale_points(std::string_view text);  // throws InvalidArgument for any other text
 
 // The axes in the order in which a step moves them.
@@ -78,8 +78,8 @@ public:
     Eigen::Matrix3d frame(const Line& line) const { return line_frame(line, volume_); }
 
     // The points of a line in the order of travel. For N steps: 3N+1 on a body diagonal, 2N+1 on a face diagonal, N+1
-    // on a single-axis line, 2 on a scale line that is read at its ends; and the returns to the check point where they are made, which have
-    // numbers of their own. Throws InvalidArgument for a line that is not in the plan.
+    // on a single-axis line, 2 on a scale line that is read at its ends; and the returns to the check point where they
+    // are made, which have numbers of their own. Throws InvalidArgument for a line that is not in the plan.
     std::vector<PlanPoint> points(const Line& line, int run = 0) const;
 
     LateralExcursion lateral_excursion(const Line& line) const;  // over all orders
