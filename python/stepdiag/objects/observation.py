@@ -36,6 +36,8 @@ class ObservedPlan(TypedDict):
     volume_mm: list[float]
     lines: list[str]
     scale_lines: list[str]
+    scale_points: str
+    """Where scale lines are read: at their two "ends", or after all "steps"."""
     steps: int
     signals: list[str]
 
@@ -119,6 +121,7 @@ def observation_object(
             "volume_mm": plan.volume.tolist(),
             "lines": list(plan.lines),
             "scale_lines": list(plan.scale_lines),
+            "scale_points": plan.scale_points,
             "steps": plan.steps,
             "signals": list(known.signals),
         },

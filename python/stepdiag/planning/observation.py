@@ -90,6 +90,7 @@ def not_measured(known: Known, plan: Mapping[str, Any] | None = None) -> Known:
     at = {
         "check_points": min(planned.check_points, planned.steps),
         "check_point": min(planned.check_point, planned.steps),
+        "scale_points": planned.scale_points if planned.scale_lines else "ends",
     }
     planned = planned.model_copy(update=at)
     if not planned.scale_lines:  # then there is nothing that these could be about

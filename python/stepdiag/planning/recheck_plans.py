@@ -109,7 +109,15 @@ def candidates(scenario: Scenario, baseline: Calibration, minutes: float) -> lis
     for lines, scale_lines in sets:
         for steps in common_steps(baseline):
             with located(f"{known.path}: plan_by_time.line_sets"):
-                planned = Plan(plan.volume, list(lines), steps, order=plan.orders, scale_lines=list(scale_lines))
+                points = plan.scale_points if scale_lines else "ends"
+                planned = Plan(
+                    plan.volume,
+                    list(lines),
+                    steps,
+                    order=plan.orders,
+                    scale_lines=list(scale_lines),
+                    scale_points=points,
+                )
             for repeats in sorted({*keys.repeats, known.keys.plan.repeats}):
                 seconds, _ = measuring_time(planned, times, repeats=repeats * runs, backward=known.keys.plan.backward)
                 if seconds <= FAR * minutes * MINUTE:

@@ -91,7 +91,7 @@ TEST(Plan, BeamWandersElevenMillimetresOnTheMirrorForStepsOf16By12By10) {
 
 TEST(Plan, ScaleLinesAreReadAtTheirEndsOrAtEveryStep) {
     const auto plan = [](int steps, stepdiag::ScalePoints points) {
-        return Plan(volume, lines({"ppp"}), steps, stepdiag::all_axes, lines({"n00"}), {2, 1}, points);
+        return Plan(volume, lines({"ppp"}), steps, stepdiag::all_axes, lines({"n00"}), {1, 1}, points);
     };
     const Line line = Line::parse("n00");
     const auto ends = plan(4, stepdiag::ScalePoints::ends).points(line);
