@@ -37,7 +37,8 @@ class SetupUncertaintyKeys(Section):
     )
     scale_um: Spread | None = _uncertain(
         "What distances read too much at a line's last point: the uncertainty of a length standard. Along a scale "
-        "line it grows with the travel. In `[uncertainty]` itself it is that of the scale lines, each by itself, and of no others.",
+        "line it grows with the travel. In `[uncertainty]` itself it is that of the scale lines, each by itself, and "
+        "of no others.",
         0.2,
     )
     scale_ppm: Spread | None = _uncertain(
