@@ -81,3 +81,10 @@ def test_public_headers_show_no_private_dependency() -> None:
         if private.match(include) or (room_of(include) is not None and not include.startswith("stepdiag/"))
     ]
     assert not offences, "\n".join(offences)
+
+
+def test_nothing_calls_std_hypot() -> None:
+    """It needs glibc 2.35; wheels are for 2.34 (DEVELOPERS.md, Wheels)."""
+    for file in [*(CPP / "src").rglob("*"), *INCLUDE_DIR.rglob("*")]:
+        if file.is_file():
+            assert not re.search(r"\bhypotf?\(", file.read_text(encoding="utf-8")), file

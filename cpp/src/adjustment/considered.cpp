@@ -24,8 +24,10 @@ void state_parts(const std::vector<DeviationEffect>& effects, const CalibratedFo
     for (const auto& [source, is_unknown, effect] : effects) {
         auto& part = calibration.uncertainty_parts[source];
         part.resize(list.size());
-        for (std::size_t i = 0; i < list.size(); ++i)
-            part[i] = std::hypot(part[i], list[i]->value(effect) * (is_unknown ? scaled : 1.0));
+        for (std::size_t i = 0; i < list.size(); ++i) {
+            const double more = list[i]->value(effect) * (is_unknown ? scaled : 1.0);
+            part[i] = std::sqrt(part[i] * part[i] + more * more);
+        }
     }
 }
 
