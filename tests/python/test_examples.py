@@ -37,6 +37,21 @@ def test_readme_has_the_report_of_the_example(tmp_path: Path) -> None:
     assert all(f"    {line}\n" in readme for line in said.splitlines()[:13])
 
 
+def test_better_plan_is_as_much_better_as_readme_says(tmp_path: Path) -> None:
+    paper, better = output_of(EXAMPLES / "two_plans.py", tmp_path / "plans.png").splitlines()
+    assert (tmp_path / "plans.png").read_bytes().startswith(b"\x89PNG")
+    paper_plan, better_plan = ((EXAMPLES / name).read_text() for name in ("scenario.toml", "better_plan.toml"))
+    assert better_plan.split("[volume]")[1].replace('scale_points = "steps"\n', "") == paper_plan.split("[volume]")[1]
+    readme = " ".join((EXAMPLES.parent / "README.md").read_text(encoding="utf-8").split())
+    for kind, said in {
+        "positioning": "positioning falls from {} to {}",
+        "straightness": "straightness from {} to {}",
+        "angle": "angles from {} to {}",
+    }.items():
+        values = [line.split(f"{kind} ")[1].split(",")[0].split()[0] for line in (paper, better)]
+        assert said.format(*values) in readme
+
+
 def test_method_page_has_the_tables_of_the_examples() -> None:
     page = (EXAMPLES.parent / "docs" / "method.md").read_text(encoding="utf-8")
     assert output_of(EXAMPLES / "variants.py") in page
