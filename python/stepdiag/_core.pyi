@@ -221,9 +221,9 @@ class Plan:
     The lines measured through a volume, in single-axis steps. Lines are named by the travel signs of X, Y, Z: three of p n 0.
     """
     largest_step_count: typing.ClassVar[int] = 2000
-    def __init__(self, volume: numpy.typing.ArrayLike, lines: collections.abc.Sequence[str], steps: typing.SupportsIndex, order: str | collections.abc.Sequence[str] = 'XYZ', scale_lines: collections.abc.Sequence[str] = [], *, check_points: CheckPoints = ..., scale_points: str = 'ends') -> None:
+    def __init__(self, volume: numpy.typing.ArrayLike, lines: collections.abc.Sequence[str], steps: typing.SupportsIndex, order: str | collections.abc.Sequence[str] = 'XYZ', scale_lines: collections.abc.Sequence[str] = [], *, check_points: CheckPoints = ..., scale_points: str = 'ends', block: typing.SupportsIndex = 1) -> None:
         """
-        volume: edges in mm. steps: per axis. order: in which a step moves the axes, "XYZ" ...; of several, run r goes in the order r modulo their number. scale_points: where scale lines are read, at their two "ends" or after all "steps". Raises InvalidArgument for an unknown or doubled line, a volume without extent, steps outside 1 .. 2000, check points that are outside 0 .. steps, "steps" without scale lines.
+        volume: edges in mm. steps: per axis. order: in which a step moves the axes, "XYZ" ...; of several, run r goes in the order r modulo their number. scale_points: where scale lines are read, at their two "ends" or after all "steps". block: so many steps of an axis follow each other before the next axis moves. Raises InvalidArgument for an unknown or doubled line, a volume without extent, steps outside 1 .. 2000, check points that are outside 0 .. steps, "steps" without scale lines.
         """
     def __repr__(self) -> str:
         ...
@@ -256,6 +256,11 @@ class Plan:
     def smallest_mirror(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Width and height (local x and y) of the smallest mirror, centred on the functional point, (2,), mm; a beam of finite diameter needs that much more.
+        """
+    @property
+    def block(self) -> int:
+        """
+        So many steps of an axis follow each other before the next axis moves.
         """
     @property
     def check_points(self) -> CheckPoints:

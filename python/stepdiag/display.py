@@ -89,7 +89,10 @@ def scale_lines_text(plan: Any) -> str:
 
 def lines_text(plan: Any) -> str:
     """How many lines a plan has: "4 lines of 50 steps, 3 scale lines at every step"."""
-    return f"{len(plan.lines)} lines of {plan.steps} steps, {len(plan.scale_lines)} scale lines{_read_at(plan)}"
+    in_blocks = f" in blocks of {plan.block}" if plan.block > 1 else ""
+    return (
+        f"{len(plan.lines)} lines of {plan.steps} steps{in_blocks}, {len(plan.scale_lines)} scale lines{_read_at(plan)}"
+    )
 
 
 def _read_at(plan: Any) -> str:

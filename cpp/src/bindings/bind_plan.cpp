@@ -89,17 +89,19 @@ void bind_plan(py::module_& m) {
         .def(py::init([](const ArrayLike& volume, const std::vector<std::string>& lines, const IntegerLike& steps,
                          const std::variant<std::string, std::vector<std::string>>& order,
                          const std::vector<std::string>& scale_lines, const CheckPoints& check_points,
-                         const std::string& scale_points) {
+                         const std::string& scale_points, const IntegerLike& block) {
                  const int count = int(to_integer(steps, "steps", 1, Plan::largest_step_count));
                  return Plan(to_vector3(volume, "volume"), parse_lines(lines), count, parse_orders(order),
-                             parse_lines(scale_lines), check_points, parse_scale_points(scale_points));
+                             parse_lines(scale_lines), check_points, parse_scale_points(scale_points),
+                             int(to_integer(block, "block", 1, Plan::largest_step_count)));
              }),
              py::arg("volume"), py::arg("lines"), py::arg("steps"), py::arg("order") = "XYZ",
              py::arg("scale_lines") = std::vector<std::string>{}, py::kw_only(),
-             py::arg("check_points") = CheckPoints{}, py::arg("scale_points") = "ends",
+             py::arg("check_points") = CheckPoints{}, py::arg("scale_points") = "ends", py::arg("block") = integer(1),
              "volume: edges in mm. steps: per axis. order: in which a step moves the axes, \"XYZ\" ...; of several, "
              "run r goes in the order r modulo their number. scale_points: where scale lines are read, at their two "
-             "\"ends\" or after all \"steps\". Raises InvalidArgument for an unknown or doubled line, a volume "
+             "\"ends\" or after all \"steps\". block: so many steps of an axis follow "
+             "each other before the next axis moves. Raises InvalidArgument for an unknown or doubled line, a volume "
              "without extent, steps outside 1 .. 2000, check points that are outside 0 .. steps, \"steps\" without "
              "scale lines.")
         .def_property_readonly_static("largest_step_count", [](const py::object&) { return Plan::largest_step_count; })
@@ -112,6 +114,8 @@ void bind_plan(py::module_& m) {
             "scale_points", [](const Plan& plan) { return name(plan.scale_points()); },
             "Where scale lines are read: at their two \"ends\", or after all \"steps\".")
         .def_property_readonly("steps", &Plan::steps)
+        .def_property_readonly("block", &Plan::block,
+                               "So many steps of an axis follow each other before the next axis moves.")
         .def_property_readonly("check_points", &Plan::check_points, "Returns that tell drift.")
         .def_property_readonly(
             "order", [](const Plan& plan) { return order_name(plan.order()); }, "The order of run 0.")

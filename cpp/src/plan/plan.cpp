@@ -25,23 +25,28 @@ StepOrder parse_order(std::string_view text) {
 }
 
 Plan::Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, StepOrder order,
-           std::vector<Line> scale_lines, const CheckPoints& check_points, ScalePoints scale_points)
-    : Plan(volume, std::move(lines), steps, std::vector{order}, std::move(scale_lines), check_points, scale_points) {}
+           std::vector<Line> scale_lines, const CheckPoints& check_points, ScalePoints scale_points, int block)
+    : Plan(volume, std::move(lines), steps, std::vector{order}, std::move(scale_lines), check_points, scale_points,
+           block) {}
 
 Plan::Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::vector<StepOrder> orders,
-           std::vector<Line> scale_lines, const CheckPoints& check_points, ScalePoints scale_points)
+           std::vector<Line> scale_lines, const CheckPoints& check_points, ScalePoints scale_points, int block)
     : volume_(volume),
       lines_(std::move(lines)),
       steps_(steps),
       orders_(std::move(orders)),
       scale_lines_(std::move(scale_lines)),
       check_points_(check_points),
-      scale_points_(scale_points) {
+      scale_points_(scale_points),
+      block_(block) {
     if (!volume_.allFinite() || volume_.minCoeff() < 1e-3 || volume_.maxCoeff() > 1e6)
         throw InvalidArgument("volume: expected three edges in mm, each from 0.001 to 1e6");
     if (steps_ < 1 || steps_ > largest_step_count)
         throw InvalidArgument("steps: expected 1 to " + std::to_string(largest_step_count) + ", got " +
                               std::to_string(steps_));
+    if (block_ < 1 || block_ > steps_)
+        throw InvalidArgument("block: expected 1 to " + std::to_string(steps_) + " (steps), got " +
+                              std::to_string(block_));
     if (lines_.empty() && scale_lines_.empty()) throw InvalidArgument("lines: expected at least one line");
     if (scale_lines_.empty() && scale_points_ == ScalePoints::steps)
         throw InvalidArgument("scale_points: expected scale_lines as well, got none");
@@ -93,7 +98,7 @@ std::vector<PlanPoint> Plan::points(const Line& line, int run) const {
     for (const Axis axis : all_axes) place(axis, line.sign(axis) < 0 ? steps_ : 0);
 
     std::vector<PlanPoint> points{point};
-    const int stride = scale && scale_points_ == ScalePoints::ends ? steps_ : 1;
+    const bool ends = scale && scale_points_ == ScalePoints::ends;
     PlanPoint check = point;
     for (const Axis axis : all_axes)
         if (line.moves(axis)) {
@@ -101,16 +106,19 @@ std::vector<PlanPoint> Plan::points(const Line& line, int run) const {
             check.commanded[index(axis)] = node_position(axis, check.node[index(axis)]);
         }
     check.is_check = true;
-    for (int step = 0; step < steps_; step += stride) {
-        for (const Axis axis : order(run)) {
-            if (!line.moves(axis)) continue;
-            place(axis, point.node[index(axis)] + line.sign(axis) * stride);
-            point.moved = axis;
-            ++point.number;
-            points.push_back(point);
-        }
-        const int made = step + 1;
-        if (scale || check_points_.every == 0 || made % check_points_.every != 0 || made <= check_points_.at) continue;
+    for (int made = 0; made < steps_;) {
+        const int before = made, ahead = ends ? steps_ : std::min(block_, steps_ - made);
+        const int stride = ends ? steps_ : 1;
+        for (const Axis axis : order(run))
+            for (int step = 0; line.moves(axis) && step < ahead; step += stride) {
+                place(axis, point.node[index(axis)] + line.sign(axis) * stride);
+                point.moved = axis;
+                ++point.number;
+                points.push_back(point);
+            }
+        made += ahead;
+        const int every = check_points_.every;
+        if (scale || every == 0 || made / every == before / every || made <= check_points_.at) continue;
         check.number = ++point.number;
         points.push_back(check);
     }
@@ -118,14 +126,15 @@ std::vector<PlanPoint> Plan::points(const Line& line, int run) const {
 }
 
 LateralExcursion Plan::lateral_excursion(const Line& line) const {
-    // Every step repeats the same lateral motion, so one step gives the full range.
+    // Every block repeats the same lateral motion, so one of them gives the full range.
     const Plan one_step(volume_, {line}, 1, orders_);
     const Eigen::Matrix<double, 3, 2> lateral = frame(line).leftCols<2>();
     LateralExcursion excursion{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
     for (int run = 0; run < int(orders_.size()); ++run) {
         const auto points = one_step.points(line, run);
         for (const PlanPoint& point : points) {
-            const Eigen::Vector2d offset = lateral.transpose() * (point.commanded - points.front().commanded) / steps_;
+            const Eigen::Vector2d offset =
+                lateral.transpose() * (point.commanded - points.front().commanded) * (double(block_) / steps_);
             excursion.lowest = excursion.lowest.cwiseMin(offset);
             excursion.highest = excursion.highest.cwiseMax(offset);
         }

@@ -141,6 +141,13 @@ class PlanSection(Section):
         "run 0, in the second in run 1 (with `backward`: runs 0 and 1, 2 and 3), and so on in turn.",
         "XYZ",
     )
+    block: Annotated[int, Field(ge=1, le=LARGEST_STEPS)] = key(
+        f"an integer from 1 to {LARGEST_STEPS}",
+        "So many steps of an axis follow each other before the next axis moves. A larger block makes straightness, "
+        "angles and squareness better known, and needs a mirror that is so many times as large (docs/plans.md).",
+        1,
+        2,
+    )
     scale_lines: tuple[str, ...] = key(
         'a list of single-axis lines such as "p00"',
         "Lines along one axis whose laser is aligned with it; they fix the slopes of the positioning errors.",

@@ -197,6 +197,7 @@ def with_plan(
             scale_lines=[renamed.get(line, line) for line in old.scale_lines],
             check_points=old.check_points,
             scale_points=old.scale_points,
+            block=old.block,
         )
         lines = [renamed.get(line, line) for line in run.line]
         position = np.array(run.position)

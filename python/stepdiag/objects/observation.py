@@ -39,6 +39,8 @@ class ObservedPlan(TypedDict):
     scale_points: str
     """Where scale lines are read: at their two "ends", or after all "steps"."""
     steps: int
+    block: int
+    """So many steps of an axis follow each other."""
     signals: list[str]
 
 
@@ -123,6 +125,7 @@ def observation_object(
             "scale_lines": list(plan.scale_lines),
             "scale_points": plan.scale_points,
             "steps": plan.steps,
+            "block": plan.block,
             "signals": list(known.signals),
         },
         "readings": readings_of(run, known),

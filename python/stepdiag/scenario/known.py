@@ -100,6 +100,7 @@ def known_of(
             scale_lines=list(keys.plan.scale_lines),
             check_points=_core.CheckPoints(keys.plan.check_points, keys.plan.check_point),
             scale_points=keys.plan.scale_points,
+            block=keys.plan.block,
         )
     check_mirrors(described, plan, path)
     described_heads = heads_by_line(keys, plan, described, path)

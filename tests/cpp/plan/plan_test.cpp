@@ -113,6 +113,29 @@ TEST(Plan, ScaleLinesAreReadAtTheirEndsOrAtEveryStep) {
                    "scale_points: expected scale_lines as well");
 }
 
+TEST(Plan, StepsInBlocksFollowEachOtherOnOneAxis) {
+    const auto plan = [](int block, const stepdiag::CheckPoints& check = {}) {
+        return Plan(volume, lines({"npp"}), 5, stepdiag::all_axes, {}, check, stepdiag::ScalePoints::ends, block);
+    };
+    const Line line = Line::parse("npp");
+    std::string moved;
+    for (const auto& point : plan(2).points(line))
+        if (point.moved) moved += stepdiag::letter(*point.moved);
+    EXPECT_EQ(moved, "XXYYZZXXYYZZXYZ");
+    const auto points = plan(2).points(line);
+    EXPECT_EQ(points[3].node, (std::array{3, 1, 0}));
+    EXPECT_EQ(points.back().node, (std::array{0, 5, 5}));
+    for (std::size_t k = 0; k < points.size(); ++k) EXPECT_EQ(points[k].number, int(k));
+    // Of blocks that hold no whole number of returns, one after each in which one is due.
+    std::vector<std::size_t> returns;
+    const auto checked = plan(2, {3, 1}).points(line);
+    for (std::size_t k = 0; k < checked.size(); ++k)
+        if (checked[k].is_check) returns.push_back(k);
+    EXPECT_EQ(returns, (std::vector<std::size_t>{13}));
+    EXPECT_LE((plan(2).smallest_mirror() - 2.0 * plan(1).smallest_mirror()).norm(), 1e-12);
+    for (const int block : {0, 6}) expect_refused([&] { plan(block); }, "block: expected 1 to 5");
+}
+
 TEST(Plan, SmallestMirrorHoldsTheBeamOnEveryLine) {
     const auto names = {"ppp", "npp", "pnp", "nnp", "ppn", "nnn", "p0p", "0np", "pp0"};
     for (const char* order : {"XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"}) {

@@ -89,6 +89,7 @@ std::vector<TestRun> runs() {
         {"without_scale_lines", Plan(volume, diagonals, 4), {}},
         {"scale_lines_at_every_step", Plan(volume, diagonals, 5, all_axes, scale_lines, {}, ScalePoints::steps), spots,
          2, true},
+        {"blocks", Plan(volume, diagonals, 5, all_axes, scale_lines, {}, ScalePoints::ends, 2), {}},
         {"faces",
          Plan(volume, lines({"ppp", "npp", "pnp", "nnp", "pp0", "np0", "p0p", "n0p", "0pp", "0np"}), 4, all_axes,
               scale_lines),

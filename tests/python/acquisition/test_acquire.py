@@ -28,7 +28,11 @@ def to_picometres(values: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("head", [BEAMS, IDEAL])
 @pytest.mark.parametrize(
     "plan",
-    [LINES, SMALL + "\nrepeats = 2\nseconds_per_reading = 3.0", LINES + '\ncheck_points = 2\nscale_points = "steps"'],
+    [
+        LINES,
+        SMALL + "\nrepeats = 2\nseconds_per_reading = 3.0",
+        LINES + '\ncheck_points = 2\nblock = 3\nscale_points = "steps"',
+    ],
 )
 def test_acquired_run_is_the_simulated_run_to_the_picometre(tmp_path: Path, head: str, plan: str) -> None:
     described = scenario(plan=plan, head=head, noise="distance_um = 0.1\ncommon_um = 0.2\nseed = 3")

@@ -70,6 +70,8 @@ CASES: dict[str, tuple[dict[Any, Any], dict[str, Any]]] = {
     "steps": ({}, {"scale_points": "steps"}),
     "psd, steps": ({}, {"layout": "psd", "scale_points": "steps"}),
     "multi_beam, steps": ({}, {"layout": "multi_beam", "scale_points": "steps"}),
+    "blocks": ({}, {"block": 2}),
+    "psd, blocks with a rest": ({}, {"layout": "psd", "block": 3, "scale_points": "steps"}),
     "common beams": ({"beam_constants": "fixed"}, {"layout": "multi_beam"}),
     "three diagonals": ({}, {"lines": ["nnn", "ppn", "pnp"]}),
     "faces": ({"reflector": "fixed"}, {"lines": FACES, "scale_lines": []}),

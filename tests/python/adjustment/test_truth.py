@@ -55,6 +55,19 @@ def test_scale_lines_read_at_every_step_are_recovered(layout: str, chain: str) -
     assert_recovered(adjust(run, scenario, knowledge_of(layout)), table, LIMIT[layout])
 
 
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("layout", ["ideal", "psd", "multi_beam"])
+def test_steps_in_blocks_are_recovered(layout: str, seed: int) -> None:
+    """Blocks that fit into the line, that leave a rest, and that are the whole line."""
+    rng = np.random.default_rng(8000 + seed)
+    scenario = random_scenario(
+        rng, layout=layout, steps=9, block=[2, 3, 4, 5, 8, 9][seed], scale_points=["ends", "steps"][seed % 2]
+    )
+    table = random_table(rng, scenario.volume, scenario.steps)
+    run = measured(reference.simulate(scenario, table))
+    assert_recovered(adjust(run, scenario, knowledge_of(layout)), table, LIMIT[layout])
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_reversed_lines_and_three_diagonals_are_recovered(seed: int) -> None:
     rng = np.random.default_rng(2000 + seed)

@@ -182,6 +182,7 @@ class Scenario:
     order: str = "XYZ"
     scale_lines: list[str] = field(default_factory=list)
     scale_points: str = "ends"  # or "steps"
+    block: int = 1  # steps of an axis one after the other
     layout: str = "ideal"
     standoff: float = 100.0
     psd_distance: float = 0.0
@@ -207,16 +208,19 @@ def commanded_points(scenario: Scenario, line: str) -> list[tuple[float, float, 
 
     points = [position()]
     every, at = (0, 0) if line in scenario.scale_lines else scenario.check_points
-    starts = [position()]  # of steps
-    for step in range(1, steps + 1):
+    home = [steps if s == "n" else 0 for s in line]
+    way = {"p": 1, "n": -1, "0": 0}
+    check = tuple((h + way[s] * at) * e / steps for h, s, e in zip(home, line, scenario.volume, strict=True))
+    for before in range(0, steps, scenario.block):
+        after = min(before + scenario.block, steps)
         for axis in scenario.order:
             i = AXES.index(axis)
-            if line[i] != "0":
-                node[i] += 1 if line[i] == "p" else -1
+            for _ in range(before, after) if line[i] != "0" else ():
+                node[i] += way[line[i]]
                 points.append(position())
-        starts.append(position())
-        if every and step % every == 0 and step > at:
-            points.append(starts[at])
+        passed = [step for step in range(before + 1, after + 1) if every and step % every == 0]
+        if passed and after > at:
+            points.append(check)
     return points
 
 

@@ -96,6 +96,7 @@ def plan_of(scenario: reference.Scenario) -> sd.Plan:
         scale_lines=scenario.scale_lines,
         check_points=sd.CheckPoints(*scenario.check_points),
         scale_points=scenario.scale_points,
+        block=scenario.block,
     )
 
 

@@ -46,6 +46,7 @@ PLANS = [
     (BODY, "repeats = 3"),
     (BODY, "check_points = 3"),
     (BODY, 'scale_points = "steps"\nbackward = true'),
+    (BODY, "block = 3\nbackward = true"),
     (FACES, "check_points = 2\ncheck_point = 1\nbackward = true"),
 ]
 CASES = pytest.mark.parametrize(("lines", "plan"), PLANS)

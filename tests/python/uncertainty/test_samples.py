@@ -81,7 +81,7 @@ def assert_readings_are(found: np.ndarray, rows: list[dict[str, Any]], channels:
 
 
 @pytest.mark.parametrize("layout", ["ideal", "psd", "multi_beam"])
-@pytest.mark.parametrize("plan", [{}, {"backward": True}, {"backward": True, "scale_points": "steps"}])
+@pytest.mark.parametrize("plan", [{}, {"backward": True}, {"backward": True, "scale_points": "steps", "block": 2}])
 def test_readings_of_a_sample_are_those_of_the_closed_forms(layout: str, plan: dict[str, Any]) -> None:
     air = Air(21.0, 99_000.0, 0.4)
     scenario, table = scenario_of(layout, 2, **plan)

@@ -53,19 +53,21 @@ public:
     // `volume`: edges X, Y, Z, mm. Scale lines are single-axis lines whose laser stands along the axis. Throws
     // InvalidArgument if there is no line, a line is given twice, an edge is outside 0.001 to 1e6 mm, `steps` is
     // outside 1 to largest_step_count, a scale line moves more than one axis, there is no order, check points are
-    // outside 0 to `steps`, or the points of scale lines are stated without any.
+    // outside 0 to `steps`, `block` is outside 1 to `steps`, or the points of scale lines are stated without any.
     Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, StepOrder order = all_axes,
          std::vector<Line> scale_lines = {}, const CheckPoints& check_points = {},
-         ScalePoints scale_points = ScalePoints::ends);
+         ScalePoints scale_points = ScalePoints::ends, int block = 1);
     // Run r uses orders[r modulo the number of orders].
     Plan(const Eigen::Vector3d& volume, std::vector<Line> lines, int steps, std::vector<StepOrder> orders,
          std::vector<Line> scale_lines = {}, const CheckPoints& check_points = {},
-         ScalePoints scale_points = ScalePoints::ends);
+         ScalePoints scale_points = ScalePoints::ends, int block = 1);
 
     const Eigen::Vector3d& volume() const { return volume_; }
     const std::vector<Line>& lines() const { return lines_; }
     const std::vector<Line>& scale_lines() const { return scale_lines_; }
     ScalePoints scale_points() const { return scale_points_; }
+    // So many steps of an axis follow each other before the next axis moves; 1: the axes take turns at every step.
+    int block() const { return block_; }
     int steps() const { return steps_; }
     const std::vector<StepOrder>& orders() const { return orders_; }
     const StepOrder& order(int run = 0) const;
@@ -95,6 +97,7 @@ private:
     std::vector<Line> scale_lines_;
     CheckPoints check_points_;
     ScalePoints scale_points_;
+    int block_;
 };
 
 // Accepts a permutation of "XYZ"; throws InvalidArgument for any other text.
