@@ -140,8 +140,8 @@ def minutes_of(place: tuple[str, str]) -> float:
 def uncertainties(pool: multiprocessing.pool.Pool, heads: Sequence[str], volumes: Sequence[str], quick: bool) -> bool:
     places = list(itertools.product(volumes, PLANS))
     minutes = dict(zip(places, pool.map(minutes_of, places, chunksize=1), strict=True))
-    lasers, inputs = (LASERS[:1], INPUTS[:1]) if quick else (LASERS, INPUTS)
-    tables = list(itertools.product(heads, volumes, inputs, lasers))
+    kinds = [(INPUTS[0], LASERS[0])] if quick else [*((INPUTS[0], laser) for laser in LASERS), (INPUTS[1], LASERS[0])]
+    tables = [(*place, *kind) for place in itertools.product(heads, volumes) for kind in kinds]
     cells = [Cell(head, volume, laser, what, plan) for head, volume, what, laser in tables for plan in PLANS]
     found = dict(zip(cells, pool.imap(largest_of, cells, chunksize=1), strict=False))
     good = True
@@ -332,7 +332,7 @@ def change(sound: sd.Calibration, wrong: sd.Calibration) -> tuple[float, float]:
 
 def faults(pool: multiprocessing.pool.Pool, count: int) -> bool:
     """What is predicted of each kind of fault, and seeded ones: on the lines measured, and on scale lines."""
-    found = dict(zip(FAULT_PLANS, pool.imap(controls, FAULT_PLANS, chunksize=1), strict=True))
+    found = {plan: controls(plan) for plan in FAULT_PLANS}
     seeds = []
     for plan, by_kind in found.items():
         for kind, channel in NAMES:
