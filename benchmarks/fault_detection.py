@@ -212,14 +212,14 @@ def controlled(setting: Setting, seed: int, fault: Fault) -> float:
     """
     run, _ = setting.run(seed, noisy=False)
     few = 5.0  # small: of first order
-    left = [setting.adjust(r, outlier_probability=0.0) for r in (run, fault.into(run, few * noise_of(fault)))]
+    left = [setting.adjust(r, outlier_probability=0.0) for r in (run, fault.into(run, few * noise_of(fault.channel)))]
     sound, faulty = (math.nan if a is None else a.weighted_square_sum for a in left)
     added = (faulty - sound) / few**2
     return added if 0.0 < added <= len(fault.rows) else 0.0
 
 
-def noise_of(fault: Fault) -> float:
-    return NOISE[{"d": "distance", "s": "spot"}.get(fault.channel[0], "tilt")]
+def noise_of(channel: str) -> float:
+    return NOISE[{"d": "distance", "s": "spot"}.get(channel[0], "tilt")]
 
 
 @functools.cache
@@ -251,7 +251,7 @@ def faulty(cell: str, seed: int) -> tuple[float, bool, bool] | None:
     else:
         return None
     run, _ = setting.run(run_seed)
-    size = (-1) ** other * level * noise_of(fault) / part**0.5
+    size = (-1) ** other * level * noise_of(fault.channel) / part**0.5
     adjusted = setting.adjust(fault.into(run, size))
     return level, adjusted is not None and bool(classes(adjusted)), adjusted is not None and fault.is_in(adjusted)
 
