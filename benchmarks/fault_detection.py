@@ -73,9 +73,7 @@ class Setting:
 
     @functools.cached_property
     def plan(self) -> sd.Plan:
-        return sd.Plan(
-            VOLUME, list(self.lines), self.steps, scale_lines=SCALE_LINES, scale_points=self.scale_points
-        )
+        return sd.Plan(VOLUME, list(self.lines), self.steps, scale_lines=SCALE_LINES, scale_points=self.scale_points)
 
     def misalignment(self, line: str, rng: np.random.Generator) -> sd.Misalignment:
         """As drawn from the priors that an adjustment has by default; a free quantity from a usual one."""

@@ -4,9 +4,9 @@
     ./run python benchmarks/plans.py --coverage [--machines 2000]
     ./run python benchmarks/plans.py --faults [--seeded 40]
 
-Lines, repeats, steps, and scale lines that are read at their ends or at every step. Minutes are those that `stepdiag nc`
-states; uncertainties are the largest of each family. "Noise alone" is the adjustment of a usual machine; "all inputs"
-propagates what examples/uncertainty.toml names beside it. `--coverage`: do 95 % intervals contain the truth where scale
+Lines, repeats, steps, and scale lines that are read at their ends or at every step. Minutes are those of `stepdiag nc`;
+uncertainties are the largest of each family. "Noise alone" is the adjustment of a usual machine; "all inputs" propagates
+what examples/uncertainty.toml names beside it. `--coverage`: do 95 % intervals contain the truth where scale
 lines are read at every step? `--faults`: which single faults a plan controls, and what becomes of some that are seeded.
 The tables are Markdown; the exit code is 1 if a figure is not as it must be.
 """
@@ -28,8 +28,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests" / "python" / "helpers"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "python" / "helpers"))
 
 import coverage
 import coverage_cases
@@ -67,7 +66,7 @@ PLANS: dict[str, dict[str, Any]] = {
 LASERS = (250.0, 500.0)  # urad, of scale lines
 INPUTS = ("noise alone", "all inputs")
 NOISE = {"distance_um": 0.1, "tilt_urad": 1.0, "spot_um": 0.5}
-EXAMPLE = ROOT / "examples" / "uncertainty.toml"
+EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "uncertainty.toml"
 MICRO = {"positioning": 1e3, "straightness": 1e3, "angle": 1e6, "squareness": 1e6}
 
 # Minutes, then families; head ideal, middle volume, 250 urad, noise alone: of an evaluation of its own, before a plan
@@ -320,9 +319,11 @@ def seeded(seed: Seed) -> Seeded | None:
 def determined(calibration: sd.Calibration) -> set[tuple[str, int]]:
     """Functions with their number of nodes, squarenesses, and slopes that are not."""
     functions = {(name, len(table[0])) for name, table in calibration.functions.items()}
-    return functions | {(name, 1) for name in calibration.squareness} | {
-        (name, 0) for name in calibration.undetermined_slopes
-    }
+    return (
+        functions
+        | {(name, 1) for name in calibration.squareness}
+        | {(name, 0) for name in calibration.undetermined_slopes}
+    )
 
 
 def change(sound: sd.Calibration, wrong: sd.Calibration) -> tuple[float, float]:
@@ -365,10 +366,10 @@ def faults(pool: multiprocessing.pool.Pool, count: int) -> bool:
             groups = [outcomes.get((plan, kind, channel, is_scale), []) for is_scale in (False, True)]
             rows.append([plan, name, *predicted_and_seeded(control, groups)])
     columns = ["plan", "fault", "found from, µm or µrad", "uncontrolled", "told apart, %"]
-    columns += ["unseen up to: positioning, µm", "squareness, µrad", "seeded: worst positioning, µm", "squareness, µrad"]
+    columns += ["unseen up to: positioning, µm", "squareness, µrad", "seeded: worst µm", "worst µrad"]
     columns += ["found, %: on diagonals", "on scale lines", "told apart, %: on diagonals", "on scale lines"]
     return table(
-        f"Single faults, head ideal, {STEPS} steps, {count} of each kind seeded on diagonals and as many on scale lines",
+        f"Single faults, head ideal, {STEPS} steps; seeded: {count} of a kind on diagonals, as many on scale lines",
         [*columns, "something determined no more, %: on diagonals", "on scale lines"],
         rows,
     )
