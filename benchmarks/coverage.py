@@ -32,7 +32,7 @@ import stepdiag as sd
 CHUNK = 50
 MANY = 10_000
 SLOWER = 5  # divisor of the machines: propagation differentiates whole calibrations with respect to about sixty inputs
-CASES = coverage_cases.CASES | coverage_propagated.CASES
+CASES = coverage_cases.CASES | coverage_cases.SCALE_LINE_CASES | coverage_propagated.CASES
 
 
 def of_chunk(name: str, steps: int, seeds: range) -> np.ndarray:
@@ -40,7 +40,7 @@ def of_chunk(name: str, steps: int, seeds: range) -> np.ndarray:
 
 
 def of_machine(name: str, seed: int, steps: int) -> np.ndarray:
-    part = coverage_cases if name in coverage_cases.CASES else coverage_propagated
+    part = coverage_propagated if name in coverage_propagated.CASES else coverage_cases
     try:
         return part.outcome(CASES[name], seed, steps)
     except sd.InvalidArgument:
@@ -95,7 +95,7 @@ def main() -> int:
     with multiprocessing.get_context("fork").Pool(given.workers) as pool:
         for name in given.case or CASES:
             start = time.monotonic()
-            machines = given.machines if name in coverage_cases.CASES else -(-given.machines // SLOWER)
+            machines = -(-given.machines // SLOWER) if name in coverage_propagated.CASES else given.machines
             z = all_outcomes(pool, name, machines, given.steps)
             if not report(name, z, given.steps, time.monotonic() - start):
                 unexpected.append(name)

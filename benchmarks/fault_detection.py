@@ -62,6 +62,7 @@ class Setting:
     repeats: int = 1
     head: str = "ideal"
     steps: int = 10
+    scale_points: str = "ends"
     face: float = 1e-3  # laser and mirror of face diagonals
     scale_laser: float = 500 * URAD  # at most
     square_to_axis: bool = False  # the mirrors of scale lines; otherwise to the beam
@@ -72,7 +73,7 @@ class Setting:
 
     @functools.cached_property
     def plan(self) -> sd.Plan:
-        return sd.Plan(VOLUME, list(self.lines), self.steps, scale_lines=SCALE_LINES)
+        return sd.Plan(VOLUME, list(self.lines), self.steps, scale_lines=SCALE_LINES, scale_points=self.scale_points)
 
     def misalignment(self, line: str, rng: np.random.Generator) -> sd.Misalignment:
         """As drawn from the priors that an adjustment has by default; a free quantity from a usual one."""
@@ -131,24 +132,30 @@ def changed(run: sd.Measurement, by: Mapping[str, Any]) -> sd.Measurement:
 
 @dataclass(frozen=True)
 class Fault:
-    """The same offset of one channel in some rows. `kind`: "reading", "slip" or another that has no name."""
+    """An offset of one channel in some rows. `kind`: "reading", "slip", "factor" or another that has no name.
+
+    `shares`: of the offset in each of the rows; none: all of it."""
 
     kind: str
     channel: str
     rows: Sequence[int]
+    shares: Sequence[float] | None = None
 
     def into(self, run: sd.Measurement, size: float) -> sd.Measurement:
         offset = np.zeros(len(run))
-        offset[list(self.rows)] = size
+        offset[list(self.rows)] = size * np.array(self.shares or 1.0)
         return changed(run, {self.channel: offset})
 
     def is_in(self, adjustment: sd.Adjustment) -> bool:
-        """Whether a class of faults has it among its members; a slip between two readings is also either of them."""
+        """Whether a class of faults has it among its members."""
+        return any(self.is_among(found) for found in classes(adjustment))
+
+    def is_among(self, members: Iterable[Any]) -> bool:
+        """A slip between two readings is also either of them."""
         return any(
             (member.channel, member.row) == (self.channel, self.rows[0])
             and (member.kind == self.kind or len(self.rows) == 1)
-            for found in classes(adjustment)
-            for member in found
+            for member in members
         )
 
 
@@ -203,14 +210,14 @@ def controlled(setting: Setting, seed: int, fault: Fault) -> float:
     """
     run, _ = setting.run(seed, noisy=False)
     few = 5.0  # small: of first order
-    left = [setting.adjust(r, outlier_probability=0.0) for r in (run, fault.into(run, few * noise_of(fault)))]
+    left = [setting.adjust(r, outlier_probability=0.0) for r in (run, fault.into(run, few * noise_of(fault.channel)))]
     sound, faulty = (math.nan if a is None else a.weighted_square_sum for a in left)
     added = (faulty - sound) / few**2
     return added if 0.0 < added <= len(fault.rows) else 0.0
 
 
-def noise_of(fault: Fault) -> float:
-    return NOISE[{"d": "distance", "s": "spot"}.get(fault.channel[0], "tilt")]
+def noise_of(channel: str) -> float:
+    return NOISE[{"d": "distance", "s": "spot"}.get(channel[0], "tilt")]
 
 
 @functools.cache
@@ -242,7 +249,7 @@ def faulty(cell: str, seed: int) -> tuple[float, bool, bool] | None:
     else:
         return None
     run, _ = setting.run(run_seed)
-    size = (-1) ** other * level * noise_of(fault) / part**0.5
+    size = (-1) ** other * level * noise_of(fault.channel) / part**0.5
     adjusted = setting.adjust(fault.into(run, size))
     return level, adjusted is not None and bool(classes(adjusted)), adjusted is not None and fault.is_in(adjusted)
 

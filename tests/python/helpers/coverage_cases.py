@@ -39,7 +39,10 @@ class Case:
     lateral: float = 0.0
     roll: float = 0.0
     gain: float = 0.0
-    scale_laser: float = 0.0  # of scale lines, whose mirror is square to the beam
+    scale_laser: float = 0.0  # of scale lines
+    scale_mirror: float = 0.0  # of theirs, against the beam
+    scale_points: str = "ends"
+    distance: float | None = None  # noise of distances; None: drawn
     told: Mapping[str, Any] = field(default_factory=dict)  # options of the evaluation
     wrong: str = ""  # with the model, where it does not hold; the families of parameters that this spoils
     concerned: tuple[str, ...] = ()
@@ -100,6 +103,38 @@ CASES = {
 }
 
 
+def scale_lines_case(layout: str, laser: float, distance: float) -> Case:
+    """Scale lines read at every step; head and mirror of all lines as the adjustment takes them to be."""
+    beams = layout == "multi_beam"  # which do not tell the mirror of a scale line from their constants
+    of_lines: dict[str, Any] = {"reflector": 1e-3, "laser": 3e-4 if beams else 1e-3}
+    told = {
+        "setup": sd.SetupPriors(laser=of_lines["laser"] if beams else "free"),
+        "setup_by_line": {line: sd.SetupPriors(laser=laser) for line in SCALE_LINES},
+    }
+    return Case(
+        "adjustment",
+        layout,
+        **(KNOWN | of_lines | {"told": told}),
+        psd_zero=1.0 if layout == "psd" else 0.0,
+        beam_constants=0.05 if beams else 0.0,
+        scale_laser=laser,
+        scale_mirror=SCALE_MIRROR if beams else 0.0,
+        scale_points="steps",
+        distance=distance,
+    )
+
+
+SCALE_MIRROR = 500e-6  # against the beam that comes back, as which it is aligned
+SCALE_LINE_CASES = {
+    f"scale lines at every step, {layout}, {laser * 1e6:g} urad, {distance * 1e6:g} nm": scale_lines_case(
+        layout, laser, distance
+    )
+    for layout in ("ideal", "psd", "multi_beam")
+    for laser in (250e-6, 500e-6)
+    for distance in (1e-4, 1e-5)
+}
+
+
 @dataclass(frozen=True)
 class Drawn:
     """A machine, its head and how everything is set up."""
@@ -123,9 +158,10 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 def setup_of(case: Case, rng: np.random.Generator, line: str) -> sd.Misalignment:
     if line in SCALE_LINES:
         laser = case.scale_laser * rng.normal(size=2)
-        # The mirror square to the beam: Exp(a, b, 0) of both. Their lateral offset is known as that of measured lines.
+        # A mirror square to the beam: Exp(a, b, 0) of both. Their lateral offset is known as that of measured lines.
         constant, lateral = case.distance_constant * rng.normal(), case.lateral * rng.normal(size=2)
-        return sd.Misalignment(laser, laser, distance_constant=constant, lateral=lateral)
+        mirror = laser + case.scale_mirror * rng.normal(size=2) if case.scale_mirror else laser
+        return sd.Misalignment(mirror, laser, distance_constant=constant, lateral=lateral)
     constants = case.beam_constants * rng.normal(size=len(BEAMS)) if case.layout == "multi_beam" else []
     return sd.Misalignment(
         case.reflector * rng.normal(size=2),
@@ -161,12 +197,19 @@ def draw(case: Case, seed: int, steps: int = STEPS) -> tuple[Drawn, np.random.Ge
     )
     return Drawn(
         sd.Machine(chain, errors, rng.uniform(-100.0, 100.0, 3)),
-        sd.Plan(volume, DIAGONALS, steps, order=str(rng.choice(ORDERS)), scale_lines=SCALE_LINES),
+        sd.Plan(
+            volume,
+            DIAGONALS,
+            steps,
+            order=str(rng.choice(ORDERS)),
+            scale_lines=SCALE_LINES,
+            scale_points=case.scale_points,
+        ),
         head,
         {line: setup_of(case, rng, line) for line in [*DIAGONALS, *SCALE_LINES]},
         sd.ReadingUncertainty(
             # By beams 20 mm apart: as good tilts as the others have.
-            distance=log_uniform(rng, 2e-5, 2e-4) if beams else log_uniform(rng, 5e-5, 5e-4),
+            distance=case.distance or (log_uniform(rng, 2e-5, 2e-4) if beams else log_uniform(rng, 5e-5, 5e-4)),
             tilt=log_uniform(rng, 5e-7, 5e-6),
             spot=log_uniform(rng, 1e-3, 1e-2),
         ),
