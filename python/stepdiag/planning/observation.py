@@ -60,7 +60,7 @@ def prospects(
 def _prospect(known: Known, steps: int) -> Prospect:
     plan = known.plan
     width, height = _core.Plan(
-        plan.volume, plan.lines, steps, order=plan.orders, scale_lines=plan.scale_lines
+        plan.volume, plan.lines, steps, order=plan.orders, scale_lines=plan.scale_lines, block=min(plan.block, steps)
     ).smallest_mirror()
     mirror = (float(width), float(height))
     try:
@@ -90,6 +90,7 @@ def not_measured(known: Known, plan: Mapping[str, Any] | None = None) -> Known:
     at = {
         "check_points": min(planned.check_points, planned.steps),
         "check_point": min(planned.check_point, planned.steps),
+        "block": min(planned.block, planned.steps),
         "scale_points": planned.scale_points if planned.scale_lines else "ends",
     }
     planned = planned.model_copy(update=at)
