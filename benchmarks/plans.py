@@ -5,8 +5,8 @@
     ./run python benchmarks/plans.py --faults [--seeded 40]
 
 Lines, repeats, steps, and scale lines that are read at their ends or at every step. Minutes are those of `stepdiag nc`;
-uncertainties are the largest of each family. "Noise alone" is the adjustment of a usual machine; "all inputs" propagates
-what examples/uncertainty.toml names beside it. `--coverage`: do 95 % intervals contain the truth where scale
+uncertainties are the largest of each family. "Noise alone": the adjustment of a usual machine. "All inputs": propagated
+from what examples/uncertainty.toml names beside it. `--coverage`: do 95 % intervals contain the truth where scale
 lines are read at every step? `--faults`: which single faults a plan controls, and what becomes of some that are seeded.
 The tables are Markdown; the exit code is 1 if a figure is not as it must be.
 """
