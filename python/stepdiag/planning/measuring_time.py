@@ -1,6 +1,7 @@
 """How long a plan takes to measure: moves of a trapezoidal speed, settling, readings, and a set-up for each line."""
 
 import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,9 +25,10 @@ class Times:
     line_change: float
     scale_line_change: float
 
-    def move(self, length: FloatArray) -> FloatArray:
+    def move(self, length: npt.ArrayLike) -> FloatArray:
         """Time of moves from rest to rest, s: at full speed, and as long again as it takes to get there; a short move
         never gets there, and speeds up for one half of its length and slows down for the other."""
+        length = np.asarray(length, dtype=float)
         reached = self.feed**2 / self.acceleration
         short = 2.0 * np.sqrt(length / self.acceleration)
         return np.where(length < reached, short, length / self.feed + self.feed / self.acceleration)
@@ -45,21 +47,46 @@ def times_of(keys: PlanByTimeSection, place: str) -> Times:
     return Times(feed, acceleration, keys.settle_s, keys.measure_s, change * MINUTE, scale_change * MINUTE)
 
 
-def measuring_time(plan: Plan, times: Times, *, repeats: int = 1, backward: bool = False) -> tuple[float, float]:
-    """Seconds from home to the last reading, and the mean time from a reading to the next one on a line.
+@dataclass(frozen=True)
+class OnLine:
+    """What a line takes whatever is measured before and after it."""
+
+    set_up: float  # s
+    seconds: float  # from its first point to its last reading, that of the first point included
+    readings: int
+    reading: float  # s
+    first: FloatArray  # (3,) where it begins and ends, mm
+    last: FloatArray
+
+
+def on_lines(plan: Plan, times: Times, *, repeats: int = 1, backward: bool = False) -> dict[str, OnLine]:
+    """Of each line of a plan, in its order.
 
     `repeats`: runs of each line, backward ones not counted. A backward run begins where the forward one ended; a
     forward run after another goes back to the line's first point."""
-    total, place = 0.0, np.zeros(3)
-    on_lines, gaps = 0.0, 0
+    found = {}
+    reading = times.settle + times.measure
     for line, passes in itertools.groupby(plan.passes(repeats, backward=backward), key=lambda planned: planned.line):
-        total += times.scale_line_change if line in plan.scale_lines else times.line_change
         way = np.concatenate([planned.positions for planned in passes])
-        total += float(times.move(np.linalg.norm(way[:1] - place, axis=1)).sum())
         moving = float(times.move(np.linalg.norm(np.diff(way, axis=0), axis=1)).sum())
-        reading = times.settle + times.measure
-        total += moving + len(way) * reading
-        on_lines += moving + (len(way) - 1) * reading
-        gaps += len(way) - 1
-        place = way[-1]
-    return total, on_lines / gaps
+        set_up = times.scale_line_change if line in plan.scale_lines else times.line_change
+        found[line] = OnLine(set_up, moving + len(way) * reading, len(way), reading, way[0], way[-1])
+    return found
+
+
+def in_turn(lines: Iterable[OnLine], times: Times) -> tuple[float, float]:
+    """Seconds from home to the last reading of lines that are measured one after another, and the mean time from a
+    reading to the next one on a line."""
+    total, place = 0.0, np.zeros(3)
+    measuring, gaps = 0.0, 0
+    for line in lines:
+        total += line.set_up + float(times.move(np.linalg.norm(line.first - place))) + line.seconds
+        measuring += line.seconds - line.reading
+        gaps += line.readings - 1
+        place = line.last
+    return total, measuring / gaps
+
+
+def measuring_time(plan: Plan, times: Times, *, repeats: int = 1, backward: bool = False) -> tuple[float, float]:
+    """As `in_turn`, of a plan with so many runs of each line."""
+    return in_turn(on_lines(plan, times, repeats=repeats, backward=backward).values(), times)

@@ -21,7 +21,9 @@ from stepdiag.scenario.known import Known, runs_of
 from stepdiag.scenario.truth import Truth, truth_of
 from stepdiag.units import MINUTE
 
-Family = Literal["length", "angle", "squareness"]
+# What a plan is to be good at: the error of the functional point in the volume, a family of parameters, or power against
+# faults of the readings.
+Family = Literal["volume", "length", "angle", "squareness", "faults"]
 FAMILIES: Final[dict[Family, tuple[Kind, ...]]] = {
     "length": ("positioning", "straightness"),
     "angle": ("angle",),
@@ -56,6 +58,8 @@ class Candidate:
     repeats: int
     check_points: int = 0
     """Steps after which the program returns to a line's check point; 0: never."""
+    scale_points: Literal["ends", "steps"] = "ends"
+    backward: bool = False
 
     @property
     def description(self) -> str:
@@ -79,8 +83,10 @@ def _moved(line: str) -> int:
 @dataclass(frozen=True)
 class Outcome:
     """What a plan takes and gives. `seconds` include set-ups; `spacing`: mm, the farthest that nodes are apart; largest
-    standard uncertainties in mm or rad; `determined`: the parameters that are, as a whole. `trouble`: why there are
-    none."""
+    standard uncertainties in mm or rad; `determined`: the parameters that are, as a whole; `volume`: the largest
+    standard uncertainty of the functional point's error in the volume (the root of three variances), mm, infinite where
+    a parameter that acts in it is not determined. `faults`: what the readings control, None where nobody asked.
+    `trouble`: why there is nothing of this."""
 
     candidate: Candidate
     seconds: float
@@ -88,6 +94,8 @@ class Outcome:
     mirror: tuple[float, float]
     largest: dict[Kind, float]
     determined: frozenset[str]
+    volume: float = math.inf
+    faults: Sequence[_core.FaultControl] | None = None
     trouble: str = ""
 
     @property
@@ -95,8 +103,22 @@ class Outcome:
         return self.seconds / MINUTE
 
     def worst(self, family: Family) -> float:
-        """The largest standard uncertainty of a family; infinite where there is none."""
+        """The largest standard uncertainty of a family, mm or rad; for faults the smallest wrong distance that is
+        found, mm. Infinite where there is none."""
+        if family == "volume":
+            return self.volume
+        if family == "faults":
+            return max((c.found_from if c.count and not c.uncontrolled else math.inf for c in self._readings), default=math.inf)
         return max(self.largest.get(kind, math.inf) for kind in FAMILIES[family])
+
+    @property
+    def untold(self) -> int:
+        """How many kinds of faults are not told from all others, or not controlled."""
+        return sum(bool(c.twins or c.uncontrolled or not c.count) for c in self.faults or ())
+
+    @property
+    def _readings(self) -> list[_core.FaultControl]:
+        return [c for c in self.faults or () if (c.kind, c.channel) == ("reading", "distance")]
 
 
 def candidates(scenario: Scenario) -> list[Candidate]:
