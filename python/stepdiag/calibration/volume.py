@@ -258,6 +258,15 @@ def errors_at_points(
     )
 
 
+def variances_in_volume(calibration: Calibration, count: int = 5) -> FloatArray:
+    """Variance of the functional point's error, summed over X, Y and Z, mm^2, at the points of a grid with so many
+    positions an axis, (count^3,); NaN where a parameter is not determined. Of a calibration with covariance."""
+    points = errors_at_points(calibration, volume_grid(np.stack([np.zeros(3), calibration.volume]), count))
+    assert points.error_uncertainty is not None
+    variances: FloatArray = (points.error_uncertainty**2).sum(axis=1)
+    return variances
+
+
 def volume_grid(box: npt.ArrayLike, count: int | Sequence[int]) -> FloatArray:
     """Commanded points (n, 3), mm, of a grid with `count` equidistant positions an axis; Z changes fastest.
 

@@ -1,15 +1,20 @@
-"""Which plan to measure in the time that there is: for step numbers, sets of lines and repeats, how long each takes and
-the largest standard uncertainty of each kind that it gives, before anyone measures."""
+"""What a plan takes and gives, before anyone measures: minutes, standard uncertainties, faults that it controls; and
+which of several plans is the best one for an aim."""
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Final, Literal
+
+import numpy as np
+import numpy.typing as npt
 
 from stepdiag import _core
 from stepdiag._core import InvalidArgument
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
+from stepdiag.calibration.volume import ONE_SIDED, variances_in_volume
+from stepdiag.config.plan_by_time_keys import PlanByTimeSection
 from stepdiag.config.scenario_keys import MachineErrorsKeys, RandomSection, TruthKeys
 from stepdiag.config.toml_text import located
 from stepdiag.parameters import KINDS, Kind, kind_of
@@ -19,35 +24,23 @@ from stepdiag.planning.observation import extents, not_measured
 from stepdiag.scenario.description import Scenario, adjust_scenario, simulate_scenario
 from stepdiag.scenario.known import Known, runs_of
 from stepdiag.scenario.truth import Truth, truth_of
-from stepdiag.units import MINUTE
+from stepdiag.units import MICRORADIAN, MICROMETRE, MINUTE
 
-# What a plan is to be good at: the error of the functional point in the volume, a family of parameters, or power against
-# faults of the readings.
+# What a plan is to be good at: the error of the functional point in the volume, a family of parameters, or power
+# against faults of the readings.
 Family = Literal["volume", "length", "angle", "squareness", "faults"]
-FAMILIES: Final[dict[Family, tuple[Kind, ...]]] = {
+KINDS_OF: Final[dict[Family, tuple[Kind, ...]]] = {
     "length": ("positioning", "straightness"),
     "angle": ("angle",),
     "squareness": ("squareness",),
 }
+ScalePoints = Literal["ends", "steps"]
 
 # Of two plans whose uncertainties differ by less than this share, the faster one is shown.
 ALIKE: Final = 0.05
 MOST_CANDIDATES: Final = 2000
-
-_DIAGONALS: Final = ("ppp", "npp", "pnp", "nnp")
-_FACES: Final = ("pp0", "np0", "p0p", "n0p", "0pp", "0np")
-_SCALES: Final = ("p00", "0p0", "00p")
-_USUAL_SETS: Final = (
-    (*_DIAGONALS, *_SCALES),
-    (*_DIAGONALS, *_SCALES[:2]),
-    _DIAGONALS,
-    (*_DIAGONALS[:3], *_SCALES),
-    (*_DIAGONALS, *_FACES[::2], *_SCALES),
-    _FACES,
-    (*_FACES, *_SCALES),
-    (*_DIAGONALS, *_FACES),
-    (*_DIAGONALS, *_FACES, *_SCALES),
-)
+# Largest errors of machines, by the limit, that `decide` tells to be within it and not within it.
+WITHIN: Final = 0.8
 
 
 @dataclass(frozen=True)
@@ -58,25 +51,27 @@ class Candidate:
     repeats: int
     check_points: int = 0
     """Steps after which the program returns to a line's check point; 0: never."""
-    scale_points: Literal["ends", "steps"] = "ends"
+    scale_points: ScalePoints = "ends"
     backward: bool = False
 
     @property
     def description(self) -> str:
-        """In words: "4 body diagonals, 3 scale lines"."""
-        return ", ".join(f"{count} {name}{'s' * (count > 1)}" for name, count in self.counts.items() if count)
+        """In words: "4 body diagonals, 3 scale lines at every step"."""
+        said = ", ".join(f"{count} {name}{'s' * (count > 1)}" for name, count in self.counts.items() if count)
+        return said + " at every step" * (self.scale_points == "steps")
 
     @property
     def counts(self) -> dict[str, int]:
         """Number of lines of each kind."""
-        counts = {name: sum(_moved(line) == axes for line in self.lines) for axes, name in _NAMES}
+        counts = {name: sum(moved(line) == axes for line in self.lines) for axes, name in _NAMES}
         return counts | {"scale line": len(self.scale_lines)}
 
 
 _NAMES: Final = ((3, "body diagonal"), (2, "face diagonal"), (1, "single-axis line"))
 
 
-def _moved(line: str) -> int:
+def moved(line: str) -> int:
+    """How many axes move on a line."""
     return 3 - line.count("0")
 
 
@@ -108,44 +103,119 @@ class Outcome:
         if family == "volume":
             return self.volume
         if family == "faults":
-            return max((c.found_from if c.count and not c.uncontrolled else math.inf for c in self._readings), default=math.inf)
-        return max(self.largest.get(kind, math.inf) for kind in FAMILIES[family])
+            return found_from(self.faults or ())
+        return max(self.largest.get(kind, math.inf) for kind in KINDS_OF[family])
 
-    @property
-    def untold(self) -> int:
-        """How many kinds of faults are not told from all others, or not controlled."""
-        return sum(bool(c.twins or c.uncontrolled or not c.count) for c in self.faults or ())
-
-    @property
-    def _readings(self) -> list[_core.FaultControl]:
-        return [c for c in self.faults or () if (c.kind, c.channel) == ("reading", "distance")]
+    def untold(self, family: Family = "faults") -> int:
+        """How many kinds of faults are not told from all others, or not controlled; 0 where faults do not count."""
+        return untold(self.faults or ()) if family == "faults" else 0
 
 
-def candidates(scenario: Scenario) -> list[Candidate]:
-    """All plans to choose from. Raises InvalidArgument where the scenario names lines that there are not."""
-    known = scenario.known
-    keys, plan = known.keys.plan_by_time, known.plan
-    stated = known.keys.plan
-    own = Candidate(tuple(plan.lines), tuple(plan.scale_lines), plan.steps, stated.repeats, stated.check_points)
-    sets = {(own.lines, own.scale_lines): None}
-    for index, lines in enumerate(_USUAL_SETS if keys.line_sets is None else keys.line_sets):
-        measured = tuple(line for line in lines if _moved(line) != 1)
-        scales = tuple(line for line in lines if _moved(line) == 1)
-        with located(f"{scenario.path}: plan_by_time.line_sets: set {index + 1}"):
-            _core.Plan(plan.volume, list(measured), plan.steps, scale_lines=list(scales))
-        sets[measured, scales] = None
-    steps, repeats = sorted({*keys.steps, own.steps}), sorted({*keys.repeats, own.repeats})
-    returns = {n: _returns(known, n) for n in steps}
-    count = len(sets) * sum(map(len, returns.values())) * len(repeats)
-    if count > MOST_CANDIDATES:
-        raise InvalidArgument(
-            f"{scenario.path}: plan_by_time: expected at most {MOST_CANDIDATES} plans to choose from, got {count} "
-            f"({len(sets)} sets of lines, {len(steps)} numbers of steps, {len(repeats)} of repeats)"
+def untold(faults: Sequence[_core.FaultControl]) -> int:
+    """How many kinds of faults are not told from all others, or not controlled."""
+    return sum(bool(c.twins or c.uncontrolled or not c.count) for c in faults)
+
+
+def found_from(faults: Sequence[_core.FaultControl]) -> float:
+    """From which size on a wrong distance is found, mm; infinite where one is that nothing controls."""
+    of_distances = [c for c in faults if (c.kind, c.channel) == ("reading", "distance")]
+    return max((c.found_from if c.count and not c.uncontrolled else math.inf for c in of_distances), default=math.inf)
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A largest standard uncertainty, mm or rad, and the words for it."""
+
+    of: Literal["volume", "squareness"]
+    u: float
+    words: str
+
+
+def volume_goal(micrometres: float) -> Goal:
+    """Of the functional point's error in the volume."""
+    return Goal("volume", micrometres * MICROMETRE, f"u of the volume of {micrometres:g} µm")
+
+
+def squareness_goal(microradians: float) -> Goal:
+    return Goal("squareness", microradians * MICRORADIAN, f"u of squareness of {microradians:g} µrad")
+
+
+def deciding_goal(micrometres: float, between_nodes: float | None = None) -> Goal:
+    """Whether the largest error is within a limit L, as `volume --limit` tells it: within where the estimate plus
+    z u is at most L, not within where the estimate minus z u is above L, z = 1.645 (95 % on one side).
+
+    The estimate is itself off by up to z u with 95 %. A machine of a largest error of 0.8 L is therefore called within
+    with 95 % where 0.8 L + z u + z u <= L, which is u <= 0.2 L / 2z. One of L / 0.8 = 1.25 L is called not within where
+    1.25 L - 2 z u > L, which then holds. `between_nodes`, mm: a stated standard uncertainty by what lies between the
+    nodes, which is part of u; none: what `volume` estimates of it from the tables comes on top."""
+    u = (1.0 - WITHIN) * micrometres * MICROMETRE / (2.0 * ONE_SIDED)
+    left = math.sqrt(max(u**2 - (between_nodes or 0.0) ** 2, 0.0))
+    return Goal("volume", left, f"a verdict within {micrometres:g} µm or not (u of the volume of {u * 1e3:.3g} µm)")
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What the best plan does: with goals the shortest one that reaches them all, else the one that is best at a family
+    in the time; nodes at most `spacing` mm apart."""
+
+    family: Family = "volume"
+    minutes: float = math.inf
+    spacing: float = math.inf
+    goals: tuple[Goal, ...] = ()
+
+    def missed(self, one: Outcome) -> float:
+        """By which factor a plan is less certain than the goals at most; 1 where it reaches them."""
+        ratios = [one.worst(goal.of) / goal.u if goal.u > 0.0 else math.inf for goal in self.goals]
+        return max([1.0, *(rounded(ratio) for ratio in ratios)])
+
+    def order(self, one: Outcome) -> tuple[float, ...]:
+        """Of two plans, the one with the smaller is the better one."""
+        own = (self.missed(one),) if self.goals else (one.untold(self.family), rounded(one.worst(self.family)))
+        over = max(one.seconds - self.minutes * MINUTE, 0.0)
+        return (over, *own, one.seconds)
+
+
+def rounded(value: float) -> float:
+    """To six digits: of plans that are mirror images of each other rounding must not choose."""
+    return float(f"{value:.6g}")
+
+
+def own_candidate(known: Known) -> Candidate:
+    """The scenario's own plan."""
+    plan, stated = known.plan, known.keys.plan
+    return normal(
+        Candidate(
+            tuple(plan.lines),
+            tuple(plan.scale_lines),
+            plan.steps,
+            stated.repeats,
+            stated.check_points,
+            stated.scale_points,
+            stated.backward,
         )
+    )
+
+
+def normal(candidate: Candidate) -> Candidate:
+    """Without scale lines it does not matter where these are read."""
+    return candidate if candidate.scale_lines else replace(candidate, scale_points="ends")
+
+
+def settings(known: Known) -> list[Candidate]:
+    """All combinations of steps, repeats, returns, scale points and backward runs, with the lines of the own plan.
+
+    Backward runs are there to tell reversal errors. Where these are unknowns, they halve no other uncertainty: they stay
+    as the scenario has them. Where there are none (`reversal = false`), both are tried."""
+    keys, own = known.keys.plan_by_time, own_candidate(known)
+    ways = [own.backward] if known.keys.adjustment.reversal else [False, True]
+    points: tuple[ScalePoints, ...] = ("ends", "steps")
     return [
-        Candidate(*lines, n, r, every)
-        for lines, n, r in itertools.product(sets, steps, repeats)
-        for every in returns[n]
+        replace(own, steps=n, repeats=r, check_points=every, scale_points=where, backward=way)
+        for n in sorted({*keys.steps, own.steps})
+        for r in sorted({*keys.repeats, own.repeats})
+        for every in _returns(known, n)
+        for where in points
+        for way in ways
     ]
 
 
@@ -156,46 +226,122 @@ def _returns(known: Known, steps: int) -> list[int]:
     return sorted({own} if known.machine_drift is None else {0, own, math.ceil(steps / 4)})
 
 
-def outcomes(scenario: Scenario, progress: Callable[[int, int], None] | None = None) -> list[Outcome]:
-    """Of all candidates. `progress` is told how many of how many are done."""
-    everything = candidates(scenario)
-    result = []
-    for done, candidate in enumerate(everything, 1):
-        result.append(outcome(scenario, candidate))
-        if progress is not None:
-            progress(done, len(everything))
-    return result
+def stated_candidates(scenario: Scenario) -> list[Candidate]:
+    """All plans with the sets of lines that [plan_by_time] states, and with those of the scenario's own. Raises
+    InvalidArgument where it states lines that there are not, or too many plans."""
+    known = scenario.known
+    keys, plan = known.keys.plan_by_time, known.plan
+    sets = {(tuple(plan.lines), tuple(plan.scale_lines)): None}
+    for index, lines in enumerate(keys.line_sets or ()):
+        measured = tuple(line for line in lines if moved(line) != 1)
+        scales = tuple(line for line in lines if moved(line) == 1)
+        with located(f"{scenario.path}: plan_by_time.line_sets: set {index + 1}"):
+            _core.Plan(plan.volume, list(measured), plan.steps, scale_lines=list(scales))
+        sets[measured, scales] = None
+    combined = settings(known)
+    if len(sets) * len(combined) > MOST_CANDIDATES:
+        raise InvalidArgument(
+            f"{scenario.path}: plan_by_time: expected at most {MOST_CANDIDATES} plans to choose from, got "
+            f"{len(sets) * len(combined)} ({len(sets)} sets of lines, {len(combined)} combinations of steps, repeats "
+            "and the like)"
+        )
+    return list(
+        dict.fromkeys(
+            normal(replace(one, lines=lines, scale_lines=scales))
+            for (lines, scales), one in itertools.product(sets, combined)
+        )
+    )
 
 
-def outcome(scenario: Scenario, candidate: Candidate) -> Outcome:
-    """The time that a plan takes, and the uncertainties of the adjustment of a run of it.
-
-    The machine of that run has errors: some uncertainties depend on them, for a beam that is 1 mm beside its place
-    reads more or less as the mirror tilts."""
-    known, plan_keys = scenario.known, scenario.known.keys.plan
-    plan = _core.Plan(
+def plan_of(known: Known, candidate: Candidate) -> _core.Plan:
+    return _core.Plan(
         known.plan.volume,
         list(candidate.lines),
         candidate.steps,
         order=known.plan.orders,
         scale_lines=list(candidate.scale_lines),
-        check_points=_core.CheckPoints(candidate.check_points, min(plan_keys.check_point, candidate.steps)),
+        check_points=_core.CheckPoints(
+            candidate.check_points, min(known.keys.plan.check_point, candidate.steps)
+        ),
+        scale_points=normal(candidate).scale_points,
     )
-    times = times_of(known.keys.plan_by_time, f"{known.path}: plan_by_time")
-    runs = candidate.repeats * runs_of(plan_keys) // plan_keys.repeats
-    seconds, between = measuring_time(plan, times, repeats=runs, backward=plan_keys.backward)
+
+
+def runs_of_candidate(known: Known, candidate: Candidate) -> int:
+    """How often it measures each line, backward runs not counted."""
+    return candidate.repeats * runs_of(known.keys.plan) // known.keys.plan.repeats
+
+
+def outcome(
+    scenario: Scenario, candidate: Candidate, *, faults: bool = False, times: PlanByTimeSection | None = None
+) -> Outcome:
+    """The time that a plan takes, and the uncertainties of the adjustment of a run of it. `faults`: also the faults
+    that it controls. `times`: in place of the scenario's.
+
+    The machine of that run has errors: some uncertainties depend on them, for a beam that is 1 mm beside its place
+    reads more or less as the mirror tilts."""
+    known = scenario.known
+    plan = plan_of(known, candidate)
+    taken = times_of(times or known.keys.plan_by_time, f"{known.path}: plan_by_time")
+    runs = runs_of_candidate(known, candidate)
+    seconds, between = measuring_time(plan, taken, repeats=runs, backward=candidate.backward)
     spacing = float(max(plan.volume)) / candidate.steps
     width, height = plan.smallest_mirror()
-    largest: dict[Kind, float] = {}
+    found = evaluate(scenario, candidate, between, faults=faults)
+    return Outcome(
+        candidate,
+        seconds,
+        spacing,
+        (float(width), float(height)),
+        found.largest,
+        found.determined,
+        found.volume,
+        found.faults,
+        found.trouble,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluated:
+    """What the adjustment of a run of a plan gives. `variances`: as `variances_in_volume`."""
+
+    largest: dict[Kind, float]
     determined: frozenset[str] = frozenset()
-    trouble = ""
+    variances: npt.NDArray[np.float64] | None = None
+    faults: Sequence[_core.FaultControl] | None = None
+    trouble: str = ""
+
+    @property
+    def volume(self) -> float:
+        """As an Outcome has it."""
+        return math.inf if self.variances is None else root_of_largest(self.variances)
+
+
+def root_of_largest(variances: npt.NDArray[np.float64]) -> float:
+    largest = float(np.max(variances))
+    return math.inf if math.isnan(largest) else math.sqrt(largest)
+
+
+def evaluate(scenario: Scenario, candidate: Candidate, between: float, *, faults: bool = False) -> Evaluated:
+    """Of a plan with so many seconds from a reading to the next one."""
     try:
         usual = _usual(scenario, candidate, between)
-        calibration, largest = _propagated(usual) if _says_more(known) else _adjusted(usual)
-        determined = frozenset(extents(calibration, plan)[0])
+        more = says_more(scenario.known)
+        controls = None
+        if faults or not more:
+            run = simulate_scenario(usual)
+            adjusted = adjust_scenario(
+                usual.known, run, full_covariance=not more, reliability=faults, search_faults=False
+            )
+            calibration = adjusted.calibration
+            controls = adjusted.reliability if faults else None
+        if more:
+            calibration = _propagated(usual)
+        largest = {kind: value for kind, (value, _) in largest_uncertainties(calibration).items()}
+        determined = frozenset(extents(calibration, usual.known.plan)[0])
+        return Evaluated(largest, determined, variances_in_volume(calibration), controls)
     except InvalidArgument as error:
-        trouble = str(error)
-    return Outcome(candidate, seconds, spacing, (float(width), float(height)), largest, determined, trouble)
+        return Evaluated({}, trouble=str(error))
 
 
 def _usual(scenario: Scenario, candidate: Candidate, between: float) -> Scenario:
@@ -206,45 +352,12 @@ def _usual(scenario: Scenario, candidate: Candidate, between: float) -> Scenario
         "steps": candidate.steps,
         "repeats": candidate.repeats,
         "check_points": candidate.check_points,
+        "scale_points": candidate.scale_points,
+        "backward": candidate.backward,
         "seconds_per_reading": between or None,
     }
     planned = not_measured(scenario.known, changes)
     return Scenario(planned, _usual_truth(scenario.truth, planned))
-
-
-def controls(scenario: Scenario, candidate: Candidate) -> Sequence[_core.FaultControl]:
-    """The faults of its readings that a plan controls; none where it determines nothing."""
-    try:
-        usual = _usual(scenario, candidate, scenario.known.keys.plan.seconds_per_reading or 0.0)
-        return adjust_scenario(usual.known, simulate_scenario(usual), reliability=True).reliability
-    except InvalidArgument:
-        return ()
-
-
-@dataclass(frozen=True)
-class Controlled:
-    """A plan that is taken, or one that tells all faults apart, and the faults that it controls."""
-
-    plan: Outcome
-    faults: Sequence[_core.FaultControl]
-
-
-def telling(
-    scenario: Scenario, found: Sequence[Outcome], taken: Outcome, family: Family = "length"
-) -> tuple[Controlled, Controlled | None]:
-    """The plan that is taken, and the fastest one with as many steps and hardly larger uncertainties that tells all
-    faults apart; None where none does."""
-    own = Controlled(taken, controls(scenario, taken.candidate))
-    if own.faults and tells_all(own.faults):
-        return own, own
-    limit = (1.0 + ALIKE) * taken.worst(family)
-    for one in sorted(complete(found), key=_seconds):
-        if one.candidate.steps != taken.candidate.steps or one is taken or one.worst(family) > limit:
-            continue
-        faults = controls(scenario, one.candidate)
-        if faults and tells_all(faults):
-            return own, Controlled(one, faults)
-    return own, None
 
 
 def _usual_truth(truth: Truth, planned: Known) -> Truth:
@@ -253,29 +366,46 @@ def _usual_truth(truth: Truth, planned: Known) -> Truth:
     return truth_of(TruthKeys(machine=machine, misalignment=truth.keys.misalignment), {}, planned)
 
 
-def _says_more(known: Known) -> bool:
-    """Whether its [uncertainty] names more than the noise of the readings."""
+def says_more(known: Known) -> bool:
+    """Whether its [uncertainty] or [instrument] names more than the noise of the readings."""
     return bool(known.uncertain.inputs) or any(noise.quantity != "channel" for noise in known.uncertain.noise)
 
 
-def _adjusted(usual: Scenario) -> tuple[_core.Calibration, dict[Kind, float]]:
-    """By the readings' own uncertainties."""
-    calibration = adjust_scenario(usual.known, simulate_scenario(usual)).calibration
-    return calibration, {kind: value for kind, (value, _) in largest_uncertainties(calibration).items()}
-
-
-def _propagated(usual: Scenario) -> tuple[_core.Calibration, dict[Kind, float]]:
+def _propagated(usual: Scenario) -> _core.Calibration:
     """By all that [uncertainty] names: drifts and walks take the longer, the longer measuring takes."""
     from stepdiag.uncertainty.virtual_calibrations import virtual_calibrations
 
     model = virtual_calibrations(usual, method="adjustment")
-    largest: dict[Kind, float] = {}
     with located(str(usual.path)):
-        found = _core.propagate(model)
-    for output, u in zip(model.outputs, found.standard_uncertainty, strict=True):
-        kind = kind_of(output.name)
-        largest[kind] = max(largest.get(kind, 0.0), float(u))
-    return model.calibration, {kind: largest[kind] for kind in KINDS if kind in largest}
+        covariance = _core.propagate(model, covariance=True).covariance
+    assert covariance is not None
+    return _core.with_covariance(model.calibration, covariance)
+
+
+def with_faults(scenario: Scenario, one: Outcome) -> Outcome:
+    """The same with the faults that its readings control."""
+    if one.faults is not None:
+        return one
+    faults = outcome(scenario, one.candidate, faults=True).faults
+    return replace(one, faults=faults or ())
+
+
+def telling(
+    scenario: Scenario, found: Sequence[Outcome], taken: Outcome, family: Family = "volume"
+) -> tuple[Outcome, Outcome | None]:
+    """The plan that is taken, and the fastest one with as many steps and hardly larger uncertainties that tells all
+    faults apart, both with their faults; None where none does."""
+    own = with_faults(scenario, taken)
+    if own.faults and tells_all(own.faults):
+        return own, own
+    for one in sorted(complete(found), key=_seconds):
+        if one.candidate.steps != taken.candidate.steps or one is taken:
+            continue
+        if _hardly_worse(one, taken, "volume" if family == "faults" else family):
+            told = with_faults(scenario, one)
+            if told.faults and tells_all(told.faults):
+                return own, told
+    return own, None
 
 
 def complete(found: Sequence[Outcome]) -> list[Outcome]:
@@ -284,42 +414,59 @@ def complete(found: Sequence[Outcome]) -> list[Outcome]:
     return [o for o in found if most > 0 and len(o.determined) == most]
 
 
-def front(found: Sequence[Outcome], family: Family = "length") -> list[Outcome]:
-    """Of the complete ones, those that no other one beats in time, spacing and the uncertainty of a family, fastest
-    first. What is but a little better is not."""
+def _hardly_worse(one: Outcome, other: Outcome, family: Family) -> bool:
+    limit = (1.0 + ALIKE) * other.worst(family)
+    return one.untold(family) <= other.untold(family) and one.worst(family) <= limit
+
+
+def front(found: Sequence[Outcome], family: Family = "volume") -> list[Outcome]:
+    """Of the complete ones, those that no other one beats in time, spacing and what counts, fastest first. What is but
+    a little better is not."""
     kept: list[Outcome] = []
-    for one in sorted(complete(found), key=lambda o: (o.seconds, o.spacing, o.worst(family))):
-        limit = (1.0 + ALIKE) * one.worst(family)
-        if not any(other.spacing <= one.spacing and other.worst(family) <= limit for other in kept):
+    for one in sorted(complete(found), key=lambda o: (o.seconds, o.spacing, o.untold(family), o.worst(family))):
+        if not any(other.spacing <= one.spacing and _hardly_worse(other, one, family) for other in kept):
             kept.append(one)
     return kept
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The plan to take, None where none is fast enough; `next_better`: the fastest with nodes as near and an
-    uncertainty smaller by a fifth at least. `spacing_kept`: its nodes are as near as was asked for."""
+    """The plan to take, None where none is fast enough; `next_better`: the fastest with nodes as near that is better by
+    a fifth at least. `spacing_kept`: its nodes are as near as was asked for; `reached`: it reaches the goals."""
 
     taken: Outcome | None
     spacing_kept: bool
+    reached: bool
     next_better: Outcome | None
     fastest: Outcome | None  # of those with nodes near enough
 
 
-def choose(found: Sequence[Outcome], minutes: float, spacing: float, family: Family = "length") -> Choice:
-    """The plan of the smallest uncertainty within the time and with nodes at most `spacing` mm apart; where none has,
-    of those within the time whose nodes are nearest."""
-    plans = front(found, family)
-    fitting = [o for o in plans if o.minutes <= minutes]
-    near = [o for o in plans if o.spacing <= spacing * (1.0 + 1e-9)]
-    allowed = [o for o in near if o in fitting]
+def choose(found: Sequence[Outcome], aim: Aim) -> Choice:
+    """The best plan for the aim within the time and with nodes near enough; where none has, of those within the time
+    whose nodes are nearest."""
+    plans = complete(found)
+    fitting = [o for o in plans if o.minutes <= aim.minutes]
+    near = [o for o in plans if o.spacing <= aim.spacing * (1.0 + 1e-9)]
+    allowed = [o for o in near if o.minutes <= aim.minutes]
     kept = bool(allowed)
     if not kept and fitting:
         nearest = min(o.spacing for o in fitting)
         allowed = [o for o in fitting if o.spacing == nearest]
-    taken = min(allowed, key=lambda o: (o.worst(family), o.seconds), default=None)
-    better = [o for o in plans if taken and o.spacing <= taken.spacing and o.worst(family) <= 0.8 * taken.worst(family)]
-    return Choice(taken, kept, min(better, key=_seconds, default=None), min(near, key=_seconds, default=None))
+    taken = min(allowed, key=aim.order, default=None)
+    better = [o for o in front(found, aim.family) if taken is not None and _much_better(o, taken, aim.family)]
+    return Choice(
+        taken,
+        kept,
+        taken is not None and aim.missed(taken) <= 1.0,
+        min(better, key=_seconds, default=None),
+        min(near, key=_seconds, default=None),
+    )
+
+
+def _much_better(one: Outcome, other: Outcome, family: Family) -> bool:
+    fewer = one.untold(family) < other.untold(family)
+    smaller = one.untold(family) == other.untold(family) and one.worst(family) <= 0.8 * other.worst(family)
+    return one.spacing <= other.spacing and (fewer or smaller)
 
 
 def _seconds(one: Outcome) -> float:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from stepdiag import _core
 from stepdiag._core import Calibration, Measurement, Recheck
-from stepdiag.calibration.volume import errors_at_points, volume_grid
+from stepdiag.calibration.volume import variances_in_volume
 from stepdiag.rechecking.verification import with_stated_between_nodes
 from stepdiag.scenario.description import Scenario, adjustment_options, reduced_run
 from stepdiag.scenario.heads import of_run
@@ -20,7 +20,6 @@ FloatArray = npt.NDArray[np.float64]
 
 Verdict = Literal["unchanged", "changed", "unexplained"]
 
-GRID: Final = 5  # positions an axis, of the low-order changes in the volume
 # Native values of a change in the unit of reports.
 CHANGE_UNITS: Final = {
     "scale": ("µm/m", 1e-6),
@@ -106,7 +105,4 @@ class Judged:
 def farthest_move(baseline: Calibration, covariance: FloatArray) -> float:
     """Standard deviation of the functional point where it is largest in the volume, mm, by a covariance (n, n) of the
     calibration's entries."""
-    changed = _core.with_covariance(baseline, covariance)
-    points = errors_at_points(changed, volume_grid(np.stack([np.zeros(3), baseline.volume]), GRID))
-    assert points.error_uncertainty is not None
-    return float(np.sqrt((points.error_uncertainty**2).sum(axis=1)).max())
+    return float(np.sqrt(variances_in_volume(_core.with_covariance(baseline, covariance)).max()))

@@ -1,0 +1,282 @@
+"""The search for the best plan: which lines, in which setting (steps, repeats, returns, scale points, backward runs).
+
+1. The lines to choose from are those of the scenario's plan, four body diagonals, six face diagonals, three single axes
+   and three scale lines. A reversed line ("ppn" for "nnp") is the same line. All lines of a plan have as many steps:
+   what differs by line is where scale lines are read, at their ends or at every step.
+2. For each setting, and for some times around the one that there is, lines are exchanged as in optimum experimental
+   design: of all sets with one line more, one less, or one in place of another, that best set is taken which is better
+   than the present one; until there is none (V. V. Fedorov, Theory of Optimal Experiments, 1972; R. D. Cook and C. J.
+   Nachtsheim, Technometrics 22 (1980) 315). The order of lines and settings is fixed, and numbers that differ in the
+   seventh digit are equal: the same scenario gives the same plan.
+3. In step 2 a plan of many steps is estimated from the exact covariances of 5 and of 10 steps, without repeats. The
+   variance of a value is a constant plus a sum over steps (a random walk), so it is taken as linear in their number, at
+   every point of the volume and for every kind of parameter, and not as falling. Over 50 steps this is within a tenth.
+4. What step 2 ends with is evaluated with exact covariances: by adjustment, or by propagation where more than the noise
+   of the readings is uncertain. So is the scenario's own plan.
+5. The best of these are exchanged again, line by line, now by exact covariances; only sets are evaluated that the
+   estimate, made smaller by a fifth, would prefer.
+
+A plan that determines fewer parameters is never better than one that determines more. Where [plan_by_time] states
+`line_sets`, all of them are evaluated exactly in all settings, and nothing is exchanged.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from stepdiag.config.plan_by_time_keys import PlanByTimeSection
+from stepdiag.planning.measuring_time import OnLine, in_turn, on_lines, times_of
+from stepdiag.planning.plan_by_time import (
+    Aim,
+    Candidate,
+    Evaluated,
+    Outcome,
+    choose,
+    complete,
+    evaluate,
+    found_from,
+    moved,
+    normal,
+    outcome,
+    own_candidate,
+    plan_of,
+    root_of_largest,
+    runs_of_candidate,
+    settings,
+    stated_candidates,
+    untold,
+)
+from stepdiag.scenario.description import Scenario
+from stepdiag.units import MINUTE
+
+_LINES: Final = ("ppp", "npp", "pnp", "nnp", "pp0", "np0", "p0p", "n0p", "0pp", "0np", "p00", "0p0", "00p")
+_SCALES: Final = _LINES[10:]
+# Sets that a search starts from.
+_STARTS: Final = ((_LINES[:4], _SCALES), (_LINES[:4], _SCALES[:2]), (_LINES[:3], _SCALES), (_LINES[4:10], ()))
+SCREENED: Final = (5, 10)  # steps
+SLACK: Final = 1.25  # of estimates
+TIMES: Final = (0.6, 0.8, 1.0, 1.4, 2.0)  # by the time that there is
+REFINED: Final = 2  # plans that are exchanged by exact covariances
+
+FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[int, int], None]
+Order = Callable[[Candidate], tuple[float, ...]]
+
+
+def best_plans(
+    scenario: Scenario, aim: Aim, *, times: PlanByTimeSection | None = None, progress: Progress | None = None
+) -> list[Outcome]:
+    """Plans among which is the best one for an aim (`choose`), and others that are faster or better.
+
+    `times`: in place of those of the scenario's [plan_by_time]. `progress` is told how many of how many parts are done.
+    Raises InvalidArgument where the scenario names lines that there are not."""
+    report = progress or (lambda done, total: None)
+    if scenario.known.keys.plan_by_time.line_sets is not None:
+        stated, found = stated_candidates(scenario), []
+        for done, candidate in enumerate(stated, 1):
+            found.append(outcome(scenario, candidate, faults=aim.family == "faults", times=times))
+            report(done, len(stated))
+        return found
+    return _Search(scenario, aim, times).run(report)
+
+
+
+
+class _Search:
+    def __init__(self, scenario: Scenario, aim: Aim, times: PlanByTimeSection | None) -> None:
+        self.scenario, self.known, self.aim, self.stated = scenario, scenario.known, aim, times
+        self.own = own_candidate(self.known)
+        self.times = times_of(times or self.known.keys.plan_by_time, f"{self.known.path}: plan_by_time")
+        self.faults = aim.family == "faults"
+        self.lines = _with_others(self.own.lines, _LINES)
+        self.scales = _with_others(self.own.scale_lines, _SCALES)
+        self.screened: dict[Candidate, Evaluated] = {}
+        self.exact: dict[Candidate, Outcome] = {}
+        self.on_lines: dict[Candidate, dict[tuple[str, bool], OnLine]] = {}
+        self.most = 0
+
+    def run(self, report: Progress) -> list[Outcome]:
+        combined = settings(self.known)
+        parts = len(combined) + 2
+        starts = self._starts()
+        self.evaluated(self.own)
+        if not self.aim.goals:
+            limits = [share * self.aim.minutes for share in TIMES]
+        else:
+            reached = self._fastest(combined, starts)
+            limits = [share * reached for share in TIMES]
+        ends: dict[Candidate, None] = {}
+        for done, setting in enumerate(combined, 1):
+            at = starts
+            for minutes in limits:
+                aim = replace(self.aim, minutes=minutes, goals=())
+                best = self._best(setting, at, self._by_estimates(aim))
+                if best is not None and self.seconds(best) <= minutes * MINUTE:
+                    ends[best] = None
+                    at = [*starts, (best.lines, best.scale_lines)]
+            report(done, parts)
+        for candidate in ends:
+            self.evaluated(candidate)
+        report(parts - 1, parts)
+        self._refine()
+        report(parts, parts)
+        return list(self.exact.values())
+
+    def _fastest(self, combined: Sequence[Candidate], starts: Sequence[tuple[tuple[str, ...], ...]]) -> float:
+        """The minutes of the fastest plan that reaches the goals, or of the one that comes nearest; the best of each
+        setting has been evaluated then."""
+        order = self._by_estimates(self.aim)
+        best = [self._best(setting, starts, order) for setting in combined if self._is_near(setting)]
+        for candidate in sorted((one for one in best if one is not None), key=order):
+            self.evaluated(candidate)
+        taken = choose(list(self.exact.values()), self.aim).taken
+        return (taken or self.evaluated(self.own)).minutes
+
+    def _is_near(self, setting: Candidate) -> bool:
+        return float(max(self.known.plan.volume)) / setting.steps <= self.aim.spacing * (1.0 + 1e-9)
+
+    def _refine(self) -> None:
+        """Exchanges by exact covariances."""
+        order = self._by_evaluations(self.aim)
+        allowed = [o for o in complete(list(self.exact.values())) if self._is_near(o.candidate)]
+        for one in sorted(allowed, key=self.aim.order)[:REFINED]:
+            self._exchanged(one.candidate, order, self._by_estimates(self.aim, SLACK))
+
+    # --- exchanges ---------------------------------------------------------------------------------------------------
+    def _starts(self) -> list[tuple[tuple[str, ...], ...]]:
+        sets = [(self.own.lines, self.own.scale_lines), *_STARTS]
+        known = {*self.lines}, {*self.scales}
+        return [(a, b) for a, b in dict.fromkeys(sets) if known[0] >= {*a} and known[1] >= {*b}]
+
+    def _best(
+        self, setting: Candidate, starts: Sequence[tuple[tuple[str, ...], ...]], order: Order
+    ) -> Candidate | None:
+        """Of a setting, from the best of the starts."""
+        found = [normal(replace(setting, lines=lines, scale_lines=scales)) for lines, scales in starts]
+        return self._exchanged(min(found, key=order), order)
+
+    def _exchanged(self, candidate: Candidate, order: Order, preferred: Order | None = None) -> Candidate:
+        """`preferred`: a cheap order, by which a candidate that is not before the present one is passed over."""
+        own = order(candidate)
+        while True:
+            others = [one for one in self._neighbours(candidate) if preferred is None or preferred(one) < own]
+            best = min(others, key=order, default=candidate)
+            if order(best) >= own:
+                return candidate
+            candidate, own = best, order(best)
+
+    def _neighbours(self, candidate: Candidate) -> Iterator[Candidate]:
+        """With one line more, one less, or one in place of another."""
+        inside = {(line, False) for line in candidate.lines} | {(line, True) for line in candidate.scale_lines}
+        every = [(line, False) for line in self.lines] + [(line, True) for line in self.scales]
+        outside = [one for one in every if one not in inside]
+        for added in [None, *outside]:
+            for removed in [None, *(one for one in every if one in inside)]:
+                chosen = (inside | ({added} if added else set())) - {removed}
+                lines = tuple(line for line in self.lines if (line, False) in chosen)
+                scales = tuple(line for line in self.scales if (line, True) in chosen)
+                if chosen != inside and lines and not {*lines} & {*scales}:
+                    yield normal(replace(candidate, lines=lines, scale_lines=scales))
+
+    # --- what plans take and give ------------------------------------------------------------------------------------
+    def seconds(self, candidate: Candidate) -> float:
+        return self._time(candidate)[0]
+
+    def _time(self, candidate: Candidate) -> tuple[float, float]:
+        setting = replace(candidate, lines=(), scale_lines=())
+        of_lines = self.on_lines.setdefault(setting, {})
+        chosen = [(line, False) for line in candidate.lines] + [(line, True) for line in candidate.scale_lines]
+        for line, is_scale in chosen:
+            if (line, is_scale) not in of_lines:
+                # A plan has at least one line that is no scale line.
+                lines = ("ppp",) if is_scale else (line,)
+                plan = plan_of(self.known, replace(candidate, lines=lines, scale_lines=(line,) if is_scale else ()))
+                runs = runs_of_candidate(self.known, candidate)
+                of_lines[line, is_scale] = on_lines(plan, self.times, repeats=runs, backward=candidate.backward)[line]
+        return in_turn([of_lines[one] for one in chosen], self.times)
+
+    def evaluated(self, candidate: Candidate) -> Outcome:
+        if candidate not in self.exact:
+            found = outcome(self.scenario, candidate, faults=self.faults, times=self.stated)
+            self.exact[candidate] = found
+            self.most = max(self.most, len(found.determined))
+        return self.exact[candidate]
+
+    def _screen(self, candidate: Candidate) -> Evaluated:
+        if candidate not in self.screened:
+            between = self._time(candidate)[1]
+            self.screened[candidate] = evaluate(self.scenario, candidate, between, faults=self.faults)
+        return self.screened[candidate]
+
+    def _standing_for(self, candidate: Candidate, steps: int, repeats: int) -> Candidate:
+        returns = math.ceil(steps * candidate.check_points / candidate.steps)
+        return replace(candidate, steps=steps, repeats=repeats, check_points=returns)
+
+    def estimated(self, candidate: Candidate) -> Outcome:
+        """Without its mirror."""
+        few, more = SCREENED
+        seconds = self.seconds(candidate)
+        spacing = float(max(self.known.plan.volume)) / candidate.steps
+        nothing = Outcome(candidate, seconds, spacing, (math.nan, math.nan), {}, frozenset())
+        # Two runs tell faults apart that one does not.
+        repeats = min(candidate.repeats, 2 if self.faults else 1)
+        steps = SCREENED if candidate.steps >= few else (candidate.steps, candidate.steps)
+        at = [self._screen(self._standing_for(candidate, n, repeats)) for n in steps]
+        if at[1].variances is None or at[0].variances is None:
+            return replace(nothing, trouble=at[1].trouble or at[0].trouble)
+        share = (candidate.steps - more) / (more - few)
+        least = 0.0 if share > 0.0 else -math.inf
+        runs = candidate.repeats / repeats
+
+        def of_steps(low: FloatArray, high: FloatArray) -> FloatArray:
+            """Of variances."""
+            result: FloatArray = (high + share * np.maximum(high - low, least)) / runs
+            return result
+
+        kinds = [kind for kind in at[1].largest if kind in at[0].largest]
+        low, high = (np.array([found.largest[kind] for kind in kinds]) ** 2 for found in at)
+        return replace(
+            nothing,
+            largest=dict(zip(kinds, np.sqrt(of_steps(low, high)).tolist(), strict=True)),
+            determined=at[1].determined,
+            volume=root_of_largest(of_steps(at[0].variances, at[1].variances)),
+            faults=at[1].faults,
+        )
+
+    # --- orders ------------------------------------------------------------------------------------------------------
+    def _by_estimates(self, aim: Aim, slack: float = 1.0) -> Order:
+        def order(candidate: Candidate) -> tuple[float, ...]:
+            seconds = self.seconds(candidate)
+            if seconds > aim.minutes * MINUTE:  # however good it is
+                return (math.inf, seconds)
+            found = self.estimated(candidate)
+            smaller = replace(
+                found,
+                volume=found.volume / slack,
+                largest={kind: u / slack for kind, u in found.largest.items()},
+            )
+            return (self._lacking(found), *aim.order(smaller))
+
+        return order
+
+    def _by_evaluations(self, aim: Aim) -> Order:
+        def order(candidate: Candidate) -> tuple[float, ...]:
+            found = self.evaluated(candidate)
+            return (self._lacking(found), *aim.order(found))
+
+        return order
+
+    def _lacking(self, one: Outcome) -> float:
+        """How many parameters it does not determine that another plan does; of fewer no plan is better."""
+        return float(-len(one.determined))
+
+
+def _with_others(own: Sequence[str], usual: Sequence[str]) -> tuple[str, ...]:
+    """Own lines, and of the usual ones those that are not among them, reversed or not."""
+    turned = str.maketrans("pn", "np")
+    inside = {*own, *(line.translate(turned) for line in own)}
+    return (*own, *(line for line in usual if line not in inside))
