@@ -13,7 +13,7 @@ from stepdiag.io.outputs import FIGURE, PLANS, OutputFile
 from stepdiag.progress import Progress
 from stepdiag.units import MICROMETRE
 
-Family = Literal["length", "angle", "squareness"]
+Family = Literal["volume", "length", "angle", "squareness", "faults"]
 
 
 class _Positive(click.FloatRange):
@@ -46,10 +46,37 @@ _POSITIVE = _Positive(min=0.0, min_open=True, max=1e9)
 @click.option(
     "--for",
     "family",
-    type=click.Choice(["length", "angle", "squareness"]),
-    default="length",
+    type=click.Choice(["volume", "length", "angle", "squareness", "faults"]),
+    default="volume",
     show_default=True,
-    help="Minimise the largest standard uncertainty of this family; length: positioning and straightness.",
+    help="Minimise the largest standard uncertainty of the functional point in the volume, or of a family (length: "
+    "positioning and straightness); faults: leave the fewest faults of readings unseen.",
+)
+@click.option(
+    "--volume-u",
+    type=_POSITIVE,
+    metavar="UM",
+    help="The shortest plan with at most this standard uncertainty (µm) of the functional point in the volume.",
+)
+@click.option(
+    "--squareness-u",
+    type=_POSITIVE,
+    metavar="URAD",
+    help="The shortest plan with at most this standard uncertainty (µrad) of the squarenesses.",
+)
+@click.option(
+    "--decide",
+    type=_POSITIVE,
+    metavar="UM",
+    help="The shortest plan that tells with 95 % whether the largest error is within this limit (µm), for machines "
+    "with 0.8 of it and with 1.25 of it.",
+)
+@click.option(
+    "--from",
+    "measured",
+    type=PATH,
+    metavar="RUN.raw.jsonl",
+    help="Take set-up, settling and reading times from this acquisition, in place of [plan_by_time].",
 )
 @click.option(
     "-o",
@@ -77,20 +104,28 @@ def plan(
     minutes: float | None,
     spacing: float | None,
     family: Family,
+    volume_u: float | None,
+    squareness_u: float | None,
+    decide: float | None,
+    measured: Path | None,
     output: OutputFile | None,
     baseline: Path | None,
     limit: float | None,
 ) -> None:
-    """Choose the plan to measure in the available time.
+    """Find the best plan for the available time, or the shortest plan for a goal.
 
     Uses head, uncertainties and unknowns of SCENARIO, and the times in its section [plan_by_time].
-    For numbers of steps, sets of lines and repeats it calculates the measuring time, set-ups
-    included, and the largest standard uncertainties of an adjustment, for a machine with the errors
-    of [machine.random].
+    Searches sets of lines (body and face diagonals, single axes, scale lines), numbers of steps,
+    repeats, and where scale lines are read. Calculates the measuring time, set-ups included, and the
+    largest standard uncertainties of an adjustment, for a machine with the errors of
+    [machine.random].
 
-    The table contains the plans that no other plan beats in time, in distance between nodes and in
-    uncertainty (see --for). More steps resolve more, but take longer and make each value less
-    certain, because it is a sum over more steps.
+    The table contains the plans that no other plan beats in time and in uncertainty (see --for), and
+    with fewer steps the best ones in the time. More steps resolve more, but take longer and make
+    each value less certain, because it is a sum over more steps.
+
+    --volume-u, --squareness-u and --decide ask for the shortest plan that reaches them all; with
+    --minutes, within this time.
 
     With --recheck it chooses the plan for `stepdiag recheck`: for each plan the smallest change of
     each kind that is seen, with the changes of [change]. Its points are nodes of the calibration.
@@ -98,39 +133,95 @@ def plan(
     if limit is not None and baseline is None:
         raise InvalidArgument("--limit: expected --recheck as well")
     if baseline is not None:
+        of_new_plans = {"--volume-u": volume_u, "--squareness-u": squareness_u, "--decide": decide, "--from": measured}
+        for name, value in of_new_plans.items():
+            if value is not None:
+                raise InvalidArgument(f"{name}: not together with --recheck")
         _plan_recheck(scenario, baseline, minutes, limit, output)
         return
-    from stepdiag.io.whole_files import write_whole
-    from stepdiag.planning.plan_by_time import choose, outcomes, own_spacing, telling
-    from stepdiag.report.plan_by_time import advice, fault_advice, left_out_rows, plan_csv, plan_rows
+    from stepdiag.io.whole_files import check_input, write_whole
+    from stepdiag.planning.best_plan import best_plans
+    from stepdiag.planning.plan_by_time import (
+        Aim,
+        choose,
+        deciding_goal,
+        own_candidate,
+        own_spacing,
+        squareness_goal,
+        telling,
+        volume_goal,
+        with_faults,
+    )
+    from stepdiag.report.plan_by_time import (
+        advice,
+        fault_advice,
+        inputs_row,
+        left_out_rows,
+        line_names,
+        own_row,
+        plan_csv,
+        plan_rows,
+        shown,
+    )
     from stepdiag.scenario.description import read_scenario
 
     described = read_scenario(scenario)
+    known = described.known
+    inputs = [scenario]
+    if measured is not None:
+        check_input(measured)
+        inputs.append(measured)
     tell_inputs(described)
-    path = None if output is None else output.claim(scenario, error_map=described.truth.error_map)
-    available = described.known.keys.plan_by_time.minutes if minutes is None else minutes
-    near = own_spacing(described.known) if spacing is None else spacing
+    path = None if output is None else output.claim(*inputs, error_map=described.truth.error_map)
+    times = None
+    if measured is not None:
+        from stepdiag.planning.times_of_run import key_rows, measured_times
+
+        taken_from = measured_times(measured, known.keys.plan_by_time, f"{known.path}: plan_by_time")
+        times = taken_from.keys
+        for row in key_rows(taken_from):
+            say(row)
+    goals = [
+        *([volume_goal(volume_u)] if volume_u is not None else []),
+        *([squareness_goal(squareness_u)] if squareness_u is not None else []),
+        *([deciding_goal(decide, known.between_nodes)] if decide is not None else []),
+    ]
+    available = known.keys.plan_by_time.minutes if minutes is None and not goals else minutes
+    near = own_spacing(known) if spacing is None else spacing
+    aim = Aim(family, math.inf if available is None else available, near, tuple(goals))
     with Progress("plans") as progress:
-        found = outcomes(described, progress)
-    choice = choose(found, available, near, family)
-    say("largest standard uncertainties by measuring time, for a machine with usual errors")
-    say("(lines: body and face diagonals, single-axis and scale lines):")
-    for line in plan_rows(found, choice, available, family):
+        found = best_plans(described, aim, times=times, progress=progress)
+    choice = choose(found, aim)
+    rows = shown(found, choice, aim)
+    with Progress("faults of the plans in the table") as progress:
+        for done, one in enumerate(rows, 1):
+            if one.minutes <= aim.minutes:
+                told = with_faults(described, one)
+                found = [told if other is one else other for other in found]
+            progress(done, len(rows))
+    choice = choose(found, aim)
+    say(inputs_row(known))
+    say("largest standard uncertainties by measuring time, for a machine with usual errors (lines: body diagonals/face")
+    say("diagonals/single axes/scale lines; found: smallest wrong distance that is; told: kinds of faults told apart):")
+    for line in plan_rows(shown(found, choice, aim), choice, aim):
         say(line)
-    for line in [*left_out_rows(found), *advice(found, available, near, family)]:
+    own = own_candidate(known)
+    own_rows = [own_row(one) for one in found if one.candidate == own]
+    for line in [*left_out_rows(found), *own_rows, *advice(found, aim)]:
         say(line)
     if choice.taken is not None:
-        with Progress("faults of the chosen plan"):
-            told = telling(described, found, choice.taken, family)
-        for line in fault_advice(*told):
+        say(f"  {line_names(choice.taken)}")
+        with Progress("plans that tell all faults apart"):
+            told_apart = telling(described, found, choice.taken, family)
+        for line in fault_advice(*told_apart):
             say(line)
     suffix = "" if path is None else path.suffix.lower().lstrip(".")
     if path is not None and suffix == "csv":
-        write_whole(path, plan_csv(found))
+        write_whole(path, plan_csv(found, family))
     elif path is not None:
         from stepdiag.figures.plan_by_time import draw_plans
 
-        write_whole(path, draw_plans(found, choice.taken, available, suffix))
+        write_whole(path, draw_plans(found, choice.taken, aim.minutes, suffix))
 
 
 def _plan_recheck(

@@ -11,12 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
-from stepdiag.parameters import REPORT_UNIT, in_report_units
-from stepdiag.planning.plan_by_time import FAMILIES, Family, Outcome, complete
+from stepdiag.parameters import REPORT_UNIT, Kind, in_report_units
+from stepdiag.planning.plan_by_time import KINDS_OF, Family, Outcome, complete
 from stepdiag.style import own_style, save, series
 
 GREY: Final = "#555555"
 TITLES: Final[dict[Family, str]] = {
+    "volume": "functional point in the volume",
     "length": "positioning and straightness",
     "angle": "angles",
     "squareness": "squarenesses",
@@ -27,12 +28,12 @@ def draw_plans(found: Sequence[Outcome], taken: Outcome | None, minutes: float, 
     """Draw the plans: content of a "png", "svg" or "pdf" file, same bytes for same plans.
 
     `taken` is the plan to mark."""
-    plans = [o for o in complete(found) if all(math.isfinite(o.worst(family)) for family in FAMILIES)]
+    plans = [o for o in complete(found) if all(math.isfinite(o.worst(family)) for family in TITLES)]
     with own_style():
-        figure = Figure(figsize=(11.0, 4.6), layout="constrained")
+        figure = Figure(figsize=(14.0, 4.6), layout="constrained")
         shapes = _shapes(plans)
-        panels: Any = figure.subplots(1, len(FAMILIES), sharex=True)
-        for axes, family in zip(panels, FAMILIES, strict=True):
+        panels: Any = figure.subplots(1, len(TITLES), sharex=True)
+        for axes, family in zip(panels, TITLES, strict=True):
             _draw_family(axes, plans, family, minutes, shapes)
             if taken is not None:
                 axes.plot(
@@ -47,8 +48,9 @@ def draw_plans(found: Sequence[Outcome], taken: Outcome | None, minutes: float, 
 
 
 def _lines(plan: Outcome) -> str:
-    """The lines of a plan in words, without its scale lines."""
-    return plan.candidate.description.partition(", " + f"{len(plan.candidate.scale_lines)} scale line")[0]
+    """Which kinds of lines a plan has beside its scale lines."""
+    counts = plan.candidate.counts
+    return " and ".join(f"{name}s" for name, count in counts.items() if count and name != "scale line")
 
 
 def _shapes(plans: Sequence[Outcome]) -> dict[str, str]:
@@ -97,8 +99,13 @@ def _draw_family(
     axes.axvline(minutes, color="#666666", linewidth=0.8, linestyle=(0, (2, 2)))
     axes.set_title(TITLES[family])
     axes.set_xlabel("measuring time (min)")
-    axes.set_ylabel(f"largest standard uncertainty ({REPORT_UNIT[FAMILIES[family][0]]})")
+    axes.set_ylabel(f"largest standard uncertainty ({REPORT_UNIT[_kind(family)]})")
 
 
 def _value(one: Outcome, family: Family) -> float:
-    return in_report_units(FAMILIES[family][0], one.worst(family))
+    return in_report_units(_kind(family), one.worst(family))
+
+
+def _kind(family: Family) -> Kind:
+    """One with the unit of the family."""
+    return "positioning" if family == "volume" else KINDS_OF[family][0]

@@ -22,7 +22,7 @@ A plan that determines fewer parameters is never better than one that determines
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -38,8 +38,6 @@ from stepdiag.planning.plan_by_time import (
     choose,
     complete,
     evaluate,
-    found_from,
-    moved,
     normal,
     outcome,
     own_candidate,
@@ -48,7 +46,6 @@ from stepdiag.planning.plan_by_time import (
     runs_of_candidate,
     settings,
     stated_candidates,
-    untold,
 )
 from stepdiag.scenario.description import Scenario
 from stepdiag.units import MINUTE
@@ -59,7 +56,7 @@ _SCALES: Final = _LINES[10:]
 _STARTS: Final = ((_LINES[:4], _SCALES), (_LINES[:4], _SCALES[:2]), (_LINES[:3], _SCALES), (_LINES[4:10], ()))
 SCREENED: Final = (5, 10)  # steps
 SLACK: Final = 1.25  # of estimates
-TIMES: Final = (0.6, 0.8, 1.0, 1.4, 2.0)  # by the time that there is
+TIMES: Final = (0.7, 1.0, 1.4, 2.0)  # by the time that there is
 REFINED: Final = 2  # plans that are exchanged by exact covariances
 
 FloatArray = npt.NDArray[np.float64]
@@ -84,8 +81,6 @@ def best_plans(
     return _Search(scenario, aim, times).run(report)
 
 
-
-
 class _Search:
     def __init__(self, scenario: Scenario, aim: Aim, times: PlanByTimeSection | None) -> None:
         self.scenario, self.known, self.aim, self.stated = scenario, scenario.known, aim, times
@@ -97,7 +92,6 @@ class _Search:
         self.screened: dict[Candidate, Evaluated] = {}
         self.exact: dict[Candidate, Outcome] = {}
         self.on_lines: dict[Candidate, dict[tuple[str, bool], OnLine]] = {}
-        self.most = 0
 
     def run(self, report: Progress) -> list[Outcome]:
         combined = settings(self.known)
@@ -119,8 +113,10 @@ class _Search:
                     ends[best] = None
                     at = [*starts, (best.lines, best.scale_lines)]
             report(done, parts)
+        most = max((len(self.estimated(candidate).determined) for candidate in ends), default=0)
         for candidate in ends:
-            self.evaluated(candidate)
+            if len(self.estimated(candidate).determined) == most:
+                self.evaluated(candidate)
         report(parts - 1, parts)
         self._refine()
         report(parts, parts)
@@ -203,7 +199,6 @@ class _Search:
         if candidate not in self.exact:
             found = outcome(self.scenario, candidate, faults=self.faults, times=self.stated)
             self.exact[candidate] = found
-            self.most = max(self.most, len(found.determined))
         return self.exact[candidate]
 
     def _screen(self, candidate: Candidate) -> Evaluated:

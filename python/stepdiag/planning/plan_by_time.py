@@ -3,7 +3,7 @@ which of several plans is the best one for an aim."""
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
@@ -17,14 +17,14 @@ from stepdiag.calibration.volume import ONE_SIDED, variances_in_volume
 from stepdiag.config.plan_by_time_keys import PlanByTimeSection
 from stepdiag.config.scenario_keys import MachineErrorsKeys, RandomSection, TruthKeys
 from stepdiag.config.toml_text import located
-from stepdiag.parameters import KINDS, Kind, kind_of
+from stepdiag.parameters import Kind
 from stepdiag.planning.fault_control import tells_all
 from stepdiag.planning.measuring_time import measuring_time, times_of
 from stepdiag.planning.observation import extents, not_measured
 from stepdiag.scenario.description import Scenario, adjust_scenario, simulate_scenario
 from stepdiag.scenario.known import Known, runs_of
 from stepdiag.scenario.truth import Truth, truth_of
-from stepdiag.units import MICRORADIAN, MICROMETRE, MINUTE
+from stepdiag.units import MICROMETRE, MICRORADIAN, MINUTE
 
 # What a plan is to be good at: the error of the functional point in the volume, a family of parameters, or power
 # against faults of the readings.
@@ -260,9 +260,7 @@ def plan_of(known: Known, candidate: Candidate) -> _core.Plan:
         candidate.steps,
         order=known.plan.orders,
         scale_lines=list(candidate.scale_lines),
-        check_points=_core.CheckPoints(
-            candidate.check_points, min(known.keys.plan.check_point, candidate.steps)
-        ),
+        check_points=_core.CheckPoints(candidate.check_points, min(known.keys.plan.check_point, candidate.steps)),
         scale_points=normal(candidate).scale_points,
     )
 
