@@ -28,7 +28,7 @@ from stepdiag.units import MICROMETRE, MICRORADIAN
 
 # Heads of columns with the numbers of lines, by Candidate.counts.
 LINES: Final = {"body diagonal": "body", "face diagonal": "face", "single-axis line": "single", "scale line": "scale"}
-FIGURES: Final = ("volume", "posit.", "straight.", "angle", "square.", "found", "told")
+FIGURES: Final = ("volume", "pos.", "str.", "angle", "squ.", "found", "told")
 UNITS: Final = ("µm", *(REPORT_UNIT[kind] for kind in KINDS), "µm", "")
 FAR: Final = 2.0  # times the time that there is: how far the table goes on
 
@@ -69,7 +69,7 @@ def plan_rows(plans: Sequence[Outcome], choice: Choice, aim: Aim) -> Iterator[st
     }
     told = {name: said for name, said in settings.items() if len({said(o.candidate) for o in plans} - {"-", "no"}) > 0}
     rows = [
-        ["minutes", "lines", *told, "steps", "spacing", "repeats", *FIGURES],
+        ["minutes", "lines", *told, "steps", "spacing", "runs", *FIGURES],
         ["", "", *("" for _ in told), "", "mm", "", *UNITS],
     ]
     for o in plans:
