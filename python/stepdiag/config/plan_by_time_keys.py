@@ -20,7 +20,8 @@ _duration = "a time of at least 0"
 class PlanByTimeSection(Section):
     """Times of moves and readings, for `plan` and `nc`, and the plans from which `plan` chooses.
 
-    Head, order, backward runs, uncertainties and unknowns of all plans are those of the scenario."""
+    Head, order, uncertainties and unknowns of all plans are those of the scenario, and backward runs unless
+    `[adjustment] reversal = false`."""
 
     minutes: Positive = key(POSITIVE, "The time that there is for measuring, set-ups included.", 30.0)
     feed_mm_per_min: Positive = key(POSITIVE, "Feed of all moves, along a straight line.", 6000.0)
@@ -46,9 +47,8 @@ class PlanByTimeSection(Section):
     )
     line_sets: tuple[Annotated[tuple[str, ...], Field(min_length=1)], ...] | None = key(
         'a list of sets of lines such as ["ppp", "npp", "pnp", "p00"]',
-        "Sets of lines to choose from, beside that of the scenario; single axes in them are scale lines. By default "
-        "three or four body diagonals, six face diagonals, and both (with four also three face diagonals), with two, "
-        "three or no scale lines.",
+        "The only sets of lines to choose from, beside that of the scenario; single axes in them are scale lines. By "
+        "default `plan` searches all sets of body and face diagonals, single axes and scale lines.",
         None,
         [["ppp", "npp", "pnp", "nnp", "p00", "0p0"], ["pp0", "np0", "p0p", "n0p", "0pp", "0np"]],
     )

@@ -204,8 +204,9 @@ def normal(candidate: Candidate) -> Candidate:
 def settings(known: Known) -> list[Candidate]:
     """All combinations of steps, repeats, returns, scale points and backward runs, with the lines of the own plan.
 
-    Backward runs are there to tell reversal errors. Where these are unknowns, they halve no other uncertainty: they stay
-    as the scenario has them. Where there are none (`reversal = false`), both are tried."""
+    Backward runs are there to tell reversal errors. Where these are unknowns, the errors of the other direction are no
+    better known for them: they stay as the scenario has them. Where there are none (`reversal = false`), both are
+    tried."""
     keys, own = known.keys.plan_by_time, own_candidate(known)
     ways = [own.backward] if known.keys.adjustment.reversal else [False, True]
     points: tuple[ScalePoints, ...] = ("ends", "steps")

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from statistics import median
 
@@ -41,7 +42,7 @@ def measured_times(raw: Path, keys: PlanByTimeSection, place: str) -> MeasuredTi
     on_line: list[float] = []
     changes: dict[bool, list[float]] = {False: [], True: []}
     readings = sorted(content.readings().values(), key=lambda one: one.time)
-    for before, after in zip(readings, readings[1:], strict=False):
+    for before, after in pairwise(readings):
         if before.visit not in planned or after.visit not in planned:
             raise InvalidArgument(f"{raw}: visit {after.visit}: not in the plan of the header")
         way = float(np.linalg.norm(np.subtract(after.position_mm, before.position_mm)))
@@ -73,8 +74,8 @@ def measured_times(raw: Path, keys: PlanByTimeSection, place: str) -> MeasuredTi
 
 def key_rows(found: MeasuredTimes) -> Iterator[str]:
     """What was measured, and the keys to write into the scenario."""
-    yield f"times of {found.path} (medians of {found.readings} readings in a row on a line, {found.line_changes} set-ups"
-    yield f"of lines and {found.scale_line_changes} of scale lines), to be written into the scenario:"
+    yield f"times of {found.path}, to be written into the scenario (medians of {found.readings} readings in a row on a"
+    yield f"line, and of {found.line_changes} set-ups of lines and {found.scale_line_changes} of scale lines):"
     yield "  [plan_by_time]"
     yield f"  settle_s = {found.keys.settle_s!r}"
     yield f"  measure_s = {found.keys.measure_s!r}"

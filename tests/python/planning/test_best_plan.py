@@ -201,7 +201,7 @@ def raw_of(scenario: Scenario, path: Path, *, set_up: float, scale_set_up: float
             direction=v.direction,
             scale_line=v.is_scale_line,
             points=v.points.tolist(),
-            position_mm=v.positions.tolist(),
+            position_mm=[(float(x), float(y), float(z)) for x, y, z in v.positions],
             nominal_mm=[0.0] * len(v.points),
         )
         for v in visits
