@@ -8,9 +8,10 @@
    than the present one; until there is none (V. V. Fedorov, Theory of Optimal Experiments, 1972; R. D. Cook and C. J.
    Nachtsheim, Technometrics 22 (1980) 315). The order of lines and settings is fixed, and numbers that differ in the
    seventh digit are equal: the same scenario gives the same plan.
-3. In step 2 a plan of many steps is estimated from the exact covariances of 5 and of 10 steps, without repeats. The
-   variance of a value is a constant plus a sum over steps (a random walk), so it is taken as linear in their number, at
-   every point of the volume and for every kind of parameter, and not as falling. Over 50 steps this is within a tenth.
+3. In step 2 a plan is estimated from the exact covariances of 5 and of 10 steps (of more where the mirror is too small
+   for so long ones), without repeats. The variance of a value is a constant plus a sum over steps (a random walk), so it
+   is taken as linear in their number, at every point of the volume and for every kind of parameter, and beyond 10 steps
+   as not falling. At 50 steps this is within a tenth or so.
 4. What step 2 ends with is evaluated with exact covariances: by adjustment, or by propagation where more than the noise
    of the readings is uncertain. So is the scenario's own plan.
 5. The best of these are exchanged again, line by line, now by exact covariances; only sets are evaluated that the
@@ -54,7 +55,7 @@ _LINES: Final = ("ppp", "npp", "pnp", "nnp", "pp0", "np0", "p0p", "n0p", "0pp", 
 _SCALES: Final = _LINES[10:]
 # Sets that a search starts from.
 _STARTS: Final = ((_LINES[:4], _SCALES), (_LINES[:4], _SCALES[:2]), (_LINES[:3], _SCALES), (_LINES[4:10], ()))
-SCREENED: Final = (5, 10)  # steps
+SCREENED: Final = ((5, 10), (10, 20), (25, 50))  # steps; the first of which the mirror is not too small
 SLACK: Final = 1.25  # of estimates
 TIMES: Final = (0.7, 1.0, 1.4, 2.0)  # by the time that there is
 REFINED: Final = 2  # plans that are exchanged by exact covariances
@@ -92,6 +93,7 @@ class _Search:
         self.screened: dict[Candidate, Evaluated] = {}
         self.exact: dict[Candidate, Outcome] = {}
         self.on_lines: dict[Candidate, dict[tuple[str, bool], OnLine]] = {}
+        self.few = self._screened_steps()
 
     def run(self, report: Progress) -> list[Outcome]:
         combined = settings(self.known)
@@ -126,19 +128,25 @@ class _Search:
         """The minutes of the fastest plan that reaches the goals, or of the one that comes nearest; the best of each
         setting has been evaluated then."""
         order = self._by_estimates(self.aim)
-        best = [self._best(setting, starts, order) for setting in combined if self._is_near(setting)]
+        best = [self._best(setting, starts, order) for setting in self._near(combined)]
         for candidate in sorted((one for one in best if one is not None), key=order):
             self.evaluated(candidate)
         taken = choose(list(self.exact.values()), self.aim).taken
         return (taken or self.evaluated(self.own)).minutes
 
-    def _is_near(self, setting: Candidate) -> bool:
-        return float(max(self.known.plan.volume)) / setting.steps <= self.aim.spacing * (1.0 + 1e-9)
+    def _near(self, combined: Sequence[Candidate]) -> list[Candidate]:
+        """Settings with nodes near enough; where there are none, those with the nearest."""
+        edge = float(max(self.known.plan.volume))
+        most = max(one.steps for one in combined)
+        return [one for one in combined if edge / one.steps <= self.aim.spacing * (1.0 + 1e-9) or one.steps == most]
 
     def _refine(self) -> None:
-        """Exchanges by exact covariances."""
+        """Exchanges by exact covariances, of plans with nodes as near as the time allows."""
         order = self._by_evaluations(self.aim)
-        allowed = [o for o in complete(list(self.exact.values())) if self._is_near(o.candidate)]
+        found = complete(list(self.exact.values()))
+        taken = choose(found, self.aim).taken
+        spacing = self.aim.spacing if taken is None else max(self.aim.spacing, taken.spacing)
+        allowed = [o for o in found if o.spacing <= spacing * (1.0 + 1e-9)]
         for one in sorted(allowed, key=self.aim.order)[:REFINED]:
             self._exchanged(one.candidate, order, self._by_estimates(self.aim, SLACK))
 
@@ -207,19 +215,25 @@ class _Search:
             self.screened[candidate] = evaluate(self.scenario, candidate, between, faults=self.faults)
         return self.screened[candidate]
 
+    def _screened_steps(self) -> tuple[int, int]:
+        for few in SCREENED:
+            if all(self._screen(self._standing_for(self.own, steps, 1)).variances is not None for steps in few):
+                return few
+        return self.own.steps, 2 * self.own.steps
+
     def _standing_for(self, candidate: Candidate, steps: int, repeats: int) -> Candidate:
         returns = math.ceil(steps * candidate.check_points / candidate.steps)
         return replace(candidate, steps=steps, repeats=repeats, check_points=returns)
 
     def estimated(self, candidate: Candidate) -> Outcome:
         """Without its mirror."""
-        few, more = SCREENED
+        few, more = self.few
         seconds = self.seconds(candidate)
         spacing = float(max(self.known.plan.volume)) / candidate.steps
         nothing = Outcome(candidate, seconds, spacing, (math.nan, math.nan), {}, frozenset())
         # Two runs tell faults apart that one does not.
         repeats = min(candidate.repeats, 2 if self.faults else 1)
-        steps = SCREENED if candidate.steps >= few else (candidate.steps, candidate.steps)
+        steps = self.few if candidate.steps >= few else (candidate.steps, candidate.steps)
         at = [self._screen(self._standing_for(candidate, n, repeats)) for n in steps]
         if at[1].variances is None or at[0].variances is None:
             return replace(nothing, trouble=at[1].trouble or at[0].trouble)

@@ -128,6 +128,15 @@ def test_estimates_of_many_steps_are_those_of_the_adjustment() -> None:
         assert estimate.seconds == pytest.approx(exact.seconds, rel=1e-12)
 
 
+def test_estimates_are_of_as_many_steps_as_the_mirror_allows() -> None:
+    scenario = parse_scenario(
+        NOISY.replace('"ideal"', '"ideal"\nmirror_mm = [60.0, 60.0]').replace("steps = 4", "steps = 20")
+    )
+    search = best_plan._Search(scenario, Aim(), None)
+    assert search.few == (25, 50)  # ten steps of 80 mm need a mirror of 90 mm
+    assert search.estimated(replace(search.own, steps=50)).volume < 1.0
+
+
 @pytest.mark.usefixtures("few_lines")
 def test_power_against_faults_is_a_merit() -> None:
     scenario = parse_scenario(NOISY + "[plan_by_time]\nsteps = [4]\nrepeats = [1, 2]\nline_change_min = 2.0\n")
