@@ -141,7 +141,7 @@ def test_init_makes_a_sheet_with_every_commanded_point(here: Path) -> None:
     assert run("init", "-o", "machine") == 0
     scenario = sd.read_scenario("machine/scenario.toml")
     sheet = sd.read_measurement("machine/measurement.csv")
-    assert len(sheet) == 4 * 31 + 3 * 2
+    assert len(sheet) == 2 * (4 * 31 + 21 + 3 * 11)
     assert sheet.channels.keys() == {"distance", "alpha", "beta"}
     simulated = sd.simulate_scenario(scenario)
     assert (sheet.line, sheet.point.tolist()) == (simulated.line, simulated.point.tolist())

@@ -39,7 +39,7 @@ def uncommented(text: str) -> str:
 
 
 def test_template_is_a_scenario_and_stays_one_with_every_key_uncommented() -> None:
-    assert parse_scenario(template()).known.plan.lines == ["ppp", "npp", "pnp", "nnp"]
+    assert parse_scenario(template()).known.plan.lines == ["ppp", "npp", "pnp", "nnp", "pp0"]
     everything = parse_scenario(uncommented(template()))
     assert everything.known.keys.adjustment.laser_urad == "free"
     assert everything.known.head.design.name == "beam and PSD"

@@ -15,6 +15,7 @@ import stepdiag as sd
 from stepdiag.acquisition.raw_file import RawFile
 from stepdiag.acquisition.raw_records import Header, RawReading, Visited
 from stepdiag.cli import main
+from stepdiag.config.scenario_template import WHY, template
 from stepdiag.planning import best_plan
 from stepdiag.planning.best_plan import best_plans
 from stepdiag.planning.measuring_time import measuring_time, times_of
@@ -31,6 +32,7 @@ from stepdiag.planning.plan_by_time import (
     settings,
     squareness_goal,
     volume_goal,
+    with_faults,
 )
 from stepdiag.planning.times_of_run import key_rows, measured_times
 from stepdiag.scenario.description import Scenario, parse_scenario
@@ -192,6 +194,23 @@ def test_verdict_of_volume_is_the_one_that_the_goal_promises() -> None:
     # With 95 % in each run, 17 or more of 20 have a probability of 0.984.
     assert verdicts["within"] >= 17
     assert verdicts["not within"] >= 17
+
+
+@pytest.mark.slow
+def test_new_scenario_has_the_best_plan_for_45_minutes_and_says_what_it_gives() -> None:
+    # Plans of more steps are less certain, and of fewer have nodes farther apart than the template's own.
+    scenario = parse_scenario(template() + "[plan_by_time]\nsteps = [10]\n")
+    aim = Aim(minutes=45.0, spacing=80.0)
+    found = best_plans(scenario, aim)
+    taken = choose(found, aim).taken
+    assert taken is not None
+    assert taken.candidate == own_candidate(scenario.known)
+    own = with_faults(scenario, taken)
+    assert own.untold() == 0
+    before = outcome(scenario, replace(own.candidate, lines=LINES[:4], repeats=1, scale_points="ends"))
+    for one in (own, before):
+        assert f"{one.minutes:.1f} minutes" in WHY
+        assert f"{one.volume * 1e3:.3g} µm" in WHY
 
 
 # --- times of a run that was made -------------------------------------------------------------------------------------
