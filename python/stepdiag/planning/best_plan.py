@@ -3,15 +3,15 @@
 1. The lines to choose from are those of the scenario's plan, four body diagonals, six face diagonals, three single axes
    and three scale lines. A reversed line ("ppn" for "nnp") is the same line. All lines of a plan have as many steps:
    what differs by line is where scale lines are read, at their ends or at every step.
-2. For each setting, and for some times around the one that there is, lines are exchanged as in optimum experimental
-   design: of all sets with one line more, one less, or one in place of another, that best set is taken which is better
-   than the present one; until there is none (V. V. Fedorov, Theory of Optimal Experiments, 1972; R. D. Cook and C. J.
-   Nachtsheim, Technometrics 22 (1980) 315). The order of lines and settings is fixed, and numbers that differ in the
-   seventh digit are equal: the same scenario gives the same plan.
+2. For each setting, and for some times around the one that there is (and for the shortest one), lines are exchanged as
+   in optimum experimental design: of all sets with one line more, one less, or one in place of another, that best set
+   is taken which is better than the present one; until there is none (V. V. Fedorov, Theory of Optimal Experiments,
+   1972; R. D. Cook and C. J. Nachtsheim, Technometrics 22 (1980) 315). The order of lines and settings is fixed, and
+   numbers that differ in the seventh digit are equal: the same scenario gives the same plan.
 3. In step 2 a plan is estimated from the exact covariances of 5 and of 10 steps (of more where the mirror is too small
-   for so long ones), without repeats. The variance of a value is a constant plus a sum over steps (a random walk), so it
-   is taken as linear in their number, at every point of the volume and for every kind of parameter, and beyond 10 steps
-   as not falling. At 50 steps this is within a tenth or so.
+   for so long ones), without repeats. The variance of a value is a constant plus a sum over steps (a random walk), and
+   so it is taken as linear in their number, at every point of the volume and for every kind of parameter, and beyond 10
+   steps as not falling. At 50 steps this is within a tenth or so.
 4. What step 2 ends with is evaluated with exact covariances: by adjustment, or by propagation where more than the noise
    of the readings is uncertain. So is the scenario's own plan.
 5. The best of these are exchanged again, line by line, now by exact covariances; only sets are evaluated that the
@@ -105,13 +105,15 @@ class _Search:
         else:
             reached = self._fastest(combined, starts)
             limits = [share * reached for share in TIMES]
-        ends: dict[Candidate, None] = {}
+        once = min(setting.repeats for setting in combined)
+        quickest = [one for one in self._near(combined) if one.repeats == once]
+        ends = dict.fromkeys(self._best(setting, starts, self._by_time) for setting in quickest)
         for done, setting in enumerate(combined, 1):
             at = starts
             for minutes in limits:
                 aim = replace(self.aim, minutes=minutes, goals=())
                 best = self._best(setting, at, self._by_estimates(aim))
-                if best is not None and self.seconds(best) <= minutes * MINUTE:
+                if self.seconds(best) <= minutes * MINUTE:
                     ends[best] = None
                     at = [*starts, (best.lines, best.scale_lines)]
             report(done, parts)
@@ -129,7 +131,7 @@ class _Search:
         setting has been evaluated then."""
         order = self._by_estimates(self.aim)
         best = [self._best(setting, starts, order) for setting in self._near(combined)]
-        for candidate in sorted((one for one in best if one is not None), key=order):
+        for candidate in sorted(best, key=order):
             self.evaluated(candidate)
         taken = choose(list(self.exact.values()), self.aim).taken
         return (taken or self.evaluated(self.own)).minutes
@@ -156,9 +158,7 @@ class _Search:
         known = {*self.lines}, {*self.scales}
         return [(a, b) for a, b in dict.fromkeys(sets) if known[0] >= {*a} and known[1] >= {*b}]
 
-    def _best(
-        self, setting: Candidate, starts: Sequence[tuple[tuple[str, ...], ...]], order: Order
-    ) -> Candidate | None:
+    def _best(self, setting: Candidate, starts: Sequence[tuple[tuple[str, ...], ...]], order: Order) -> Candidate:
         """Of a setting, from the best of the starts."""
         found = [normal(replace(setting, lines=lines, scale_lines=scales)) for lines, scales in starts]
         return self._exchanged(min(found, key=order), order)
@@ -278,6 +278,9 @@ class _Search:
             return (self._lacking(found), *aim.order(found))
 
         return order
+
+    def _by_time(self, candidate: Candidate) -> tuple[float, ...]:
+        return (self._lacking(self.estimated(candidate)), self.seconds(candidate))
 
     def _lacking(self, one: Outcome) -> float:
         """How many parameters it does not determine that another plan does; of fewer no plan is better."""
