@@ -57,7 +57,7 @@ _SCALES: Final = _LINES[10:]
 _STARTS: Final = ((_LINES[:4], _SCALES), (_LINES[:4], _SCALES[:2]), (_LINES[:3], _SCALES), (_LINES[4:10], ()))
 SCREENED: Final = ((5, 10), (10, 20), (25, 50))  # steps; the first of which the mirror is not too small
 SLACK: Final = 1.25  # of estimates
-TIMES: Final = (0.7, 1.0, 1.4, 2.0)  # by the time that there is
+TIMES: Final = (0.7, 1.0, 1.2, 1.5, 2.0)  # by the time that there is
 REFINED: Final = 2  # plans that are exchanged by exact covariances
 
 FloatArray = npt.NDArray[np.float64]

@@ -263,6 +263,7 @@ def plan_of(known: Known, candidate: Candidate) -> _core.Plan:
         scale_lines=list(candidate.scale_lines),
         check_points=_core.CheckPoints(candidate.check_points, min(known.keys.plan.check_point, candidate.steps)),
         scale_points=normal(candidate).scale_points,
+        block=min(known.plan.block, candidate.steps),
     )
 
 
