@@ -90,7 +90,8 @@ double usual_tilt(const Measurement& measurement, const std::vector<std::size_t>
     std::size_t far = rows.front();
     for (const std::size_t row : rows)
         if (std::abs(point(row) - point(rows.front())) > std::abs(point(far) - point(rows.front()))) far = row;
-    const auto first = tilt_of(measurement, rows.front(), far, head), last = tilt_of(measurement, far, rows.front(), head);
+    const auto first = tilt_of(measurement, rows.front(), far, head),
+               last = tilt_of(measurement, far, rows.front(), head);
     double tilt = first.value_or(last.value_or(0.0));
     if (first && last && std::abs(*first - *last) > most) tilt = std::min(*first, *last);
     return std::min(1.0, step * std::round(tilt / step));

@@ -52,17 +52,14 @@ double covered(double u, Error error) {
 }
 
 // Too long by travel, in one direction.
-double second_order(double difference, double mirror) {
-    return 1.5 * difference * difference - mirror * mirror / 2.0;
-}
+double second_order(double difference, double mirror) { return 1.5 * difference * difference - mirror * mirror / 2.0; }
 
 TEST(SetupPriors, ContainTheMirrorThatFollowsALaser) {
     for (const double laser : {100e-6, 500e-6}) {
         const double u = scale_factor(HeadLayout::ideal, true, readings(true), laser, std::nullopt);
         EXPECT_NEAR(u, 1.5284 * laser * laser, 1e-4 * u);  // -ln(0.05)/1.96
-        const double share = covered(u, [&](const double* z) {
-            return second_order(0.0, laser * z[0]) + second_order(0.0, laser * z[1]);
-        });
+        const double share = covered(
+            u, [&](const double* z) { return second_order(0.0, laser * z[0]) + second_order(0.0, laser * z[1]); });
         EXPECT_NEAR(share, 0.95, chance);
     }
 }
@@ -84,8 +81,13 @@ TEST(SetupPriors, ContainTheMirrorOfAScaleLineThatNoReadingTells) {
     struct Angles {
         double laser, mirror;
     };
-    for (const auto [laser, mirror] : {Angles{250e-6, 300e-6}, {500e-6, 500e-6}, {500e-6, 50e-6}, {50e-6, 500e-6},
-                                       {500e-6, 0.0}, {0.0, 500e-6}, {1e-9, 2e-3}}) {
+    for (const auto [laser, mirror] : {Angles{250e-6, 300e-6},
+                                       {500e-6, 500e-6},
+                                       {500e-6, 50e-6},
+                                       {50e-6, 500e-6},
+                                       {500e-6, 0.0},
+                                       {0.0, 500e-6},
+                                       {1e-9, 2e-3}}) {
         for (const auto layout : {HeadLayout::multi_beam, HeadLayout::ideal}) {
             const LineReadings told = readings(layout == HeadLayout::multi_beam);
             const double u = scale_factor(layout, true, told, laser, mirror);
@@ -115,9 +117,10 @@ TEST(SetupPriors, ContainTheAnglesOfMeasuredLines) {
     EXPECT_NEAR(covered(face, [&](const double* z) { return variance * z[0] * z[0] / 2.0; }), 0.95, chance);
     EXPECT_EQ(scale_factor(HeadLayout::ideal, false, readings(true, 0.0, {true, true}), laser, mirror), 0.0);
     const double untold = scale_factor(HeadLayout::multi_beam, false, readings(true), laser, std::nullopt);
-    EXPECT_NEAR(covered(untold, [&](const double* z) {
-                    return second_order(laser * z[0], 0.0) + second_order(laser * z[1], 0.0);
-                }), 0.95, chance);
+    EXPECT_NEAR(
+        covered(untold,
+                [&](const double* z) { return second_order(laser * z[0], 0.0) + second_order(laser * z[1], 0.0); }),
+        0.95, chance);
 }
 
 }  // namespace
