@@ -47,7 +47,7 @@ double mirror_unknown(PriorUncertainty laser, PriorUncertainty mirror) {
 }
 
 // D l + l^2/2 of both directions, D known, of this size. Where both are of a size they add up in D's direction, of
-// which their squares alone know nothing: the last term is fitted, and covers 94.9 to 95.4 % for every D.
+// which their squares alone know nothing: the last term is fitted, and covers 94.9 to 95.3 % for every D.
 double tilt_read(PriorUncertainty laser, double tilt) {
     const double l = laser * laser, product = l * tilt * tilt;
     return std::sqrt(std::pow(both_directions(0.0, l), 2) + product + std::min(product / 2.0, l * l));

@@ -56,8 +56,8 @@ def cosine_rows(measurement: Measurement, known: Known) -> Iterator[str]:
             yield (
                 f"{which}no reading tells the mirror's angle against the beam, taken to be known to "
                 f"{mirror * MICRO:g} µrad (reflector_urad), and the laser along the axis to {laser * MICRO:g} µrad: "
-                f"they read {abs(mean) * MICRO:.2g} µm/m too {'long' if mean > 0.0 else 'short'} on average; that is in "
-                "the uncertainties, not corrected"
+                f"they read {abs(mean) * MICRO:.2g} µm/m too {'long' if mean > 0.0 else 'short'} on average; that is "
+                "in the uncertainties, not corrected"
             )
             continue
         # (a^2 + b^2)/2 of two normal angles, of this variance each once a tilt has told their difference.

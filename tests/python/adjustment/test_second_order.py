@@ -48,7 +48,7 @@ def scale_of(adjustment: sd.Adjustment, seed: int, axis: str) -> tuple[float, fl
 
 
 def beyond_tilt(tilt: float, laser: float) -> float:
-    """Standard uncertainty, by travel, of what a scale line's laser does whose mirror has this tilt (docs/method.md)."""
+    """By travel: standard uncertainty of what the laser of a scale line does, tilt: the mirror's (docs/method.md)."""
     square = -np.log(0.05) / FACTOR * laser**2
     return float(np.sqrt(square**2 + (tilt * laser) ** 2 + min((tilt * laser) ** 2 / 2.0, laser**4)))
 
