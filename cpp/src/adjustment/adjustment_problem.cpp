@@ -82,16 +82,22 @@ std::optional<double> tilt_of(const Measurement& measurement, std::size_t row, s
     return std::hypot(change[1], change[2]) / (2.0 * std::abs(change[0]));
 }
 
-// By the line's first row. Where its farthest one differs by more than machines turn, one of them is wrong, and the
+// By the line's first point. Where its last one differs by more than machines turn, one of them is wrong, and the
 // smaller counts. Rounded, so that noise has no part in a prior.
 double usual_tilt(const Measurement& measurement, const std::vector<std::size_t>& rows, const HeadCalibration& head) {
     constexpr double step = 50e-6, most = 500e-6;
-    const auto point = [&](std::size_t row) { return measurement.stations()[row].point; };
-    std::size_t far = rows.front();
-    for (const std::size_t row : rows)
-        if (std::abs(point(row) - point(rows.front())) > std::abs(point(far) - point(rows.front()))) far = row;
-    const auto first = tilt_of(measurement, rows.front(), far, head),
-               last = tilt_of(measurement, far, rows.front(), head);
+    // Whatever the order of the rows; of several runs the first one's, forward.
+    const auto earlier = [&](std::size_t row, std::size_t other) {
+        const Station &here = measurement.stations()[row], &there = measurement.stations()[other];
+        return std::tie(here.run, here.direction) < std::tie(there.run, there.direction);
+    };
+    std::size_t near = rows.front(), far = rows.front();
+    for (const std::size_t row : rows) {
+        const auto point = [&](std::size_t of) { return measurement.stations()[of].point; };
+        if (point(row) < point(near) || (point(row) == point(near) && earlier(row, near))) near = row;
+        if (point(row) > point(far) || (point(row) == point(far) && earlier(row, far))) far = row;
+    }
+    const auto first = tilt_of(measurement, near, far, head), last = tilt_of(measurement, far, near, head);
     double tilt = first.value_or(last.value_or(0.0));
     if (first && last && std::abs(*first - *last) > most) tilt = std::min(*first, *last);
     return std::min(1.0, step * std::round(tilt / step));

@@ -210,9 +210,13 @@ class DenseAdjustment:
         return {None: 500e-6, "free": 2e-3, "fixed": 0.0}.get(given, given)  # type: ignore[arg-type, return-value]
 
     def tilt(self, line: str) -> float:
-        """Of the mirror against the beam, at the line's first point or the farthest, to 50 urad; 0: both are lost."""
-        rows = np.flatnonzero(self.rows_of(line))
-        first, last = rows[0], max(rows, key=lambda row: abs(self.run.point[row] - self.run.point[rows[0]]))
+        """Of the mirror against the beam, at the line's first point or the last, to 50 urad; 0: both are lost."""
+
+        def place(row: int) -> tuple[int, str]:  # of several runs the first one's, forward
+            return int(self.run.run[row]), "" if self.run.direction[row] == "forward" else "backward"
+
+        rows = sorted(np.flatnonzero(self.rows_of(line)), key=place)
+        first, last = (end(rows, key=lambda row: self.run.point[row]) for end in (min, max))
         found = [t for t in (self.tilt_of(first, last), self.tilt_of(last, first)) if np.isfinite(t)]
         if not found:
             return 0.0
