@@ -342,6 +342,11 @@ class SetupQuantity:
         The same on scale lines.
         """
     @property
+    def scale_line_usual(self) -> float:
+        """
+        The same on scale lines whose readings do not tell it.
+        """
+    @property
     def symbol(self) -> str:
         """
         Over a column of a report.
@@ -350,6 +355,11 @@ class SetupQuantity:
     def unit(self) -> str:
         """
         Of the library: rad, mm, 1, mm s-1.
+        """
+    @property
+    def usual(self) -> float:
+        """
+        How far from 0 it usually is, where readings do not tell; infinite: they always do.
         """
 class Measurement:
     """

@@ -49,38 +49,58 @@ double usable(const RawValue& raw, const Measurement& measurement, std::size_t r
     return raw.value;
 }
 
-// By the line's first row, to 500 urad, so that noise and the machine's angles have no part in a prior. A spot tells it
-// by its change, which has no zero offset.
-double usual_tilt(const Measurement& measurement, const std::vector<std::size_t>& rows, const HeadCalibration& head) {
-    constexpr double step = 500e-6;
-    const auto value = [&](const char* channel, std::size_t row) {
+// The angle of the mirror against the beam by this row, rad; none where a channel of it is lost. A spot tells it by its
+// change since another row, which has no zero offset.
+std::optional<double> tilt_of(const Measurement& measurement, std::size_t row, std::size_t other,
+                              const HeadCalibration& head) {
+    const auto value = [&](const char* channel, std::size_t at) -> std::optional<double> {
         const Channel* found = measurement.find(channel);
-        return found && found->value[row] ? *found->value[row] : 0.0;
+        return found ? found->value[at] : std::nullopt;
     };
-    const std::size_t first = rows.front(), last = rows.back();
-    double x = 0.0, y = 0.0;
     if (const int beams = measurement.beam_count(); beams > 0) {
         Eigen::VectorXd distances(beams);
         for (int i = 0; i < beams; ++i) {
-            const auto& read = measurement.find("d" + std::to_string(i + 1))->value[first];
-            if (!read) return 0.0;
+            const auto read = value(("d" + std::to_string(i + 1)).c_str(), row);
+            if (!read) return std::nullopt;
             distances[i] = *read;
         }
-        if (const auto reduced = reduce_beams(distances, head.beam_offsets)) {
-            x = reduced->reading.alpha;
-            y = reduced->reading.beta;
-        }
-    } else if (measurement.find("spot_x")) {
-        const double path = 2.0 * std::abs(value("distance", last) - value("distance", first));
-        if (path > 0.0) {
-            x = (value("spot_x", last) - value("spot_x", first)) / path;
-            y = (value("spot_y", last) - value("spot_y", first)) / path;
-        }
-    } else {
-        x = value("alpha", first);
-        y = value("beta", first);
+        const auto reduced = reduce_beams(distances, head.beam_offsets);
+        return reduced ? std::optional(Eigen::Vector2d(reduced->reading.alpha, reduced->reading.beta).norm()) : std::nullopt;
     }
-    return std::min(1.0, step * std::round(std::sqrt(x * x + y * y) / step));
+    if (!measurement.find("spot_x")) {
+        const auto alpha = value("alpha", row), beta = value("beta", row);
+        return alpha && beta ? std::optional(Eigen::Vector2d(*alpha, *beta).norm()) : std::nullopt;
+    }
+    std::array<double, 3> change{};
+    for (int c = 0; c < 3; ++c) {
+        const char* channel = std::array{"distance", "spot_x", "spot_y"}[c];
+        const auto here = value(channel, row), there = value(channel, other);
+        if (!here || !there) return std::nullopt;
+        change[c] = *here - *there;
+    }
+    if (change[0] == 0.0) return std::nullopt;
+    return Eigen::Vector2d(change[1], change[2]).norm() / (2.0 * std::abs(change[0]));
+}
+
+// By the line's first point. Where its last one differs by more than machines turn, one of them is wrong, and the
+// smaller counts. Rounded, so that noise has no part in a prior.
+double usual_tilt(const Measurement& measurement, const std::vector<std::size_t>& rows, const HeadCalibration& head) {
+    constexpr double step = 50e-6, most = 500e-6;
+    // Whatever the order of the rows; of several runs the first one's, forward.
+    const auto earlier = [&](std::size_t row, std::size_t other) {
+        const Station &here = measurement.stations()[row], &there = measurement.stations()[other];
+        return std::tie(here.run, here.direction) < std::tie(there.run, there.direction);
+    };
+    std::size_t near = rows.front(), far = rows.front();
+    for (const std::size_t row : rows) {
+        const auto point = [&](std::size_t of) { return measurement.stations()[of].point; };
+        if (point(row) < point(near) || (point(row) == point(near) && earlier(row, near))) near = row;
+        if (point(row) > point(far) || (point(row) == point(far) && earlier(row, far))) far = row;
+    }
+    const auto first = tilt_of(measurement, near, far, head), last = tilt_of(measurement, far, near, head);
+    double tilt = first.value_or(last.value_or(0.0));
+    if (first && last && std::abs(*first - *last) > most) tilt = std::min(*first, *last);
+    return std::min(1.0, step * std::round(tilt / step));
 }
 
 // On all of the line's runs.
@@ -99,8 +119,6 @@ LineReadings line_readings(const Measurement& measurement, const Line& line, con
         readings.times = readings.times && time->value[row].has_value();
     }
     readings.tilt = usual_tilt(measurement, rows, head);
-    if (!plan.is_scale_line(line))  // or by the last one, so that one wrong reading has no part in it
-        readings.tilt = std::min(readings.tilt, usual_tilt(measurement, {rows.rbegin(), rows.rend()}, head));
     const LateralExcursion beside = plan.lateral_excursion(line);
     const double rounding = 1e-12 * plan.volume().norm();
     for (int c = 0; c < 2; ++c) readings.beside[c] = beside.highest[c] - beside.lowest[c] > rounding;
@@ -129,7 +147,8 @@ constexpr double widest_weights = 3e4;
 // Of beams with unknown constants: with more, steps crawl along a valley, and compilers decide whether they arrive.
 constexpr double widest_weights_of_beams = 2.3e4;
 
-// Beams whose constants are unknown say nothing of the mean tilt: that is known as well as the laser is.
+// Beams whose constants are unknown say nothing of the mean tilt: that is known as well as the laser is, or on scale
+// lines, where the laser is no unknown, as the mirror.
 double weighable_beam(const LineSetup& setup) {
     const std::vector<Eigen::Vector2d>& beams = setup.model.head().beam_offsets;
     Eigen::Vector2d centre = Eigen::Vector2d::Zero();
@@ -140,9 +159,10 @@ double weighable_beam(const LineSetup& setup) {
         arm = std::max(arm, (beams[i] - centre).norm());
         unknown = unknown || setup.prior[setup::beam_constants + int(i)] != fixed_unknown;
     }
-    const PriorUncertainty laser = std::max(setup.prior[setup::laser], setup.prior[setup::laser + 1]);
-    if (!unknown || laser == fixed_unknown) return 0.0;
-    return std::min(laser, record(SetupQuantity::laser).usual) * arm / widest_weights_of_beams;
+    const int angle = setup.is_scale_line ? setup::reflector : setup::laser;
+    const PriorUncertainty known = std::max(setup.prior[angle], setup.prior[angle + 1]);
+    if (!unknown || known == fixed_unknown) return 0.0;
+    return std::min(known, record(SetupQuantity::laser).usual) * arm / widest_weights_of_beams;
 }
 
 }  // namespace

@@ -79,6 +79,10 @@ void bind_measurement(py::module_& m) {
                       "What an adjustment takes it for by default: infinite: free; 0: fixed at 0; else the standard "
                       "uncertainty with which it is known to be 0.")
         .def_readonly("scale_line_prior", &Quantity::scale_line_prior, "The same on scale lines.")
+        .def_readonly("usual", &Quantity::usual,
+                      "How far from 0 it usually is, where readings do not tell; infinite: they always do.")
+        .def_readonly("scale_line_usual", &Quantity::scale_line_usual,
+                      "The same on scale lines whose readings do not tell it.")
         .def_readonly("meaning", &Quantity::meaning);
     m.attr("adjusted_quantity_count") = adjusted_quantity_count;
     m.def(

@@ -62,7 +62,8 @@ class AdjustmentSection(AdjustmentKeys):
     "free"). Tilts determine the difference of both. What they leave open acts by its square, as an error of the
     distances proportional to the travel, which is part of the uncertainties. The same applies to single axes and faces,
     where distances alone are read, and where beams have constants; an angle that is "free" there counts as known to
-    2000."""
+    2000. On a scale line where no reading tells the difference, `reflector_urad` is that of the mirror against the
+    beam, by default 500."""
 
     angles: Literal["free", "fixed"] = key(
         '"free" or "fixed"', "Rotations of the machine's axes; fixed: it has none.", "free"

@@ -39,18 +39,32 @@ def cosine_rows(measurement: Measurement, known: Known) -> Iterator[str]:
             "[adjustment] says how well it stands (2000 if it is free), and that is in the uncertainties"
         )
     keys = known.keys.adjustment
-    lines: dict[tuple[float, float], list[str]] = {}
+    lines: dict[tuple[bool, float, float], list[str]] = {}
     for line in known.plan.scale_lines:
+        is_told = _tilts_tell(measurement, known, line)
         laser = scale_line_angle(keys, line, "laser")
-        mirror = scale_line_angle(keys, line, "reflector") if _tilts_tell(measurement, known, line) else math.inf
-        if laser > 0.0 and mirror > 0.0:
-            lines.setdefault((laser, mirror), []).append(line)
-    for (laser, mirror), names in lines.items():
+        mirror = scale_line_angle(keys, line, "reflector", is_told=is_told)
+        if not is_told and mirror == 0.0:
+            is_told, mirror = True, math.inf  # tied to the beam
+        if mirror > 0.0 and (laser > 0.0 or not is_told):
+            lines.setdefault((is_told, laser, mirror), []).append(line)
+    for (is_told, laser, mirror), names in lines.items():
+        which = f"scale lines {', '.join(names)}: "
+        if not is_told:
+            # D^2 - D l - l^2/2 of two directions.
+            mean = 2.0 * mirror**2 - laser**2
+            yield (
+                f"{which}no reading tells the mirror's angle against the beam, taken to be known to "
+                f"{mirror * MICRO:g} µrad (reflector_urad), and the laser along the axis to {laser * MICRO:g} µrad: "
+                f"they read {abs(mean) * MICRO:.2g} µm/m too {'long' if mean > 0.0 else 'short'} on average; that is "
+                "in the uncertainties, not corrected"
+            )
+            continue
         # (a^2 + b^2)/2 of two normal angles, of this variance each once a tilt has told their difference.
         short = 1.0 / (laser**-2 + mirror**-2)
         known_of_mirror = f", the mirror square to it to {mirror * MICRO:g} µrad; beyond what their tilts tell it reads"
         yield (
-            f"scale lines {', '.join(names)}: a laser that stands along the axis to {laser * MICRO:g} µrad"
+            f"{which}a laser that stands along the axis to {laser * MICRO:g} µrad"
             f"{known_of_mirror if math.isfinite(mirror) else ' reads'} too short, never too long, by "
             f"{short * MICRO:.2g} µm/m on average; that is in the uncertainties, not corrected"
         )

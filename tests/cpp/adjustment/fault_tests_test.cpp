@@ -374,7 +374,8 @@ TEST(FaultTests, OfSlipsAreWhatSolutionsSay) {
                 q -= solved.solver.equations().row(r).product(effect) /
                      solved.problem.readings()[r].standard_uncertainty;
             const double found = std::pow(tests.scores()[h].standard_uncertainty, -2);
-            EXPECT_NEAR(found, q, 1e-9 * tests.square(h) + 1e-6 * q) << h;
+            // q is what a difference of squares leaves: of the least controlled slips 3e-7 of them.
+            EXPECT_NEAR(found, q, 3e-9 * tests.square(h) + 1e-6 * q) << h;
         }
     }
 }

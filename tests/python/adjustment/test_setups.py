@@ -230,7 +230,7 @@ def test_free_drift_without_times_is_refused() -> None:
 
 @pytest.mark.parametrize("deviation", [None, 200e-6, "fixed"])
 def test_cosine_error_of_a_scale_line_is_in_the_uncertainty(deviation: Any) -> None:
-    """A beam that is out of true by (a, b) reads travel (a^2 + b^2)/2 short: known to sqrt(2) s^2 of the travel."""
+    """A beam that is out of true by (a, b) reads travel (a^2 + b^2)/2 short: 95 % of it is below -ln(0.05) s^2."""
     rng = np.random.default_rng(50)
     scenario = random_scenario(rng, steps=4, scale_lines=["p00"], tool=(0.0, 0.0, 0.0))
     # Without angles of the machine: they turn the mirror, and what they do depends on the laser to first order.
@@ -245,7 +245,7 @@ def test_cosine_error_of_a_scale_line_is_in_the_uncertainty(deviation: Any) -> N
     travel = scenario.volume[0]
     _, _, found = adjust(run, scenario, knowledge).calibration.functions["EXX"]
     # Start and end are read once each, and nothing else sees the scale of X: no lever, no beam beside its place.
-    expected = np.hypot(np.sqrt(2) * s * s * travel, np.sqrt(2) * u)
+    expected = np.hypot(-np.log(0.05) / 1.959963984540054 * s * s * travel, np.sqrt(2) * u)
     assert found[-1] == pytest.approx(expected, rel=1e-3)
 
 

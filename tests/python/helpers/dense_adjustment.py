@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 import reference
 from dense_model import SQUARENESS, Array, DenseModel, Setup, Stations, Table, Unknown, rounding
+from scipy.optimize import brentq
 from scipy.stats import chi2
 
 import stepdiag as sd
@@ -21,6 +22,7 @@ RANK_THRESHOLD = 1e-9  # of the largest singular value: exact null vectors stand
 FREE = {"lateral": 1000.0, "roll": 1.0, "gain": 1.0}  # mm, rad, 1: they act by tilts, which are 0 on a perfect machine
 HELD = 1e8  # 1/rad or 1/mm: how tightly an unknown is held that no reading sees
 NOTHING = 1e-6  # standard uncertainties of readings, a unit of an unknown: such a column is made of roundings
+FACTOR = 1.959963984540054  # an interval of 95 %, by the standard uncertainty
 UNITS = {"distance": 1e-4, "tilt": 1e-6, "spot": 1e-3}  # default uncertainties of readings
 
 
@@ -138,8 +140,10 @@ class DenseAdjustment:
         if self.is_scale(line) and quantity == "laser" and self.mirror_is_free(line):
             return 0.0  # what it does is a cosine error
         if self.is_scale(line) and not self.tilts_tell(line):
-            if quantity in ("reflector", "laser", "psd_zero"):
-                return 0.0  # square to each other; what the laser's angle does is a cosine error
+            if quantity == "reflector":
+                return self.mirror_of_untold(line)
+            if quantity in ("laser", "psd_zero"):
+                return 0.0  # what the laser's angle does is a cosine error
             if quantity in ("roll", "gain") and not self.has_tilts(line):
                 return 0.0
         return deviation(self.scenario, self.knowledge, line, quantity)
@@ -163,29 +167,73 @@ class DenseAdjustment:
         return bool(np.isinf(deviation(self.scenario, self.knowledge, line, "reflector")))
 
     def cosine_prior(self, line: str) -> float:
-        """Root mean square of what the squares of unknown angles do to a distance, by travel.
+        """By travel: 95 % of what the squares of unknown angles do to a distance, by the normal distribution's factor.
 
-        A mirror and a laser that turn together by e read -e^2/2 too much; a laser that turns alone, 3/2 e^2. Of a
-        normal e of variance v, E[e^4] is 3 v^2; of two directions across the line the errors add."""
-
-        def error(variance: float, directions: int, factor: float) -> float:
-            return factor / 2 * variance * float(np.sqrt(3 * directions + directions * (directions - 1)))
+        With D the angle between mirror and laser and l that of the laser, a distance reads D^2 - D l - l^2/2 too much
+        in each direction across the line, once D^2 is corrected -D l - l^2/2. A laser that turns alone: 3/2 l^2."""
 
         def prior(quantity: str) -> float:
             return deviation(self.scenario, self.knowledge, line, quantity)
 
+        def one_sided(variance: float, directions: int) -> float:
+            return variance / 2 * float(chi2.ppf(0.95, directions)) / FACTOR if directions else 0.0
+
         laser, mirror, usual = prior("laser"), prior("reflector"), 2e-3
         if self.is_scale(line) and not self.tilts_tell(line):
-            return error(laser**2, 2, 1.0)
+            mirror = self.mirror_of_untold(line)
+            form = np.array([[1.0, -0.5], [-0.5, -0.5]]) * np.outer((mirror, laser), (mirror, laser))
+            low, high = np.linalg.eigvalsh(form)
+            parts = [2 * abs(x) for x in (low, high) if abs(x) > 1e-9 * max(abs(low), abs(high))]
+            if not parts:
+                return 0.0
+
+            def outside(q: float) -> float:
+                return sum(x * np.exp(-q / x) for x in parts) / sum(parts) - 0.05
+
+            return float(brentq(outside, 0.0, 4 * max(parts), xtol=1e-12 * max(parts))) / FACTOR
         if not self.tilts_tell(line):
-            return error((usual if np.isinf(laser) else laser) ** 2, 2, 3.0)
+            return one_sided(3 * (usual if np.isinf(laser) else laser) ** 2, 2)
+        if self.is_scale(line) and np.isinf(mirror):
+            by_first_order = (self.tilt(line) * laser) ** 2
+            return float(np.sqrt(one_sided(laser**2, 2) ** 2 + by_first_order + min(by_first_order / 2, laser**4)))
         if np.isinf(laser) and np.isinf(mirror):
             laser = mirror = usual
         # A tilt has told their difference: what is left is in both.
         left = laser if np.isinf(mirror) else mirror if np.isinf(laser) else 0.0
         if not left and laser and mirror:
             left = laser * mirror / float(np.hypot(laser, mirror))
-        return error(left**2, line.count("0"), 1.0)
+        return one_sided(left**2, line.count("0"))
+
+    def mirror_of_untold(self, line: str) -> float:
+        """Of a scale line where nothing tells the mirror's angle against the beam."""
+        given = self.knowledge.given(line, "reflector", True)
+        return {None: 500e-6, "free": 2e-3, "fixed": 0.0}.get(given, given)  # type: ignore[arg-type, return-value]
+
+    def tilt(self, line: str) -> float:
+        """Of the mirror against the beam, at the line's first point or the last, to 50 urad; 0: both are lost."""
+
+        def place(row: int) -> tuple[int, str]:  # of several runs the first one's, forward
+            return int(self.run.run[row]), "" if self.run.direction[row] == "forward" else "backward"
+
+        rows = sorted(np.flatnonzero(self.rows_of(line)), key=place)
+        first, last = (end(rows, key=lambda row: self.run.point[row]) for end in (min, max))
+        found = [t for t in (self.tilt_of(first, last), self.tilt_of(last, first)) if np.isfinite(t)]
+        if not found:
+            return 0.0
+        return 50e-6 * round(float(min(found) if max(found) - min(found) > 500e-6 else found[0]) / 50e-6)
+
+    def tilt_of(self, row: int, other: int) -> float:
+        read = self.run.channels
+        if self.scenario.layout == "ideal":
+            return float(np.hypot(read["alpha"][row], read["beta"][row]))
+        if self.scenario.layout == "psd":
+            x, y, path = (read[name][row] - read[name][other] for name in ("spot_x", "spot_y", "distance"))
+            return float(np.hypot(x, y) / abs(2 * path)) if path else np.nan
+        beams = np.array([read[f"d{i + 1}"][row] for i in range(len(self.scenario.beam_offsets))])
+        if not np.all(np.isfinite(beams)):
+            return np.nan
+        offsets = np.column_stack([np.ones(len(beams)), self.scenario.beam_offsets])
+        return float(np.hypot(*np.linalg.lstsq(offsets, beams, rcond=None)[0][1:]))
 
     # --- what is known beside the readings, as rows of the scaled problem with 0 on the right ---
 

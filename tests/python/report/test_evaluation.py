@@ -4,6 +4,7 @@ import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from small_scenario import SCENARIO
 
@@ -109,6 +110,24 @@ def test_scale_lines_have_a_word_on_their_cosine_error(tmp_path: Path, capsys: p
     # Both known to 500 urad: a tilt leaves half of the variance.
     assert "0p0: a laser that stands along the axis to 500 µrad, the mirror square to it to 500 µrad" in said
     assert "beyond what their tilts tell it reads too short, never too long, by 0.12 µm/m" in said
+
+
+def test_scale_lines_whose_mirror_no_reading_tells_have_a_word_on_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = simulated(tmp_path, NOISY)
+    scale = np.isin(run.line, ["p00", "0p0", "00p"])
+    channels = {n: np.where(scale & (n in ("alpha", "beta")), np.nan, v) for n, v in run.channels.items()}
+    run = sd.Measurement(run.line, run.point.tolist(), run.position, channels, run=run.run.tolist())
+    own = "[adjustment.p00]\nreflector_urad = 300.0\n[adjustment.0p0]\nreflector_urad = 'fixed'\n"
+    said = report(tmp_path, capsys, NOISY + own, run)
+    told = "the mirror's angle against the beam, taken to be known to"
+    # 2 D^2 - l^2 with l known to 500 urad.
+    assert f"scale lines p00: no reading tells {told} 300 µrad (reflector_urad)" in said
+    assert "they read 0.07 µm/m too short on average" in said
+    assert f"scale lines 00p: no reading tells {told} 500 µrad" in said
+    assert "they read 0.25 µm/m too long on average" in said
+    assert "scale lines 0p0: a laser that stands along the axis to 500 µrad reads too short, never too long" in said
 
 
 def test_drift_has_a_word_on_squareness(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -56,8 +56,8 @@ def test_every_key_reaches_the_core() -> None:
           "gain": 0.01}),
         (PSD, "p00", {"reflector": math.inf, "distance_constant": math.inf, "psd_zero": math.inf,
                       "lateral": 1.0, "roll": 0.02, "gain": 0.01}),
-        (BEAMS, "p00", {"distance_constant": math.inf, "beam_constants": math.inf, "lateral": 1.0, "roll": 0.02,
-                        "gain": 0.01}),
+        (BEAMS, "p00", {"reflector": 500e-6, "distance_constant": math.inf, "beam_constants": math.inf, "lateral": 1.0,
+                        "roll": 0.02, "gain": 0.01}),
     ],
 )  # fmt: skip
 def test_defaults_are_the_documented_ones(text: str, line: str, expected: dict[str, float]) -> None:

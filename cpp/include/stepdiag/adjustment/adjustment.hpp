@@ -27,10 +27,11 @@ namespace stepdiag {
 // With D = reflector - laser, the angle that a tilt reads, and m, the reflector's angle to the line, distances read
 // travel (3/2 D^2 - m^2/2) too much, in each direction across the line. Where no point stands beside the line in that
 // direction (single axes, faces, scale lines), m is known by the priors and by D only, and acts at second order. The
-// adjustment linearises at its best value; the root mean square of what is left beyond is the uncertainty of an error
-// by travel, as if it went both ways. With D known it is one of reading short, travel u^2(m)/2 on average. The same
-// holds for D where distances alone or beams with unknown constants are read. A scale line without tilts is taken to
-// have its mirror square to the beam.
+// adjustment linearises at its best value. What is left beyond is the uncertainty of an error by travel, as if it went
+// both ways, so large that 95 % intervals contain it. With D known it is one of reading short, travel u^2(m)/2 on
+// average. The same holds for D where distances alone or beams with unknown constants are read. On a scale line that
+// no reading tells D of, the reflector's prior is that of D, 500 urad by default: it is aligned by the beam that comes
+// back.
 using SetupPriors = std::array<std::optional<PriorUncertainty>, adjusted_quantity_count>;
 
 // Standard deviation with which the second difference of neighbouring nodes is known to be 0: real axes are smooth.

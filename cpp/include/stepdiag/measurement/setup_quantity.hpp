@@ -46,7 +46,7 @@ struct SetupQuantityRecord {
     std::string_view report_unit;  // as in keys
     std::string_view meaning;
     // What an adjustment takes it for by default, on measured lines and on scale lines. A drift is fixed where readings
-    // of the line have no time; the angles are fixed on a scale line that has no tilts.
+    // of the line have no time, and the laser is on a scale line whose mirror no reading tells.
     PriorUncertainty prior, scale_line_prior;
     std::string_view components = {};       // a letter each; empty: a single one without a letter
     std::optional<HeadLayout> layout = {};  // the only one that has it
@@ -54,12 +54,15 @@ struct SetupQuantityRecord {
     // What "free" means: infinite but for what acts by tilts only, which are 0 on a perfect machine.
     PriorUncertainty broadest = free_unknown;
     double usual = free_unknown;  // how far from 0 it usually is, where readings do not tell; infinite: they always do
+    // The mirror of a scale line where no reading tells it, against the beam: aligned by the beam that comes back.
+    PriorUncertainty scale_line_usual = free_unknown;
 };
 
 // clang-format off
 inline constexpr std::array<SetupQuantityRecord, setup_quantity_count> setup_quantities = {{
     {"reflector", "reflector_urad", "reflector", "reflector", "rad", "urad",
-     "tilt (a, b) of the mirror about local x and y", free_unknown, free_unknown, "ab", {}, false, free_unknown, 2e-3},
+     "tilt (a, b) of the mirror about local x and y", free_unknown, free_unknown, "ab", {}, false, free_unknown, 2e-3,
+     500e-6},
     {"laser", "laser_urad", "laser", "laser", "rad", "urad",
      "tilt (a, b) of the beam and the sensor's axes", free_unknown, 500e-6, "ab", {}, false, free_unknown, 2e-3},
     {"distance_constant", "distance_constant_mm", "distance constant", "constant", "mm", "um",
