@@ -146,7 +146,6 @@ class PlanSection(Section):
         "So many steps of an axis follow each other before the next axis moves. A larger block makes straightness, "
         "angles and squareness better known, and needs a mirror that is so many times as large (docs/plans.md).",
         1,
-        2,
     )
     scale_lines: tuple[str, ...] = key(
         'a list of single-axis lines such as "p00"',
