@@ -91,8 +91,8 @@ TEST(SetupPriors, ContainTheMirrorOfAScaleLineThatNoReadingTells) {
         for (const auto layout : {HeadLayout::multi_beam, HeadLayout::ideal}) {
             const LineReadings told = readings(layout == HeadLayout::multi_beam);
             const double u = scale_factor(layout, true, told, laser, mirror);
-            const double share = covered(u, [&](const double* z) {
-                const double d[] = {mirror * z[0], mirror * z[1]}, l[] = {laser * z[2], laser * z[3]};
+            const double share = covered(u, [s = laser, m = mirror](const double* z) {  // clang 14 captures no bindings
+                const double d[] = {m * z[0], m * z[1]}, l[] = {s * z[2], s * z[3]};
                 return second_order(d[0], d[0] + l[0]) + second_order(d[1], d[1] + l[1]);
             });
             EXPECT_NEAR(share, 0.95, chance) << laser << " " << mirror;
