@@ -65,7 +65,8 @@ std::optional<double> tilt_of(const Measurement& measurement, std::size_t row, s
             distances[i] = *read;
         }
         const auto reduced = reduce_beams(distances, head.beam_offsets);
-        return reduced ? std::optional(Eigen::Vector2d(reduced->reading.alpha, reduced->reading.beta).norm()) : std::nullopt;
+        return reduced ? std::optional(Eigen::Vector2d(reduced->reading.alpha, reduced->reading.beta).norm())
+                       : std::nullopt;
     }
     if (!measurement.find("spot_x")) {
         const auto alpha = value("alpha", row), beta = value("beta", row);
