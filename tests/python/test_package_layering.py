@@ -33,7 +33,7 @@ BELOW: dict[str, set[str]] = {
     "export": {"io"},
     "mistakes": {"scenario"},
     "rechecking": {"scenario"},
-    "acquisition": {"mistakes"},
+    "acquisition": {"mistakes", "planning"},
     "twin": {"acquisition"},
     "linuxcnc": set(),
     "figures": {"planning"},

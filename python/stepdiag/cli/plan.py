@@ -175,7 +175,7 @@ def plan(
     path = None if output is None else output.claim(*inputs, error_map=described.truth.error_map)
     times = None
     if measured is not None:
-        from stepdiag.planning.times_of_run import key_rows, measured_times
+        from stepdiag.acquisition.times_of_run import key_rows, measured_times
 
         taken_from = measured_times(measured, known.keys.plan_by_time, f"{known.path}: plan_by_time")
         times = taken_from.keys

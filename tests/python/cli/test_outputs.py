@@ -86,6 +86,7 @@ INPUTS = {
     *{("verify", name) for name in ("calibration", "scenario", "run")},
     *{("recheck", name) for name in ("baseline", "scenario", "run")},
     ("plan", "baseline"),
+    ("plan", "measured"),
     *{("export", "calibration"), ("volume", "calibration")},
     *{("check", "files"), ("head show", "name"), ("head check", "name"), ("head sensitivity", "name")},
     *{("plot", "files"), ("plot", "truth"), ("plot", "scenario"), ("acquire", "temperatures")},

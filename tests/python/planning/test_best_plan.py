@@ -14,6 +14,7 @@ from small_scenario import SCENARIO
 import stepdiag as sd
 from stepdiag.acquisition.raw_file import RawFile
 from stepdiag.acquisition.raw_records import Header, RawReading, Visited
+from stepdiag.acquisition.times_of_run import key_rows, measured_times
 from stepdiag.cli import main
 from stepdiag.config.scenario_template import WHY, template
 from stepdiag.planning import best_plan
@@ -34,7 +35,6 @@ from stepdiag.planning.plan_by_time import (
     volume_goal,
     with_faults,
 )
-from stepdiag.planning.times_of_run import key_rows, measured_times
 from stepdiag.scenario.description import Scenario, parse_scenario
 from stepdiag.scenario.order_of_run import visits_of
 from stepdiag.twin.server import Twin
