@@ -25,7 +25,7 @@ def header(known: Known, options: Options, space: Space, times: Times, visits: l
     yield f"volume {_triple(plan.volume)} mm, chain {keys.machine.chain}, tool {_triple(known.tool)} mm"
     yield (
         f"lines {' '.join(plan.lines)}{scale}; {plan.steps} steps an axis of {_triple(step)} mm, "
-        f"order {' '.join(dict.fromkeys(plan.orders))}"
+        f"order {' '.join(dict.fromkeys(plan.orders))}{f', in blocks of {plan.block}' if plan.block > 1 else ''}"
     )
     backward = ", forward and backward in turn" if keys.plan.backward else ""
     yield f"each line measured {f'{runs} times' if runs > 1 else 'once'}{backward}"

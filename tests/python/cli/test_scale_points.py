@@ -24,6 +24,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def write_without_positions(run: str, to: str) -> None:
+    with Path(run).open() as file:
+        rows = [row for row in csv.reader(file) if not row[0].startswith("#")]
+    Path(to).write_text("".join(",".join([*row[:2], *row[5:]]) + "\n" for row in rows))
+
+
 def test_run_has_a_reading_at_every_step_of_a_scale_line(folder: Path) -> None:
     steps, ends = sd.read_measurement("steps.csv"), sd.read_measurement("ends.csv")
     assert len(steps) == 4 * 16 + 3 * 6
@@ -76,9 +82,7 @@ def test_file_with_the_other_points_is_that_mistake(
 def test_ends_whose_positions_an_import_took_from_the_plan_are_that_mistake(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with Path("ends.csv").open() as file:
-        rows = [row for row in csv.reader(file) if not row[0].startswith("#")]
-    Path("short.csv").write_text("".join(",".join([*row[:2], *row[5:]]) + "\n" for row in rows))
+    write_without_positions("ends.csv", "short.csv")
     assert main(["import", "short.csv", "--scenario", "steps.toml", "-o", "run.csv"]) == 0
     assert main(["evaluate", "steps.toml", "run.csv", "-o", "x.csv"]) == 2
     assert "at its two ends, the plan has every step" in capsys.readouterr().err
@@ -87,9 +91,7 @@ def test_ends_whose_positions_an_import_took_from_the_plan_are_that_mistake(
 def test_steps_that_an_import_looks_up_in_a_plan_of_ends_are_that_mistake(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with Path("steps.csv").open() as file:
-        rows = [row for row in csv.reader(file) if not row[0].startswith("#")]
-    Path("short.csv").write_text("".join(",".join([*row[:2], *row[5:]]) + "\n" for row in rows))
+    write_without_positions("steps.csv", "short.csv")
     assert main(["import", "short.csv", "--scenario", "ends.toml", "-o", "run.csv"]) == 2
     assert 'reads this scale line at its two ends (expected scale_points = "steps")' in capsys.readouterr().err
 
