@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "expect.hpp"
-#include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/diagnosis/adjust.hpp"
 #include "stepdiag/simulation/simulate.hpp"
 
 // Unknowns of the set-ups: reflector, laser and distance constant; on scale lines the distance constant only.

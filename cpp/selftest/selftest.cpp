@@ -23,7 +23,7 @@
 #include "stepdiag/machine/parameter_table.hpp"
 #include "stepdiag/version.hpp"
 #ifdef STEPDIAG_WHOLE_LIBRARY
-#include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/diagnosis/adjust.hpp"
 #include "stepdiag/core/instruction_set.hpp"
 #endif
 

@@ -10,7 +10,7 @@ import os
 import stepdiag.io.displays
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'ChangeCombination', 'ChangePriors', 'ChangeTerm', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'PredictedReading', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'Recheck', 'ReplayMismatch', 'ReturnedBeam', 'RoundedChannel', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'check_points', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'newer_format', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'recheck', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'without_lost_marks', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'ChangeCombination', 'ChangePriors', 'ChangeTerm', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'PredictedReading', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'Recheck', 'ReplayMismatch', 'ReturnedBeam', 'RoundedChannel', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'Thresholds', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'check_points', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'newer_format', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'recheck', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'thresholds', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'without_lost_marks', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -1469,6 +1469,100 @@ class Calibration:
     def volume(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (3,) edges, mm
+        """
+class Thresholds:
+    """
+    Every limit that a verdict, or the search for faults and mistakes, is made with. thresholds has the values in force.
+    """
+    @property
+    def alternative(self) -> float:
+        """
+        What is less behind the best fault or mistake may be it.
+        """
+    @property
+    def chance(self) -> float:
+        """
+        Difference in chi-square that does not make one mistake better than another.
+        """
+    @property
+    def far_below_stated(self) -> float:
+        """
+        Noise factor below which such residuals are no noise.
+        """
+    @property
+    def farthest_prior(self) -> float:
+        """
+        Distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2), beyond which a fit is rejected.
+        """
+    @property
+    def fault(self) -> float:
+        """
+        Least gain of a fault in chi-square.
+        """
+    @property
+    def found_with_99_percent(self) -> float:
+        """
+        Size of a fault, in its standard uncertainties, that is found with a probability of 99 %.
+        """
+    @property
+    def gross_scatter(self) -> float:
+        """
+        Of the square sum a reading: values far from any machine.
+        """
+    @property
+    def largest_noise_factor(self) -> float:
+        """
+        Beyond it a fit is rejected.
+        """
+    @property
+    def largest_variance_factor(self) -> float:
+        """
+        Square of largest_noise_factor.
+        """
+    @property
+    def misfit_doubtful(self) -> float:
+        """
+        Probability of a misfit below which a fit is doubtful.
+        """
+    @property
+    def misfit_rejected(self) -> float:
+        """
+        Probability of a misfit below which a fit is rejected, where the misfit also differs between lines, channels or times.
+        """
+    @property
+    def mistake(self) -> float:
+        """
+        Least gain of a mistake in the whole run.
+        """
+    @property
+    def no_misfit_doubtful(self) -> float:
+        """
+        The same above which there is less noise than stated.
+        """
+    @property
+    def pattern(self) -> float:
+        """
+        Probability of a pattern of residuals, where chi-square finds a misfit.
+        """
+    @property
+    def pattern_alone(self) -> float:
+        """
+        The same, where it finds none.
+        """
+    @property
+    def prior_scatter_rejected(self) -> float:
+        """
+        Probability of set-up values that scatter more than their priors, below which a fit is rejected.
+        """
+    @property
+    def rounding_alone(self) -> float:
+        """
+        Rms of residuals in units of their rounding.
+        """
+    @property
+    def second_order(self) -> float:
+        """
+        Gain from which second order may distinguish faults.
         """
 class SetupPriors:
     """
@@ -3733,3 +3827,4 @@ adjusted_quantity_count: int = 9
 largest_repeat_count: int = 1000
 leaf_samples: int = 2000
 pilot_samples: int = 10000
+thresholds: Thresholds

@@ -20,8 +20,9 @@ BELOW: dict[str, set[str]] = {
     "simulation": {"machine", "plan", "head", "measurement"},
     "evaluation": {"machine", "plan", "measurement"},
     "adjustment": {"evaluation"},
-    "recheck": {"adjustment"},
-    "batch": {"adjustment"},
+    "diagnosis": {"adjustment"},
+    "recheck": {"diagnosis"},
+    "batch": {"diagnosis"},
     "uncertainty": {"simulation", "batch", "monte_carlo"},
     "controller": {"machine"},
 }

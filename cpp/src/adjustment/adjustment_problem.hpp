@@ -14,7 +14,8 @@
 
 #include "adjustment/bordered_band.hpp"
 #include "adjustment/channel_model.hpp"
-#include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/adjustment/options.hpp"
+#include "stepdiag/adjustment/results.hpp"
 
 namespace stepdiag {
 

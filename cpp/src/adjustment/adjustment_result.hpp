@@ -4,7 +4,8 @@
 #include "adjustment/adjustment_tables.hpp"
 #include "adjustment/gauss_newton.hpp"
 #include "adjustment/observability.hpp"
-#include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/adjustment/options.hpp"
+#include "stepdiag/adjustment/results.hpp"
 
 namespace stepdiag {
 

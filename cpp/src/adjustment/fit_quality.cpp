@@ -1,3 +1,5 @@
+#include "stepdiag/adjustment/fit_quality.hpp"
+
 #include <cmath>
 
 #include "adjustment/adjustment_result.hpp"

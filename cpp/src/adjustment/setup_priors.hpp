@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "adjustment/channel_model.hpp"
-#include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/adjustment/options.hpp"
 
 namespace stepdiag {
 

@@ -6,6 +6,7 @@
 #include "adjustment/smoothness.hpp"
 #include "batch/simd_adjustment.hpp"
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/diagnosis/adjust.hpp"
 
 namespace stepdiag {
 namespace {

@@ -1,7 +1,10 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "options.hpp"
+#include "stepdiag/adjustment/fit_quality.hpp"
+#include "stepdiag/evaluation/thresholds.hpp"
 
 namespace stepdiag::bindings {
 namespace {
@@ -72,6 +75,47 @@ py::object& reason_wording() {
 }
 std::vector<std::string> in_words(const std::vector<FitReason>& reasons) {
     return reason_wording()(reasons).cast<std::vector<std::string>>();
+}
+
+AdjustmentOfRun judged(AdjustmentOfRun found, const FoundBeside& beside) {
+    found.adjustment = judge(std::move(found.adjustment), beside);
+    found.adjustment.calibration.fit_reasons = in_words(found.adjustment.verdict.reasons);
+    return found;
+}
+
+void bind_thresholds(py::module_& m) {
+    py::class_<Thresholds> bound(m, "Thresholds",
+                                 "Every limit that a verdict, or the search for faults and mistakes, is made with. "
+                                 "thresholds has the values in force.");
+    const auto add = [&](const char* name, double Thresholds::*value, const char* doc) {
+        bound.def_readonly(name, value, doc);
+    };
+    add("largest_noise_factor", &Thresholds::largest_noise_factor, "Beyond it a fit is rejected.");
+    add("misfit_rejected", &Thresholds::misfit_rejected,
+        "Probability of a misfit below which a fit is rejected, where the misfit also differs between lines, channels "
+        "or times.");
+    add("misfit_doubtful", &Thresholds::misfit_doubtful, "Probability of a misfit below which a fit is doubtful.");
+    add("no_misfit_doubtful", &Thresholds::no_misfit_doubtful,
+        "The same above which there is less noise than stated.");
+    add("pattern", &Thresholds::pattern, "Probability of a pattern of residuals, where chi-square finds a misfit.");
+    add("pattern_alone", &Thresholds::pattern_alone, "The same, where it finds none.");
+    add("rounding_alone", &Thresholds::rounding_alone, "Rms of residuals in units of their rounding.");
+    add("far_below_stated", &Thresholds::far_below_stated, "Noise factor below which such residuals are no noise.");
+    add("farthest_prior", &Thresholds::farthest_prior,
+        "Distance of a set-up value from its prior, in sqrt(u_prior^2 - u^2), beyond which a fit is rejected.");
+    add("prior_scatter_rejected", &Thresholds::prior_scatter_rejected,
+        "Probability of set-up values that scatter more than their priors, below which a fit is rejected.");
+    add("fault", &Thresholds::fault, "Least gain of a fault in chi-square.");
+    add("alternative", &Thresholds::alternative, "What is less behind the best fault or mistake may be it.");
+    add("second_order", &Thresholds::second_order, "Gain from which second order may distinguish faults.");
+    add("gross_scatter", &Thresholds::gross_scatter, "Of the square sum a reading: values far from any machine.");
+    add("mistake", &Thresholds::mistake, "Least gain of a mistake in the whole run.");
+    add("chance", &Thresholds::chance, "Difference in chi-square that does not make one mistake better than another.");
+    add("found_with_99_percent", &Thresholds::found_with_99_percent,
+        "Size of a fault, in its standard uncertainties, that is found with a probability of 99 %.");
+    bound.def_property_readonly("largest_variance_factor", &Thresholds::largest_variance_factor,
+                                "Square of largest_noise_factor.");
+    m.attr("thresholds") = thresholds;
 }
 py::object& unseen_wording() {
     static py::object& words = *new py::object(py::none());
@@ -496,31 +540,11 @@ void bind_result(py::module_& m) {
             "What is known of unknowns that are not determined one by one.")
         .def(
             "with_mistake",
-            [](Result found, const std::string& mistake) {
-                Verdict& verdict = found.adjustment.verdict;
-                verdict.fit = Fit::rejected;
-                verdict.reasons.insert(verdict.reasons.begin(), {FitFinding::mistake, 0.0, 0.0})->parameter = mistake;
-                found.adjustment.calibration.fit = verdict.fit;
-                found.adjustment.calibration.fit_reasons = in_words(verdict.reasons);
-                return found;
-            },
+            [](Result found, const std::string& mistake) { return judged(std::move(found), {mistake, {}}); },
             py::arg("mistake"), "The same, rejected because this mistake would explain the readings.")
         .def(
             "with_implausible_inputs",
-            [](Result found, const std::vector<std::string>& inputs) {
-                Verdict& verdict = found.adjustment.verdict;
-                const bool is_rejected = verdict.fit == Fit::rejected;
-                if (!inputs.empty() && !is_rejected) verdict.fit = Fit::doubtful;
-                auto place = is_rejected ? verdict.reasons.end() : verdict.reasons.begin();
-                for (const std::string& input : inputs) {
-                    FitReason reason{FitFinding::implausible_input, 0.0, 0.0};
-                    reason.parameter = input;
-                    place = std::next(verdict.reasons.insert(place, reason));
-                }
-                found.adjustment.calibration.fit = verdict.fit;
-                found.adjustment.calibration.fit_reasons = in_words(verdict.reasons);
-                return found;
-            },
+            [](Result found, const std::vector<std::string>& inputs) { return judged(std::move(found), {"", inputs}); },
             py::arg("inputs"),
             "The same, at best doubtful where there are inputs that no workshop has, a sentence each.")
         .def(
@@ -579,6 +603,7 @@ Calibration worded(const Adjustment& adjustment) {
 }
 
 void bind_adjustment(py::module_& m) {
+    bind_thresholds(m);
     bind_options(m);
     bind_result(m);
     m.def(

@@ -1,5 +1,5 @@
 #include "bindings.hpp"
-#include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/diagnosis/adjust.hpp"
 #include "stepdiag/evaluation/constant_index.hpp"
 #include "stepdiag/evaluation/conventional.hpp"
 #include "stepdiag/evaluation/enhanced.hpp"

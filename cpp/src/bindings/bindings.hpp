@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/diagnosis/adjust.hpp"
 #include "stepdiag/core/error.hpp"
 #include "stepdiag/machine/chain.hpp"
 #include "stepdiag/optics/body.hpp"

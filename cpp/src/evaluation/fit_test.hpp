@@ -4,13 +4,10 @@
 
 #include <Eigen/Core>
 
+#include "stepdiag/evaluation/thresholds.hpp"
 #include "stepdiag/machine/fit.hpp"
 
 namespace stepdiag {
-
-inline constexpr double largest_noise_factor = 3.0;  // square root of the variance factor
-inline constexpr double doubtful_below = 1e-2;       // probability of a misfit at least as large
-inline constexpr double doubtful_above = 1.0 - 1e-3;
 
 // The probability of a larger square sum.
 double chi_square_probability(double square_sum, double freedom);

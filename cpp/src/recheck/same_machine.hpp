@@ -1,7 +1,7 @@
 // What readings and the calibration that predicts them must have in common. Internal: not installed.
 #pragma once
 
-#include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/adjustment/options.hpp"
 
 namespace stepdiag {
 

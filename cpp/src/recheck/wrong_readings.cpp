@@ -5,6 +5,8 @@
 #include <map>
 #include <utility>
 
+#include "stepdiag/diagnosis/adjust.hpp"
+
 namespace stepdiag {
 
 std::vector<Misfit> largest_misfits(const AdjustmentProblem& problem, const Prediction& prediction, std::size_t count) {

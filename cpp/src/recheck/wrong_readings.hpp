@@ -8,6 +8,7 @@
 
 #include "recheck/prediction.hpp"
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/evaluation/thresholds.hpp"
 
 namespace stepdiag {
 
@@ -63,7 +64,6 @@ struct Judgement {
 template <class Judge, class Judged>
 bool leave_out_one(const Run& run, AdjustmentProblem& problem, const Judge& judge, Judged& judged,
                    std::vector<FaultClass>& found) {
-    constexpr double gain_of_a_fault = 28.0;  // as an adjustment has it
     constexpr double next_to_the_worst = 0.5, least_share = 0.5;
     FaultClass wrong{{}, FaultTreatment::left_out, true};
     std::vector<int> without;
@@ -76,7 +76,7 @@ bool leave_out_one(const Run& run, AdjustmentProblem& problem, const Judge& judg
         const auto rest = judge(problem);
         problem.readings()[misfit.reading].outlier = 0;
         const double gain = judged.fit.square_sum - rest.fit.square_sum;
-        if (rest.fit.freedom < 1 || rest.probability < readings_asked_below || gain < gain_of_a_fault) continue;
+        if (rest.fit.freedom < 1 || rest.probability < readings_asked_below || gain < thresholds.fault) continue;
         wrong.members.push_back(wrong_reading(run, problem, misfit, rest.missed[misfit.reading], gain));
         without.push_back(misfit.reading);
     }

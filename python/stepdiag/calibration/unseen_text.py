@@ -39,7 +39,7 @@ def unseen_rows(calibration: Calibration) -> Iterator[str]:
     for sentence in calibration.unseen_faults:
         yield f"unseen: {sentence}"
     if calibration.unseen_faults:
-        # Sizes and effects are lower bounds: adjustment/reliability looks at a part of the slips.
+        # Sizes and effects are lower bounds: diagnosis/reliability looks at a part of the slips.
         yield "  (one at a time, from a part of the possible faults: the true sizes and effects may be larger;"
         yield "  evaluate --reliability computes all, stepdiag observe names the plan that would tell more)"
 

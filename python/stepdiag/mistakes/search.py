@@ -30,11 +30,11 @@ from stepdiag.scenario.known import Known
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor
 
-CLEAR: Final = 60.0  # least gain in chi-square
-ALTERNATIVE: Final = 25.0  # what is less behind the best may be it, as of faults
-CHANCE: Final = 9.0  # difference that does not make one better than the other
-FAULT: Final = 28.0  # what one fault of single readings must explain to be one
-CREDIBLE: Final = 9.0  # variance factor above which a fit is rejected: not worth an exact adjustment
+CLEAR: Final = _core.thresholds.mistake
+ALTERNATIVE: Final = _core.thresholds.alternative
+CHANCE: Final = _core.thresholds.chance
+FAULT: Final = _core.thresholds.fault
+CREDIBLE: Final = _core.thresholds.largest_variance_factor  # above it: not worth an exact adjustment
 PROMISING: Final = 36.0  # after the screening: what is above is not below `CREDIBLE` at its minimum
 MOST_ADJUSTED: Final = 4
 BEGUN: Final = 2  # singles on which a second mistake is sought

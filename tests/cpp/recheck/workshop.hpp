@@ -1,7 +1,7 @@
 // A machine, its calibration, and a short run later.
 #pragma once
 
-#include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/diagnosis/adjust.hpp"
 #include "stepdiag/simulation/simulate.hpp"
 #include "support/usual.hpp"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/adjustment/options.hpp"
 #include "stepdiag/evaluation/evaluation.hpp"
 
 namespace stepdiag {

@@ -16,7 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/adjustment/options.hpp"
+#include "stepdiag/adjustment/results.hpp"
 #include "stepdiag/recheck/verification.hpp"
 
 namespace stepdiag {

@@ -12,7 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/adjustment/options.hpp"
+#include "stepdiag/adjustment/results.hpp"
 
 namespace stepdiag {
 

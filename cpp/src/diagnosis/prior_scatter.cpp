@@ -1,4 +1,4 @@
-#include "adjustment/prior_scatter.hpp"
+#include "diagnosis/prior_scatter.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "adjustment/residual_tests.hpp"
+#include "diagnosis/residual_tests.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,9 @@
 #include <tuple>
 #include <unsupported/Eigen/SpecialFunctions>
 
-#include "adjustment/fault_tests.hpp"
+#include "diagnosis/fault_tests.hpp"
+
+#include "stepdiag/evaluation/thresholds.hpp"
 
 namespace stepdiag {
 namespace {
@@ -248,14 +250,14 @@ double chi_square(const FitReason& trend) { return std::pow(trend.value / trend.
 
 // The best, and those that the readings do not tell from it.
 void keep_the_best(std::vector<ResidualPattern>& patterns) {
-    constexpr double told_apart = 25.0, least_share = 0.5;  // of the best one's chi-square
+    constexpr double least_share = 0.5;  // of the best one's chi-square
     if (patterns.empty()) return;
     std::stable_sort(patterns.begin(), patterns.end(),
                      [](const auto& a, const auto& b) { return a.probability < b.probability; });
     const double best = chi_square(patterns.front().reason), alike = patterns.front().probability;
     std::size_t kept = 1;
     while (kept < patterns.size() &&
-           chi_square(patterns[kept].reason) > std::max(best - told_apart, least_share * best))
+           chi_square(patterns[kept].reason) > std::max(best - thresholds.alternative, least_share * best))
         ++kept;
     patterns.resize(kept);
     for (std::size_t k = 1; k < patterns.size(); ++k) {

@@ -1,4 +1,4 @@
-#include "adjustment/fault_search.hpp"
+#include "diagnosis/fault_search.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,16 +6,12 @@
 #include <unsupported/Eigen/SpecialFunctions>
 #include <utility>
 
-#include "evaluation/fit_test.hpp"
+#include "stepdiag/evaluation/thresholds.hpp"
 
 namespace stepdiag {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double alternative = 25.0;    // in chi-square: what is less behind the best may be it
-constexpr double gross_scatter = 25.0;  // of the square sum a reading
-constexpr double large_gain = 1000.0;   // where second order may tell
-constexpr double credible = largest_noise_factor * largest_noise_factor;  // variance factor; above it is rejected
 constexpr double twin = 0.99;  // correlation of what shows the same in all other readings
 constexpr std::size_t most_exact = 20;
 constexpr std::size_t most_members = 40;  // which are near enough to what is behind them
@@ -40,7 +36,7 @@ struct FaultSearch::Tested {
     // others may be larger than they.
     bool is_hopeless(double gain, int more) const {
         constexpr double hidden = 3.0;
-        return square_sum - credible * freedom > hidden * gain * more;
+        return square_sum - thresholds.largest_variance_factor() * freedom > hidden * gain * more;
     }
     // By falling gain.
     std::vector<int> order() const {
@@ -59,7 +55,7 @@ FaultSearch::FaultSearch(const AdjustmentProblem& problem, const AdjustmentOptio
     : problem_(problem), hypotheses_(problem), options_(options), smoothness_(smoothness) {
     constexpr double usual_tests = 1000.0;
     limit_ = options.outlier_probability > 0.0 ? gain_of_probability(options.outlier_probability / usual_tests)
-                                               : FaultTests::significant;
+                                               : thresholds.fault;
     most_ = std::max(10, int(problem.readings().size() / 50));
 }
 
@@ -71,7 +67,7 @@ FaultSearch::SolutionPointer FaultSearch::run() {
     SolutionPointer plain = solution_of(handled()), solution;
     if (!options_.search_faults) return plain->solve_from_zero(soon) || plain->go_from_zero(rough) ? plain : nullptr;
     if (!plain->solve_from_zero()) plain.reset();
-    if (corrects && (!plain || plain->scatter() > gross_scatter)) solution = without_gross(plain);
+    if (corrects && (!plain || plain->scatter() > thresholds.gross_scatter)) solution = without_gross(plain);
     if (!solution) solution = plain;
     if (!solution) return nullptr;
     const bool corrected = corrects && correct(solution);
@@ -176,7 +172,7 @@ FaultSearch::SolutionPointer FaultSearch::without_gross(const SolutionPointer& p
         const std::vector<Found> before = std::exchange(found_, {});
         SolutionPointer next = find_linearly(solution) ? solution_of(handled()) : nullptr;
         // Where that leaves as much, it is no faults of readings.
-        if (next && !(next->solve_from_zero() && next->scatter() <= gross_scatter)) next.reset();
+        if (next && !(next->solve_from_zero() && next->scatter() <= thresholds.gross_scatter)) next.reset();
         if (next && next->square_sum() < (solution ? solution : plain ? plain : next)->square_sum() * 1.01) {
             solution = next;
             continue;
@@ -217,7 +213,7 @@ bool FaultSearch::find_linearly(const SolutionPointer& where) {
         Found all{{}, Handling::open};
         for (const int h : order)
             if (all.members.size() < most_members &&
-                best - rest.tests->scores()[h].gain < alternative * rest.noise_beside(best))
+                best - rest.tests->scores()[h].gain < thresholds.alternative * rest.noise_beside(best))
                 all.members.push_back(rest.candidate(h));
         open.push_back(std::move(all));
     }
@@ -281,7 +277,7 @@ bool FaultSearch::find_more(SolutionPointer& solution) {
         const auto next = worst(tested);
         // A scatter that nobody believes and no fault explains: then the many that were found explain nothing either.
         constexpr std::size_t few = 5;
-        if (!next) return found_.size() <= few || tested.noise_beside(0.0) <= credible;
+        if (!next) return found_.size() <= few || tested.noise_beside(0.0) <= thresholds.largest_variance_factor();
         if (tested.is_hopeless(next->score.gain, most_ - int(found_.size()))) return false;
         if (int(found_.size()) == most_) return false;
         const std::vector<Found> before = found_;
@@ -320,7 +316,7 @@ bool FaultSearch::drop_or_exchange(const Solution& solution) {
         double gain = 0.0;
         for (std::size_t h = 0; h < tested.hypotheses->all().size(); ++h)
             if (tested.hypotheses->all()[h] == own) gain = tested.tests->scores()[h].gain;
-        if (best->score.gain - gain < alternative * tested.noise_beside(best->score.gain)) continue;
+        if (best->score.gain - gain < thresholds.alternative * tested.noise_beside(best->score.gain)) continue;
         found_[k] = {{*best}};
         changed = true;
     }
@@ -333,7 +329,7 @@ void FaultSearch::explain_by_fewer(SolutionPointer& solution) {
     for (std::size_t k = 0; k < found_.size(); ++k) {
         const Candidate own = found_[k].members.front();
         const FaultHypothesis tested = hypotheses_.as_tested(own.hypothesis);
-        if (own.score.gain < large_gain || !hypotheses_.differs_from_slip(tested)) continue;
+        if (own.score.gain < thresholds.second_order || !hypotheses_.differs_from_slip(tested)) continue;
         Candidate other = own;
         other.hypothesis = own.hypothesis == tested ? *hypotheses_.as_slip(tested) : tested;
         other.score.size = -own.score.size;
@@ -383,21 +379,21 @@ std::optional<FaultSearch::Found> FaultSearch::class_of(int number, const Soluti
     if (!worst(tested)) return std::nullopt;
     const std::vector<int> order = tested.order();
     const double best = tested.tests->scores()[order.front()].gain;
-    const double behind = alternative * tested.noise_beside(best);
+    const double behind = thresholds.alternative * tested.noise_beside(best);
     std::vector<Candidate> members;
     for (const int h : order) {
         const double less = best - tested.tests->scores()[h].gain;
-        const bool may_be = best > large_gain && members.size() < most_exact && less < behind + second_order * best;
+        const bool may_be = best > thresholds.second_order && members.size() < most_exact && less < behind + second_order * best;
         if (members.size() < most_members && (less < behind || may_be)) members.push_back(tested.candidate(h));
     }
-    if (best > large_gain && tested.noise_beside(best) <= credible) {
+    if (best > thresholds.second_order && tested.noise_beside(best) <= thresholds.largest_variance_factor()) {
         add_slips(members);
         adjust_exactly(members, number, solution);
         const std::vector<Candidate> twins = with_twins(members, tested);
         if (is_told_by_leaving_out(twins, tested)) members = twins;
     }
     Found found{members, is_told_by_leaving_out(members, tested) ? Handling::left_out : Handling::shared};
-    add_names(found.members, best > large_gain);
+    add_names(found.members, best > thresholds.second_order);
     return found;
 }
 
@@ -418,7 +414,7 @@ void FaultSearch::adjust_exactly(std::vector<Candidate>& candidates, int number,
         freedom = with->degrees_of_freedom();
     }
     if (least == infinity) return;
-    const double behind = alternative * noise(least, freedom);
+    const double behind = thresholds.alternative * noise(least, freedom);
     for (std::size_t i = 0; i < square_sum.size(); ++i)
         candidates[i].score.gain = gain_of_least + least - square_sum[i];
     candidates.erase(std::remove_if(candidates.begin(), candidates.end(),
@@ -561,17 +557,6 @@ std::vector<FaultClass> FaultSearch::classes(const Solution& solution, const Cal
             if (is_doubtful(entry)) entry.corrected = false;
     if (left_) add(*left_, FaultTreatment::none);
     return classes;
-}
-
-std::string name(Slips slips) { return slips == Slips::report ? "report" : "estimate"; }
-
-std::string name(FaultTreatment treatment) {
-    switch (treatment) {
-        case FaultTreatment::none: return "none";
-        case FaultTreatment::left_out: return "left_out";
-        case FaultTreatment::estimated: return "estimated";
-    }
-    return "";
 }
 
 }  // namespace stepdiag

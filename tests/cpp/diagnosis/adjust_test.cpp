@@ -1,5 +1,5 @@
 // The exact adjustment as a C++ caller uses it. (The Python tests go further; these also run under the sanitizers.)
-#include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/diagnosis/adjust.hpp"
 
 #include <gtest/gtest.h>
 
@@ -172,6 +172,25 @@ TEST(Adjustment, FindsAndNamesReadingsThatDoNotFit) {
     AdjustmentOptions keep;
     keep.outlier_probability = 0.0;
     EXPECT_LT(shop.adjust(spoilt, keep).chi_square_probability, 1e-6);
+}
+
+TEST(Adjustment, IsJudgedWithWhatWasFoundBesideIt) {
+    const Workshop shop;
+    const Adjustment sound = shop.adjust(shop.run());
+    EXPECT_EQ(judge(sound, {}).verdict.fit, sound.verdict.fit);
+    const Adjustment doubtful = judge(sound, {"", {"85 °C", "an expansion of -11.5"}});
+    EXPECT_EQ(doubtful.verdict.fit, stepdiag::Fit::doubtful);
+    EXPECT_EQ(doubtful.calibration.fit, stepdiag::Fit::doubtful);
+    ASSERT_GE(doubtful.verdict.reasons.size(), 2u);
+    EXPECT_EQ(doubtful.verdict.reasons[0].parameter, "85 °C");
+    EXPECT_EQ(doubtful.verdict.reasons[1].parameter, "an expansion of -11.5");
+    const Adjustment rejected = judge(doubtful, {"line ppp is line npp", {}});
+    EXPECT_EQ(rejected.calibration.fit, stepdiag::Fit::rejected);
+    EXPECT_EQ(rejected.verdict.reasons.front().finding, stepdiag::FitFinding::mistake);
+    // What makes a fit doubtful does not mend a rejected one, and comes last.
+    const Adjustment both = judge(rejected, {"", {"68 °F"}});
+    EXPECT_EQ(both.verdict.fit, stepdiag::Fit::rejected);
+    EXPECT_EQ(both.verdict.reasons.back().parameter, "68 °F");
 }
 
 TEST(Adjustment, CovarianceHasTheVariancesOfTheTables) {

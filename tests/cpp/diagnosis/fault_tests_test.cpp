@@ -1,4 +1,4 @@
-#include "adjustment/fault_tests.hpp"
+#include "diagnosis/fault_tests.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,6 +9,8 @@
 #include "adjustment/gauss_newton.hpp"
 #include "adjustment/observability.hpp"
 #include "adjustment/smoothness.hpp"
+#include "stepdiag/diagnosis/adjust.hpp"
+#include "stepdiag/evaluation/thresholds.hpp"
 #include "stepdiag/simulation/simulate.hpp"
 #include "support/random_machine.hpp"
 #include "support/usual.hpp"
@@ -284,7 +286,7 @@ TEST(FaultTests, AgreeWithActualAdjustments) {
         const double slope = (without(score.size + step) - without(score.size - step)) / (2.0 * step);
         EXPECT_LT(std::abs(slope / curvature), 0.01 * size + 0.01 * score.standard_uncertainty)
             << name(kind) << channel;
-        EXPECT_GT(score.gain, FaultTests::significant) << name(kind) << channel;
+        EXPECT_GT(score.gain, stepdiag::thresholds.fault) << name(kind) << channel;
     }
 }
 

@@ -1,18 +1,19 @@
-#include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/diagnosis/adjust.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "adjustment/adjustment_result.hpp"
 #include "adjustment/considered.hpp"
-#include "adjustment/fault_search.hpp"
-#include "adjustment/fault_tests.hpp"
-#include "adjustment/prior_scatter.hpp"
-#include "adjustment/reliability.hpp"
+#include "diagnosis/fault_search.hpp"
+#include "diagnosis/fault_tests.hpp"
+#include "diagnosis/prior_scatter.hpp"
+#include "diagnosis/reliability.hpp"
 #include "adjustment/smoothness.hpp"
-#include "adjustment/verdict.hpp"
+#include "diagnosis/verdict.hpp"
 #include "evaluation/fit_test.hpp"
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/evaluation/thresholds.hpp"
 
 namespace stepdiag {
 namespace {
@@ -65,7 +66,7 @@ std::vector<FitReason> coefficients_in_place_of_faults(const AdjustmentProblem& 
     double of_readings = without.square_sum();
     for (const CoefficientUnknown& of : of_all.coefficients())
         of_readings -= std::pow(without.x()[of.unknown] / of.prior, 2);
-    if (of_readings > found.weighted_square_sum + FaultTests::significant * std::max(1.0, found.variance_factor()))
+    if (of_readings > found.weighted_square_sum + thresholds.fault * std::max(1.0, found.variance_factor()))
         return {};
     return far_coefficients(expansion_estimates(without.problem(), without.x(), without.inverse()),
                             drift_estimates(without.problem(), without.x(), without.inverse()));
@@ -92,24 +93,6 @@ double residual_rounding(const NormalEquations& equations) {
 }
 
 }  // namespace
-
-std::string name(RoundingCause cause) {
-    constexpr const char* names[] = {"doubles", "decimals", "weights"};
-    return names[static_cast<int>(cause)];
-}
-
-double Adjustment::variance_factor() const {
-    return degrees_of_freedom > 0 ? weighted_square_sum / degrees_of_freedom : 1.0;
-}
-
-std::vector<std::size_t> Adjustment::outliers() const {
-    std::vector<std::size_t> list;
-    for (std::size_t r = 0; r < residuals.size(); ++r)
-        if (!residuals[r].used()) list.push_back(r);
-    std::stable_sort(list.begin(), list.end(),
-                     [&](std::size_t i, std::size_t j) { return residuals[i].outlier < residuals[j].outlier; });
-    return list;
-}
 
 Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
                   const HeadCalibrations& heads, const AdjustmentOptions& options) {
@@ -160,7 +143,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
         judge(result, patterns, prior_scatter(problem, x, solver.factor()), residual_rounding(solver.equations()));
     if (!solution->is_minimum()) {
         const double factor = std::sqrt(result.variance_factor());
-        result.verdict = {Fit::rejected, {{FitFinding::noise_factor, factor, largest_noise_factor}}};
+        result.verdict = {Fit::rejected, {{FitFinding::noise_factor, factor, thresholds.largest_noise_factor}}};
     }
     for (const FitReason& reason : coefficients_in_place_of_faults(of_all, options, result)) {
         result.verdict.fit = Fit::rejected;

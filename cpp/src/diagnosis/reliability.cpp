@@ -1,4 +1,4 @@
-#include "adjustment/reliability.hpp"
+#include "diagnosis/reliability.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,11 +7,11 @@
 #include <set>
 #include <utility>
 
+#include "stepdiag/evaluation/thresholds.hpp"
+
 namespace stepdiag {
 namespace {
 
-constexpr double power_of_99_percent = 7.6;  // square root of the noncentrality: sqrt(28) + 2.3
-constexpr double told_apart = 25.0;          // difference of chi-square
 constexpr double twin = 0.999;               // correlation
 constexpr double most_numbers = 4e6;         // of effects kept
 constexpr std::size_t fewest_places = 200;
@@ -109,7 +109,7 @@ private:
         const Eigen::VectorXd effect = tests_.effect(h);
         const Eigen::VectorXd& changes = effects_.add(h, effect);
         const double u = tests_.scores()[h].standard_uncertainty;
-        const double size_found = power_of_99_percent * noise_ * u;
+        const double size_found = thresholds.found_with_99_percent * noise_ * u;
         if (std::isinf(u)) return note_uncontrolled(h, changes, control);
         ++control.count;
         control.found_from = std::max(control.found_from, size_found);
@@ -139,7 +139,7 @@ private:
         if (has_twin) ++control.twins;
         else
             control.told_from =
-                std::max(control.told_from, noise_ * std::sqrt(told_apart / (1.0 - nearest * nearest)) * u);
+                std::max(control.told_from, noise_ * std::sqrt(thresholds.alternative / (1.0 - nearest * nearest)) * u);
     }
 
     // Of any size. It does no harm where it is a constant that the set-up takes up.
@@ -179,7 +179,7 @@ class Unseen {
 public:
     Unseen(Solution& solution, const FaultTests& tests, const CalibratedForms& forms, double noise)
         : solver_(solution.solver()),
-          limit_(power_of_99_percent * noise),
+          limit_(thresholds.found_with_99_percent * noise),
           values_(calibrated_values(forms, solution.inverse())),
           hypotheses_(tests.hypotheses()),
           tests_(tests) {

@@ -6,7 +6,7 @@
 // 1 that add up to f, and so has tails no longer than chi-square(f): Q/f against that of all other readings is tested
 // as F, on both sides, which errs on the safe side. A factor that all uncertainties share cancels.
 //
-// Trends. The readings are off by a size times how far along they are: the score test of adjustment/fault_tests.hpp,
+// Trends. The readings are off by a size times how far along they are: the score test of diagnosis/fault_tests.hpp,
 // exact under the model: correlations of residuals and unequal redundancies are in q. Where the unknowns
 // absorb the trend (a drift linear in time of a line that is measured once, a scale), q is 0: no test, nothing is said.
 #pragma once
@@ -15,7 +15,7 @@
 
 #include "adjustment/bordered_band.hpp"
 #include "adjustment/normal_equations.hpp"
-#include "stepdiag/adjustment/adjustment.hpp"
+#include "stepdiag/adjustment/results.hpp"
 
 namespace stepdiag {
 

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "adjustment/adjustment_result.hpp"
-#include "adjustment/fault_tests.hpp"
+#include "diagnosis/fault_tests.hpp"
 #include "adjustment/solution.hpp"
 
 namespace stepdiag {

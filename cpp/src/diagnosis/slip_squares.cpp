@@ -1,4 +1,4 @@
-#include "adjustment/slip_squares.hpp"
+#include "diagnosis/slip_squares.hpp"
 
 #include <algorithm>
 #include <array>

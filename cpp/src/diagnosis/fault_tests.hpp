@@ -11,7 +11,7 @@
 #include <optional>
 #include <vector>
 
-#include "adjustment/slip_squares.hpp"
+#include "diagnosis/slip_squares.hpp"
 
 namespace stepdiag {
 
@@ -84,8 +84,6 @@ std::vector<FaultScore> scores_of(const std::vector<const ReadingPattern*>& patt
 // a solution, and so of all where the inverse loses digits.
 class FaultTests {
 public:
-    static constexpr double significant = 28.0;  // gain in chi-square
-
     // At the equations' last linearisation. `factor`: of N there; `inverse`: its inverse; `variances`: of the readings,
     // from it. The equations, the factor and the hypotheses must outlive this.
     FaultTests(const NormalEquations& equations, const BorderedFactor& factor, const BorderedBand& inverse,

@@ -1,7 +1,7 @@
 // The verdict of an adjustment's fit. Internal: not installed.
 #pragma once
 
-#include "adjustment/residual_tests.hpp"
+#include "diagnosis/residual_tests.hpp"
 
 namespace stepdiag {
 

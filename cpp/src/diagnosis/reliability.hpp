@@ -2,7 +2,7 @@
 #pragma once
 
 #include "adjustment/adjustment_result.hpp"
-#include "adjustment/fault_tests.hpp"
+#include "diagnosis/fault_tests.hpp"
 #include "adjustment/solution.hpp"
 
 namespace stepdiag {

@@ -1,23 +1,14 @@
-#include "adjustment/verdict.hpp"
+#include "diagnosis/verdict.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
-#include "adjustment/fault_tests.hpp"
-#include "evaluation/fit_test.hpp"
+#include "stepdiag/diagnosis/adjust.hpp"
+#include "stepdiag/evaluation/thresholds.hpp"
 
 namespace stepdiag {
 namespace {
-
-constexpr double rejected_below = 3e-4;  // probability of a sound run's misfit
-// Of the most conspicuous of all patterns of residuals: where chi-square finds a misfit, and where it does not.
-constexpr double pattern_below = 1e-2;
-constexpr double pattern_alone_below = 3e-3;
-constexpr double farthest_prior = 5.0;
-// Residuals that are rounding, and far below what is stated of the noise: nothing tests that statement. An instrument
-// that shows few decimals has residuals of a third of its step, which is not far below what is stated of it.
-constexpr double rounding_alone = 1.0, far_below_stated = 1e-2;
-constexpr double prior_scatter_rejected_below = 1e-6;  // as of a single value beyond five
 
 double noise_factor(const Adjustment& adjustment) { return std::sqrt(adjustment.variance_factor()); }
 
@@ -31,7 +22,7 @@ FitReason noise(FitFinding finding, const Adjustment& adjustment) {
 
 void compare_with_stated_noise(const Adjustment& adjustment, std::vector<FitReason>& reasons) {
     const double factor = noise_factor(adjustment);
-    if (!(factor <= largest_noise_factor)) reasons.push_back({FitFinding::noise_factor, factor, largest_noise_factor});
+    if (!(factor <= thresholds.largest_noise_factor)) reasons.push_back({FitFinding::noise_factor, factor, thresholds.largest_noise_factor});
 }
 
 void take_patterns(const std::vector<ResidualPattern>& patterns, double limit, std::vector<FitReason>& reasons) {
@@ -52,8 +43,8 @@ void compare_with_priors(const Adjustment& adjustment, std::vector<FitReason>& r
     for (const SetupEstimate& e : adjustment.setup) {
         if (!e.value || !std::isfinite(e.prior) || e.prior == 0.0) continue;
         const double distance = distance_from_prior(*e.value, e.standard_uncertainty, e.prior);
-        if (!(distance <= farthest_prior))
-            reasons.push_back({FitFinding::prior, distance, farthest_prior, e.line, name(e.quantity), e.component});
+        if (!(distance <= thresholds.farthest_prior))
+            reasons.push_back({FitFinding::prior, distance, thresholds.farthest_prior, e.line, name(e.quantity), e.component});
     }
     for (const FitReason& reason : far_coefficients(adjustment.expansion, adjustment.machine_drift))
         reasons.push_back(reason);
@@ -63,7 +54,7 @@ void judge_faults(const Adjustment& adjustment, std::vector<FitReason>& reasons)
     for (std::size_t k = 0; k < adjustment.faults.size(); ++k) {
         const FaultClass& found = adjustment.faults[k];
         const Fault& best = found.members.front();
-        FitReason reason{FitFinding::fault, best.chi_square_gain, FaultTests::significant, best.line, best.channel};
+        FitReason reason{FitFinding::fault, best.chi_square_gain, thresholds.fault, best.line, best.channel};
         reason.fault = int(k) + 1;
         if (!found.corrected) reasons.push_back(reason);
         if (!(found.spread > found.plausible)) continue;
@@ -77,50 +68,18 @@ void judge_faults(const Adjustment& adjustment, std::vector<FitReason>& reasons)
 
 }  // namespace
 
-std::string name(FitFinding finding) {
-    switch (finding) {
-        case FitFinding::no_redundancy: return "no_redundancy";
-        case FitFinding::no_noise: return "no_noise";
-        case FitFinding::noise_factor: return "noise_factor";
-        case FitFinding::misfit: return "misfit";
-        case FitFinding::no_misfit: return "no_misfit";
-        case FitFinding::uneven_misfit: return "uneven_misfit";
-        case FitFinding::trend: return "trend";
-        case FitFinding::prior: return "prior";
-        case FitFinding::prior_scatter: return "prior_scatter";
-        case FitFinding::fault: return "fault";
-        case FitFinding::alternatives: return "alternatives";
-        case FitFinding::scaled: return "scaled";
-        case FitFinding::mistake: return "mistake";
-        case FitFinding::implausible_input: return "implausible_input";
-    }
-    return "";
-}
-
-std::string name(FitAspect aspect) {
-    switch (aspect) {
-        case FitAspect::whole: return "";
-        case FitAspect::second_half: return "second_half";
-        case FitAspect::far_half: return "far_half";
-        case FitAspect::time: return "time";
-        case FitAspect::position: return "position";
-        case FitAspect::time_or_position: return "time_or_position";
-    }
-    return "";
-}
-
 std::vector<FitReason> far_coefficients(const std::vector<ExpansionEstimate>& expansion,
                                         const std::vector<DriftEstimate>& machine_drift) {
     std::vector<FitReason> reasons;
     for (const ExpansionEstimate& e : expansion)
         if (const double distance = distance_from_prior(e.value - e.stated, e.standard_uncertainty, e.prior);
-            !(distance <= farthest_prior))
-            reasons.push_back({FitFinding::prior, distance, farthest_prior, "", "expansion",
+            !(distance <= thresholds.farthest_prior))
+            reasons.push_back({FitFinding::prior, distance, thresholds.farthest_prior, "", "expansion",
                                e.axes.size() == 1 ? e.axes.front() : -1});
     for (const DriftEstimate& e : machine_drift)
         if (const double distance = distance_from_prior(e.value, e.standard_uncertainty, e.prior);
-            !(distance <= farthest_prior))
-            reasons.push_back({FitFinding::prior, distance, farthest_prior, "", "machine_drift", e.axis});
+            !(distance <= thresholds.farthest_prior))
+            reasons.push_back({FitFinding::prior, distance, thresholds.farthest_prior, "", "machine_drift", e.axis});
     return reasons;
 }
 
@@ -132,24 +91,45 @@ Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& 
         return {Fit::unchecked, {{FitFinding::no_redundancy, 0.0, 1.0}}};
     const double probability = adjustment.chi_square_probability;
     compare_with_stated_noise(adjustment, reasons);
-    if (!(probability >= rejected_below)) take_patterns(patterns, pattern_below, reasons);
+    if (!(probability >= thresholds.misfit_rejected)) take_patterns(patterns, thresholds.pattern, reasons);
     compare_with_priors(adjustment, reasons);
-    if (reasons.empty()) take_patterns(prior_scatter, prior_scatter_rejected_below, reasons);
+    if (reasons.empty()) take_patterns(prior_scatter, thresholds.prior_scatter_rejected, reasons);
     if (!reasons.empty()) return {Fit::rejected, reasons};
-    if (residual_rounding <= rounding_alone && noise_factor(adjustment) < far_below_stated)
-        return {Fit::unchecked, {{FitFinding::no_noise, residual_rounding, rounding_alone}}};
+    if (residual_rounding <= thresholds.rounding_alone && noise_factor(adjustment) < thresholds.far_below_stated)
+        return {Fit::unchecked, {{FitFinding::no_noise, residual_rounding, thresholds.rounding_alone}}};
 
-    if (!(probability >= doubtful_below)) {
-        take_patterns(patterns, pattern_below, reasons);
+    if (!(probability >= thresholds.misfit_doubtful)) {
+        take_patterns(patterns, thresholds.pattern, reasons);
         reasons.push_back(noise(FitFinding::misfit, adjustment));
     } else {
-        take_patterns(patterns, pattern_alone_below, reasons);
+        take_patterns(patterns, thresholds.pattern_alone, reasons);
         // Where less was stated than can be weighed, less noise than is used says nothing of what was stated.
-        if (probability > doubtful_above && adjustment.rounded.empty())
+        if (probability > thresholds.no_misfit_doubtful && adjustment.rounded.empty())
             reasons.push_back(noise(FitFinding::no_misfit, adjustment));
     }
-    take_patterns(prior_scatter, pattern_alone_below, reasons);
+    take_patterns(prior_scatter, thresholds.pattern_alone, reasons);
     return {reasons.empty() ? Fit::accepted : Fit::doubtful, reasons};
+}
+
+Adjustment judge(Adjustment adjustment, const FoundBeside& beside) {
+    Verdict& verdict = adjustment.verdict;
+    const auto reason = [](FitFinding finding, const std::string& words) {
+        FitReason reason{finding, 0.0, 0.0};
+        reason.parameter = words;
+        return reason;
+    };
+    const bool is_rejected = verdict.fit == Fit::rejected;
+    auto place = is_rejected ? verdict.reasons.end() : verdict.reasons.begin();
+    for (const std::string& input : beside.implausible_inputs) {
+        if (!is_rejected) verdict.fit = Fit::doubtful;
+        place = std::next(verdict.reasons.insert(place, reason(FitFinding::implausible_input, input)));
+    }
+    if (!beside.mistake.empty()) {
+        verdict.fit = Fit::rejected;
+        verdict.reasons.insert(verdict.reasons.begin(), reason(FitFinding::mistake, beside.mistake));
+    }
+    adjustment.calibration.fit = verdict.fit;
+    return adjustment;
 }
 
 void scale_uncertainties(Adjustment& adjustment) {

@@ -11,7 +11,7 @@
 
 #include "adjustment/adjustment_problem.hpp"
 #include "adjustment/bordered_band.hpp"
-#include "adjustment/residual_tests.hpp"
+#include "diagnosis/residual_tests.hpp"
 
 namespace stepdiag {
 

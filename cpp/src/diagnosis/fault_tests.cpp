@@ -1,4 +1,4 @@
-#include "adjustment/fault_tests.hpp"
+#include "diagnosis/fault_tests.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -60,11 +60,6 @@ std::vector<FaultScore> scores_of(const std::vector<const ReadingPattern*>& patt
             scores.emplace_back(s[side], q[side] > least_share * square[side] ? q[side] : 0.0);
     }
     return scores;
-}
-
-std::string name(FaultKind kind) {
-    constexpr const char* names[] = {"reading", "slip", "factor"};
-    return names[static_cast<int>(kind)];
 }
 
 FaultHypotheses::FaultHypotheses(const AdjustmentProblem& problem) {
