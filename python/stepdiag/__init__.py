@@ -144,6 +144,7 @@ if TYPE_CHECKING:
         volume_grid,
     )
     from stepdiag.calibration.volume_change import FigureChange, ParameterEffect, VolumeChange, volume_change
+    from stepdiag.evaluation.judge import Judgement, judge
     from stepdiag.export.common import ExportOptions
     from stepdiag.export.write import export_calibration
     from stepdiag.head.description import parse_head_design, read_head_design, shipped_head
@@ -224,6 +225,7 @@ __all__ = [
     "HeadDesign",
     "Interferometer",
     "InvalidArgument",
+    "Judgement",
     "KeyTrigger",
     "Known",
     "KnownCombination",
@@ -315,6 +317,7 @@ __all__ = [
     "functional_point_straightness",
     "head_sensitivities",
     "in_report_units",
+    "judge",
     "kind_of",
     "largest_deviations",
     "largest_uncertainties",
@@ -401,6 +404,10 @@ _LATER = {
         "parse_head_design",
         "read_head_design",
         "shipped_head",
+    ),
+    "evaluation.judge": (
+        "Judgement",
+        "judge",
     ),
     "io.data_files": (
         "read_calibration",

@@ -83,16 +83,11 @@ def evaluate(
     """
     from stepdiag.calibration.temperature_text import temperature_warnings
     from stepdiag.config.toml_text import located
+    from stepdiag.evaluation.judge import judge
     from stepdiag.io.data_files import is_netcdf, read_measurement, write_calibration
     from stepdiag.io.whole_files import check_input
     from stepdiag.report.evaluation import evaluation_report
-    from stepdiag.report.mistakes import mistake_text, searchable, with_mistake
-    from stepdiag.scenario.description import (
-        JudgedEvaluation,
-        adjust_scenario,
-        evaluate_beside_adjustment,
-        read_scenario,
-    )
+    from stepdiag.scenario.description import JudgedEvaluation, read_scenario
     from stepdiag.scenario.provenance import provenance_of
 
     check_input(run)
@@ -111,31 +106,8 @@ def evaluate(
     provenance = provenance_of(known, run, method=method)
     with located(str(run)), Progress("evaluate"):
         of_inputs = input_warnings(known, run, measurement)
-        search = searchable(known, measurement)
-        mistakes = search.before() if search else []
-        try:
-            result = (
-                adjust_scenario(
-                    known,
-                    measurement,
-                    full_covariance=with_covariance,
-                    reliability=reliability,
-                    search_faults=not mistakes,
-                )
-                if method == "adjustment"
-                else evaluate_beside_adjustment(
-                    known, measurement, method=method, full_covariance=with_covariance, search_faults=not mistakes
-                )
-            )
-        except InvalidArgument as error:
-            raise with_mistake(error, search, mistakes) from None
-    adjusted = result.adjustment if isinstance(result, JudgedEvaluation) else result
-    is_odd = adjusted is None or adjusted.verdict.fit in ("doubtful", "rejected")
-    with Progress("mistakes"):
-        if search and is_odd and not mistakes:
-            mistakes = search.after(adjusted)
-    if mistakes:
-        result = result.with_mistake(mistake_text(mistakes))
+        judged = judge(known, measurement, method=method, full_covariance=with_covariance, reliability=reliability)
+    result, mistakes = judged.result, judged.mistakes
     written = write_calibration(
         result.calibration if isinstance(result, JudgedEvaluation) else result,
         path,

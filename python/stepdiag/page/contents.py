@@ -9,9 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement
+from stepdiag._core import Calibration, InvalidArgument, Measurement
 from stepdiag.calibration.comparison import Comparison, compare_calibrations
 from stepdiag.calibration.volume_change import VolumeChange, volume_change
+from stepdiag.evaluation.judge import Judgement, judge
 from stepdiag.io.adjustment_read import FitDetails, details_of, read_fit_details
 from stepdiag.io.data_files import date_of_today, read_calibration, read_measurement
 from stepdiag.io.whole_files import check_input, read_bytes
@@ -19,8 +20,7 @@ from stepdiag.mistakes.search import FoundMistake
 from stepdiag.page.budget import Budget, read_budget
 from stepdiag.page.header import ReportHeader, header_of
 from stepdiag.parameters import in_report_units, kind_of, units_of
-from stepdiag.report.mistakes import searchable
-from stepdiag.scenario.description import adjust_scenario, read_scenario
+from stepdiag.scenario.description import read_scenario
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.provenance import provenance_of
 from stepdiag.units import REPORT_UNITS
@@ -102,16 +102,16 @@ def read_contents(request: ReportRequest) -> Contents:
     if known is not None:
         _check_machine(request, calibration, known)
     _check_fingerprints(request, calibration, known, notes)
-    mistakes: list[FoundMistake] = []
+    mistakes: tuple[FoundMistake, ...] = ()
     if known is not None and measurement is not None:
-        is_odd = calibration.fit in ("doubtful", "rejected")
-        search = searchable(known, measurement) if is_odd else None
-        mistakes = search.before() if search else []
-        if details is None and calibration.method == "adjustment":
-            adjustment = _evaluated_again(request, calibration, known, measurement, search_faults=not mistakes)
-            details = details_of(adjustment, measurement)
-        if search and not mistakes:
-            mistakes = search.after(adjustment or _adjusted(known, measurement))
+        is_again = details is None and calibration.method == "adjustment"
+        if is_again or calibration.fit in ("doubtful", "rejected"):
+            judged = _judged(request, calibration, known, measurement)
+            mistakes = judged.mistakes if calibration.fit in ("doubtful", "rejected") else ()
+            if is_again and judged.adjustment is not None:
+                adjustment = judged.adjustment
+                _check_values(request, calibration, adjustment.calibration)
+                details = details_of(adjustment, measurement)
     if adjustment is not None:
         notes.append("Residuals and set-up were computed again from scenario and run; the values are the file's.")
     before = comparison = None
@@ -135,16 +135,20 @@ def read_contents(request: ReportRequest) -> Contents:
         measurement=measurement,
         budget=None if request.uncertainty is None else read_budget(request.uncertainty, calibration),
         notes=tuple(notes),
-        mistakes=tuple(mistakes),
+        mistakes=mistakes,
     )
 
 
-def _adjusted(known: Known, measurement: Measurement) -> Adjustment | None:
-    """Of faults that it finds, no mistake is made; None where the run cannot be adjusted."""
+def _judged(request: ReportRequest, calibration: Calibration, known: Known, measurement: Measurement) -> Judgement:
+    """The evaluation once more, with what would explain that it is not accepted."""
     try:
-        return adjust_scenario(known, measurement)
-    except InvalidArgument:
-        return None
+        match calibration.method:
+            case "enhanced" | "conventional" as method:
+                return judge(known, measurement, method=method)
+            case _:
+                return judge(known, measurement)
+    except InvalidArgument as error:
+        raise InvalidArgument(f"{request.run}: does not belong to {request.scenario}: {error}") from None
 
 
 def _check_machine(request: ReportRequest, calibration: Calibration, known: Known) -> None:
@@ -193,15 +197,8 @@ def _check_fingerprints(
             notes.append("The description of a head has changed since the evaluation (another SHA-256).")
 
 
-def _evaluated_again(
-    request: ReportRequest, calibration: Calibration, known: Known, measurement: Measurement, *, search_faults: bool
-) -> Adjustment:
-    """The same evaluation once more, which must give the file's values."""
-    try:
-        adjustment = adjust_scenario(known, measurement, search_faults=search_faults)
-    except InvalidArgument as error:
-        raise InvalidArgument(f"{request.run}: does not belong to {request.scenario}: {error}") from None
-    again = adjustment.calibration
+def _check_values(request: ReportRequest, calibration: Calibration, again: Calibration) -> None:
+    """The same evaluation once more must give the file's values."""
     if (
         again.functions.keys() != calibration.functions.keys()
         or again.squareness.keys() != calibration.squareness.keys()
@@ -217,7 +214,6 @@ def _evaluated_again(
     for name, (angle, _) in calibration.squareness.items():
         if abs(again.squareness[name][0] - angle) > SAME_VALUE:
             _refuse(request, name, abs(again.squareness[name][0] - angle))
-    return adjustment
 
 
 def _refuse(request: ReportRequest, name: str, difference: float) -> None:

@@ -13,13 +13,13 @@ from stepdiag.calibration.largest_by_kind import largest_entries, largest_uncert
 from stepdiag.calibration.temperature_text import temperature_text
 from stepdiag.calibration.volume import VolumeErrors
 from stepdiag.calibration.volume_change import VolumeChange
+from stepdiag.mistakes.text import mistake_text
 from stepdiag.page.contents import Contents
 from stepdiag.page.header import TITLES
 from stepdiag.page.html import Markup, definitions, element, listed, markup, section, table
 from stepdiag.page.numbers import COVERAGE_FACTOR, NBSP, NOT_KNOWN, moment, position, shown, with_interval
 from stepdiag.page.volume import ErrorInVolume, place_of_largest, why_not_known, with_ends
 from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, in_report_units, kind_of
-from stepdiag.report.mistakes import mistake_text
 from stepdiag.units import MICROMETRE
 
 HEADLINE: Final = {

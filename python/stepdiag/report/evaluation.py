@@ -18,11 +18,12 @@ from stepdiag.calibration.finding_text import NOISE_ALONE, combination_text, fau
 from stepdiag.calibration.largest_by_kind import largest_uncertainties
 from stepdiag.calibration.temperature_text import temperature_rows
 from stepdiag.calibration.unseen_text import unseen_rows
+from stepdiag.display import point_text
 from stepdiag.mistakes.copies import passes_of
 from stepdiag.mistakes.search import FoundMistake
+from stepdiag.mistakes.text import change_rows
 from stepdiag.parameters import KINDS, REPORT_UNIT, Kind, in_report_units, kind_of
 from stepdiag.report.fault_control import control_rows
-from stepdiag.report.mistakes import change_rows, unchecked_row
 from stepdiag.report.prior_effects import cosine_rows, drift_rows, rounding_rows
 from stepdiag.report.setup_table import NOTHING_LEARNT, setup_rows
 from stepdiag.scenario.description import JudgedEvaluation, reduced_run
@@ -204,3 +205,19 @@ def uncertainty_rows(calibration: Calibration) -> Iterator[str]:
     yield f"largest standard uncertainties{', of noise alone' if calibration.method in NOISE_ALONE else ''}:"
     for kind, (uncertainty, where) in largest_uncertainties(calibration).items():
         yield f"  {kind:<13}{in_report_units(kind, uncertainty):9.3g} {REPORT_UNIT[kind]:<5} ({where})"
+
+
+def unchecked_row(known: Known) -> str:
+    """What no reading shows, with the values that were used, so that a person can check them."""
+    heads = list(known.heads.values())
+    standoffs = ", ".join(dict.fromkeys(f"{head.standoff:g}" for head in heads))
+    wavelengths = ", ".join(dict.fromkeys(f"{head.wavelength:g}" for head in heads))
+    scales = ""
+    if known.expansion is not None:
+        numbers = dict.fromkeys(f"{1e6 * c:g}" for c in known.expansion.expansion.coefficient)
+        scales = f", expansion of the scales {', '.join(numbers)} µm/(m·K)"
+    return (
+        f"check by hand, as no reading shows it: place of b in the chain {known.chain.name}, tool offset "
+        f"{point_text(known.tool)}, standoff {standoffs} mm, wavelength {wavelengths} nm{scales}, and the index of air "
+        "and the temperature that all distances were reduced with"
+    )

@@ -8,10 +8,11 @@ import numpy as np
 
 from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement, check_points
 from stepdiag.calibration.finding_text import verdict_rows
+from stepdiag.evaluation.judge import judge
 from stepdiag.io.data_files import read_measurement
 from stepdiag.mistakes.search import FoundMistake
-from stepdiag.report.mistakes import change_rows, mistake_text, searchable, with_mistake
-from stepdiag.scenario.description import adjust_scenario, read_scenario
+from stepdiag.mistakes.text import change_rows, mistake_text
+from stepdiag.scenario.description import read_scenario
 from stepdiag.scenario.known import Known
 from stepdiag.scenario.planned_readings import lost_readings
 
@@ -47,17 +48,10 @@ def adjust_run(scenario_file: Path, run_file: Path) -> FoundTogether:
 
 
 def _adjusted(known: Known, run: Measurement) -> FoundTogether:
-    search = searchable(known, run)
-    mistakes = search.before() if search else []
-    try:
-        adjustment = adjust_scenario(known, run, search_faults=not mistakes)
-    except InvalidArgument as error:
-        raise with_mistake(error, search, mistakes) from None
-    if search and not mistakes:
-        mistakes = search.after(adjustment)
-    if mistakes and not (mistakes[0].or_faults and adjustment.verdict.fit == "accepted"):
-        adjustment = adjustment.with_mistake(mistake_text(mistakes))
-    return FoundTogether(tuple(_said(known, run, adjustment, mistakes)), adjustment.calibration, tuple(mistakes))
+    found = judge(known, run)
+    assert found.adjustment is not None  # as the method is the adjustment
+    text = tuple(_said(known, run, found.adjustment, found.mistakes))
+    return FoundTogether(text, found.calibration, found.mistakes)
 
 
 def _said(known: Known, run: Measurement, adjustment: Adjustment, mistakes: Sequence[FoundMistake]) -> Iterator[str]:

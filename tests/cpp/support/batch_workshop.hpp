@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "stepdiag/diagnosis/adjust.hpp"
 #include "stepdiag/batch/batch_evaluator.hpp"
 #include "stepdiag/core/random_blocks.hpp"
 #include "stepdiag/simulation/simulate.hpp"

@@ -11,7 +11,7 @@ from places import DOCS, EXAMPLES
 import stepdiag as sd
 from stepdiag.calibration.finding_text import mistake_reason
 from stepdiag.mistakes.catalogue import CATALOGUE
-from stepdiag.report.mistakes import change_rows, mistake_text
+from stepdiag.mistakes.text import change_rows, mistake_text
 
 PAGE = (DOCS / "mistakes.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```\n(.*?)```", PAGE, re.DOTALL)
