@@ -122,7 +122,9 @@ def _stamp(calibration: Calibration) -> Markup | None:
     """Always in sight, and across every printed page, also from browsers without margin boxes."""
     if is_valid(calibration):
         return None
-    return element("p", headline(calibration), class_=f"stamp {calibration.fit or 'unknown'}", aria_hidden="true")
+    words, colon, rest = headline(calibration).partition(":")
+    content = markup(words, element("span", colon + rest))  # paper has the rest in its margin
+    return element("p", content, class_=f"stamp {calibration.fit or 'unknown'}", aria_hidden="true")
 
 
 def _contents_list(contents: Contents) -> Markup:
