@@ -173,6 +173,18 @@ def test_rejected_fit_is_said_first_and_in_red(browser: Browser, folder: Path) -
     seen.page.close()
 
 
+@pytest.mark.parametrize("name", ["rejected", "doubtful"])
+def test_what_is_not_valid_stays_in_sight(name: str, browser: Browser, folder: Path) -> None:
+    seen = Seen(browser, folder / f"{name}.html")
+    seen.page.evaluate("document.documentElement.scrollTo({top: 1e6, behavior: 'instant'})")
+    stamp = seen.page.locator(".stamp")
+    box = stamp.bounding_box()
+    assert box is not None
+    assert 0.0 <= box["y"] < 10.0, "at the top of the window, at the end of the page"
+    assert f"Calibration {name.upper()}: do not" in stamp.inner_text()
+    seen.page.close()
+
+
 CONTRAST = """() => {
   const channels = (colour) => (colour.match(/[\\d.]+/g) || []).map(Number);
   const linear = (c) => (c /= 255) <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;

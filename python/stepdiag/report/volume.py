@@ -17,7 +17,8 @@ _RANKED: Final = 5  # parameters in the report; the JSON object has all
 
 
 def volume_report(found: VolumeErrors) -> Iterator[str]:
-    """Verdicts on machine and calibration; then largest error, rms, ranges, tilts, diagonals, what causes them, and what they refer to."""
+    """Verdicts on machine and calibration; then largest error, rms, ranges, tilts, diagonals, what causes them,
+    and what they refer to."""
     yield from _verdict_rows(found)
     if not math.isnan(found.largest):
         place = ", ".join(f"{axis} {p:g}" for axis, p in zip("XYZ", found.largest_at, strict=True))
