@@ -163,13 +163,25 @@ def test_views_of_the_volume_have_ink(view: str, report: Seen) -> None:
 
 def test_rejected_fit_is_said_first_and_in_red(browser: Browser, folder: Path) -> None:
     seen = Seen(browser, folder / "rejected.html")
-    assert seen.page.title().startswith("Fit REJECTED: do not use this calibration")
+    assert seen.page.title().startswith("Calibration REJECTED: do not use it")
     box = seen.page.locator("#verdict").bounding_box()
     assert box is not None
     assert box["y"] < 450, "seen without scrolling"
-    assert "Fit REJECTED: do not use this calibration" in seen.page.locator("#verdict h2").inner_text()
+    assert "Calibration REJECTED: do not use it" in seen.page.locator("#verdict h2").inner_text()
     red = np.mean(picture(seen.page, "#verdict"), axis=(0, 1))
     assert red[0] > 2.0 * max(red[1], red[2]), "most of the band is red"
+    seen.page.close()
+
+
+@pytest.mark.parametrize("name", ["rejected", "doubtful"])
+def test_what_is_not_valid_stays_in_sight(name: str, browser: Browser, folder: Path) -> None:
+    seen = Seen(browser, folder / f"{name}.html")
+    seen.page.evaluate("document.documentElement.scrollTo({top: 1e6, behavior: 'instant'})")
+    stamp = seen.page.locator(".stamp")
+    box = stamp.bounding_box()
+    assert box is not None
+    assert 0.0 <= box["y"] < 10.0, "at the top of the window, at the end of the page"
+    assert f"Calibration {name.upper()}: do not" in stamp.inner_text()
     seen.page.close()
 
 
@@ -210,7 +222,6 @@ def test_words_stand_out_from_what_is_behind_them(name: str, browser: Browser, f
 def test_printed_page_has_all_figures_on_pages_of_a4(folder: Path) -> None:
     with pytest.MonkeyPatch.context() as patched:
         patched.chdir(folder)
-        assert main(["report", "judged.csv", "-o", "rejected.pdf"]) == 3
         assert main(["report", "calibration.nc", "-o", "report.pdf"]) == 0
         said = subprocess.run(["pdfinfo", "report.pdf"], capture_output=True, text=True, check=True).stdout
         assert int(re.findall(r"Pages:\s+(\d+)", said)[0]) > 1
@@ -221,9 +232,26 @@ def test_printed_page_has_all_figures_on_pages_of_a4(folder: Path) -> None:
         for name in sd.read_calibration("calibration.nc").functions:
             assert re.search(rf"{name} \((µm|µrad)\)", text), "the axis of the drawing"
         assert re.search(r"\b1 ?/ ?\d", text), "pages are numbered"
-        bad = subprocess.run(["pdftotext", "rejected.pdf", "-"], capture_output=True, text=True, check=True).stdout
-        pages = bad.split("\f")[:-1]
-        assert all("REJECTED: do not use this calibration" in page for page in pages), "on every page"
+        assert "Calibration" not in pages_of("report.pdf")[1], "none where it is valid"
+
+
+def pages_of(path: str) -> list[str]:
+    said = subprocess.run(["pdftotext", "-layout", path, "-"], capture_output=True, text=True, check=True).stdout
+    return said.split("\f")[:-1]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("judged", "REJECTED: do not use it"), ("doubtful", "DOUBTFUL: do not rely on the stated uncertainties")],
+)
+def test_every_printed_page_says_that_the_calibration_is_not_valid(name: str, words: str, folder: Path) -> None:
+    with pytest.MonkeyPatch.context() as patched:
+        patched.chdir(folder)
+        main(["report", f"{name}.csv", "-o", f"{name}.pdf"])
+        pages = pages_of(f"{name}.pdf")
+        assert len(pages) > 1
+        for page in pages:  # the first line is the band above all else
+            assert page.strip().splitlines()[0].strip() == f"Calibration {words}"
 
 
 def test_volume_is_on_paper_as_it_is_on_the_screen(browser: Browser, folder: Path, tmp_path: Path) -> None:

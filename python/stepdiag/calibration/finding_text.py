@@ -92,6 +92,15 @@ MEANING: Final = {
     "unchecked": "nothing controls the readings",
 }
 
+# Whether a calibration is valid, where nothing else is said; what the machine is against its limit is another question.
+HEADLINE: Final = {
+    "accepted": "valid: the readings agree",
+    "doubtful": "DOUBTFUL: do not rely on the stated uncertainties",
+    "rejected": "REJECTED: do not use it",
+    "unchecked": "UNCHECKED: nothing controls the readings",
+    None: "NOT KNOWN to be valid",
+}
+
 # By its reason.
 UNCHECKED: Final = {
     "no_redundancy": "there are no more readings than unknowns, so that nothing controls them",
@@ -217,6 +226,20 @@ def _largest_values(errors: ErrorMap) -> Iterator[tuple[str, tuple[float, str]]]
         for name, (position, value) in tables.items():
             k = int(abs(value).argmax())
             yield name, (float(value[k]), f" at {position[k]:g} mm")
+
+
+def is_valid(calibration: Calibration) -> bool:
+    """Whether a calibration is to be relied on without a word of warning."""
+    return calibration.fit == "accepted" and not calibration.unverified
+
+
+def headline(calibration: Calibration, which: str = "Calibration") -> str:
+    """Whether a calibration is valid, in a few words for titles and printed pages."""
+    if not calibration.unverified:
+        return f"{which} {HEADLINE[calibration.fit]}"
+    if calibration.fit == "accepted":
+        return f"{which} UNVERIFIED: its values may have been changed"
+    return f"{which} {HEADLINE[calibration.fit]}. Unverified"
 
 
 def fit_row(calibration: Calibration) -> str:

@@ -32,7 +32,7 @@ _STYLES: Final[dict[str, dict[str, Any]]] = {
 _COLOURED: Final = (
     re.compile(r"(\bfit(?::| is)? )(accepted|unchecked|doubtful|rejected)\b", re.IGNORECASE),
     re.compile(r"^()(doubtful|rejected)(?= because )"),
-    re.compile(r"^(verdict: )(within|not within|undecided)\b"),
+    re.compile(r"^(machine: )(within|not within|undecided)\b"),
     re.compile(r"( )(improved|worse)$"),
     re.compile(r"^((?:stepdiag: |[^ ]+: )?)(warning:|error:)"),
 )

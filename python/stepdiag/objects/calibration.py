@@ -19,10 +19,11 @@ Verdict = Literal["accepted", "doubtful", "rejected", "unchecked"]
 
 
 class Fit(TypedDict):
-    """Whether the readings agree with each other and with the scenario."""
+    """Whether the calibration is valid: the readings agree with each other and with the scenario. This does not tell
+    how accurate the machine is."""
 
     verdict: Verdict | None
-    """null: not known"""
+    """Of the calibration, not of the machine; null: not known"""
     reasons: list[str]
     """Why that verdict, a sentence each."""
     variance_factor: float | None

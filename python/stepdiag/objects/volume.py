@@ -53,7 +53,8 @@ class VolumeObject(TypedDict):
     """Of X, Y, Z: the grid has all combinations."""
     limit_um: float | None
     verdict: Literal["within", "not within", "undecided"] | None
-    """At 95 %; null: no limit, or none for the reason below"""
+    """Of the machine against the limit, at 95 %, as far as the calibration is valid (`fit`); null: no limit, or none
+    for the reason below"""
     no_verdict_because: str | None
     bounds_um: list[float | None] | None
     """The largest error is above the first with 95 %, and below the second with 95 %."""

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from stepdiag._core import Calibration, InvalidArgument, __version__
+from stepdiag.calibration.finding_text import headline, is_valid
 from stepdiag.calibration.volume import judged
 from stepdiag.io.file_kind import PAGE_BEGINS
 from stepdiag.objects.evaluation import mistake_of
@@ -27,7 +28,7 @@ from stepdiag.page.numbers import moment
 from stepdiag.page.residuals import residuals_section, setup_section, temperature_section
 from stepdiag.page.volume import ErrorInVolume, drawing_of, error_grid, error_in_volume, volume_section
 from stepdiag.page.words import (
-    HEADLINE,
+    EARLIER,
     commands_section,
     comparison_section,
     header_block,
@@ -77,6 +78,7 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
     ]
     body = [
         element("a", "Skip to the verdict", href="#verdict", class_="skip"),
+        _stamp(calibration),
         element("div", header_block(contents), verdict_block(contents), class_="opening"),
         _contents_list(contents),
         element("main", *sections, id="main"),
@@ -90,7 +92,7 @@ def report_page(request: ReportRequest, output: Path) -> tuple[str, Contents]:
         ),
         *data,
     ]
-    return _whole(_title(contents), calibration, body, plotly), contents
+    return _whole(_title(contents), _running_words(contents), body, plotly), contents
 
 
 def report_values(contents: Contents, found: ErrorInVolume, before: ErrorInVolume | None) -> dict[str, Any]:
@@ -113,8 +115,16 @@ def report_values(contents: Contents, found: ErrorInVolume, before: ErrorInVolum
 def _title(contents: Contents) -> str:
     machine = contents.header.words.get("machine", "three-axis machine tool")
     words = f"Calibration report: {machine}"
-    words = f"Unverified. {words}" if contents.calibration.unverified else words
-    return words if contents.calibration.fit == "accepted" else f"{HEADLINE[contents.calibration.fit]}. {words}"
+    return words if is_valid(contents.calibration) else f"{headline(contents.calibration)}. {words}"
+
+
+def _stamp(calibration: Calibration) -> Markup | None:
+    """Always in sight, and across every printed page, also from browsers without margin boxes."""
+    if is_valid(calibration):
+        return None
+    words, colon, rest = headline(calibration).partition(":")
+    content = markup(words, element("span", colon + rest))  # paper has the rest in its margin
+    return element("p", content, class_=f"stamp {calibration.fit or 'unknown'}", aria_hidden="true")
 
 
 def _contents_list(contents: Contents) -> Markup:
@@ -137,7 +147,7 @@ def _contents_list(contents: Contents) -> Markup:
     return element("nav", element("ul", *links), aria_label="Contents", class_="screen-only")
 
 
-def _whole(title: str, calibration: Calibration, body: list[Markup], plotly: str) -> str:
+def _whole(title: str, running: str, body: list[Markup | None], plotly: str) -> str:
     own = _own("report.js")
     policy = (
         "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; "
@@ -146,7 +156,7 @@ def _whole(title: str, calibration: Calibration, body: list[Markup], plotly: str
     colours = "".join(
         f"--{name}: {COLOUR[name]}; " for name in ("accepted", "rejected", "doubtful", "after", "before", "backward")
     )
-    style = f":root {{ {colours}--band: {BAND}; }}\n{_own('report.css')}{_running_words(calibration)}"
+    style = f":root {{ {colours}--band: {BAND}; }}\n{_own('report.css')}{running}"
     head = markup(
         element("meta", http_equiv="Content-Security-Policy", content=policy),
         Markup("\n"),
@@ -163,14 +173,17 @@ def _whole(title: str, calibration: Calibration, body: list[Markup], plotly: str
     return f"{PAGE_BEGINS}{head}</head>\n<body>\n{inside}\n{scripts}</body>\n</html>\n"
 
 
-def _running_words(calibration: Calibration) -> str:
-    """On every printed page, of a calibration that is not to be relied on."""
-    said = [HEADLINE[calibration.fit]] if calibration.fit in ("rejected", "doubtful") else []
-    said += ["Unverified"] if calibration.unverified else []
+def _running_words(contents: Contents) -> str:
+    """On every printed page, of a calibration that is not to be relied on: in words, as paper may have no colours."""
+    calibration, before = contents.calibration, contents.before
+    said = [] if is_valid(calibration) else [headline(calibration)]
+    said += [] if before is None or is_valid(before) else [headline(before, EARLIER)]
     if not said:
         return ""
-    words, colour = ". ".join(said), COLOUR["rejected"]
-    return f"@page {{ @top-left {{ content: '{words}'; color: {colour}; font-weight: 700; }} }}\n"
+    look = "width: 100%; text-align: center; color: #000; border: solid #000; border-width: 1.5pt 0; font: 700 10pt"
+    family = 'system-ui, "Liberation Sans", sans-serif'
+    band = f"content: '{'. '.join(said)}'; {look} {family}; margin: 4mm 0"
+    return f"@page {{ margin-top: 20mm; @top-center {{ {band}; }} }}\n"
 
 
 def _json(identifier: str, content: Any) -> Markup:

@@ -8,7 +8,16 @@ from typing import Any, Final
 import numpy as np
 
 from stepdiag._core import Calibration
-from stepdiag.calibration.finding_text import MEANING, NOISE_ALONE, NOT_SEEN, PROVENANCE, UNVERIFIED, mistake_reason
+from stepdiag.calibration.finding_text import (
+    MEANING,
+    NOISE_ALONE,
+    NOT_SEEN,
+    PROVENANCE,
+    UNVERIFIED,
+    headline,
+    is_valid,
+    mistake_reason,
+)
 from stepdiag.calibration.largest_by_kind import largest_entries, largest_uncertainties
 from stepdiag.calibration.temperature_text import temperature_text
 from stepdiag.calibration.volume import VolumeErrors
@@ -22,20 +31,22 @@ from stepdiag.page.volume import ErrorInVolume, place_of_largest, why_not_known,
 from stepdiag.parameters import FUNCTIONS, REPORT_UNIT, SQUARENESSES, in_report_units, kind_of
 from stepdiag.units import MICROMETRE
 
-HEADLINE: Final = {
-    "accepted": "Fit accepted",
-    "doubtful": "Fit DOUBTFUL: do not rely on the stated uncertainties",
-    "rejected": "Fit REJECTED: do not use this calibration",
-    "unchecked": "Fit UNCHECKED: nothing controls the readings",
-    None: "Fit NOT KNOWN",
-}
-_CAN_BE_USED: Final = {
-    "accepted": "Yes. The readings agree with each other and with the described set-up.",
-    "doubtful": "With care. The values are the best fit, but the stated uncertainties are not to be relied on.",
+_IS_VALID: Final = {
+    "accepted": "Yes. The readings agree with each other and with the described set-up. This does not tell how "
+    "accurate the machine is.",
+    "doubtful": "Doubtful. The values are the best fit, but the stated uncertainties are not to be relied on.",
     "rejected": "No. The readings contradict each other. Do not correct the machine with these values.",
-    "unchecked": "Unchecked. The readings do not test this calibration; the reason is below.",
+    "unchecked": "Unchecked. The readings do not test this calibration; the reason is above.",
     None: "Not known. The file does not say how well the readings agree.",
 }
+# What an answer about the machine rests on, where its calibration is not accepted.
+_RESTS_ON: Final = {
+    "doubtful": "The calibration is doubtful: do not rely on this answer.",
+    "rejected": "The calibration is rejected: do not use this answer.",
+    "unchecked": "The calibration is unchecked: nothing controls the readings behind this answer.",
+    None: "Whether the calibration is valid is not known.",
+}
+EARLIER: Final = "The earlier calibration is"
 LEAST_PROBABILITY: Final = 1e-12  # that is told
 MOST_EFFECTS: Final = 6
 MOST_REASONS: Final = 6  # that are shown at once
@@ -72,19 +83,16 @@ def verdict_block(contents: Contents) -> Markup:
     """The verdict of the fit with its reasons and the mistake that would explain it, before anything else."""
     calibration = contents.calibration
     fit = calibration.fit
+    is_open = calibration.unverified and fit == "accepted"  # it was valid, and may have been changed since
     parts: list[Any] = [
         element(
             "h2",
-            element("span", SYMBOL[fit], class_="symbol", aria_hidden="true"),
-            f" {HEADLINE[fit]}",
+            element("span", SYMBOL[None if is_open else fit], class_="symbol", aria_hidden="true"),
+            f" {headline(calibration)}",
             id="verdict-heading",
         )
     ]
-    meaning = (
-        "The file does not say how well the readings agree."
-        if fit is None
-        else f"{MEANING[fit][0].upper()}{MEANING[fit][1:]}."
-    )
+    meaning = "The file does not say how well the readings agree." if fit is None else f"Fit {fit}: {MEANING[fit]}."
     factor = calibration.variance_factor
     if factor is not None:
         meaning += f" Variance factor {factor:.3g}; 1 is expected."
@@ -112,9 +120,14 @@ def verdict_block(contents: Contents) -> Markup:
     notes.append(_sentence(temperature_text(calibration)))
     if fit == "accepted":
         notes.append(_sentence(NOT_SEEN))
+    notes.append("All this is about the readings. How accurate the machine is stands in the summary.")
     parts += [element("p", note, class_="note") for note in notes]
     return element(
-        "section", *parts, id="verdict", class_=f"verdict {fit or 'unknown'}", aria_labelledby="verdict-heading"
+        "section",
+        *parts,
+        id="verdict",
+        class_=f"verdict {'unknown' if fit is None or is_open else fit}",
+        aria_labelledby="verdict-heading",
     )
 
 
@@ -126,20 +139,40 @@ def _sentence(note: str) -> str:
 def summary_section(contents: Contents, found: ErrorInVolume) -> Markup:
     """A few lines that a customer understands."""
     calibration = contents.calibration
-    lines: list[tuple[str, object]] = [
-        ("Can it be used?", _CAN_BE_USED[calibration.fit]),
+    machine = [
+        _within(found.figures),
         ("Error in the volume", _volume(contents, found.figures)),
-        *_within(found.figures),
         ("Largest errors", _sentence("; ".join(_largest(calibration)))),
+    ]
+    lines: list[tuple[str, object]] = [
+        ("Is this calibration valid?", _is_valid(calibration)),
         ("How well known", _how_well(calibration)),
         *([("Uncertainty budget", _sentence(calibration.budget))] if calibration.budget else []),
         *([("Conditions used", listed(map(_sentence, calibration.conditions)))] if calibration.conditions else []),
         ("Not determined", _open(calibration)),
     ]
-    note = None
-    if calibration.fit == "rejected":
-        note = element("p", element("strong", "The fit is rejected: the figures below are not to be used."))
-    return section("summary", "Summary", note, definitions(lines, "lines"))
+    warning = {
+        "rejected": "This calibration is rejected: the figures below are not to be used.",
+        "doubtful": "This calibration is doubtful: the intervals below are not to be relied on.",
+    }.get(calibration.fit or "")
+    return section(
+        "summary",
+        "Summary",
+        element("p", element("strong", warning)) if warning else None,
+        element("h3", "The machine"),
+        definitions(machine, "lines"),
+        element("h3", "The calibration"),
+        definitions(lines, "lines"),
+    )
+
+
+def _is_valid(calibration: Calibration) -> Markup:
+    """Whether the readings agree, which is no answer about the machine."""
+    answer, rest = _IS_VALID[calibration.fit].split(". ", 1)
+    if calibration.unverified:
+        answer = "Not known" if calibration.fit == "accepted" else answer
+        rest += f" {_sentence(UNVERIFIED)}"
+    return markup(element("strong", f"{answer}."), f" {rest}")
 
 
 def _volume(contents: Contents, figures: VolumeErrors) -> Markup:
@@ -156,10 +189,10 @@ def _volume(contents: Contents, figures: VolumeErrors) -> Markup:
     return markup(*parts)
 
 
-def _within(figures: VolumeErrors) -> Iterator[tuple[str, object]]:
-    """The verdict against a limit that was given."""
+def _within(figures: VolumeErrors) -> tuple[str, object]:
+    """The machine against the limit that was given, and what the answer rests on."""
     if figures.limit is None:
-        return
+        return "Is the machine within its limit?", "Not asked: the report was made without a limit."
     if figures.verdict is None or figures.bounds is None:
         verdict, why = "Not known", _sentence(figures.no_verdict_because)
     else:
@@ -172,7 +205,13 @@ def _within(figures: VolumeErrors) -> Iterator[tuple[str, object]]:
                 f"The largest error is above {above} and below {below} (95 % each).",
             ),
         }[figures.verdict]
-    yield f"Within {figures.limit / MICROMETRE:.4g}{NBSP}µm?", markup(element("strong", f"{verdict}."), f" {why}")
+    if figures.verdict is not None and figures.fit != "accepted":
+        why += f" {_RESTS_ON[figures.fit]}"
+        verdict += f" ({figures.fit or 'validity not known'})"
+    return (
+        f"Is the machine within {figures.limit / MICROMETRE:.4g}{NBSP}µm?",
+        markup(element("strong", f"{verdict}."), f" {why}"),
+    )
 
 
 def _largest(calibration: Calibration) -> Iterator[str]:
@@ -384,7 +423,6 @@ def comparison_section(contents: Contents) -> Markup | None:
         notes.append(f"only before: {', '.join(comparison.only_in_a)}")
     if comparison.only_in_b:
         notes.append(f"only after: {', '.join(comparison.only_in_b)}")
-    fit = comparison.a.fit
     return section(
         "comparison",
         "Before and after",
@@ -393,7 +431,7 @@ def comparison_section(contents: Contents) -> Markup | None:
             element("strong", _verdict_of(change, (comparison.a.fit, comparison.b.fit))),
             " The curves above show the earlier calibration dashed.",
         ),
-        None if fit == "accepted" else element("p", f"The earlier calibration: {HEADLINE[fit]}.", class_="note"),
+        None if is_valid(comparison.a) else element("p", f"{headline(comparison.a, EARLIER)}.", class_="note"),
         table("Error of the tool in the volume", ["", "before", "after", "change", ""], volume),
         table("Error in the volume that one difference makes alone", ["Parameter", "largest", "rms", ""], effects),
         table(

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from stepdiag._core import Calibration, Machine
+from stepdiag.calibration.finding_text import headline, is_valid
 from stepdiag.calibration.table_sums import FloatArray
 from stepdiag.calibration.temperature_text import temperature_rows
 from stepdiag.calibration.volume import MOST_NODES, Interval, VolumeContribution, VolumeErrors, VolumeFigure
@@ -16,7 +17,8 @@ _RANKED: Final = 5  # parameters in the report; the JSON object has all
 
 
 def volume_report(found: VolumeErrors) -> Iterator[str]:
-    """Verdict first; then largest error, rms, ranges, tilts, diagonals, what causes them, and what they refer to."""
+    """Verdicts on machine and calibration; then largest error, rms, ranges, tilts, diagonals, what causes them,
+    and what they refer to."""
     yield from _verdict_rows(found)
     if not math.isnan(found.largest):
         place = ", ".join(f"{axis} {p:g}" for axis, p in zip("XYZ", found.largest_at, strict=True))
@@ -33,26 +35,32 @@ def volume_report(found: VolumeErrors) -> Iterator[str]:
 
 
 def _verdict_rows(found: VolumeErrors) -> Iterator[str]:
-    if found.fit == "rejected":
-        yield "not to be trusted: the fit of this calibration is rejected; do not use these values"
+    source = found.source
+    is_first = not isinstance(source, Calibration) or not is_valid(source)
+    of_calibration = f"fit: {found.fit or 'not known'}"
+    if isinstance(source, Calibration):
+        of_calibration = f"{headline(source, 'calibration')} ({of_calibration})"
+    if is_first:
+        yield of_calibration
     for names, parts in _by_missing(found.missing):
         yield f"not determined: {', '.join(parts)}; no figures that need {names}"
     if found.limit is None:
-        if found.fit != "rejected":
-            yield f"fit: {found.fit or 'not known'}"
+        if not is_first:
+            yield of_calibration
         return
     limit = f"{found.limit * 1e3:g} µm"
     if found.verdict is None:
-        yield f"no verdict on the limit of {limit}: {found.no_verdict_because}"
+        yield f"machine: no verdict on the limit of {limit}: {found.no_verdict_because}"
         return
     assert found.bounds is not None
     above, below = (f"{1e3 * end:.4g} µm" for end in found.bounds)
     yield {
-        "within": f"verdict: within {limit}: the largest error is below {below} (95 %)",
-        "not within": f"verdict: not within {limit}: the largest error is above {above} (95 %)",
-        "undecided": f"verdict: undecided at {limit}: the largest error is above {above}, below {below} (95 % each)",
+        "within": f"machine: within {limit}: the largest error is below {below} (95 %)",
+        "not within": f"machine: not within {limit}: the largest error is above {above} (95 %)",
+        "undecided": f"machine: undecided at {limit}: the largest error is above {above}, below {below} (95 % each)",
     }[found.verdict]
-    yield f"fit: {found.fit or 'not known'}"
+    if not is_first:
+        yield of_calibration
 
 
 def _by_missing(missing: Mapping[str, tuple[str, ...]]) -> Iterator[tuple[str, tuple[str, ...]]]:

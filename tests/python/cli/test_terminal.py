@@ -58,7 +58,7 @@ def said(monkeypatch: pytest.MonkeyPatch, line: str, stream: io.StringIO | None 
         ("warning: 3 points lack a reading", "warning:"),
         ("run.csv: warning: 3 points lack a reading", "warning:"),
         ("stepdiag: error: run.csv: cannot be read", "error:"),
-        ("verdict: not within 20 µm", "not within"),
+        ("machine: not within 20 µm", "not within"),
     ],
 )
 def test_verdicts_and_warnings_have_a_colour(monkeypatch: pytest.MonkeyPatch, line: str, word: str) -> None:

@@ -28,10 +28,10 @@ def said(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -> 
 
 
 def test_first_line_is_the_verdict(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert said(capsys, "c.nc", "--limit", "1000")[0].startswith("verdict: within 1000 µm: the largest error is below ")
-    assert said(capsys, "c.nc", "--limit", "1")[0].startswith("verdict: not within 1 µm: the largest error is above ")
+    assert said(capsys, "c.nc", "--limit", "1000")[0].startswith("machine: within 1000 µm: the largest error is below ")
+    assert said(capsys, "c.nc", "--limit", "1")[0].startswith("machine: not within 1 µm: the largest error is above ")
     largest = sd.volume_errors(sd.read_calibration("c.nc")).largest * 1e3
-    assert said(capsys, "c.nc", "--limit", f"{largest}")[0].startswith("verdict: undecided at ")
+    assert said(capsys, "c.nc", "--limit", f"{largest}")[0].startswith("machine: undecided at ")
 
 
 def test_report_has_at_most_fifteen_lines(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -42,7 +42,7 @@ def test_file_without_covariance_has_values_and_says_why_there_is_no_verdict(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     lines = said(capsys, "c.csv", "--limit", "1000")
-    assert lines[0].startswith("no verdict on the limit of 1000 µm: the calibration has no covariance")
+    assert lines[0].startswith("machine: no verdict on the limit of 1000 µm: the calibration has no covariance")
     assert any(line.startswith("largest error ") for line in lines)
     assert any(line.startswith("no intervals: ") for line in lines)
 
@@ -99,15 +99,23 @@ def test_object_without_covariance_or_parameters_has_null(here: Path, capsys: py
     content = printed("volume", capsys, "volume", "m.csv")
     assert content["largest_um"] is content["at_mm"] is content["ranges"]["X"]["value_um"] is None
     assert content["missing"] == {"X": ["EXX"]}
-    assert said(capsys, "m.csv")[0].startswith("not determined: EXX")
+    assert said(capsys, "m.csv")[1].startswith("not determined: EXX")
 
 
 def test_rejected_fit_is_told_first_and_ends_with_code_3(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sd.write_calibration(sd.read_calibration("c.nc").judged("rejected", ["it was dropped"]), "r.nc")
     lines = said(capsys, "r.nc", "--limit", "1000", code=3)
-    assert lines[0].startswith("not to be trusted")
+    assert lines[0] == "calibration REJECTED: do not use it (fit: rejected)"
     assert any(line.startswith("warning: r.nc: the fit is rejected") for line in lines)
     assert printed("volume", capsys, "volume", "r.nc", "--limit", "1000", status=3)["verdict"] is None
+
+
+def test_doubt_about_the_calibration_is_told_before_the_machine(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sd.write_calibration(sd.read_calibration("c.nc").judged("doubtful", ["more noise than stated"]), "d.nc")
+    first, second = said(capsys, "d.nc", "--limit", "1")[:2]
+    assert first == "calibration DOUBTFUL: do not rely on the stated uncertainties (fit: doubtful)"
+    assert second.startswith("machine: not within 1 µm: ")
+    assert said(capsys, "c.nc", "--limit", "1")[1] == "calibration valid: the readings agree (fit: accepted)"
 
 
 @pytest.mark.parametrize(

@@ -222,12 +222,57 @@ def test_verdict_is_the_first_thing_that_is_said(fit: str, evaluated: Path) -> N
     page = page_of(calibration=Path("judged.csv"))
     (section,) = [attributes for attributes in page.all("section") if attributes.get("id") == "verdict"]
     assert section["class"] == f"verdict {fit}"
-    first = page.text.index(f"Fit {fit}" if fit == "accepted" else f"Fit {fit.upper()}")
+    first = page.text.index("Calibration valid" if fit == "accepted" else f"Calibration {fit.upper()}")
     assert first < page.text.index("Summary")
     assert page.text.index("the <first> reason") < page.text.index("Summary")
     if fit == "rejected":
-        assert page.text.startswith("Fit REJECTED: do not use this calibration"), "the title"
+        assert page.text.startswith("Calibration REJECTED: do not use it"), "the title"
         assert "the figures below are not to be used" in page.text
+
+
+@pytest.mark.parametrize(
+    ("fit", "is_valid", "of_machine"),
+    [
+        ("accepted", "Yes.", "No. The largest error is above"),
+        ("doubtful", "Doubtful.", "No (doubtful). The largest error is above"),
+        ("unchecked", "Unchecked.", "No (unchecked). The largest error is above"),
+        ("rejected", "No.", "Not known."),
+    ],
+)
+def test_calibration_and_machine_are_asked_about_by_name(
+    fit: str, is_valid: str, of_machine: str, evaluated: Path
+) -> None:
+    """An answer about the readings is none about the machine, and rests on it."""
+    sd.write_calibration(sd.read_calibration("calibration.nc").judged(fit, ["x"]), "judged.nc")
+    text = page_of(calibration=Path("judged.nc"), limit=0.001).text
+    assert f"The machine Is the machine within 1 µm? {of_machine}" in text
+    assert f"The calibration Is this calibration valid? {is_valid}" in text
+    assert ("This does not tell how accurate the machine is." in text) == (fit == "accepted")
+    without = page_of(calibration=Path("judged.nc")).text
+    assert "Is the machine within its limit? Not asked: the report was made without a limit." in without
+
+
+def test_unverified_calibration_is_not_called_valid(evaluated: Path) -> None:
+    sd.read_calibration("calibration.nc").judged("accepted", []).write("sound.csv")
+    lines = Path("sound.csv").read_text().splitlines(keepends=True)
+    Path("old.csv").write_text("".join(line for line in lines if "sha256=" not in line or "_sha256" in line))
+    page = page_of(calibration=Path("old.csv"))
+    assert page.text.startswith("Calibration UNVERIFIED: its values may have been changed")
+    assert "Calibration valid" not in page.text
+    assert "Is this calibration valid? Not known. The readings agree" in page.text
+
+
+@pytest.mark.parametrize("fit", ["accepted", "doubtful", "unchecked", "rejected"])
+def test_what_is_not_valid_is_stamped_on_screen_and_on_paper(fit: str, evaluated: Path) -> None:
+    sd.write_calibration(sd.read_calibration("calibration.nc").judged(fit, ["x"]), "judged.nc")
+    text = report_page(ReportRequest(calibration=Path("judged.nc")), Path("report.html"))[0]
+    is_valid = fit == "accepted"
+    assert (f'<p class="stamp {fit}"' in text) != is_valid
+    assert (f"@top-center {{ content: 'Calibration {fit.upper()}: " in text) != is_valid
+    sd.write_calibration(sd.read_calibration("calibration.nc").judged("accepted", []), "sound.nc")
+    earlier = ReportRequest(calibration=Path("sound.nc"), before=Path("judged.nc"))
+    said = f"@top-center {{ content: 'The earlier calibration is {fit.upper()}: "
+    assert (said in report_page(earlier, Path("report.html"))[0]) != is_valid
 
 
 def test_mistake_is_said_beside_the_verdict(here: Path) -> None:
@@ -238,7 +283,7 @@ def test_mistake_is_said_beside_the_verdict(here: Path) -> None:
         assert main(["evaluate", "scenario.toml", "run.csv", "-o", name]) == 3
         page = page_of(calibration=Path(name), scenario=Path("scenario.toml"), run=Path("run.csv"))
         said = page.text.index("mistake explains the readings: the head is turned by 180° about its beam")
-        assert page.text.index("Fit REJECTED") < said < page.text.index("Summary")
+        assert page.text.index("Calibration REJECTED") < said < page.text.index("Summary")
         assert page.text.count("mistake explains the readings") == 1, "of the file's reasons"
         assert "Turn the head, or in the run multiply alpha_urad, beta_urad by -1." in page.text
 
@@ -322,6 +367,7 @@ def test_what_is_not_determined_is_said_where_it_counts(here: Path) -> None:
 
 
 def test_error_in_the_volume_is_that_of_the_volume_command(evaluated: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sd.write_calibration(sd.read_calibration("calibration.nc").judged("accepted", []), "calibration.nc")
     page = page_of(calibration=Path("calibration.nc"), limit=0.02)
     found = sd.volume_errors(sd.read_calibration("calibration.nc"))
     assert main(["volume", "calibration.nc", "--limit", "20", "--json"]) == 0
@@ -329,7 +375,7 @@ def test_error_in_the_volume_is_that_of_the_volume_command(evaluated: Path, caps
     drawn = json.loads(page.scripts["stepdiag-volume"])
     # Drawings are rounded to 0.1 nm.
     np.testing.assert_allclose(drawn["worst"]["error_um"], 1e3 * found.largest_components, rtol=0.0, atol=5.1e-5)
-    assert re.search(r"Within 20 µm\? No\. The largest error is above \d+\.\d+ µm \(95 %\)", page.text)
+    assert re.search(r"Is the machine within 20 µm\? No\. The largest error is above \d+\.\d+ µm \(95 %\)", page.text)
     for wrong in (0.0, -1.0, float("nan")):
         with pytest.raises(InvalidArgument, match="`limit`: expected a length "):
             page_of(calibration=Path("calibration.nc"), limit=wrong)
