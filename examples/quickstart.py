@@ -22,3 +22,7 @@ for method in ("conventional", "enhanced", "adjustment"):
 found = sd.adjust(run, plan, head, machine.chain)
 tilts = [e.value * 1e6 for e in found.setup if e.line == "ppp" and e.quantity == "reflector"]
 print(f"the mirror stood at {tilts[0]:.3f}, {tilts[1]:.3f} µrad on ppp")
+
+scenario = sd.read_scenario("examples/scenario.toml")
+judged = sd.judge(scenario, sd.simulate_scenario(scenario))
+print(f"the run of examples/scenario.toml is {judged.fit}")

@@ -18,11 +18,12 @@ def output_of(*arguments: str | Path) -> str:
 
 def test_quickstart_shows_that_each_method_is_better_than_the_one_before() -> None:
     lines = output_of(EXAMPLES / "quickstart.py").splitlines()
-    conventional, enhanced, adjustment, mirror = lines
+    conventional, enhanced, adjustment, mirror, judged = lines
     assert conventional.startswith("conventional: positioning known to 100.0")
     assert enhanced.startswith("enhanced: positioning known to 0.0")
     assert adjustment == "adjustment: positioning known to 0.000000 µm"
     assert mirror == "the mirror stood at 100.000, 300.000 µrad on ppp"
+    assert judged == "the run of examples/scenario.toml is accepted"
     readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
     assert "\n".join(f"    {line}" for line in lines) in readme
     code = (EXAMPLES / "quickstart.py").read_text(encoding="utf-8")

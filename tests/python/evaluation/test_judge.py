@@ -1,0 +1,101 @@
+"""One judgement: evaluate, check, report and the library give the same verdict for the same run."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mistaken import changed
+from small_scenario import SCENARIO
+
+import stepdiag as sd
+from stepdiag.cli import main
+
+STATED = SCENARIO.replace("seed = 3", "tilt_urad = 1.0\nseed = 3")
+
+
+def times(factor: float, *names: str) -> Callable[[sd.Measurement], sd.Measurement]:
+    return lambda run: changed(run, {name: factor * run.channels[name] for name in names})
+
+
+def wrong(name: str, rows: slice, size: float) -> Callable[[sd.Measurement], sd.Measurement]:
+    def with_fault(run: sd.Measurement) -> sd.Measurement:
+        values = np.array(run.channels[name])
+        values[rows] += size
+        return changed(run, {name: values})
+
+    return with_fault
+
+
+RUNS = {
+    "sound": lambda run: run,
+    "tilts with the wrong sign": times(-1.0, "alpha", "beta"),
+    "tilts too large": times(2.0, "alpha", "beta"),
+    "one wrong tilt": wrong("alpha", slice(7, 8), 1e-4),
+    "three wrong tilts": wrong("beta", slice(4, 40, 12), 2e-4),
+    "a slip of distances": wrong("distance", slice(6, 16), 3e-3),
+    "a wrong distance": wrong("distance", slice(5, 6), 1e-2),
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    Path("scenario.toml").write_text(STATED)
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_every_way_gives_the_same_verdict(folder: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    scenario = sd.read_scenario("scenario.toml")
+    RUNS[name](sd.simulate_scenario(scenario)).write("run.csv")
+    judged = sd.judge(scenario, sd.read_measurement("run.csv"))
+
+    main(["evaluate", "scenario.toml", "run.csv", "-o", "calibration.csv", "--json"])
+    evaluated = json.loads(capsys.readouterr().out)
+    assert evaluated["fit"]["verdict"] == judged.fit
+    written = sd.read_calibration("calibration.csv")
+    assert written.fit == judged.fit
+    assert written.fit_reasons == judged.reasons
+
+    main(["check", "scenario.toml", "run.csv"])
+    fit = {"rejected": "REJECTED"}.get(judged.fit, judged.fit)
+    assert f"fit: {fit}" in capsys.readouterr().out
+
+    assert main(
+        ["report", "calibration.csv", "--scenario", "scenario.toml", "--run", "run.csv", "-o", "report.html"]
+    ) in (
+        0,
+        3,
+    )
+    page = Path("report.html").read_text()
+    for found in judged.mistakes if judged.fit in ("doubtful", "rejected") else ():
+        assert found.text.replace("'", "&#x27;").replace("'", "&#39;") in page or found.text in page
+
+
+def test_a_mistake_rejects_the_run_and_is_its_first_reason(folder: Path) -> None:
+    scenario = sd.read_scenario("scenario.toml")
+    judged = sd.judge(scenario, RUNS["tilts with the wrong sign"](sd.simulate_scenario(scenario)))
+    assert judged.fit == "rejected"
+    assert judged.mistakes
+    assert judged.adjustment is not None
+    assert judged.adjustment.verdict.reasons[0].finding == "mistake"
+    assert judged.reasons[0].startswith("a mistake explains the readings: the head is turned by 180°")
+
+
+@pytest.mark.parametrize("method", ["enhanced", "conventional"])
+def test_a_linear_method_has_the_worse_of_both_verdicts(folder: Path, method: str) -> None:
+    scenario = sd.read_scenario("scenario.toml")
+    run = sd.simulate_scenario(scenario)
+    sound = sd.judge(scenario, run, method=method)  # type: ignore[arg-type]
+    assert sound.adjustment is not None
+    assert sound.adjustment.verdict.fit == sd.judge(scenario, run).fit
+    assert not sound.mistakes
+    mistaken = RUNS["tilts with the wrong sign"](run)
+    assert sd.judge(scenario, mistaken, method=method).fit == "rejected"  # type: ignore[arg-type]
+
+
+def test_thresholds_are_those_of_the_core() -> None:
+    assert sd._core.thresholds.fault == 28.0
+    assert sd._core.thresholds.largest_variance_factor == sd._core.thresholds.largest_noise_factor**2
