@@ -23,8 +23,8 @@
 #include "stepdiag/machine/parameter_table.hpp"
 #include "stepdiag/version.hpp"
 #ifdef STEPDIAG_WHOLE_LIBRARY
-#include "stepdiag/diagnosis/adjust.hpp"
 #include "stepdiag/core/instruction_set.hpp"
+#include "stepdiag/diagnosis/adjust.hpp"
 #endif
 
 using namespace stepdiag;

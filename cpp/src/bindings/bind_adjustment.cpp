@@ -87,7 +87,7 @@ void bind_thresholds(py::module_& m) {
     py::class_<Thresholds> bound(m, "Thresholds",
                                  "Every limit that a verdict, or the search for faults and mistakes, is made with. "
                                  "thresholds has the values in force.");
-    const auto add = [&](const char* name, double Thresholds::*value, const char* doc) {
+    const auto add = [&](const char* name, double Thresholds::* value, const char* doc) {
         bound.def_readonly(name, value, doc);
     };
     add("largest_noise_factor", &Thresholds::largest_noise_factor, "Beyond it a fit is rejected.");
@@ -95,8 +95,7 @@ void bind_thresholds(py::module_& m) {
         "Probability of a misfit below which a fit is rejected, where the misfit also differs between lines, channels "
         "or times.");
     add("misfit_doubtful", &Thresholds::misfit_doubtful, "Probability of a misfit below which a fit is doubtful.");
-    add("no_misfit_doubtful", &Thresholds::no_misfit_doubtful,
-        "The same above which there is less noise than stated.");
+    add("no_misfit_doubtful", &Thresholds::no_misfit_doubtful, "The same above which there is less noise than stated.");
     add("pattern", &Thresholds::pattern, "Probability of a pattern of residuals, where chi-square finds a misfit.");
     add("pattern_alone", &Thresholds::pattern_alone, "The same, where it finds none.");
     add("rounding_alone", &Thresholds::rounding_alone, "Rms of residuals in units of their rounding.");

@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "stepdiag/diagnosis/adjust.hpp"
 #include "stepdiag/core/error.hpp"
+#include "stepdiag/diagnosis/adjust.hpp"
 #include "stepdiag/machine/chain.hpp"
 #include "stepdiag/optics/body.hpp"
 #include "stepdiag/simulation/simulate.hpp"

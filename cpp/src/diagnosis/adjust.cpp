@@ -5,11 +5,11 @@
 
 #include "adjustment/adjustment_result.hpp"
 #include "adjustment/considered.hpp"
+#include "adjustment/smoothness.hpp"
 #include "diagnosis/fault_search.hpp"
 #include "diagnosis/fault_tests.hpp"
 #include "diagnosis/prior_scatter.hpp"
 #include "diagnosis/reliability.hpp"
-#include "adjustment/smoothness.hpp"
 #include "diagnosis/verdict.hpp"
 #include "evaluation/fit_test.hpp"
 #include "stepdiag/core/error.hpp"
@@ -66,8 +66,7 @@ std::vector<FitReason> coefficients_in_place_of_faults(const AdjustmentProblem& 
     double of_readings = without.square_sum();
     for (const CoefficientUnknown& of : of_all.coefficients())
         of_readings -= std::pow(without.x()[of.unknown] / of.prior, 2);
-    if (of_readings > found.weighted_square_sum + thresholds.fault * std::max(1.0, found.variance_factor()))
-        return {};
+    if (of_readings > found.weighted_square_sum + thresholds.fault * std::max(1.0, found.variance_factor())) return {};
     return far_coefficients(expansion_estimates(without.problem(), without.x(), without.inverse()),
                             drift_estimates(without.problem(), without.x(), without.inverse()));
 }

@@ -383,7 +383,8 @@ std::optional<FaultSearch::Found> FaultSearch::class_of(int number, const Soluti
     std::vector<Candidate> members;
     for (const int h : order) {
         const double less = best - tested.tests->scores()[h].gain;
-        const bool may_be = best > thresholds.second_order && members.size() < most_exact && less < behind + second_order * best;
+        const bool may_be =
+            best > thresholds.second_order && members.size() < most_exact && less < behind + second_order * best;
         if (members.size() < most_members && (less < behind || may_be)) members.push_back(tested.candidate(h));
     }
     if (best > thresholds.second_order && tested.noise_beside(best) <= thresholds.largest_variance_factor()) {

@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "adjustment/adjustment_result.hpp"
-#include "diagnosis/fault_tests.hpp"
 #include "adjustment/solution.hpp"
+#include "diagnosis/fault_tests.hpp"
 
 namespace stepdiag {
 

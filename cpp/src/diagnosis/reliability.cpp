@@ -12,8 +12,8 @@
 namespace stepdiag {
 namespace {
 
-constexpr double twin = 0.999;               // correlation
-constexpr double most_numbers = 4e6;         // of effects kept
+constexpr double twin = 0.999;        // correlation
+constexpr double most_numbers = 4e6;  // of effects kept
 constexpr std::size_t fewest_places = 200;
 
 using Effect = FaultControl::Effect;

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "adjustment/adjustment_result.hpp"
-#include "diagnosis/fault_tests.hpp"
 #include "adjustment/solution.hpp"
+#include "diagnosis/fault_tests.hpp"
 
 namespace stepdiag {
 

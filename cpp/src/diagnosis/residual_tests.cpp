@@ -8,7 +8,6 @@
 #include <unsupported/Eigen/SpecialFunctions>
 
 #include "diagnosis/fault_tests.hpp"
-
 #include "stepdiag/evaluation/thresholds.hpp"
 
 namespace stepdiag {

@@ -22,7 +22,8 @@ FitReason noise(FitFinding finding, const Adjustment& adjustment) {
 
 void compare_with_stated_noise(const Adjustment& adjustment, std::vector<FitReason>& reasons) {
     const double factor = noise_factor(adjustment);
-    if (!(factor <= thresholds.largest_noise_factor)) reasons.push_back({FitFinding::noise_factor, factor, thresholds.largest_noise_factor});
+    if (!(factor <= thresholds.largest_noise_factor))
+        reasons.push_back({FitFinding::noise_factor, factor, thresholds.largest_noise_factor});
 }
 
 void take_patterns(const std::vector<ResidualPattern>& patterns, double limit, std::vector<FitReason>& reasons) {
@@ -44,7 +45,8 @@ void compare_with_priors(const Adjustment& adjustment, std::vector<FitReason>& r
         if (!e.value || !std::isfinite(e.prior) || e.prior == 0.0) continue;
         const double distance = distance_from_prior(*e.value, e.standard_uncertainty, e.prior);
         if (!(distance <= thresholds.farthest_prior))
-            reasons.push_back({FitFinding::prior, distance, thresholds.farthest_prior, e.line, name(e.quantity), e.component});
+            reasons.push_back(
+                {FitFinding::prior, distance, thresholds.farthest_prior, e.line, name(e.quantity), e.component});
     }
     for (const FitReason& reason : far_coefficients(adjustment.expansion, adjustment.machine_drift))
         reasons.push_back(reason);

@@ -47,7 +47,8 @@ Fit fit_of_noise(double square_sum, int freedom) {
     if (freedom <= 0) return Fit::unchecked;
     if (!(std::sqrt(square_sum / freedom) <= thresholds.largest_noise_factor)) return Fit::rejected;
     const double probability = chi_square_probability(square_sum, freedom);
-    return probability >= thresholds.misfit_doubtful && probability <= thresholds.no_misfit_doubtful ? Fit::accepted : Fit::doubtful;
+    return probability >= thresholds.misfit_doubtful && probability <= thresholds.no_misfit_doubtful ? Fit::accepted
+                                                                                                     : Fit::doubtful;
 }
 
 ChiSquare chi_square(const Eigen::VectorXd& values, const Eigen::MatrixXd& covariance) {

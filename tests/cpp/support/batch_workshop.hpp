@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "stepdiag/diagnosis/adjust.hpp"
 #include "stepdiag/batch/batch_evaluator.hpp"
 #include "stepdiag/core/random_blocks.hpp"
+#include "stepdiag/diagnosis/adjust.hpp"
 #include "stepdiag/simulation/simulate.hpp"
 #include "support/usual.hpp"
 

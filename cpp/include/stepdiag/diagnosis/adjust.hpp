@@ -1,5 +1,5 @@
-// Adjusts a run and judges the fit: search for faults of readings, exact adjustment with what was done about them, tests
-// of what is left, verdict (docs/conventions.md, "Verdict of a fit").
+// Adjusts a run and judges the fit: search for faults of readings, exact adjustment with what was done about them,
+// tests of what is left, verdict (docs/conventions.md, "Verdict of a fit").
 #pragma once
 
 #include "stepdiag/adjustment/options.hpp"
@@ -15,7 +15,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
 
 // What a caller found beside the numbers of an adjustment: in words, which adjust() does not make.
 struct FoundBeside {
-    std::string mistake = {};                         // that would explain the run: the fit is rejected
+    std::string mistake = {};                          // that would explain the run: the fit is rejected
     std::vector<std::string> implausible_inputs = {};  // that no workshop has: it is doubtful at best
 };
 // The same adjustment, judged with that: its verdict, and the fit that its calibration carries.

@@ -6,9 +6,9 @@ namespace stepdiag {
 
 struct Thresholds {
     // Noise. A noise factor is the square root of a variance factor; probabilities are of a misfit at least as large.
-    double largest_noise_factor = 3.0;  // beyond it the fit is rejected
-    double misfit_rejected = 3e-4;      // below it, where the misfit also differs between lines, channels or times
-    double misfit_doubtful = 1e-2;      // below it
+    double largest_noise_factor = 3.0;       // beyond it the fit is rejected
+    double misfit_rejected = 3e-4;           // below it, where the misfit also differs between lines, channels or times
+    double misfit_doubtful = 1e-2;           // below it
     double no_misfit_doubtful = 1.0 - 1e-3;  // above it: less noise than stated
     // Of the most conspicuous of all patterns of residuals: where chi-square finds a misfit, and where it does not.
     double pattern = 1e-2, pattern_alone = 3e-3;
@@ -20,12 +20,12 @@ struct Thresholds {
     double prior_scatter_rejected = 1e-6;  // probability, as of a single value beyond five
 
     // Faults and mistakes, in chi-square.
-    double fault = 28.0;        // least gain of a fault
-    double alternative = 25.0;  // what is less behind the best may be it
+    double fault = 28.0;           // least gain of a fault
+    double alternative = 25.0;     // what is less behind the best may be it
     double second_order = 1000.0;  // gain from which second order may tell faults apart
     double gross_scatter = 25.0;   // of the square sum a reading: values far from any machine
-    double mistake = 60.0;  // least gain of a mistake in the whole run
-    double chance = 9.0;    // difference that does not make one mistake better than another
+    double mistake = 60.0;         // least gain of a mistake in the whole run
+    double chance = 9.0;           // difference that does not make one mistake better than another
     // Power: square root of the noncentrality with which a fault is found with 99 %, sqrt(28) + 2.3.
     double found_with_99_percent = 7.6;
 
