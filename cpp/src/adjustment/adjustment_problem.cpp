@@ -188,6 +188,7 @@ AdjustmentProblem::AdjustmentProblem(const Measurement& measurement, const Plan&
     collect_setups(measurement, options);
     collect_points(measurement, options);
     round_uncertainties();
+    weigh(options.noise);
     number_unknowns(options, elimination);
 }
 
@@ -265,7 +266,8 @@ void AdjustmentProblem::collect_points(const Measurement& measurement, const Adj
         for (int c = 0; c < int(names.size()); ++c)
             if (const auto raw =
                     raw_value(measurement.find(names[c]), row, usual_uncertainty(options.uncertainty, names[c])))
-                readings_.push_back({row, c, usable(*raw, measurement, row, names[c]), raw->standard_uncertainty});
+                readings_.push_back({row, c, usable(*raw, measurement, row, names[c]), raw->standard_uncertainty,
+                                     raw->standard_uncertainty});
         point.end_reading = int(readings_.size());
         if (point.end_reading == point.first_reading) continue;
 
@@ -327,6 +329,7 @@ void AdjustmentProblem::round_uncertainties() {
                 reading.of_doubles = double_rounding(kind_, c, longest(point));
                 reading.rounding = std::max(reading.of_doubles, step / std::sqrt(12.0));
                 double least = std::max(reading.rounding, beams);
+                reading.noise = std::max(reading.noise, reading.rounding);
                 if (c == 0 && count > 0) least = std::max(least, tilts / count * longest(point) / widest_weights);
                 if (!(reading.standard_uncertainty < least)) continue;
                 rounded.stated = reading.standard_uncertainty;
@@ -539,6 +542,27 @@ void AdjustmentProblem::estimate(std::vector<EstimatedFault> faults) {
         change_scale_.push_back(is_length(readings_[fault.pattern.readings.front()]) ? 1.0 / metre : 1.0);
     }
     faults_ = std::move(faults);
+}
+
+std::string AdjustmentProblem::noise_channel(const AdjustedReading& reading) const {
+    return kind_ == HeadLayout::multi_beam ? std::string("distance") : channel_name(reading);
+}
+
+void AdjustmentProblem::weigh(const std::vector<NoiseFactor>& noise) {
+    if (noise.empty()) return;
+    for (const AdjustedPoint& point : points_) {
+        const std::string line = setups_[point.setup].line.name();
+        for (int r = point.first_reading; r < point.end_reading; ++r) {
+            const std::string channel = noise_channel(readings_[r]);
+            const NoiseFactor* of_reading = nullptr;
+            for (const NoiseFactor& each : noise)
+                if (each.channel == channel && (each.line == line || (each.line.empty() && !of_reading)))
+                    of_reading = &each;
+            if (!of_reading) continue;
+            AdjustedReading& reading = readings_[r];
+            reading.standard_uncertainty = std::max(reading.standard_uncertainty, reading.noise * of_reading->factor);
+        }
+    }
 }
 
 bool AdjustmentProblem::is_length(const AdjustedReading& reading) const {

@@ -48,7 +48,8 @@ struct AdjustedReading {
     std::size_t row;
     int channel;  // of the head: a row of the model
     double value;
-    double standard_uncertainty;  // what is stated, or its rounding where that is more
+    double noise;                 // standard uncertainty: what is stated, or its rounding where that is more
+    double standard_uncertainty;  // the same times a noise factor, or what the solution can bear where that is more
     double of_doubles = 0.0;      // standard uncertainty by the rounding of doubles, in it and in its model
     double rounding = 0.0;        // the same, or by the decimals of the file where that is more
     int outlier = 0;              // as in ReadingResidual
@@ -119,6 +120,8 @@ public:
     bool has_rotations() const { return rotations_; }
     std::string channel_name(const AdjustedReading& reading) const;
     bool is_length(const AdjustedReading& reading) const;  // mm rather than rad
+    std::string noise_channel(const AdjustedReading& reading) const;  // of NoiseFactor
+    void weigh(const std::vector<NoiseFactor>& noise);                // instead of what it was weighed with before
     // Channels of which stated uncertainties were below the rounding of readings.
     const std::vector<RoundedChannel>& rounded() const { return rounded_; }
 

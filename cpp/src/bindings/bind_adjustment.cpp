@@ -95,6 +95,10 @@ void bind_thresholds(py::module_& m) {
         "Probability of a misfit below which a fit is rejected, where the misfit also differs between lines, channels "
         "or times.");
     add("misfit_doubtful", &Thresholds::misfit_doubtful, "Probability of a misfit below which a fit is doubtful.");
+    add("noise_component", &Thresholds::noise_component,
+        "Probability below which the scatter of a channel is taken for its noise.");
+    add("widest_component", &Thresholds::widest_component,
+        "Largest relative standard uncertainty of a noise factor that is used.");
     add("no_misfit_doubtful", &Thresholds::no_misfit_doubtful, "The same above which there is less noise than stated.");
     add("pattern", &Thresholds::pattern, "Probability of a pattern of residuals, where chi-square finds a misfit.");
     add("pattern_alone", &Thresholds::pattern_alone, "The same, where it finds none.");
@@ -179,6 +183,12 @@ void bind_options(py::module_& m) {
         .def_readonly("record", &MachineDrift::record);
 
     const AdjustmentOptions usual;
+    py::class_<NoiseFactor>(m, "NoiseFactor",
+                            "What the stated standard uncertainties of a channel's readings are multiplied by.")
+        .def_readonly("channel", &NoiseFactor::channel, "\"distance\" (of beams, too), \"alpha\", ...")
+        .def_readonly("line", &NoiseFactor::line, "Empty: all lines that have no factor of their own.")
+        .def_readonly("factor", &NoiseFactor::factor);
+
     py::class_<AdjustmentOptions>(
         m, "AdjustmentOptions",
         "What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all "
@@ -197,14 +207,17 @@ void bind_options(py::module_& m) {
         "reached "
         "soon, values are those that were, and rejected. distance_scale_uncertainty, air_index_uncertainty: relative "
         "standard uncertainties of all distances in common, by the instrument's scale and by the index of the air; "
-        "they count in the uncertainties only.")
+        "they count in the uncertainties only. noise: what stated standard uncertainties of readings are multiplied "
+        "by, as is known beforehand. variance_components: estimates how much each channel scatters, and takes that "
+        "for its noise where it is more than is stated.")
         .def(py::init([](const ReadingUncertainty& uncertainty, const Priors& setup,
                          const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
                          bool rotations, const std::optional<Smoothness>& smoothness, double outlier_probability,
                          const std::string& slips, bool scale_uncertainty, bool full_covariance,
                          const PlausibleLimits& plausible, const std::optional<KnownExpansion>& expansion,
                          const std::optional<MachineDrift>& machine_drift, bool reliability, bool search_faults,
-                         double distance_scale_uncertainty, double air_index_uncertainty) {
+                         double distance_scale_uncertainty, double air_index_uncertainty,
+                         const std::vector<NoiseFactor>& noise, bool variance_components) {
                  AdjustmentOptions options{uncertainty,
                                            setup.value,
                                            {},
@@ -222,7 +235,9 @@ void bind_options(py::module_& m) {
                                            reliability,
                                            search_faults,
                                            distance_scale_uncertainty,
-                                           air_index_uncertainty};
+                                           air_index_uncertainty,
+                                           noise,
+                                           variance_components};
                  for (const auto& [line, priors] : setup_by_line) options.setup_by_line[line] = priors.value;
                  return options;
              }),
@@ -236,7 +251,8 @@ void bind_options(py::module_& m) {
              py::arg("machine_drift") = std::nullopt, py::arg("reliability") = usual.reliability,
              py::arg("search_faults") = usual.search_faults,
              py::arg("distance_scale_uncertainty") = usual.distance_scale_uncertainty,
-             py::arg("air_index_uncertainty") = usual.air_index_uncertainty, "adjust() checks them.")
+             py::arg("air_index_uncertainty") = usual.air_index_uncertainty, py::arg("noise") = usual.noise,
+             py::arg("variance_components") = usual.variance_components, "adjust() checks them.")
         .def_readonly("uncertainty", &AdjustmentOptions::uncertainty)
         .def_property_readonly("setup", [](const AdjustmentOptions& o) { return Priors{o.setup}; })
         .def_property_readonly("setup_by_line",
@@ -261,7 +277,9 @@ void bind_options(py::module_& m) {
         .def_readonly("reliability", &AdjustmentOptions::reliability)
         .def_readonly("search_faults", &AdjustmentOptions::search_faults)
         .def_readonly("distance_scale_uncertainty", &AdjustmentOptions::distance_scale_uncertainty)
-        .def_readonly("air_index_uncertainty", &AdjustmentOptions::air_index_uncertainty);
+        .def_readonly("air_index_uncertainty", &AdjustmentOptions::air_index_uncertainty)
+        .def_readonly("noise", &AdjustmentOptions::noise)
+        .def_readonly("variance_components", &AdjustmentOptions::variance_components);
 }
 
 void bind_result(py::module_& m) {
@@ -302,6 +320,13 @@ void bind_result(py::module_& m) {
         .def_readonly("value", &DriftEstimate::value, "mm/s")
         .def_readonly("standard_uncertainty", &DriftEstimate::standard_uncertainty, "mm/s")
         .def_readonly("prior", &DriftEstimate::prior, "Standard uncertainty of its prior.");
+
+    py::class_<VarianceComponent>(m, "VarianceComponent",
+                                  "How much the readings of a channel scatter, as their residuals tell it.")
+        .def_readonly("noise", &VarianceComponent::noise, "Root of the component: times what is stated.")
+        .def_readonly("standard_uncertainty", &VarianceComponent::standard_uncertainty, "Of the factor.")
+        .def_readonly("used", &VarianceComponent::used,
+                      "Stated uncertainties were multiplied by it; otherwise they stayed.");
 
     py::class_<Outlier>(m, "Outlier", "A reading that was left out.")
         .def_readonly("row", &Outlier::row, "Row of the measurement, from 0.")
@@ -462,6 +487,9 @@ void bind_result(py::module_& m) {
         .def_property_readonly(
             "expansion", [](const AdjustmentOfRun& a) { return a.adjustment.expansion; },
             "Expansion coefficients that were unknowns.")
+        .def_property_readonly(
+            "variance_components", [](const AdjustmentOfRun& a) { return a.adjustment.variance_components; },
+            "VarianceComponent of each channel, and of its lines that scatter otherwise; of what others control.")
         .def_property_readonly(
             "rounded", [](const AdjustmentOfRun& a) { return a.adjustment.rounded; },
             "Channels of which the stated uncertainties are below what their numbers, or double precision, can bear; "

@@ -10,6 +10,7 @@
 #include "diagnosis/fault_tests.hpp"
 #include "diagnosis/prior_scatter.hpp"
 #include "diagnosis/reliability.hpp"
+#include "diagnosis/variance_components.hpp"
 #include "diagnosis/verdict.hpp"
 #include "evaluation/fit_test.hpp"
 #include "stepdiag/core/error.hpp"
@@ -91,6 +92,108 @@ double residual_rounding(const NormalEquations& equations) {
                                                            "readings"));
 }
 
+using SolutionPointer = std::shared_ptr<Solution>;
+
+// What a run is adjusted to: each channel with its noise, and with what was done about faults.
+struct Found {
+    SolutionPointer solution = nullptr;  // none where no minimum is reached
+    std::optional<FaultSearch> faults = {};
+    std::vector<ScatterOfChannel> scatter = {};
+};
+
+// Where nobody will use what comes out: a second's worth.
+SolutionPointer solved_soon(const AdjustmentProblem& problem, const AdjustmentOptions& options) {
+    constexpr int least_soon = 40, work = 40'000, rough = 10;
+    const int soon = std::clamp(work / problem.size(), least_soon, GaussNewton::usual_most_steps);
+    auto solution = std::make_shared<Solution>(problem, smoothness_at_start(options));
+    return solution->solve_from_zero(soon) || solution->go_from_zero(rough) ? solution : nullptr;
+}
+
+SolutionPointer solved(const AdjustmentProblem& problem, const AdjustmentOptions& options) {
+    auto solution = std::make_shared<Solution>(problem, smoothness_at_start(options));
+    return solution->solve_from_zero() ? solution : nullptr;
+}
+
+// Nothing but noise, beyond what is credible.
+bool is_noise_alone(const std::vector<ScatterOfChannel>& scatter) {
+    return std::all_of(scatter.begin(), scatter.end(), [](const auto& each) { return each.is_noise; }) &&
+           std::any_of(scatter.begin(), scatter.end(), [](const auto& each) {
+               return each.is_significant && each.component.noise.factor > thresholds.largest_noise_factor;
+           });
+}
+
+bool is_odd(const std::vector<ScatterOfChannel>& scatter) {
+    return std::any_of(scatter.begin(), scatter.end(),
+                       [](const auto& each) { return each.probability < odd_scatter; });
+}
+
+// Distances that are taken for far better than they are decide what tilts have to say, so that nothing controls them
+// any more. Taken for far worse, they show their scatter: the factor that they come down to, or none.
+std::vector<NoiseFactor> noise_of_loose_distances(const AdjustmentProblem& of_all, const AdjustmentOptions& options) {
+    constexpr int most_rounds = 10;
+    constexpr double loose = 1000.0, at_once = 0.1;  // what tilts do to distances hides a scatter that is far below
+    std::vector<NoiseFactor> noise{{"distance", "", loose}};
+    for (int round = 0; round < most_rounds; ++round) {
+        AdjustmentProblem problem = of_all;
+        problem.weigh(noise);
+        const SolutionPointer solution = solved(problem, options);
+        if (!solution) break;
+        std::vector<NoiseFactor> next;
+        for (const ScatterOfChannel& each : scatter_of_channels(*solution, noise))
+            if (each.component.noise.channel == "distance" && each.component.noise.line.empty())
+                next.push_back(each.component.noise);
+        if (next.empty()) break;
+        double& factor = next.front().factor;
+        factor = std::max(factor, at_once * noise.front().factor);
+        if (factor <= 1.0) break;
+        if (are_alike(noise, next)) return next;
+        noise = next;
+    }
+    return {};
+}
+
+// Scatter comes before faults: channels that scatter more than stated are weighed with that, and faults are sought as
+// far as they stand out of it; beyond what is credible it is noise, and none is sought. Where faults were found, the
+// channels' scatter is looked at again.
+Found find(const AdjustmentProblem& of_all, const AdjustmentOptions& options) {
+    constexpr int most_rounds = 6, most_searches = 3;
+    Found found;
+    AdjustmentProblem problem = of_all;
+    if (!options.search_faults) {
+        found.solution = solved_soon(problem, options);
+        found.faults.emplace(problem, options, smoothness_at_start(options));
+        return found;
+    }
+    SolutionPointer plain = solved(problem, options);
+    std::vector<NoiseFactor> noise;
+    // Looks at the scatter; false where the readings are weighed with it already.
+    const auto weigh = [&](Solution& solution) {
+        found.scatter = scatter_of_channels(solution, noise);
+        std::vector<NoiseFactor> next = to_weigh(found.scatter);
+        if (are_alike(noise, next)) return false;
+        noise = std::move(next);
+        problem = of_all;
+        problem.weigh(noise);
+        plain = solved(problem, options);
+        return true;
+    };
+    if (options.variance_components) {
+        if (plain) found.scatter = scatter_of_channels(*plain, noise);
+        if (!plain || is_odd(found.scatter)) noise = noise_of_loose_distances(of_all, options);
+        if (!noise.empty()) {
+            problem.weigh(noise);
+            plain = solved(problem, options);
+        }
+        for (int round = 0; round < most_rounds && plain && weigh(*plain); ++round) {}
+    }
+    for (int search = 0;; ++search) {
+        found.faults.emplace(problem, options, smoothness_at_start(options));
+        found.solution = plain && is_noise_alone(found.scatter) ? plain : found.faults->run(plain);
+        const bool is_done = !options.variance_components || !found.solution || found.solution == plain;
+        if (is_done || search == most_searches || !weigh(*found.solution)) return found;
+    }
+}
+
 }  // namespace
 
 Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain& chain, const Eigen::Vector3d& tool,
@@ -102,8 +205,9 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
         throw InvalidArgument("adjustment: nothing can be determined: the run has no readings that count");
     refuse_foreign_distances(measurement, plan);
 
-    FaultSearch faults(of_all, options, smoothness_at_start(options));
-    const std::shared_ptr<Solution> solution = faults.run();
+    Found found = find(of_all, options);
+    FaultSearch& faults = *found.faults;
+    const SolutionPointer solution = found.solution;
     if (!solution) refuse_unsolved(measurement, plan);
     const AdjustmentProblem& problem = solution->problem();
     const Observability& observability = solution->observability();
@@ -132,6 +236,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     result.residuals = reading_residuals(solver.equations(), solution->reading_variances());
     std::stable_sort(result.residuals.begin(), result.residuals.end(),
                      [](const ReadingResidual& a, const ReadingResidual& b) { return a.row < b.row; });
+    for (const ScatterOfChannel& each : found.scatter) result.variance_components.push_back(each.component);
     result.combinations = known_combinations(observability, x, inverse);
     result.weighted_square_sum = solver.equations().square_sum(x);
     result.degrees_of_freedom = solution->degrees_of_freedom();

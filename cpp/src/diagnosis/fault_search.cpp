@@ -59,14 +59,9 @@ FaultSearch::FaultSearch(const AdjustmentProblem& problem, const AdjustmentOptio
     most_ = std::max(10, int(problem.readings().size() / 50));
 }
 
-FaultSearch::SolutionPointer FaultSearch::run() {
+FaultSearch::SolutionPointer FaultSearch::run(SolutionPointer plain) {
     const bool corrects = options_.outlier_probability > 0.0;
-    // A second's worth, where nobody will use what comes out.
-    constexpr int least_soon = 40, work = 40'000, rough = 10;
-    const int soon = std::clamp(work / problem_.size(), least_soon, GaussNewton::usual_most_steps);
-    SolutionPointer plain = solution_of(handled()), solution;
-    if (!options_.search_faults) return plain->solve_from_zero(soon) || plain->go_from_zero(rough) ? plain : nullptr;
-    if (!plain->solve_from_zero()) plain.reset();
+    SolutionPointer solution;
     if (corrects && (!plain || plain->scatter() > thresholds.gross_scatter)) solution = without_gross(plain);
     if (!solution) solution = plain;
     if (!solution) return nullptr;

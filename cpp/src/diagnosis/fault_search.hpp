@@ -29,8 +29,9 @@ public:
     FaultSearch(const AdjustmentProblem& problem, const AdjustmentOptions& options,
                 const std::array<double, function_count>& smoothness);
 
-    // The adjustment with what was done about the faults; none where no minimum is reached.
-    std::shared_ptr<Solution> run();
+    // The adjustment with what was done about the faults; none where no minimum is reached. `plain`: the problem's own
+    // solution; none where its minimum is not reached.
+    std::shared_ptr<Solution> run(std::shared_ptr<Solution> plain);
     // What was found by then. `forms`: of which alternatives are compared.
     std::vector<FaultClass> classes(const Solution& solution, const CalibratedForms& forms,
                                     const Measurement& measurement) const;

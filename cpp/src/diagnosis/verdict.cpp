@@ -20,6 +20,18 @@ FitReason noise(FitFinding finding, const Adjustment& adjustment) {
     return reason;
 }
 
+// Of channels that scatter more than stated, and were weighed with that: those beyond what is credible, or the others.
+void take_components(const Adjustment& adjustment, bool beyond, std::vector<FitReason>& reasons) {
+    const double most = thresholds.largest_noise_factor;
+    for (const VarianceComponent& each : adjustment.variance_components) {
+        if (!each.used || (each.noise.factor > most) != beyond) continue;
+        FitReason reason{beyond ? FitFinding::noise_factor : FitFinding::misfit, each.noise.factor, beyond ? most : 1.0,
+                         each.noise.line, each.noise.channel};
+        reason.standard_uncertainty = each.standard_uncertainty;
+        reasons.push_back(reason);
+    }
+}
+
 void compare_with_stated_noise(const Adjustment& adjustment, std::vector<FitReason>& reasons) {
     const double factor = noise_factor(adjustment);
     if (!(factor <= thresholds.largest_noise_factor))
@@ -92,6 +104,7 @@ Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& 
     if (reasons.empty() && adjustment.degrees_of_freedom <= 0)
         return {Fit::unchecked, {{FitFinding::no_redundancy, 0.0, 1.0}}};
     const double probability = adjustment.chi_square_probability;
+    take_components(adjustment, true, reasons);
     compare_with_stated_noise(adjustment, reasons);
     if (!(probability >= thresholds.misfit_rejected)) take_patterns(patterns, thresholds.pattern, reasons);
     compare_with_priors(adjustment, reasons);
@@ -100,6 +113,7 @@ Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& 
     if (residual_rounding <= thresholds.rounding_alone && noise_factor(adjustment) < thresholds.far_below_stated)
         return {Fit::unchecked, {{FitFinding::no_noise, residual_rounding, thresholds.rounding_alone}}};
 
+    take_components(adjustment, false, reasons);
     if (!(probability >= thresholds.misfit_doubtful)) {
         take_patterns(patterns, thresholds.pattern, reasons);
         reasons.push_back(noise(FitFinding::misfit, adjustment));
@@ -136,6 +150,9 @@ Adjustment judge(Adjustment adjustment, const FoundBeside& beside) {
 
 void scale_uncertainties(Adjustment& adjustment) {
     const double factor = noise_factor(adjustment);
+    const auto& components = adjustment.variance_components;
+    if (std::any_of(components.begin(), components.end(), [](const VarianceComponent& each) { return each.used; }))
+        return;
     if (adjustment.degrees_of_freedom <= 0 || !(factor > 1.0)) return;
     Calibration& calibration = adjustment.calibration;
     const auto scale = [&](std::vector<double>& all) {

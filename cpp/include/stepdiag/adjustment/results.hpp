@@ -65,6 +65,13 @@ struct RoundedChannel {
     RoundingCause cause;
 };
 
+// How much the readings of a channel scatter, as their residuals tell it (diagnosis/variance_components.hpp).
+struct VarianceComponent {
+    NoiseFactor noise;            // root of the component: times what is stated
+    double standard_uncertainty;  // of the factor
+    bool used = false;            // stated uncertainties were multiplied by it; otherwise they stayed
+};
+
 // What may be wrong with the readings of one channel in one set-up. A slip is an offset of all of them from a point on,
 // in the order in which they were made: a fringe counter that lost count, a head that was knocked. A factor makes
 // distances too long by a part of the travel: the air of a single line, tilts whose zero is off (a distance is
@@ -110,8 +117,8 @@ struct FaultClass {
 enum class FitFinding {
     no_redundancy,  // nothing controls the readings
     no_noise,       // rms of the residuals in units of their rounding: a simulation without noise
-    noise_factor,   // root of the variance factor, beyond what is credible
-    misfit,         // root of the variance factor: the readings scatter by it more than stated
+    noise_factor,   // root of the variance factor, beyond what is credible; of a channel: of its variance component
+    misfit,         // the same, where the readings scatter more than stated
     no_misfit,      // root of the variance factor: the readings scatter by it less than stated
     uneven_misfit,  // root of the variance factor of one group of readings, where it differs from that of the others
     trend,          // residuals of one channel run with time or position: from the first reading to the last
@@ -140,10 +147,10 @@ struct FitReason {
     FitFinding finding;
     double value;  // of a trend mm or rad
     double limit;  // of an uneven misfit that of the other readings; of noise, trends, prior_scatter what is expected
-    std::string line = {};     // of an uneven misfit, a trend or a prior; empty: all
-    std::string channel = {};  // of an uneven misfit or a trend: "distance", ..., empty: all; of priors: the quantity
+    std::string line = {};     // of noise, a trend or a prior; empty: all
+    std::string channel = {};  // of noise or a trend: "distance", ..., empty: all; of priors: the quantity
     int component = 0;         // of a prior; of "expansion" the axis, -1: of all in common; of "machine_drift" the axis
-    double standard_uncertainty = 0.0;  // of the value of a misfit, no_misfit, trend, scaled
+    double standard_uncertainty = 0.0;  // of the value of noise, a trend, scaled
     int run = -1;                       // of an uneven misfit: this run alone; -1: all
     FitAspect aspect = FitAspect::whole;
     bool alternative = false;    // of a trend: instead of the one before; the readings do not tell which
@@ -224,6 +231,7 @@ struct Adjustment {
     std::vector<ExpansionEstimate> expansion = {};
     std::vector<DriftEstimate> machine_drift = {};
     std::vector<RoundedChannel> rounded = {};
+    std::vector<VarianceComponent> variance_components = {};  // of channels that others control
 
     double variance_factor() const;             // weighted_square_sum/degrees_of_freedom; 1 without freedom
     std::vector<std::size_t> outliers() const;  // readings that were left out: into `residuals`, by their number

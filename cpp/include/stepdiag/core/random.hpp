@@ -13,6 +13,7 @@ enum class RandomStream : std::uint32_t {
     reading_noise = 1,
     error_map = 2,
     verification = 3,
+    variance_components = 4,
     camera_shot_noise = 16,
     camera_read_noise = 17,
     position_device = 18,

@@ -10,6 +10,8 @@ struct Thresholds {
     double misfit_rejected = 3e-4;           // below it, where the misfit also differs between lines, channels or times
     double misfit_doubtful = 1e-2;           // below it
     double no_misfit_doubtful = 1.0 - 1e-3;  // above it: less noise than stated
+    double noise_component = 2e-4;           // that a channel scatters as much by chance: below it that is its noise
+    double widest_component = 0.3;           // relative standard uncertainty of a noise factor that is used, at most
     // Of the most conspicuous of all patterns of residuals: where chi-square finds a misfit, and where it does not.
     double pattern = 1e-2, pattern_alone = 3e-3;
     // Residuals that are rounding (rms in its units), and below this noise factor: nothing tests what is stated.
