@@ -14,8 +14,8 @@ namespace stepdiag {
 double double_rounding(HeadLayout kind, int channel, double longest);
 
 // Readings of one channel were written with so many decimals that they are all multiples of the step that this returns:
-// 1, 0.1, ... 1e-9 units; 0 where they are finer. `unit`: of files, 1e-6 for µrad. Readings that stand where the plan
-// says, to the step, tell none: a machine without errors reads round numbers.
+// 100, 10, ... 1e-9 units; 0 where they are finer. `unit`: of files, 1e-6 for µrad. Multiples where the plan has
+// multiples, too, or all as far from the plan, tell none: a machine without errors reads round numbers.
 double decimal_step(const std::vector<double>& values, const std::vector<double>& planned, double unit);
 
 }  // namespace stepdiag

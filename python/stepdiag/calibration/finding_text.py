@@ -287,13 +287,18 @@ def verdict_rows(adjustment: Adjustment) -> Iterator[str]:
         yield f"fit: unchecked: {UNCHECKED[verdict.reasons[0].finding]}"
         return
     reasons = reason_texts(verdict.reasons)
-    said = reasons.pop(0) if verdict.fit == "doubtful" else MEANING[verdict.fit]
+    is_noise = bool(verdict.reasons) and _is_noise_of_channel(verdict.reasons[0])
+    said = reasons.pop(0) if verdict.fit == "doubtful" or is_noise else MEANING[verdict.fit]
     yield (
         f"fit: {_shown(verdict.fit)}: {said} (variance factor {adjustment.variance_factor:.3g} with "
         f"{adjustment.degrees_of_freedom} degrees of freedom, {_probability(adjustment.chi_square_probability)})"
     )
     yield from (f"{verdict.fit} because {reason}" for reason in reasons)
-    if [reason.finding for reason in verdict.reasons] == ["misfit"]:
+    if any(component.used for component in adjustment.variance_components):
+        yield (
+            "note: the uncertainties are of this noise; if it is what these channels have, state it in [uncertainty]"
+        )
+    elif [reason.finding for reason in verdict.reasons] == ["misfit"]:
         yield (
             "remedy: no line, channel, time or position scatters unlike the others; if the noise is what it is, "
             "[adjustment] scale_uncertainty = true multiplies all uncertainties by "
@@ -309,6 +314,8 @@ def reason_text(reason: FitReason) -> str:
     """One reason, without a full stop."""
     noise = f"{reason.value:.3g} ± {reason.standard_uncertainty:.1g} times"
     match reason.finding:
+        case "noise_factor" if reason.channel:
+            return f"noise: {_scatter(reason)} (at most {reason.limit:g} times is credible)"
         case "noise_factor":
             return (
                 f"the readings scatter {reason.value:.3g} times as much as their stated uncertainties "
@@ -340,6 +347,8 @@ def reason_text(reason: FitReason) -> str:
             )
         case "prior_scatter":
             return _prior_scatter(reason)
+        case "misfit" if reason.channel:
+            return f"noise: {_scatter(reason)}"
         case "misfit" | "no_misfit":
             return f"the noise is about {noise} what is stated"
         case "scaled":
@@ -462,6 +471,18 @@ def _group(reason: FitReason) -> str:
             return f"run {reason.run} does"
     channel = f"channel {reason.channel}" if reason.channel else ""
     return f"{' of '.join(filter(None, (channel, reason.line and f'line {reason.line}')))} does"
+
+
+def _is_noise_of_channel(reason: FitReason) -> bool:
+    return reason.finding in ("noise_factor", "misfit") and bool(reason.channel)
+
+
+def _scatter(reason: FitReason) -> str:
+    where = f" on line {reason.line}" if reason.line else ""
+    return (
+        f"{reason.channel}{where} scatters {reason.value:.3g} ± {reason.standard_uncertainty:.2g} times as much as "
+        "stated"
+    )
 
 
 def _signal(reason: FitReason) -> str:
