@@ -53,6 +53,8 @@ std::string name(FitFinding finding) {
         case FitFinding::prior_scatter: return "prior_scatter";
         case FitFinding::fault: return "fault";
         case FitFinding::alternatives: return "alternatives";
+        case FitFinding::fault_cost: return "fault_cost";
+        case FitFinding::undetermined: return "undetermined";
         case FitFinding::scaled: return "scaled";
         case FitFinding::mistake: return "mistake";
         case FitFinding::implausible_input: return "implausible_input";

@@ -109,6 +109,9 @@ void bind_thresholds(py::module_& m) {
     add("prior_scatter_rejected", &Thresholds::prior_scatter_rejected,
         "Probability of set-up values that scatter more than their priors, below which a fit is rejected.");
     add("fault", &Thresholds::fault, "Least gain of a fault in chi-square.");
+    add("most_faults", &Thresholds::most_faults, "Of a channel, by its redundancy; one in any case.");
+    add("fault_cost", &Thresholds::fault_cost,
+        "How many times as large uncertainties what was done about faults may make the largest of a family.");
     add("alternative", &Thresholds::alternative, "What is less behind the best fault or mistake may be it.");
     add("second_order", &Thresholds::second_order, "Gain from which second order may distinguish faults.");
     add("gross_scatter", &Thresholds::gross_scatter, "Of the square sum a reading: values far from any machine.");

@@ -6,6 +6,7 @@
 #include "adjustment/adjustment_result.hpp"
 #include "adjustment/considered.hpp"
 #include "adjustment/smoothness.hpp"
+#include "diagnosis/fault_cost.hpp"
 #include "diagnosis/fault_search.hpp"
 #include "diagnosis/fault_tests.hpp"
 #include "diagnosis/prior_scatter.hpp"
@@ -70,6 +71,15 @@ std::vector<FitReason> coefficients_in_place_of_faults(const AdjustmentProblem& 
     if (of_readings > found.weighted_square_sum + thresholds.fault * std::max(1.0, found.variance_factor())) return {};
     return far_coefficients(expansion_estimates(without.problem(), without.x(), without.inverse()),
                             drift_estimates(without.problem(), without.x(), without.inverse()));
+}
+
+// The calibration at these values of the unknowns, were nothing left out or freed.
+Calibration without_treatment(const Solution& treated, const AdjustmentProblem& plain,
+                              const AdjustmentOptions& options) {
+    Solution solution(plain, smoothness_at_start(options));
+    solution.linearise(treated.x().head(plain.size()));
+    return make_calibration(plain, solution.tables(), choose_forms(solution.tables()), solution.x(),
+                            solution.inverse());
 }
 
 // Rms of the residuals, each in units of its rounding, or of where the solver stops.
@@ -166,25 +176,29 @@ Found find(const AdjustmentProblem& of_all, const AdjustmentOptions& options) {
     }
     SolutionPointer plain = solved(problem, options);
     std::vector<NoiseFactor> noise;
+    const auto weigh_with = [&](std::vector<NoiseFactor> next) {
+        noise = std::move(next);
+        problem = of_all;
+        problem.weigh(noise);
+        plain = solved(problem, options);
+    };
     // Looks at the scatter; false where the readings are weighed with it already.
     const auto weigh = [&](Solution& solution) {
         found.scatter = scatter_of_channels(solution, noise);
         std::vector<NoiseFactor> next = to_weigh(found.scatter);
         if (are_alike(noise, next)) return false;
-        noise = std::move(next);
-        problem = of_all;
-        problem.weigh(noise);
-        plain = solved(problem, options);
+        weigh_with(std::move(next));
         return true;
     };
     if (options.variance_components) {
-        if (plain) found.scatter = scatter_of_channels(*plain, noise);
-        if (!plain || is_odd(found.scatter)) noise = noise_of_loose_distances(of_all, options);
-        if (!noise.empty()) {
-            problem.weigh(noise);
-            plain = solved(problem, options);
+        bool is_changed = plain && weigh(*plain);
+        std::vector<NoiseFactor> loose;
+        if (is_changed || !plain || is_odd(found.scatter)) loose = noise_of_loose_distances(of_all, options);
+        if (!loose.empty()) {
+            weigh_with(loose);
+            is_changed = true;
         }
-        for (int round = 0; round < most_rounds && plain && weigh(*plain); ++round) {}
+        for (int round = 0; round < most_rounds && plain && is_changed; ++round) is_changed = weigh(*plain);
     }
     for (int search = 0;; ++search) {
         found.faults.emplace(problem, options, smoothness_at_start(options));
@@ -245,6 +259,9 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     const auto patterns = residual_patterns(result, measurement, solver.equations(), solver.factor());
     result.verdict =
         judge(result, patterns, prior_scatter(problem, x, solver.factor()), residual_rounding(solver.equations()));
+    if (!result.faults.empty())
+        take_costs(costs_of_faults(result.calibration, without_treatment(*solution, faults.problem(), options)),
+                   result.verdict);
     if (!solution->is_minimum()) {
         const double factor = std::sqrt(result.variance_factor());
         result.verdict = {Fit::rejected, {{FitFinding::noise_factor, factor, thresholds.largest_noise_factor}}};

@@ -56,11 +56,11 @@ FaultSearch::FaultSearch(const AdjustmentProblem& problem, const AdjustmentOptio
     constexpr double usual_tests = 1000.0;
     limit_ = options.outlier_probability > 0.0 ? gain_of_probability(options.outlier_probability / usual_tests)
                                                : thresholds.fault;
-    most_ = std::max(10, int(problem.readings().size() / 50));
 }
 
 FaultSearch::SolutionPointer FaultSearch::run(SolutionPointer plain) {
     const bool corrects = options_.outlier_probability > 0.0;
+    limit_faults(plain);
     SolutionPointer solution;
     if (corrects && (!plain || plain->scatter() > thresholds.gross_scatter)) solution = without_gross(plain);
     if (!solution) solution = plain;
@@ -75,6 +75,31 @@ FaultSearch::SolutionPointer FaultSearch::run(SolutionPointer plain) {
     }
     left_ = class_of(int(found_.size()), *solution);
     return solution;
+}
+
+void FaultSearch::limit_faults(const SolutionPointer& plain) {
+    const SolutionPointer at = plain ? plain : solution_of(problem_);
+    if (!plain) at->linearise(at->x());
+    std::map<std::string, double> redundancy;
+    for (std::size_t r = 0; r < problem_.readings().size(); ++r)
+        redundancy[problem_.noise_channel(problem_.readings()[r])] += 1.0 - at->reading_variances()[Eigen::Index(r)];
+    for (const auto& [name, sum] : redundancy) most_[name] = std::max(1, int(thresholds.most_faults * sum));
+}
+
+std::string FaultSearch::channel(const Candidate& candidate) const {
+    return problem_.noise_channel(problem_.readings()[std::size_t(*hypotheses_.readings(candidate.hypothesis).begin())]);
+}
+
+int FaultSearch::left_of(const std::string& name) const {
+    return most_.at(name) - int(std::count_if(found_.begin(), found_.end(), [&](const Found& found) {
+               return channel(found.members.front()) == name;
+           }));
+}
+
+int FaultSearch::left_of_all() const {
+    int left = 0;
+    for (const auto& entry : most_) left += std::max(0, left_of(entry.first));
+    return left;
 }
 
 // --- problems, with what was found in them ---
@@ -196,7 +221,7 @@ bool FaultSearch::find_linearly(const SolutionPointer& where) {
         const Tested rest = tested(-1);
         const auto next = worst(rest);
         if (!next) break;
-        if (rest.is_hopeless(next->score.gain, most_ - int(found_.size()))) return false;
+        if (rest.is_hopeless(next->score.gain, left_of_all())) return false;
         found_.push_back({{*next}});
     }
     std::vector<Found> open;
@@ -218,7 +243,7 @@ bool FaultSearch::find_linearly(const SolutionPointer& where) {
 
 // Corrects what there is, and says whether it could.
 bool FaultSearch::correct(SolutionPointer& solution) {
-    const int most_rounds = 5 + most_;
+    const int most_rounds = 5 + left_of_all() + int(found_.size());
     for (int round = 0; round < most_rounds; ++round) {
         if (!find_more(solution)) return false;
         if (found_.empty()) return true;
@@ -246,7 +271,7 @@ bool FaultSearch::correct(SolutionPointer& solution) {
             return true;
         }
         const auto left = worst(test(*treated, treated->x()));
-        if (!left || round + 1 == most_rounds || int(found_.size()) == most_) {
+        if (!left || round + 1 == most_rounds || left_of(channel(*left)) <= 0) {
             solution = treated;
             return true;
         }
@@ -265,16 +290,19 @@ bool FaultSearch::correct(SolutionPointer& solution) {
 
 // One after the other, each as one more unknown. False: there are too many.
 bool FaultSearch::find_more(SolutionPointer& solution) {
-    for (int step = 0; step < 4 * most_; ++step) {
+    const int most_steps = 4 * (left_of_all() + int(found_.size()));
+    for (int step = 0; step < most_steps; ++step) {
         explain_by_fewer(solution);
         last_ = std::make_shared<Tested>(test(*solution, solution->x()));
         const Tested& tested = *last_;
         const auto next = worst(tested);
         // A scatter that nobody believes and no fault explains: then the many that were found explain nothing either.
         constexpr std::size_t few = 5;
+        const bool is_too_many = std::any_of(most_.begin(), most_.end(), [&](const auto& of) { return left_of(of.first) < 0; });
+        if (!next && is_too_many) return false;
         if (!next) return found_.size() <= few || tested.noise_beside(0.0) <= thresholds.largest_variance_factor();
-        if (tested.is_hopeless(next->score.gain, most_ - int(found_.size()))) return false;
-        if (int(found_.size()) == most_) return false;
+        if (tested.is_hopeless(next->score.gain, left_of_all())) return false;
+        if (left_of(channel(*next)) <= 0) return false;
         const std::vector<Found> before = found_;
         found_.push_back({{*next}});
         SolutionPointer more = solve_near(*solution);

@@ -6,15 +6,18 @@
 // Where Gauss-Newton fails, or settles where readings scatter far too much, the search begins on the problem
 // linearised at zero, which has one minimum whatever the readings are; there and then all of a class are free, so that
 // no gross value is left in the problem. What it takes is that a fault is controlled: N faults of which each is seen
-// beside the others need as many redundant directions. The standard plan has one a step among the distances of the body
+// beside the others need as many redundant directions. So a channel has at most a tenth as many as its redundancy, and
+// at least one; more are no faults of readings. The standard plan has one a step among the distances of the body
 // diagonals, five among the tilts, and one among the scale lines.
 #pragma once
 
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "adjustment/adjustment_result.hpp"
@@ -28,6 +31,8 @@ public:
     // `smoothness`: as of GaussNewton.
     FaultSearch(const AdjustmentProblem& problem, const AdjustmentOptions& options,
                 const std::array<double, function_count>& smoothness);
+
+    const AdjustmentProblem& problem() const { return problem_; }  // with nothing left out or freed
 
     // The adjustment with what was done about the faults; none where no minimum is reached. `plain`: the problem's own
     // solution; none where its minimum is not reached.
@@ -74,6 +79,10 @@ private:
     Eigen::VectorXd carried(const Solution& from, const AdjustmentProblem& to) const;
     Tested test(Solution& solution, const Eigen::VectorXd& x) const;
     std::optional<Candidate> worst(const Tested& tested) const;  // if it is significant
+    void limit_faults(const SolutionPointer& plain);
+    std::string channel(const Candidate& candidate) const;
+    int left_of(const std::string& channel) const;  // how many more faults it may have
+    int left_of_all() const;
 
     SolutionPointer without_gross(const SolutionPointer& plain);  // none where that helps nothing
     bool find_linearly(const SolutionPointer& where);             // at zero where there is no solution yet
@@ -94,7 +103,7 @@ private:
     AdjustmentOptions options_;
     std::array<double, function_count> smoothness_;
     double limit_;
-    int most_;
+    std::map<std::string, int> most_;  // by noise channel
     std::vector<Found> found_;
     std::optional<Found> left_;     // what was found and nothing was done about
     std::shared_ptr<Tested> last_;  // of a run without faults

@@ -127,6 +127,13 @@ Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& 
     return {reasons.empty() ? Fit::accepted : Fit::doubtful, reasons};
 }
 
+void take_costs(const std::vector<FitReason>& costs, Verdict& verdict) {
+    if (costs.empty() || verdict.fit == Fit::unchecked) return;
+    if (verdict.fit == Fit::accepted) verdict.fit = Fit::doubtful;
+    const bool is_rejected = verdict.fit == Fit::rejected;
+    verdict.reasons.insert(is_rejected ? verdict.reasons.end() : verdict.reasons.begin(), costs.begin(), costs.end());
+}
+
 Adjustment judge(Adjustment adjustment, const FoundBeside& beside) {
     Verdict& verdict = adjustment.verdict;
     const auto reason = [](FitFinding finding, const std::string& words) {

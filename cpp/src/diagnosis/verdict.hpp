@@ -17,5 +17,7 @@ Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& 
 
 // AdjustmentOptions::scale_uncertainty, of an adjustment with its verdict.
 void scale_uncertainties(Adjustment& adjustment);
+// What the treatment of faults costs makes a fit doubtful at best, and comes first.
+void take_costs(const std::vector<FitReason>& costs, Verdict& verdict);
 
 }  // namespace stepdiag

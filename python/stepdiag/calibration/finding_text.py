@@ -289,6 +289,8 @@ def verdict_rows(adjustment: Adjustment) -> Iterator[str]:
     reasons = reason_texts(verdict.reasons)
     is_noise = bool(verdict.reasons) and _is_noise_of_channel(verdict.reasons[0])
     said = reasons.pop(0) if verdict.fit == "doubtful" or is_noise else MEANING[verdict.fit]
+    if verdict.fit == "accepted" and adjustment.faults:
+        said = f"{_corrected(adjustment)}; {said}"
     yield (
         f"fit: {_shown(verdict.fit)}: {said} (variance factor {adjustment.variance_factor:.3g} with "
         f"{adjustment.degrees_of_freedom} degrees of freedom, {_probability(adjustment.chi_square_probability)})"
@@ -367,6 +369,13 @@ def reason_text(reason: FitReason) -> str:
                 f"what fault {reason.fault} may be, and no reading tells, makes a difference of {value:.3g} {unit} in "
                 f"{reason.parameter} ({limit:g} {unit} is plausible)"
             )
+        case "fault_cost":
+            return (
+                f"what was left out or freed for faults makes {kind_of(reason.parameter)} ({reason.parameter}) "
+                f"{reason.value:.3g} times as uncertain (at most {reason.limit:g} times is accepted)"
+            )
+        case "undetermined":
+            return f"what was left out or freed for faults leaves {reason.parameter} undetermined, wholly or in part"
         case "mistake":
             return mistake_reason(reason.parameter)
         case "implausible_input":
@@ -471,6 +480,15 @@ def _group(reason: FitReason) -> str:
             return f"run {reason.run} does"
     channel = f"channel {reason.channel}" if reason.channel else ""
     return f"{' of '.join(filter(None, (channel, reason.line and f'line {reason.line}')))} does"
+
+
+def _corrected(adjustment: Adjustment) -> str:
+    """How many readings were left out and faults freed."""
+    left_out, freed = len(adjustment.outliers), sum(found.treatment == "estimated" for found in adjustment.faults)
+    texts = [f"{left_out} reading{'s' * (left_out != 1)} left out"] if left_out else []
+    if freed:
+        texts.append(f"{freed} fault{'s' * (freed != 1)} freed")
+    return ", ".join(texts) or "a fault of readings"
 
 
 def _is_noise_of_channel(reason: FitReason) -> bool:

@@ -126,6 +126,8 @@ enum class FitFinding {
     prior_scatter,  // standard deviation of all values of a set-up quantity, as far as the readings tell it
     fault,          // gain in chi-square of a fault that was found and not corrected
     alternatives,   // what alternative faults make of one parameter differs by this much, mm or rad
+    fault_cost,     // what was done about faults makes the largest uncertainty of a family so many times as large
+    undetermined,   // it leaves parameters undetermined that were not
     scaled,         // root of the variance factor, by which the uncertainties were multiplied (scale_uncertainty)
     mistake,        // one in the whole run or its scenario would explain the readings; adjust() looks for none
     implausible_input,  // a temperature, coefficient, ... that no workshop has; adjust() looks at none
@@ -155,7 +157,8 @@ struct FitReason {
     FitAspect aspect = FitAspect::whole;
     bool alternative = false;    // of a trend: instead of the one before; the readings do not tell which
     int fault = 0;               // of a fault and of alternatives: number of the class, from 1
-    std::string parameter = {};  // of alternatives: "EXX", ...; of a mistake, an implausible_input what it is
+    // Of alternatives, fault_cost, undetermined: "EXX", ...; of a mistake, an implausible_input what it is.
+    std::string parameter = {};
 };
 
 // Whether the readings of an adjustment agree with each other, with their uncertainties and with the priors. It does
