@@ -104,12 +104,10 @@ double residual_rounding(const NormalEquations& equations) {
 
 using SolutionPointer = std::shared_ptr<Solution>;
 
-// What a run is adjusted to: each channel with its noise, and with what was done about faults.
-struct Found {
-    SolutionPointer solution = nullptr;  // none where no minimum is reached
-    std::optional<FaultSearch> faults = {};
-    std::vector<ScatterOfChannel> scatter = {};
-};
+SolutionPointer solved(const AdjustmentProblem& problem, const AdjustmentOptions& options) {
+    auto solution = std::make_shared<Solution>(problem, smoothness_at_start(options));
+    return solution->solve_from_zero() ? solution : nullptr;
+}
 
 // Where nobody will use what comes out: a second's worth.
 SolutionPointer solved_soon(const AdjustmentProblem& problem, const AdjustmentOptions& options) {
@@ -119,23 +117,46 @@ SolutionPointer solved_soon(const AdjustmentProblem& problem, const AdjustmentOp
     return solution->solve_from_zero(soon) || solution->go_from_zero(rough) ? solution : nullptr;
 }
 
-SolutionPointer solved(const AdjustmentProblem& problem, const AdjustmentOptions& options) {
-    auto solution = std::make_shared<Solution>(problem, smoothness_at_start(options));
-    return solution->solve_from_zero() ? solution : nullptr;
-}
+using Scatter = std::vector<ScatterOfChannel>;
 
-// Nothing but noise, beyond what is credible.
-bool is_noise_alone(const std::vector<ScatterOfChannel>& scatter) {
-    return std::all_of(scatter.begin(), scatter.end(), [](const auto& each) { return each.is_noise; }) &&
-           std::any_of(scatter.begin(), scatter.end(), [](const auto& each) {
-               return each.is_significant && each.component.noise.factor > thresholds.largest_noise_factor;
-           });
-}
-
-bool is_odd(const std::vector<ScatterOfChannel>& scatter) {
+bool is_odd(const Scatter& scatter) {
     return std::any_of(scatter.begin(), scatter.end(),
-                       [](const auto& each) { return each.probability < odd_scatter; });
+                       [](const ScatterOfChannel& each) { return each.probability < odd_scatter; });
 }
+
+bool is_noise(const Scatter& scatter) {
+    return std::all_of(scatter.begin(), scatter.end(), [](const ScatterOfChannel& each) { return each.is_noise; });
+}
+
+bool is_beyond_credible(const std::vector<NoiseFactor>& noise) {
+    return std::any_of(noise.begin(), noise.end(),
+                       [](const NoiseFactor& each) { return each.factor > thresholds.largest_noise_factor; });
+}
+
+// A run with its readings weighed by some noise, and adjusted with what was done about faults.
+struct Weighed {
+    Weighed(const AdjustmentProblem& of_all, const AdjustmentOptions& options, std::vector<NoiseFactor> with)
+        : noise(std::move(with)) {
+        AdjustmentProblem problem = of_all;
+        problem.weigh(noise);
+        solution = plain = options.search_faults ? solved(problem, options) : solved_soon(problem, options);
+        faults.emplace(problem, options, smoothness_at_start(options));
+    }
+    // What another look at the scatter says of the noise.
+    std::vector<NoiseFactor> look() {
+        scatter = scatter_of_channels(*solution, noise);
+        return to_weigh(scatter);
+    }
+    void find_faults() {
+        solution = faults->run(plain);
+        if (solution && solution != plain) look();
+    }
+
+    std::vector<NoiseFactor> noise;
+    SolutionPointer plain, solution;  // none where no minimum is reached
+    std::optional<FaultSearch> faults;
+    Scatter scatter;
+};
 
 // Distances that are taken for far better than they are decide what tilts have to say, so that nothing controls them
 // any more. Taken for far worse, they show their scatter: the factor that they come down to, or none.
@@ -162,50 +183,41 @@ std::vector<NoiseFactor> noise_of_loose_distances(const AdjustmentProblem& of_al
     return {};
 }
 
-// Scatter comes before faults: channels that scatter more than stated are weighed with that, and faults are sought as
-// far as they stand out of it; beyond what is credible it is noise, and none is sought. Where faults were found, the
-// channels' scatter is looked at again.
-Found find(const AdjustmentProblem& of_all, const AdjustmentOptions& options) {
+// The run with each channel weighed by its own noise, and the faults that stand out of that.
+Weighed weigh_by_noise(const AdjustmentProblem& of_all, const AdjustmentOptions& options) {
     constexpr int most_rounds = 6, most_searches = 3;
-    Found found;
-    AdjustmentProblem problem = of_all;
-    if (!options.search_faults) {
-        found.solution = solved_soon(problem, options);
-        found.faults.emplace(problem, options, smoothness_at_start(options));
-        return found;
+    Weighed run(of_all, options, noise_of_loose_distances(of_all, options));
+    for (int round = 0; round < most_rounds && run.plain; ++round) {
+        std::vector<NoiseFactor> next = run.look();
+        if (are_alike(run.noise, next)) break;
+        run = Weighed(of_all, options, std::move(next));
     }
-    SolutionPointer plain = solved(problem, options);
-    std::vector<NoiseFactor> noise;
-    const auto weigh_with = [&](std::vector<NoiseFactor> next) {
-        noise = std::move(next);
-        problem = of_all;
-        problem.weigh(noise);
-        plain = solved(problem, options);
-    };
-    // Looks at the scatter; false where the readings are weighed with it already.
-    const auto weigh = [&](Solution& solution) {
-        found.scatter = scatter_of_channels(solution, noise);
-        std::vector<NoiseFactor> next = to_weigh(found.scatter);
-        if (are_alike(noise, next)) return false;
-        weigh_with(std::move(next));
-        return true;
-    };
-    if (options.variance_components) {
-        bool is_changed = plain && weigh(*plain);
-        std::vector<NoiseFactor> loose;
-        if (is_changed || !plain || is_odd(found.scatter)) loose = noise_of_loose_distances(of_all, options);
-        if (!loose.empty()) {
-            weigh_with(loose);
-            is_changed = true;
-        }
-        for (int round = 0; round < most_rounds && plain && is_changed; ++round) is_changed = weigh(*plain);
+    for (int search = 0; run.plain; ++search) {
+        run.find_faults();
+        if (!run.solution || run.solution == run.plain || search == most_searches) break;
+        std::vector<NoiseFactor> next = to_weigh(run.scatter);
+        if (are_alike(run.noise, next)) break;
+        run = Weighed(of_all, options, std::move(next));
     }
-    for (int search = 0;; ++search) {
-        found.faults.emplace(problem, options, smoothness_at_start(options));
-        found.solution = plain && is_noise_alone(found.scatter) ? plain : found.faults->run(plain);
-        const bool is_done = !options.variance_components || !found.solution || found.solution == plain;
-        if (is_done || search == most_searches || !weigh(*found.solution)) return found;
-    }
+    return run;
+}
+
+// Scatter comes before faults. Where some channel scatters more than stated, a few faults may explain all of it. If
+// they do not, and it is noise, the readings are weighed with that, and faults are sought as far as they stand out of
+// it; beyond what is credible it is noise alone.
+Weighed find(const AdjustmentProblem& of_all, const AdjustmentOptions& options) {
+    Weighed run(of_all, options, {});
+    if (!options.search_faults) return run;
+    if (run.plain && options.variance_components) run.look();
+    const bool may_be_noise = options.variance_components && (!run.plain || is_odd(run.scatter));
+    run.find_faults();
+    if (!may_be_noise || (run.solution && run.solution != run.plain && !is_odd(run.scatter))) return run;
+    Weighed by_noise = weigh_by_noise(of_all, options);
+    if (by_noise.noise.empty() || !by_noise.solution) return run;
+    if (is_beyond_credible(by_noise.noise)) by_noise.solution = by_noise.plain;
+    if (!by_noise.solution) return run;
+    by_noise.look();
+    return is_noise(by_noise.scatter) ? by_noise : run;
 }
 
 }  // namespace
@@ -219,7 +231,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
         throw InvalidArgument("adjustment: nothing can be determined: the run has no readings that count");
     refuse_foreign_distances(measurement, plan);
 
-    Found found = find(of_all, options);
+    Weighed found = find(of_all, options);
     FaultSearch& faults = *found.faults;
     const SolutionPointer solution = found.solution;
     if (!solution) refuse_unsolved(measurement, plan);

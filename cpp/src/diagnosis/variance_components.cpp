@@ -17,8 +17,9 @@ constexpr int draws = 16;                // a multiple of BorderedFactor::sides,
 constexpr double least_redundancy = 0.02;  // of two readings whose difference counts
 constexpr int fewest_differences = 8;
 constexpr double fewest_freedom = 2.0;  // sum of redundancies
-// Standard uncertainties by which two robust factors, or a robust one and that of the square sum, differ clearly.
-constexpr double clear = 5.0;
+// Standard uncertainties by which a factor is clearly larger than another one.
+constexpr double clear_of_squares = 2.5;  // than the robust one
+constexpr double clear_of_lines = 5.0;    // of a line than that of its channel: there are many
 
 using Draws = Eigen::Matrix<double, Eigen::Dynamic, draws, Eigen::RowMajor>;
 
@@ -113,8 +114,11 @@ struct Factor {
     double value, standard_uncertainty;
 };
 
-double together(const Factor& a, const Factor& b) {
-    return std::sqrt(std::pow(a.standard_uncertainty, 2) + std::pow(b.standard_uncertainty, 2));
+// Whether one factor is clearly larger than another one, were both of the same scatter.
+bool is_clearly_larger(const Factor& one, const Factor& other, double clear) {
+    const double relative = std::sqrt(std::pow(one.standard_uncertainty / one.value, 2) +
+                                      std::pow(other.standard_uncertainty / other.value, 2));
+    return one.value > other.value * (1.0 + clear * relative);
 }
 
 // By the smaller half of the differences, beside that of the draws.
@@ -208,8 +212,7 @@ std::vector<ScatterOfChannel> scatter_of_channels(Solution& solution, const std:
             if (!(factor.standard_uncertainty < thresholds.widest_component * factor.value)) continue;
             for (std::size_t g = 0; g < groups.size(); ++g)
                 if (groups[g].channel == of_line.channel && groups[g].line.empty() &&
-                    factor.value - robust[g].value >
-                        clear * together(factor, robust[g]))
+                    is_clearly_larger(factor, robust[g], clear_of_lines))
                     of_lines.emplace_back(of_line.channel, of_line.line);
         }
         if (of_lines.size() > known) {
@@ -222,7 +225,7 @@ std::vector<ScatterOfChannel> scatter_of_channels(Solution& solution, const std:
     std::vector<ScatterOfChannel> scatter;
     for (std::size_t g = 0; g < groups.size(); ++g) {
         ScatterOfChannel of;
-        of.is_noise = !(factors[g].value > robust[g].value + clear * together(factors[g], robust[g]));
+        of.is_noise = !is_clearly_larger(factors[g], robust[g], clear_of_squares);
         const Factor& factor = of.is_noise ? factors[g] : robust[g];
         const double before = weighed_with(solution.problem(), groups[g]);
         const bool is_used = std::any_of(weighed.begin(), weighed.end(), [&](const NoiseFactor& each) {
