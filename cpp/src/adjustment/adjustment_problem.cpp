@@ -188,7 +188,6 @@ AdjustmentProblem::AdjustmentProblem(const Measurement& measurement, const Plan&
     collect_setups(measurement, options);
     collect_points(measurement, options);
     round_uncertainties();
-    weigh(options.noise);
     number_unknowns(options, elimination);
 }
 

@@ -186,12 +186,6 @@ void bind_options(py::module_& m) {
         .def_readonly("record", &MachineDrift::record);
 
     const AdjustmentOptions usual;
-    py::class_<NoiseFactor>(m, "NoiseFactor",
-                            "What the stated standard uncertainties of a channel's readings are multiplied by.")
-        .def_readonly("channel", &NoiseFactor::channel, "\"distance\" (of beams, too), \"alpha\", ...")
-        .def_readonly("line", &NoiseFactor::line, "Empty: all lines that have no factor of their own.")
-        .def_readonly("factor", &NoiseFactor::factor);
-
     py::class_<AdjustmentOptions>(
         m, "AdjustmentOptions",
         "What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all "
@@ -210,8 +204,7 @@ void bind_options(py::module_& m) {
         "reached "
         "soon, values are those that were, and rejected. distance_scale_uncertainty, air_index_uncertainty: relative "
         "standard uncertainties of all distances in common, by the instrument's scale and by the index of the air; "
-        "they count in the uncertainties only. noise: what stated standard uncertainties of readings are multiplied "
-        "by, as is known beforehand. variance_components: estimates how much each channel scatters, and takes that "
+        "they count in the uncertainties only. variance_components: estimates how much each channel scatters, and takes that "
         "for its noise where it is more than is stated.")
         .def(py::init([](const ReadingUncertainty& uncertainty, const Priors& setup,
                          const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
@@ -220,7 +213,7 @@ void bind_options(py::module_& m) {
                          const PlausibleLimits& plausible, const std::optional<KnownExpansion>& expansion,
                          const std::optional<MachineDrift>& machine_drift, bool reliability, bool search_faults,
                          double distance_scale_uncertainty, double air_index_uncertainty,
-                         const std::vector<NoiseFactor>& noise, bool variance_components) {
+                         bool variance_components) {
                  AdjustmentOptions options{uncertainty,
                                            setup.value,
                                            {},
@@ -239,7 +232,6 @@ void bind_options(py::module_& m) {
                                            search_faults,
                                            distance_scale_uncertainty,
                                            air_index_uncertainty,
-                                           noise,
                                            variance_components};
                  for (const auto& [line, priors] : setup_by_line) options.setup_by_line[line] = priors.value;
                  return options;
@@ -254,8 +246,7 @@ void bind_options(py::module_& m) {
              py::arg("machine_drift") = std::nullopt, py::arg("reliability") = usual.reliability,
              py::arg("search_faults") = usual.search_faults,
              py::arg("distance_scale_uncertainty") = usual.distance_scale_uncertainty,
-             py::arg("air_index_uncertainty") = usual.air_index_uncertainty, py::arg("noise") = usual.noise,
-             py::arg("variance_components") = usual.variance_components, "adjust() checks them.")
+             py::arg("air_index_uncertainty") = usual.air_index_uncertainty, py::arg("variance_components") = usual.variance_components, "adjust() checks them.")
         .def_readonly("uncertainty", &AdjustmentOptions::uncertainty)
         .def_property_readonly("setup", [](const AdjustmentOptions& o) { return Priors{o.setup}; })
         .def_property_readonly("setup_by_line",
@@ -281,7 +272,6 @@ void bind_options(py::module_& m) {
         .def_readonly("search_faults", &AdjustmentOptions::search_faults)
         .def_readonly("distance_scale_uncertainty", &AdjustmentOptions::distance_scale_uncertainty)
         .def_readonly("air_index_uncertainty", &AdjustmentOptions::air_index_uncertainty)
-        .def_readonly("noise", &AdjustmentOptions::noise)
         .def_readonly("variance_components", &AdjustmentOptions::variance_components);
 }
 
@@ -326,7 +316,15 @@ void bind_result(py::module_& m) {
 
     py::class_<VarianceComponent>(m, "VarianceComponent",
                                   "How much the readings of a channel scatter, as their residuals tell it.")
-        .def_readonly("noise", &VarianceComponent::noise, "Root of the component: times what is stated.")
+        .def_property_readonly(
+            "channel", [](const VarianceComponent& c) { return c.noise.channel; },
+            "\"distance\" (of beams, too), \"alpha\", ...")
+        .def_property_readonly(
+            "line", [](const VarianceComponent& c) { return c.noise.line; },
+            "Of a line that scatters unlike the channel's others; empty: all others.")
+        .def_property_readonly(
+            "factor", [](const VarianceComponent& c) { return c.noise.factor; },
+            "Root of the component: times the noise that is stated.")
         .def_readonly("standard_uncertainty", &VarianceComponent::standard_uncertainty, "Of the factor.")
         .def_readonly("used", &VarianceComponent::used,
                       "Stated uncertainties were multiplied by it; otherwise they stayed.");

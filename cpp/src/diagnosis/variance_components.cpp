@@ -3,7 +3,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <array>
 #include <map>
+#include <numeric>
+#include <tuple>
 #include <utility>
 
 #include "evaluation/fit_test.hpp"
@@ -17,9 +20,9 @@ constexpr int draws = 16;                // a multiple of BorderedFactor::sides,
 constexpr double least_redundancy = 0.02;  // of two readings whose difference counts
 constexpr int fewest_differences = 8;
 constexpr double fewest_freedom = 2.0;  // sum of redundancies
-// Standard uncertainties by which a factor is clearly larger than another one.
-constexpr double clear_of_squares = 2.5;  // than the robust one
-constexpr double clear_of_lines = 5.0;    // of a line than that of its channel: there are many
+constexpr double clear_of_noise = 4.0;  // standard deviations of the draws
+// Standard uncertainties by which the factor of a line is clearly larger than that of its channel: there are many lines.
+constexpr double clear_of_lines = 5.0;
 
 using Draws = Eigen::Matrix<double, Eigen::Dynamic, draws, Eigen::RowMajor>;
 
@@ -97,39 +100,77 @@ Draws responses(const Solution& solution, const std::vector<int>& readings) {
     return z;
 }
 
-// Mean of the smaller half of the squares.
+struct Factor {
+    double value, standard_uncertainty;
+};
+
+// Roots of mean squares: of the readings' residuals, of the smaller half of the differences, and of all of them.
+struct Scales {
+    double residuals, smaller_half, differences;
+};
+
 template <class Residual>
-double smaller_half(const Group& group, const Residual& residual) {
+Scales scales(const Group& group, const Residual& residual) {
+    double of_residuals = 0.0;
+    for (const int r : group.readings) of_residuals += std::pow(residual(r), 2);
     std::vector<double> squares;
     for (const Group::Difference& d : group.differences)
         squares.push_back(std::pow(residual(d.b) - residual(d.a), 2) / d.redundancy);
     const auto half = squares.begin() + std::ptrdiff_t(squares.size() / 2);
     std::nth_element(squares.begin(), half, squares.end());
-    double sum = 0.0;
-    for (auto each = squares.begin(); each != half; ++each) sum += *each;
-    return sum / double(half - squares.begin());
+    const double smaller = std::accumulate(squares.begin(), half, 0.0);
+    return {std::sqrt(of_residuals / double(group.readings.size())),
+            std::sqrt(smaller / double(half - squares.begin())),
+            std::sqrt(std::accumulate(half, squares.end(), smaller) / double(squares.size()))};
 }
 
-struct Factor {
-    double value, standard_uncertainty;
+// Of the residuals beside those of the draws.
+class Comparison {
+public:
+    Comparison(const Group& group, const Eigen::VectorXd& residuals, const Draws& noise)
+        : is_possible_(int(group.differences.size()) >= fewest_differences) {
+        if (!is_possible_) return;
+        observed_ = scales(group, [&](int r) { return residuals[r]; });
+        for (int k = 0; k < draws; ++k) drawn_[std::size_t(k)] = scales(group, [&](int r) { return noise(r, k); });
+    }
+
+    // By the smaller half of the differences.
+    Factor robust() const {
+        if (!is_possible_) return {1.0, INFINITY};
+        const auto [mean, deviation] = of_draws([](const Scales& s) { return s.smaller_half; });
+        const double value = observed_.smaller_half / mean;
+        return {value, value * deviation / mean};
+    }
+    // Whether differences are as large beside the residuals as those of noise: gross readings make the smaller half of
+    // them small, and what is smooth makes all of them small.
+    bool is_noise() const {
+        if (!is_possible_) return true;
+        const auto is_small = [&](const auto& ratio) {
+            const auto [mean, deviation] = of_draws(ratio);
+            return ratio(observed_) < mean - clear_of_noise * deviation;
+        };
+        return !is_small([](const Scales& s) { return s.smaller_half / s.residuals; }) &&
+               !is_small([](const Scales& s) { return s.differences / s.residuals; });
+    }
+
+private:
+    template <class Quantity>
+    std::pair<double, double> of_draws(const Quantity& quantity) const {
+        Eigen::Array<double, draws, 1> values;
+        for (int k = 0; k < draws; ++k) values[k] = quantity(drawn_[std::size_t(k)]);
+        const double mean = values.mean();
+        return {mean, std::sqrt((values - mean).square().sum() / (draws - 1))};
+    }
+
+    bool is_possible_;
+    Scales observed_ = {};
+    std::array<Scales, draws> drawn_ = {};
 };
 
-// Whether one factor is clearly larger than another one, were both of the same scatter.
-bool is_clearly_larger(const Factor& one, const Factor& other, double clear) {
+bool is_clearly_larger(const Factor& one, const Factor& other) {
     const double relative = std::sqrt(std::pow(one.standard_uncertainty / one.value, 2) +
                                       std::pow(other.standard_uncertainty / other.value, 2));
-    return one.value > other.value * (1.0 + clear * relative);
-}
-
-// By the smaller half of the differences, beside that of the draws.
-Factor robust_factor(const Group& group, const Eigen::VectorXd& residuals, const Draws& noise) {
-    if (int(group.differences.size()) < fewest_differences) return {1.0, INFINITY};
-    Eigen::Array<double, draws, 1> of_noise;
-    for (int k = 0; k < draws; ++k) of_noise[k] = std::sqrt(smaller_half(group, [&](int r) { return noise(r, k); }));
-    const double mean = of_noise.mean();
-    const double deviation = std::sqrt((of_noise - mean).square().sum() / (draws - 1));
-    const double value = std::sqrt(smaller_half(group, [&](int r) { return residuals[r]; })) / mean;
-    return {value, value * deviation / mean};
+    return one.value > other.value * (1.0 + clear_of_lines * relative);
 }
 
 // By square sums.
@@ -172,6 +213,27 @@ double probability_of_factor(const Factor& factor) {
     return chi_square_probability(factor.value * factor.value * freedom, freedom);
 }
 
+// Lines on which a channel scatters clearly more than on its others.
+std::vector<Key> uneven_lines(Solution& solution, const std::vector<Group>& groups, const Eigen::VectorXd& residuals,
+                              const Draws& noise) {
+    std::vector<Key> every, uneven;
+    for (const LineSetup& setup : solution.problem().setups())
+        for (const Group& group : groups) every.emplace_back(group.channel, setup.line.name());
+    const std::vector<Group> of_lines = groups_of(solution, every);
+    for (const Group& channel : groups) {
+        if (!channel.line.empty()) continue;
+        const Factor usual = Comparison(channel, residuals, noise).robust();
+        for (const Group& line : of_lines) {
+            if (line.channel != channel.channel) continue;
+            const Factor factor = Comparison(line, residuals, noise).robust();
+            if (factor.standard_uncertainty < thresholds.widest_component * factor.value &&
+                is_clearly_larger(factor, usual))
+                uneven.emplace_back(line.channel, line.line);
+        }
+    }
+    return uneven;
+}
+
 bool is_odd(const std::vector<Factor>& factors) {
     return std::any_of(factors.begin(), factors.end(), [](const Factor& factor) {
         return factor.value > 1.0 && probability_of_factor(factor) < odd_scatter;
@@ -181,65 +243,53 @@ bool is_odd(const std::vector<Factor>& factors) {
 }  // namespace
 
 std::vector<ScatterOfChannel> scatter_of_channels(Solution& solution, const std::vector<NoiseFactor>& weighed) {
+    const Eigen::VectorXd& residuals = solution.solver().equations().residuals();
     std::vector<Key> of_lines;
     for (const NoiseFactor& each : weighed)
         if (!each.line.empty()) of_lines.emplace_back(each.channel, each.line);
-    std::vector<Group> groups = groups_of(solution, of_lines);
-    const Eigen::VectorXd& residuals = solution.solver().equations().residuals();
-    const auto by_squares = [&](std::vector<Draws>& noise) {
-        std::vector<Group> controlled;
-        for (Group& group : groups)
-            if (group.freedom >= fewest_freedom) {
-                noise.push_back(responses(solution, group.readings));
-                controlled.push_back(std::move(group));
-            }
-        groups = std::move(controlled);
-        return factors_of_squares(groups, residuals, noise);
+    std::vector<Group> groups;
+    std::vector<Factor> factors;
+    Draws noise;  // of all groups, each with its factor
+    const auto look = [&] {
+        groups.clear();
+        for (Group& group : groups_of(solution, of_lines))
+            if (group.freedom >= fewest_freedom) groups.push_back(std::move(group));
+        std::vector<Draws> by_group;
+        for (const Group& group : groups) by_group.push_back(responses(solution, group.readings));
+        factors = factors_of_squares(groups, residuals, by_group);
+        noise = Draws::Zero(residuals.size(), draws);
+        for (std::size_t g = 0; g < groups.size(); ++g) noise += std::max(1.0, factors[g].value) * by_group[g];
     };
-    std::vector<Draws> noise;
-    std::vector<Factor> factors = by_squares(noise), robust = factors;
-    if (is_odd(factors) || !weighed.empty()) {
-        Draws all = Draws::Zero(residuals.size(), draws);
-        for (const Draws& each : noise) all += each;
-        for (std::size_t g = 0; g < groups.size(); ++g) robust[g] = robust_factor(groups[g], residuals, all);
-        // Lines of a channel that scatter otherwise than its others.
-        std::vector<Key> every;
-        for (const LineSetup& setup : solution.problem().setups())
-            for (const Group& group : groups) every.emplace_back(group.channel, setup.line.name());
+    look();
+    const bool is_closer = is_odd(factors) || !weighed.empty();
+    if (is_closer) {
         const std::size_t known = of_lines.size();
-        for (const Group& of_line : groups_of(solution, every)) {
-            const Factor factor = robust_factor(of_line, residuals, all);
-            if (!(factor.standard_uncertainty < thresholds.widest_component * factor.value)) continue;
-            for (std::size_t g = 0; g < groups.size(); ++g)
-                if (groups[g].channel == of_line.channel && groups[g].line.empty() &&
-                    is_clearly_larger(factor, robust[g], clear_of_lines))
-                    of_lines.emplace_back(of_line.channel, of_line.line);
-        }
-        if (of_lines.size() > known) {
-            groups = groups_of(solution, of_lines);
-            noise.clear();
-            factors = robust = by_squares(noise);
-            for (std::size_t g = 0; g < groups.size(); ++g) robust[g] = robust_factor(groups[g], residuals, all);
-        }
+        for (const Key& line : uneven_lines(solution, groups, residuals, noise)) of_lines.push_back(line);
+        if (of_lines.size() > known) look();
     }
     std::vector<ScatterOfChannel> scatter;
     for (std::size_t g = 0; g < groups.size(); ++g) {
         ScatterOfChannel of;
-        of.is_noise = !is_clearly_larger(factors[g], robust[g], clear_of_squares);
-        const Factor& factor = of.is_noise ? factors[g] : robust[g];
+        Factor factor = factors[g];
+        if (is_closer) {
+            const Comparison comparison(groups[g], residuals, noise);
+            of.is_noise = comparison.is_noise();
+            if (!of.is_noise) {
+                factor = comparison.robust();
+                for (double* each : {&factor.value, &factor.standard_uncertainty}) *each *= std::max(1.0, factors[g].value);
+            }
+        }
         const double before = weighed_with(solution.problem(), groups[g]);
+        factor = {before * factor.value, before * factor.standard_uncertainty};
+        if (!std::isfinite(factor.standard_uncertainty)) continue;
         const bool is_used = std::any_of(weighed.begin(), weighed.end(), [&](const NoiseFactor& each) {
             return each.channel == groups[g].channel && each.line == groups[g].line && each.factor > 1.0;
         });
-        const Factor stated{before * factor.value, before * factor.standard_uncertainty};
-        if (!std::isfinite(stated.standard_uncertainty)) continue;
-        const bool is_known = stated.standard_uncertainty < thresholds.widest_component * std::max(1.0, stated.value);
-        of.component = {
-            {groups[g].channel, groups[g].line, stated.value}, stated.standard_uncertainty, is_used};
+        of.component = {{groups[g].channel, groups[g].line, factor.value}, factor.standard_uncertainty, is_used};
+        if (factor.value > 1.0) of.probability = probability_of_factor(factor);
         // What was taken for noise stays so near the limit: otherwise nothing would come to rest there.
-        const double limit = thresholds.noise_component * (is_used ? 10.0 : 1.0);
-        if (stated.value > 1.0) of.probability = probability_of_factor(stated);
-        of.is_significant = is_known && of.probability < limit;
+        of.is_significant = factor.standard_uncertainty < thresholds.widest_component * std::max(1.0, factor.value) &&
+                            of.probability < thresholds.noise_component * (is_used ? 10.0 : 1.0);
         scatter.push_back(of);
     }
     return scatter;

@@ -110,9 +110,9 @@ class AdjustmentSection(AdjustmentKeys):
     )
     scale_uncertainty: bool = key(
         "true or false",
-        "Where the readings scatter more than stated (variance factor above 1), all stated uncertainties are "
-        "multiplied by the root of the variance factor, and the fit is doubtful at best. For noise that is larger by "
-        "one factor throughout.",
+        "Where the readings scatter more than stated (variance factor above 1) and no channel was weighed with its own "
+        "scatter, all stated uncertainties are multiplied by the root of the variance factor, and the fit is doubtful "
+        "at best.",
         False,
     )
     by_line: dict[str, AdjustmentKeys] = tables("LINE")

@@ -1,9 +1,9 @@
 """One judgement of a run (docs/conventions.md, "Verdict of a fit"): mistakes, evaluation, mistakes, verdict."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, Literal
 
-from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement, NoiseFactor
+from stepdiag._core import Adjustment, Calibration, InvalidArgument, Measurement
 from stepdiag.calibration.finding_text import mistake_reason
 from stepdiag.mistakes.search import FoundMistake, MistakeSearch
 from stepdiag.mistakes.text import change_rows, mistake_text
@@ -17,7 +17,6 @@ from stepdiag.scenario.known import Known
 
 # A sound run has a misfit at least as improbable in one of twenty cases. A search takes as long as an evaluation.
 SEARCHED_BELOW: Final = 0.05
-NOISE: Final = ("noise_factor", "misfit")  # of a channel: it scatters more than stated
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +87,11 @@ def judge(
             mistakes = search.after(None, refused=True)
         raise _with_mistakes(error, mistakes) from None
     adjusted = result.adjustment if isinstance(result, JudgedEvaluation) else result
-    if search and not mistakes and _is_odd(adjusted):
-        # What the adjustment took for noise is noise for the search, too.
-        noise = _noise(adjusted)
-        mistakes = (MistakeSearch(replace(known, noise=noise), measurement) if noise else search).after(adjusted)
+    if search and not mistakes and _is_noise(adjusted):
+        # A mistake is what explains all of the scatter; a part of it is noise.
+        mistakes = [found for found in search.after(None) if found.fit == "accepted"]
+    elif search and not mistakes and _is_odd(adjusted):
+        mistakes = search.after(adjusted)
     is_corrected = adjusted is not None and adjusted.verdict.fit == "accepted"
     if mistakes and not (mistakes[0].or_faults and is_corrected):
         result = result.with_mistake(mistake_text(mistakes))
@@ -116,18 +116,14 @@ def _evaluated(
     )
 
 
-def _noise(adjusted: Adjustment | None) -> tuple[NoiseFactor, ...]:
-    return tuple(each.noise for each in (adjusted.variance_components if adjusted else ()) if each.used)
+def _is_noise(adjusted: Adjustment | None) -> bool:
+    """Whether channels scatter more than stated, and the readings were weighed with that."""
+    return adjusted is not None and any(component.used for component in adjusted.variance_components)
 
 
 def _is_odd(adjusted: Adjustment | None) -> bool:
     """Whether something may be wrong with the run as a whole."""
-    if adjusted is None or adjusted.faults:
-        return True
-    reasons = [reason.finding for reason in adjusted.verdict.reasons if not (reason.finding in NOISE and reason.channel)]
-    if _noise(adjusted) and not reasons:
-        return False  # it is noise, whatever its size
-    if adjusted.verdict.fit in ("doubtful", "rejected"):
+    if adjusted is None or adjusted.faults or adjusted.verdict.fit in ("doubtful", "rejected"):
         return True
     return adjusted.degrees_of_freedom > 0 and adjusted.chi_square_probability < SEARCHED_BELOW
 

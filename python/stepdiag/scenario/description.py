@@ -341,7 +341,6 @@ def adjustment_options(
         air_index_uncertainty=index_uncertainty(
             known.instrument, measurement, known.assumed_air, known.head.wavelength
         ),
-        noise=list(known.noise),
         variance_components=not of_samples,
     )
 

@@ -30,8 +30,7 @@ class Known(Displayed):
     plausible; how far the machine may change; what is known of the scales' expansion, None where the scenario has no
     [temperature]; the drift of the functional point, None where it is no unknown; what is uncertain; what is known of
     the instrument's scale and its sensors of the air. `assumed_air`: with whose constant index the instrument counts;
-    None where it compensates for the air. `implausible`: what is stated and no workshop has, a sentence each. `noise`:
-    what an adjustment of a run found its readings to scatter by."""
+    None where it compensates for the air. `implausible`: what is stated and no workshop has, a sentence each."""
 
     path: Path
     keys: KnownKeys
@@ -54,7 +53,6 @@ class Known(Displayed):
     uncertain: _core.UncertainInputs = field(compare=False)
     implausible: tuple[str, ...] = field(compare=False)
     instrument: KnownInstrument = field(compare=False)
-    noise: tuple[_core.NoiseFactor, ...] = field(default=(), compare=False)
 
     @property
     def known(self) -> "Known":

@@ -11,7 +11,6 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "stepdiag/evaluation/evaluation.hpp"
 #include "stepdiag/measurement/setup_quantity.hpp"
@@ -89,7 +88,6 @@ struct AdjustmentOptions {
     // the air, as its sensors make it. As deviations of the scales' sensors they are uncertainty only.
     double distance_scale_uncertainty = 0.0;
     double air_index_uncertainty = 0.0;
-    std::vector<NoiseFactor> noise = {};  // known beforehand
     // Estimates how much each channel scatters, and takes that for its noise where it is more than is stated:
     // Adjustment::variance_components. Not where no faults are looked for.
     bool variance_components = true;

@@ -65,6 +65,13 @@ struct RoundedChannel {
     RoundingCause cause;
 };
 
+// What the stated standard uncertainties of a channel's readings are multiplied by.
+struct NoiseFactor {
+    std::string channel;    // "distance": of all beams, too
+    std::string line = {};  // empty: on all lines that have no factor of their own
+    double factor = 1.0;
+};
+
 // How much the readings of a channel scatter, as their residuals tell it (diagnosis/variance_components.hpp).
 struct VarianceComponent {
     NoiseFactor noise;            // root of the component: times what is stated

@@ -21,13 +21,6 @@ struct ReadingUncertainty {
     double spot = 1e-3;        // mm
 };
 
-// What the stated standard uncertainties of a channel's readings are multiplied by.
-struct NoiseFactor {
-    std::string channel;    // "distance": of all beams, too
-    std::string line = {};  // empty: on all lines that have no factor of their own
-    double factor = 1.0;
-};
-
 // What is known of the expansion of the scales. With it, an evaluation refers positioning errors to the reference
 // temperature, by the temperatures of the run's own channels (measurement/records.hpp).
 struct KnownExpansion {
