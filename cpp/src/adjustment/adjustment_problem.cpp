@@ -519,6 +519,13 @@ void AdjustmentProblem::weigh_unknowns() {
     }
 }
 
+void AdjustmentProblem::free_set_up(SetupQuantity quantity) {
+    for (LineSetup& setup : setups_)
+        for (const int c : setup.active)
+            if (setup::component(c).quantity == quantity)
+                prior_[setup.unknown[c]] = setup.prior[c] = record(quantity).broadest;
+}
+
 int AdjustmentProblem::informative_priors() const {
     int count = int(coefficients_.size());
     for (const LineSetup& setup : setups_)

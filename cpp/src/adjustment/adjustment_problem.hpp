@@ -150,6 +150,7 @@ public:
     const std::vector<double>& prior() const { return prior_; }
     // Those that are no limits of what is called free; of alternatives, that all but one are no fault.
     int informative_priors() const;
+    void free_set_up(SetupQuantity quantity);  // on all lines where it is an unknown
     // How far from 0 each unknown usually is.
     const std::vector<double>& usual() const { return usual_; }
     // What makes changes of unknowns comparable: 1 for angles (rad), 1/metre for lengths (mm).

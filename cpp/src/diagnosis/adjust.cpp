@@ -2,6 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
 
 #include "adjustment/adjustment_result.hpp"
 #include "adjustment/considered.hpp"
@@ -202,6 +207,24 @@ Weighed weigh_by_noise(const AdjustmentProblem& of_all, const AdjustmentOptions&
     return run;
 }
 
+// Whether priors of set-ups that are far too narrow explain the scatter: without them there is none.
+bool priors_explain(const Weighed& run, const AdjustmentProblem& of_all, const AdjustmentOptions& options) {
+    if (!run.solution) return false;
+    AdjustmentProblem problem = of_all;
+    std::set<SetupQuantity> far;
+    for (const LineSetup& setup : of_all.setups())
+        for (const int c : setup.active) {
+            const int j = setup.unknown[c];
+            const double u = std::sqrt(element(run.solution->inverse(), j, j)), prior = setup.prior[c];
+            if (std::isfinite(prior) && distance_from_prior(run.solution->x()[j], u, prior) > thresholds.farthest_prior)
+                far.insert(setup::component(c).quantity);
+        }
+    if (far.empty()) return false;
+    for (const SetupQuantity quantity : far) problem.free_set_up(quantity);
+    const SolutionPointer solution = solved(problem, options);
+    return solution && !is_odd(scatter_of_channels(*solution, {}));
+}
+
 // Scatter comes before faults. Where some channel scatters more than stated, a few faults may explain all of it. If
 // they do not, and it is noise, the readings are weighed with that, and faults are sought as far as they stand out of
 // it; beyond what is credible it is noise alone.
@@ -212,6 +235,7 @@ Weighed find(const AdjustmentProblem& of_all, const AdjustmentOptions& options) 
     const bool may_be_noise = options.variance_components && (!run.plain || is_odd(run.scatter));
     run.find_faults();
     if (!may_be_noise || (run.solution && run.solution != run.plain && !is_odd(run.scatter))) return run;
+    if (priors_explain(run, of_all, options)) return run;
     Weighed by_noise = weigh_by_noise(of_all, options);
     if (by_noise.noise.empty() || !by_noise.solution) return run;
     if (is_beyond_credible(by_noise.noise)) by_noise.solution = by_noise.plain;

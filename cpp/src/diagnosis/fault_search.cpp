@@ -13,6 +13,7 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double twin = 0.99;  // correlation of what shows the same in all other readings
+constexpr int least_on_the_way = 5;  // faults of a channel, though fewer may be left
 constexpr std::size_t most_exact = 20;
 constexpr std::size_t most_members = 40;  // which are near enough to what is behind them
 
@@ -94,6 +95,10 @@ int FaultSearch::left_of(const std::string& name) const {
     return most_.at(name) - int(std::count_if(found_.begin(), found_.end(), [&](const Found& found) {
                return channel(found.members.front()) == name;
            }));
+}
+
+bool FaultSearch::are_too_many() const {
+    return std::any_of(most_.begin(), most_.end(), [&](const auto& of) { return left_of(of.first) < 0; });
 }
 
 int FaultSearch::left_of_all() const {
@@ -298,11 +303,12 @@ bool FaultSearch::find_more(SolutionPointer& solution) {
         const auto next = worst(tested);
         // A scatter that nobody believes and no fault explains: then the many that were found explain nothing either.
         constexpr std::size_t few = 5;
-        const bool is_too_many = std::any_of(most_.begin(), most_.end(), [&](const auto& of) { return left_of(of.first) < 0; });
-        if (!next && is_too_many) return false;
+        if (!next && are_too_many()) return false;
         if (!next) return found_.size() <= few || tested.noise_beside(0.0) <= thresholds.largest_variance_factor();
-        if (tested.is_hopeless(next->score.gain, left_of_all())) return false;
-        if (left_of(channel(*next)) <= 0) return false;
+        if (tested.is_hopeless(next->score.gain, std::max(left_of_all(), least_on_the_way))) return false;
+        // On the way there may be more: several readings, until they are found to be one slip.
+        const std::string& of = channel(*next);
+        if (left_of(of) + std::max(most_.at(of), least_on_the_way) <= 0) return false;
         const std::vector<Found> before = found_;
         found_.push_back({{*next}});
         SolutionPointer more = solve_near(*solution);
@@ -579,6 +585,8 @@ std::vector<FaultClass> FaultSearch::classes(const Solution& solution, const Cal
     if (std::count_if(classes.begin(), classes.end(), is_doubtful) > 1)
         for (FaultClass& entry : classes)
             if (is_doubtful(entry)) entry.corrected = false;
+    if (are_too_many())
+        for (FaultClass& entry : classes) entry.corrected = false;
     if (left_) add(*left_, FaultTreatment::none);
     return classes;
 }

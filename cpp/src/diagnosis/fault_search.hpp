@@ -83,6 +83,7 @@ private:
     std::string channel(const Candidate& candidate) const;
     int left_of(const std::string& channel) const;  // how many more faults it may have
     int left_of_all() const;
+    bool are_too_many() const;
 
     SolutionPointer without_gross(const SolutionPointer& plain);  // none where that helps nothing
     bool find_linearly(const SolutionPointer& where);             // at zero where there is no solution yet

@@ -287,9 +287,8 @@ std::vector<ScatterOfChannel> scatter_of_channels(Solution& solution, const std:
         });
         of.component = {{groups[g].channel, groups[g].line, factor.value}, factor.standard_uncertainty, is_used};
         if (factor.value > 1.0) of.probability = probability_of_factor(factor);
-        // What was taken for noise stays so near the limit: otherwise nothing would come to rest there.
         of.is_significant = factor.standard_uncertainty < thresholds.widest_component * std::max(1.0, factor.value) &&
-                            of.probability < thresholds.noise_component * (is_used ? 10.0 : 1.0);
+                            of.probability < thresholds.noise_component;
         scatter.push_back(of);
     }
     return scatter;

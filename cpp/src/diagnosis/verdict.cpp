@@ -43,15 +43,6 @@ void take_patterns(const std::vector<ResidualPattern>& patterns, double limit, s
         if (pattern.probability < limit) reasons.push_back(pattern.reason);
 }
 
-// A value that stands further from its prior than the readings' own uncertainty of it lets chance explain. Five
-// standard deviations: of dozens of unknowns in a sound run, one stands beyond four in every 250 runs.
-double distance_from_prior(double value, double standard_uncertainty, double prior) {
-    constexpr double least_share = 1e-3;  // of the prior: below it the readings say nothing that could contradict it
-    const double known = std::max(prior * prior - standard_uncertainty * standard_uncertainty,
-                                  least_share * least_share * prior * prior);
-    return std::abs(value) / std::sqrt(known);
-}
-
 void compare_with_priors(const Adjustment& adjustment, std::vector<FitReason>& reasons) {
     for (const SetupEstimate& e : adjustment.setup) {
         if (!e.value || !std::isfinite(e.prior) || e.prior == 0.0) continue;
@@ -81,6 +72,15 @@ void judge_faults(const Adjustment& adjustment, std::vector<FitReason>& reasons)
 }
 
 }  // namespace
+
+// A value that stands further from its prior than the readings' own uncertainty of it lets chance explain. Five
+// standard deviations: of dozens of unknowns in a sound run, one stands beyond four in every 250 runs.
+double distance_from_prior(double value, double standard_uncertainty, double prior) {
+    constexpr double least_share = 1e-3;  // of the prior: below it the readings say nothing that could contradict it
+    const double known = std::max(prior * prior - standard_uncertainty * standard_uncertainty,
+                                  least_share * least_share * prior * prior);
+    return std::abs(value) / std::sqrt(known);
+}
 
 std::vector<FitReason> far_coefficients(const std::vector<ExpansionEstimate>& expansion,
                                         const std::vector<DriftEstimate>& machine_drift) {

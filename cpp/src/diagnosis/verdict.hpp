@@ -17,6 +17,9 @@ Verdict judge(const Adjustment& adjustment, const std::vector<ResidualPattern>& 
 
 // AdjustmentOptions::scale_uncertainty, of an adjustment with its verdict.
 void scale_uncertainties(Adjustment& adjustment);
+// Of a value from its prior, in what lets chance explain: the readings' own uncertainty of it.
+double distance_from_prior(double value, double standard_uncertainty, double prior);
+
 // What the treatment of faults costs makes a fit doubtful at best, and comes first.
 void take_costs(const std::vector<FitReason>& costs, Verdict& verdict);
 
