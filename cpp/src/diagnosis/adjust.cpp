@@ -13,9 +13,9 @@
 #include "adjustment/smoothness.hpp"
 #include "diagnosis/fault_cost.hpp"
 #include "diagnosis/fault_search.hpp"
-#include "diagnosis/fault_tests.hpp"
 #include "diagnosis/prior_scatter.hpp"
 #include "diagnosis/reliability.hpp"
+#include "diagnosis/said_faults.hpp"
 #include "diagnosis/variance_components.hpp"
 #include "diagnosis/verdict.hpp"
 #include "evaluation/fit_test.hpp"
@@ -142,24 +142,29 @@ bool is_beyond_credible(const std::vector<NoiseFactor>& noise) {
 struct Weighed {
     Weighed(const AdjustmentProblem& of_all, const AdjustmentOptions& options, std::vector<NoiseFactor> with)
         : noise(std::move(with)) {
-        AdjustmentProblem problem = of_all;
-        problem.weigh(noise);
-        solution = plain = options.search_faults ? solved(problem, options) : solved_soon(problem, options);
-        faults.emplace(problem, options, smoothness_at_start(options));
+        auto weighed = std::make_shared<AdjustmentProblem>(of_all);
+        weighed->weigh(noise);
+        problem = weighed;
+        plain = options.search_faults ? solved(*problem, options) : solved_soon(*problem, options);
+        if (plain) state = FaultState{{}, plain};
+        faults = std::make_shared<FaultContext>(*problem, options, smoothness_at_start(options), plain);
     }
     // What another look at the scatter says of the noise.
     std::vector<NoiseFactor> look() {
-        scatter = scatter_of_channels(*solution, noise);
+        scatter = scatter_of_channels(*state->solution, noise);
         return to_weigh(scatter);
     }
     void find_faults() {
-        solution = faults->run(plain);
-        if (solution && solution != plain) look();
+        state = search_faults(*faults);
+        if (has_faults()) look();
     }
+    bool has_faults() const { return state && state->solution != plain; }
 
     std::vector<NoiseFactor> noise;
-    SolutionPointer plain, solution;  // none where no minimum is reached
-    std::optional<FaultSearch> faults;
+    std::shared_ptr<const AdjustmentProblem> problem;  // to which the next one refers
+    std::shared_ptr<const FaultContext> faults;
+    std::shared_ptr<Solution> plain;  // with nothing done about faults; none where no minimum is reached
+    std::optional<FaultState> state;
     Scatter scatter;
 };
 
@@ -199,7 +204,7 @@ Weighed weigh_by_noise(const AdjustmentProblem& of_all, const AdjustmentOptions&
     }
     for (int search = 0; run.plain; ++search) {
         run.find_faults();
-        if (!run.solution || run.solution == run.plain || search == most_searches) break;
+        if (!run.has_faults() || search == most_searches) break;
         std::vector<NoiseFactor> next = to_weigh(run.scatter);
         if (are_alike(run.noise, next)) break;
         run = Weighed(of_all, options, std::move(next));
@@ -209,14 +214,15 @@ Weighed weigh_by_noise(const AdjustmentProblem& of_all, const AdjustmentOptions&
 
 // Whether priors of set-ups that are far too narrow explain the scatter: without them there is none.
 bool priors_explain(const Weighed& run, const AdjustmentProblem& of_all, const AdjustmentOptions& options) {
-    if (!run.solution) return false;
+    if (!run.state) return false;
+    Solution& at = *run.state->solution;
     AdjustmentProblem problem = of_all;
     std::set<SetupQuantity> far;
     for (const LineSetup& setup : of_all.setups())
         for (const int c : setup.active) {
             const int j = setup.unknown[c];
-            const double u = std::sqrt(element(run.solution->inverse(), j, j)), prior = setup.prior[c];
-            if (std::isfinite(prior) && distance_from_prior(run.solution->x()[j], u, prior) > thresholds.farthest_prior)
+            const double u = std::sqrt(element(at.inverse(), j, j)), prior = setup.prior[c];
+            if (std::isfinite(prior) && distance_from_prior(at.x()[j], u, prior) > thresholds.farthest_prior)
                 far.insert(setup::component(c).quantity);
         }
     if (far.empty()) return false;
@@ -234,12 +240,10 @@ Weighed find(const AdjustmentProblem& of_all, const AdjustmentOptions& options) 
     if (run.plain && options.variance_components) run.look();
     const bool may_be_noise = options.variance_components && (!run.plain || is_odd(run.scatter));
     run.find_faults();
-    if (!may_be_noise || (run.solution && run.solution != run.plain && !is_odd(run.scatter))) return run;
-    if (priors_explain(run, of_all, options)) return run;
+    if (!may_be_noise || (run.has_faults() && !is_odd(run.scatter)) || priors_explain(run, of_all, options)) return run;
     Weighed by_noise = weigh_by_noise(of_all, options);
-    if (by_noise.noise.empty() || !by_noise.solution) return run;
-    if (is_beyond_credible(by_noise.noise)) by_noise.solution = by_noise.plain;
-    if (!by_noise.solution) return run;
+    if (by_noise.noise.empty() || !by_noise.plain || !by_noise.state) return run;
+    if (is_beyond_credible(by_noise.noise)) by_noise.state = FaultState{{}, by_noise.plain};
     by_noise.look();
     return is_noise(by_noise.scatter) ? by_noise : run;
 }
@@ -256,9 +260,8 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     refuse_foreign_distances(measurement, plan);
 
     Weighed found = find(of_all, options);
-    FaultSearch& faults = *found.faults;
-    const SolutionPointer solution = found.solution;
-    if (!solution) refuse_unsolved(measurement, plan);
+    if (!found.state) refuse_unsolved(measurement, plan);
+    const std::shared_ptr<Solution>& solution = found.state->solution;
     const AdjustmentProblem& problem = solution->problem();
     const Observability& observability = solution->observability();
     GaussNewton& solver = solution->solver();
@@ -276,7 +279,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     const std::vector<bool> known = known_unknowns(problem, observability.determined(), inverse);
     result.calibration.findings = observability.findings(known);
     if (!is_anything_determined(result.calibration)) throw NothingDetermined("adjustment", result.calibration.findings);
-    result.faults = faults.classes(*solution, forms, measurement);
+    result.faults = said_faults(*found.faults, *found.state, forms, measurement);
     refuse_implausible(result.calibration, measurement, plan, options.plausible);
     if (options.full_covariance) add_covariance(problem, forms, solver.factor(), result.calibration);
     result.setup = setup_estimates(problem, known, x, inverse);
@@ -296,7 +299,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
     result.verdict =
         judge(result, patterns, prior_scatter(problem, x, solver.factor()), residual_rounding(solver.equations()));
     if (!result.faults.empty())
-        take_costs(costs_of_faults(result.calibration, without_treatment(*solution, faults.problem(), options)),
+        take_costs(costs_of_faults(result.calibration, without_treatment(*solution, *found.problem, options)),
                    result.verdict);
     if (!solution->is_minimum()) {
         const double factor = std::sqrt(result.variance_factor());
@@ -307,7 +310,7 @@ Adjustment adjust(const Measurement& measurement, const Plan& plan, const Chain&
         result.verdict.reasons.push_back(reason);
     }
     const double noise = std::sqrt(std::max(1.0, result.variance_factor()));
-    result.unseen = unseen_faults(*solution, faults.tests(*solution), forms, noise);
+    result.unseen = unseen_faults(*solution, *tests_now(*found.faults, *found.state)->tests, forms, noise);
     if (options.reliability) result.reliability = reliability(*solution, forms, noise);
     if (options.scale_uncertainty) scale_uncertainties(result);
     add_deviation_effects(deviation_effects(solver, options), problem, forms, observability, result);
