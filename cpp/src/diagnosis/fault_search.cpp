@@ -103,7 +103,8 @@ std::optional<FaultState> Search::found_linearly(const SolutionPointer& where, c
 }
 
 FaultState Search::find_more(FaultState state) const {
-    for (int step = 0; step < steps_a_fault * context_.most_of_all; ++step) {
+    // Sound runs need no limit.
+    for (int step = 0; step == 0 || step < steps_a_fault * context_.most_of_all(); ++step) {
         while (const auto fewer = with_fewer(state)) state = *fewer;                  // 3
         state.tests = std::make_shared<TestedFaults>(context_.test(state.solution));  // 4
         const auto worst = context_.worst(*state.tests);
@@ -144,7 +145,7 @@ std::optional<FaultState> Search::with_fewer(const FaultState& state) const {
 bool Search::is_too_much(const FaultState& state, const std::optional<FaultCandidate>& worst) const {
     const TestedFaults& tests = *state.tests;
     if (!worst)
-        return context_.are_too_many(state.found) ||
+        return (!state.found.empty() && context_.are_too_many(state.found)) ||
                (int(state.found.size()) > few &&
                 !(tests.noise_beside(0.0) <= thresholds.largest_variance_factor()));
     const int on_the_way = context_.left_of(context_.channel(*worst), state.found) + more_on_the_way;
@@ -185,8 +186,8 @@ std::optional<FoundFaults> Search::revised(const FaultState& state) const {
 }
 
 FaultState Search::correct(FaultState state) const {
-    const int most_rounds = rounds_more + context_.most_of_all;
-    for (int round = 0; round < most_rounds; ++round) {
+    const auto is_last = [&](int round) { return round + 1 >= rounds_more + context_.most_of_all(); };
+    for (int round = 0; round == 0 || !is_last(round - 1); ++round) {
         state = find_more(state);  // 3 to 7
         if (state.gave_up || state.found.empty()) return state;
         FoundFaults classes;  // 8
@@ -205,7 +206,7 @@ FaultState Search::correct(FaultState state) const {
         const auto treated = treat(state, classes);  // 9
         if (!treated) return state;
         const auto left = context_.worst(context_.test(treated->solution));
-        if (!left || round + 1 == most_rounds || context_.left_of(context_.channel(*left), classes) <= 0) return *treated;
+        if (!left || is_last(round) || context_.left_of(context_.channel(*left), classes) <= 0) return *treated;
         const auto next = near(state, with(state.found, *left));
         if (!next) return {classes, treated->solution};  // said as they were to be treated, not as open
         state = *next;

@@ -13,6 +13,7 @@ double gain_of_probability(double probability) { return std::pow(Eigen::numext::
 // A part of the redundancy of each channel. N faults of which each is seen beside the others need N redundant readings,
 // and what is found by chance grows with them.
 std::map<std::string, int> most_faults(const AdjustmentProblem& problem, Solution& solution) {
+    solution.linearise(solution.x());
     std::map<std::string, double> redundancy;
     for (std::size_t r = 0; r < problem.readings().size(); ++r)
         redundancy[problem.noise_channel(problem.readings()[r])] +=
@@ -58,28 +59,32 @@ FaultContext::FaultContext(const AdjustmentProblem& of_all, const AdjustmentOpti
       all(std::move(of_none)),
       limit(given.outlier_probability > 0.0
                 ? gain_of_probability(given.outlier_probability / search_limits::usual_tests)
-                : thresholds.fault),
-      most(most_faults(problem, *(all ? all : unsolved({})))),
-      most_of_all(left_of_all({})) {}
+                : thresholds.fault) {}
+
+// At zero: where gross readings lead, redundancies are others.
+const std::map<std::string, int>& FaultContext::most() const {
+    if (most_.empty()) most_ = most_faults(problem, *unsolved({}));
+    return most_;
+}
 
 std::string FaultContext::channel(const FaultCandidate& candidate) const {
     return problem.noise_channel(problem.readings()[std::size_t(*hypotheses.readings(candidate.hypothesis).begin())]);
 }
 
 int FaultContext::left_of(const std::string& name, const FoundFaults& found) const {
-    return most.at(name) - int(std::count_if(found.begin(), found.end(), [&](const FoundFault& fault) {
+    return most().at(name) - int(std::count_if(found.begin(), found.end(), [&](const FoundFault& fault) {
                return channel(fault.members.front()) == name;
            }));
 }
 
 int FaultContext::left_of_all(const FoundFaults& found) const {
     int left = 0;
-    for (const auto& of : most) left += std::max(0, left_of(of.first, found));
+    for (const auto& of : most()) left += std::max(0, left_of(of.first, found));
     return left;
 }
 
 bool FaultContext::are_too_many(const FoundFaults& found) const {
-    return std::any_of(most.begin(), most.end(), [&](const auto& of) { return left_of(of.first, found) < 0; });
+    return std::any_of(most().begin(), most().end(), [&](const auto& of) { return left_of(of.first, found) < 0; });
 }
 
 FaultContext::SolutionPointer FaultContext::unsolved(const FoundFaults& found) const {

@@ -121,15 +121,18 @@ struct FaultContext {
     const AdjustmentOptions& options;
     const std::array<double, function_count> smoothness;
     const SolutionPointer all;
-    const double limit;                     // least gain of a fault
-    const std::map<std::string, int> most;  // faults of each channel
-    const int most_of_all;
+    const double limit;  // least gain of a fault
 
+    const std::map<std::string, int>& most() const;  // faults of each channel
+    int most_of_all() const { return left_of_all({}); }
     std::string channel(const FaultCandidate& candidate) const;
     // How many more faults a channel, or all of them, may have beside these; below 0 where there are more already.
     int left_of(const std::string& channel, const FoundFaults& found) const;
     int left_of_all(const FoundFaults& found) const;
     bool are_too_many(const FoundFaults& found) const;
+
+private:
+    mutable std::map<std::string, int> most_;  // made when it is asked for: sound runs do without
 };
 
 }  // namespace stepdiag

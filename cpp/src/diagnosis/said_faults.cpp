@@ -86,7 +86,7 @@ std::vector<FaultClass> said_faults(const FaultContext& context, const FaultStat
     if (std::count_if(classes.begin(), classes.end(), is_doubtful) > 1)
         for (FaultClass& entry : classes)
             if (is_doubtful(entry)) entry.corrected = false;
-    if (context.are_too_many(state.found))  // where nothing else is at hand
+    if (!state.found.empty() && context.are_too_many(state.found))  // where nothing else is at hand
         for (FaultClass& entry : classes) entry.corrected = false;
     if (state.left) classes.push_back(said(*state.left, FaultTreatment::none));
     return classes;
