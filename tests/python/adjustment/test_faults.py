@@ -52,7 +52,7 @@ def test_two_outliers_of_twenty_sigma_are_found_and_named(
     bad = spoilt(run, [(*place, size) for place, size in sizes.items()])
     adjustment = adjust(bad, scenario)
     assert [found.treatment for found in adjustment.faults] == ["left_out", "left_out"]
-    assert adjustment.verdict.fit == "accepted"
+    assert is_sound_but_for_its_costs(adjustment)
     named = {(o.row, o.channel) for o in adjustment.outliers}
     assert named >= set(places)
     for found in adjustment.faults:
@@ -84,7 +84,6 @@ def test_two_outliers_of_twenty_sigma_are_found_and_named(
     assert adjustment.chi_square_probability > 1e-3
     ignored = adjust(bad, scenario, outlier_probability=0.0)
     assert ignored.outliers == []
-    assert ignored.chi_square_probability < 1e-3
     (found,) = ignored.faults  # the larger one hides nothing and is named; nothing is done about it
     assert (found.treatment, found.corrected, ignored.verdict.fit) == ("none", False, "rejected")
 
@@ -141,15 +140,17 @@ def test_false_alarms_are_as_rare_as_stated() -> None:
     assert alarms <= 22
 
 
-def test_where_the_model_is_wrong_nothing_is_left_out() -> None:
-    """More than one in fifty, and more than ten: it is not the readings."""
+def test_where_a_fifth_of_the_distances_is_wrong_it_is_their_noise() -> None:
     run, scenario = run_of(35, steps=10)
     rng = np.random.default_rng(35)
     rows = rng.choice(124, 25, replace=False)
     adjustment = adjust(spoilt(run, [(int(r), "distance", float(rng.choice([-40, 40]))) for r in rows]), scenario)
     assert adjustment.outliers == []
     assert all(np.all(used[np.isfinite(run.channels[c])]) for c, used in adjustment.used.items() if c == "distance")
-    assert adjustment.chi_square_probability < 1e-6
+    assert adjustment.faults == []
+    (reason,) = adjustment.verdict.reasons
+    assert (adjustment.verdict.fit, reason.finding, reason.channel) == ("rejected", "noise_factor", "distance")
+    assert abs(reason.value - np.sqrt(0.8 + 0.2 * 40.0**2)) < 3 * reason.standard_uncertainty
 
 
 def test_outlier_that_nothing_controls_is_not_invented() -> None:
@@ -192,6 +193,12 @@ def normalised(adjustment: sd.Adjustment, table: reference.ErrorTable) -> float:
     return max(float(np.max(np.concatenate(errors))), *of_squareness)
 
 
+def is_sound_but_for_its_costs(adjustment: sd.Adjustment) -> bool:
+    """Accepted, or doubtful for what was left out or freed alone."""
+    costs = {reason.finding for reason in adjustment.verdict.reasons}
+    return adjustment.verdict.fit == ("doubtful" if costs else "accepted") and costs <= {"undetermined", "fault_cost"}
+
+
 def told(layout: str = "ideal") -> tuple[sd.Measurement, reference.Scenario, reference.ErrorTable]:
     rng = np.random.default_rng(41)
     scenario = random_scenario(rng, steps=20, layout=layout)
@@ -216,7 +223,8 @@ def test_slip_of_a_body_diagonal_is_a_class_with_its_twin_and_rejected(size: flo
     assert "fault" in {reason.finding for reason in adjustment.verdict.reasons}
     # Estimated it is judged with the rest, and the truth is within what is said in either case.
     estimated = adjust(bad, scenario, slips="estimate")
-    assert estimated.verdict.fit == "accepted"
+    assert is_sound_but_for_its_costs(estimated)
+    assert estimated.verdict.fit == "doubtful"  # a slip costs more than half of what a squareness is known to
     assert estimated.faults[0].corrected
     assert normalised(adjustment, table) < SOUND
     assert normalised(estimated, table) < SOUND
@@ -231,7 +239,7 @@ def test_end_of_a_scale_line_may_be_any_of_the_three_or_a_factor_of_a_diagonal()
     by_kind = {kind: {f.line for f in found.members if f.kind == kind} for kind in ("reading", "factor")}
     assert by_kind == {"reading": {"p00", "0p0", "00p"}, "factor": {"ppp", "npp", "pnp", "nnp"}}
     assert found.treatment == "estimated"
-    assert small.verdict.fit == "accepted"
+    assert (small.verdict.fit, is_sound_but_for_its_costs(small)) == ("doubtful", True)
     assert normalised(small, table) < SOUND
     assert small.calibration.functions["EXX"][2][-1] > 3e-3  # what the alternatives differ by
     large = adjust(changed(run, [("p00", 1, "distance", 1.0)]), scenario)
@@ -250,7 +258,7 @@ def test_gross_distance_is_found_and_does_no_harm(layout: str, size: float) -> N
     adjustment = adjust(bad, scenario)
     (found,) = adjustment.faults
     assert ("ppp", 30) in {(fault.line, fault.point) for fault in found.members}
-    assert adjustment.verdict.fit == "accepted"
+    assert is_sound_but_for_its_costs(adjustment)
     assert normalised(adjustment, table) < SOUND
 
 
@@ -264,16 +272,21 @@ def test_gross_tilt_is_found_and_does_no_harm() -> None:
     assert normalised(adjustment, table) < SOUND
 
 
-def test_several_gross_readings_are_found() -> None:
-    """Five distances of one run, 0.1 to 9 mm off, on steps of their own: as many as that many redundant ones carry."""
+def test_several_gross_readings_are_found_up_to_a_tenth_of_the_redundancy() -> None:
+    """Distances of one run, 0.1 to 9 mm off, on steps of their own; some 48 of them are redundant."""
     run, scenario, table = told()
     places = [("ppp", 7, 0.1), ("npp", 21, -0.3), ("pnp", 40, 9.0), ("nnp", 47, 2.0), ("ppp", 33, -1.0)]
-    adjustment = adjust(changed(run, [(line, p, "distance", size) for line, p, size in places]), scenario)
-    members = [{(f.line, f.point) for f in found.members} for found in adjustment.faults]
-    assert len(members) == len(places)
-    assert all(any((line, p) in found for found in members) for line, p, _ in places)
-    assert adjustment.verdict.fit == "accepted"
-    assert normalised(adjustment, table) < SOUND
+    four, five = (
+        adjust(changed(run, [(line, p, "distance", size) for line, p, size in places[:count]]), scenario)
+        for count in (4, 5)
+    )
+    assert len(four.faults) == 4
+    for line, point, _ in places[:4]:
+        assert any((line, point) in {(f.line, f.point) for f in found.members} for found in four.faults)
+    assert is_sound_but_for_its_costs(four)
+    assert normalised(four, table) < SOUND
+    assert five.verdict.fit == "rejected"
+    assert not any(found.corrected for found in five.faults)
 
 
 def test_consecutive_rows_that_are_off_are_two_slips() -> None:
@@ -300,10 +313,10 @@ def test_tilts_that_are_off_from_point_1_on_are_not_taken_for_a_wrong_first_one(
         assert adjustment.verdict.fit == "rejected"
     else:  # both are unknowns, so that what they differ by is in the uncertainties
         assert [(fault.kind, fault.point) for fault in found.members] == [("slip", 1), ("reading", 0)]
-        assert (found.treatment, adjustment.verdict.fit) == ("estimated", "accepted")
+        assert (found.treatment, is_sound_but_for_its_costs(adjustment)) == ("estimated", True)
     first = adjust(changed(run, [(line, 0, "beta", size)]), scenario)
     assert (first.faults[0].members[0].kind, first.faults[0].members[0].point) == ("reading", 0)
-    assert first.verdict.fit == "accepted"
+    assert is_sound_but_for_its_costs(first)
     assert normalised(first, table) < SOUND
 
 
@@ -318,7 +331,7 @@ def test_slip_from_point_1_on_is_the_same_as_a_wrong_first_distance() -> None:
         one, other = members["reading", "npp", 0], members["slip", "npp", 1]
         assert (one.size, one.chi_square_gain) == (-other.size, other.chi_square_gain)
         assert found.corrected
-        assert adjustment.verdict.fit == "accepted"
+        assert is_sound_but_for_its_costs(adjustment)
         assert normalised(adjustment, table) < SOUND
     for name, (_, value, u) in slip.calibration.functions.items():
         assert np.max(np.abs(reading.calibration.functions[name][1] - value) - 1e-6 * u) <= 0  # both at their minimum

@@ -70,7 +70,7 @@ def test_fit_is_said_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     run = simulated(tmp_path, NOISY)
     assert report(tmp_path, capsys, NOISY, run).startswith("fit: accepted: the readings agree")
     sure = NOISY + "[uncertainty]\ndistance_um = 0.05\ntilt_urad = 0.5\n"
-    assert report(tmp_path, capsys, sure, run).startswith("fit: doubtful: the noise is about 1.9")
+    assert report(tmp_path, capsys, sure, run).startswith("fit: doubtful: noise: alpha scatters 1.7")
 
 
 def test_outliers_are_named_with_their_size(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
