@@ -10,7 +10,7 @@ import os
 import stepdiag.io.displays
 import typing
 import xarray
-__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'ChangeCombination', 'ChangePriors', 'ChangeTerm', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'PredictedReading', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'Recheck', 'ReplayMismatch', 'ReturnedBeam', 'RoundedChannel', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'Thresholds', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'check_points', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'newer_format', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'recheck', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'thresholds', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'without_lost_marks', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
+__all__: list[str] = ['AdaptiveProcedure', 'Adjustment', 'AdjustmentOptions', 'BatchEvaluator', 'BeamSegment', 'BeamSpot', 'Bins', 'Calibration', 'CalibrationEntry', 'Camera', 'Chain', 'ChangeCombination', 'ChangePriors', 'ChangeTerm', 'CheckPoints', 'Compensator', 'DerivedOutput', 'DiagonalErrors', 'Distribution', 'DriftEstimate', 'Environment', 'ErrorAtPoint', 'ErrorMap', 'Expansion', 'ExpansionEstimate', 'Fault', 'FaultClass', 'FaultControl', 'FitQuality', 'FitReason', 'FunctionModel', 'GaussianMode', 'Head', 'HeadBeam', 'HeadBody', 'HeadCalibration', 'HeadDesign', 'Interferometer', 'InvalidArgument', 'JointRegion', 'KnownCombination', 'KnownExpansion', 'LateralEffect', 'LineDeviation', 'Machine', 'MachineDrift', 'Measurement', 'Misalignment', 'MonteCarloResult', 'Noise', 'Outlier', 'Output', 'PartialStatistics', 'Plan', 'PlannedPass', 'PlausibleLimits', 'PredictedReading', 'Propagation', 'RangeModel', 'ReadingNoise', 'ReadingUncertainty', 'Recheck', 'ReplayMismatch', 'ReturnedBeam', 'RoundedChannel', 'SampleModel', 'ScaleTemperatures', 'Sensitivity', 'SetupEstimate', 'SetupPriors', 'SetupQuantity', 'SimulationOptions', 'Smoothness', 'SpotSensor', 'Stability', 'StatisticsOptions', 'Thresholds', 'UncertainInput', 'UncertainInputs', 'UncertainQuantity', 'Undetermined', 'UnseenFault', 'Validation', 'VarianceComponent', 'Verdict', 'Verification', 'VirtualCalibrations', 'VirtualReadout', 'VolumeDraws', 'VolumeSummary', 'VolumetricAccuracy', 'adjust', 'adjusted_quantity_count', 'beam_radius', 'check_points', 'choose_instruction_set', 'compare', 'couple', 'cramer_rao_bound', 'derived_at_point', 'derived_on_diagonals', 'diagonal_errors', 'drawn_inputs', 'error_at_point', 'error_uncertainties_at', 'errors_at', 'evaluate', 'expose', 'fit_quality', 'head_sensitivities', 'in_recorded_air', 'instruction_set', 'instruction_sets', 'largest_repeat_count', 'leaf_samples', 'locate', 'make_bins', 'newer_format', 'normal_quantile', 'numerical_tolerance', 'pilot_samples', 'power_inside', 'propagate', 'propagate_linear', 'random_error_map', 'read_calibration', 'read_distance', 'read_error_map', 'read_head', 'read_measurement', 'recheck', 'run_leaves', 'run_ranges', 'setup_quantities', 'simulate', 'straightness_reference', 'summarise_volume', 't_quantile', 'thresholds', 'trace_beams', 'uncertain_quantities', 'verify', 'volumetric_accuracy', 'with_covariance', 'without_lost_marks', 'word_findings_with', 'word_reasons_with', 'word_unseen_faults_with']
 class InvalidArgument(ValueError):
     """
     Bad input: the message names the argument, file and line, or key, what was expected and what came.
@@ -1500,6 +1500,11 @@ class Thresholds:
         Least gain of a fault in chi-square.
         """
     @property
+    def fault_cost(self) -> float:
+        """
+        How many times as large uncertainties what was done about faults may make the largest of a family.
+        """
+    @property
     def found_with_99_percent(self) -> float:
         """
         Size of a fault, in its standard uncertainties, that is found with a probability of 99 %.
@@ -1535,9 +1540,19 @@ class Thresholds:
         Least gain of a mistake in the whole run.
         """
     @property
+    def most_faults(self) -> float:
+        """
+        Of a channel, by its redundancy; one in any case.
+        """
+    @property
     def no_misfit_doubtful(self) -> float:
         """
         The same above which there is less noise than stated.
+        """
+    @property
+    def noise_component(self) -> float:
+        """
+        Probability below which the scatter of a channel is taken for its noise.
         """
     @property
     def pattern(self) -> float:
@@ -1563,6 +1578,11 @@ class Thresholds:
     def second_order(self) -> float:
         """
         Gain from which second order may distinguish faults.
+        """
+    @property
+    def widest_component(self) -> float:
+        """
+        Largest relative standard uncertainty of a noise factor that is used.
         """
 class SetupPriors:
     """
@@ -1611,9 +1631,9 @@ class MachineDrift:
         ...
 class AdjustmentOptions:
     """
-    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of a false alarm among a thousand tests for faults; 0: they are named and not corrected. slips: "report" rejects a run with a slip, "estimate" makes it an unknown and accepts that. scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best. plausible: what a machine can be. expansion: of the scales; coefficients that are uncertain are unknowns. machine_drift: of which the rates are unknowns. reliability: also which faults the readings control. search_faults: False: it is known already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not reached soon, values are those that were, and rejected. distance_scale_uncertainty, air_index_uncertainty: relative standard uncertainties of all distances in common, by the instrument's scale and by the index of the air; they count in the uncertainties only.
+    What adjust() takes for known and unknown. uncertainty: of readings where the run states none. setup: of all lines; setup_by_line replaces the quantities that it names. one_setup_per_line: all runs of a line share its set-up. reversal: tables of their own for nodes approached in - direction. rotations: False: the machine has no angular errors. outlier_probability: of a false alarm among a thousand tests for faults; 0: they are named and not corrected. slips: "report" rejects a run with a slip, "estimate" makes it an unknown and accepts that. scale_uncertainty: where the variance factor is above 1, its root multiplies all stated uncertainties, and the fit is doubtful at best. plausible: what a machine can be. expansion: of the scales; coefficients that are uncertain are unknowns. machine_drift: of which the rates are unknowns. reliability: also which faults the readings control. search_faults: False: it is known already what is wrong with the run as a whole; faults are not looked for, and where the minimum is not reached soon, values are those that were, and rejected. distance_scale_uncertainty, air_index_uncertainty: relative standard uncertainties of all distances in common, by the instrument's scale and by the index of the air; they count in the uncertainties only. variance_components: estimates how much each channel scatters, and takes that for its noise where it is more than is stated.
     """
-    def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.00012, slips: str = 'report', scale_uncertainty: bool = False, full_covariance: bool = False, plausible: PlausibleLimits = ..., expansion: KnownExpansion | None = None, machine_drift: MachineDrift | None = None, reliability: bool = False, search_faults: bool = True, distance_scale_uncertainty: typing.SupportsFloat | typing.SupportsIndex = 0.0, air_index_uncertainty: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __init__(self, *, uncertainty: ReadingUncertainty = ..., setup: SetupPriors = ..., setup_by_line: collections.abc.Mapping[str, SetupPriors] = {}, one_setup_per_line: bool = False, reversal: bool = True, rotations: bool = True, smoothness: Smoothness | None = None, outlier_probability: typing.SupportsFloat | typing.SupportsIndex = 0.00012, slips: str = 'report', scale_uncertainty: bool = False, full_covariance: bool = False, plausible: PlausibleLimits = ..., expansion: KnownExpansion | None = None, machine_drift: MachineDrift | None = None, reliability: bool = False, search_faults: bool = True, distance_scale_uncertainty: typing.SupportsFloat | typing.SupportsIndex = 0.0, air_index_uncertainty: typing.SupportsFloat | typing.SupportsIndex = 0.0, variance_components: bool = True) -> None:
         """
         adjust() checks them.
         """
@@ -1674,6 +1694,9 @@ class AdjustmentOptions:
         """
     @property
     def uncertainty(self) -> ReadingUncertainty:
+        ...
+    @property
+    def variance_components(self) -> bool:
         ...
 class SetupEstimate:
     """
@@ -1811,6 +1834,35 @@ class DriftEstimate:
     def value(self) -> float:
         """
         mm/s
+        """
+class VarianceComponent:
+    """
+    How much the readings of a channel scatter, as their residuals tell it.
+    """
+    @property
+    def channel(self) -> str:
+        """
+        "distance" (of beams, too), "alpha", ...
+        """
+    @property
+    def factor(self) -> float:
+        """
+        Root of the component: times the noise that is stated.
+        """
+    @property
+    def line(self) -> str:
+        """
+        Of a line that scatters unlike the channel's others; empty: all others.
+        """
+    @property
+    def standard_uncertainty(self) -> float:
+        """
+        Of the factor.
+        """
+    @property
+    def used(self) -> bool:
+        """
+        Stated uncertainties were multiplied by it; otherwise they stayed.
         """
 class Outlier:
     """
@@ -2267,6 +2319,11 @@ class Adjustment:
     def used(self) -> dict[str, numpy.typing.NDArray[numpy.bool]]:
         """
         channel -> (n,) whether a reading was used: it was there, and is no outlier.
+        """
+    @property
+    def variance_components(self) -> list[VarianceComponent]:
+        """
+        VarianceComponent of each channel, and of its lines that scatter otherwise; of what others control.
         """
     @property
     def variance_factor(self) -> float:

@@ -119,7 +119,7 @@ public:
     bool tells_reversal() const { return reversal_; }
     bool has_rotations() const { return rotations_; }
     std::string channel_name(const AdjustedReading& reading) const;
-    bool is_length(const AdjustedReading& reading) const;  // mm rather than rad
+    bool is_length(const AdjustedReading& reading) const;             // mm rather than rad
     std::string noise_channel(const AdjustedReading& reading) const;  // of NoiseFactor
     void weigh(const std::vector<NoiseFactor>& noise);                // instead of what it was weighed with before
     // Channels of which stated uncertainties were below the rounding of readings.

@@ -18,9 +18,9 @@ double double_rounding(HeadLayout kind, int channel, double longest) {
 
 double decimal_step(const std::vector<double>& values, const std::vector<double>& planned, double unit) {
     constexpr int coarsest = -2, most_decimals = 9;  // of decimals: from hundreds of units
-    constexpr double unclear = 1e-3;   // of a step: as much may be rounding
-    constexpr std::size_t enough = 5;  // places beside the plan; fewer may be chance
-    constexpr double told = 100.0;     // places a step: the plan has lengths between the multiples
+    constexpr double unclear = 1e-3;                 // of a step: as much may be rounding
+    constexpr std::size_t enough = 5;                // places beside the plan; fewer may be chance
+    constexpr double told = 100.0;                   // places a step: the plan has lengths between the multiples
     double size = 0.0;
     for (const double value : values) size = std::max(size, std::abs(value));
     double per_unit = std::pow(10.0, coarsest) / unit;

@@ -204,7 +204,8 @@ void bind_options(py::module_& m) {
         "reached "
         "soon, values are those that were, and rejected. distance_scale_uncertainty, air_index_uncertainty: relative "
         "standard uncertainties of all distances in common, by the instrument's scale and by the index of the air; "
-        "they count in the uncertainties only. variance_components: estimates how much each channel scatters, and takes that "
+        "they count in the uncertainties only. variance_components: estimates how much each channel scatters, and "
+        "takes that "
         "for its noise where it is more than is stated.")
         .def(py::init([](const ReadingUncertainty& uncertainty, const Priors& setup,
                          const std::map<std::string, Priors>& setup_by_line, bool one_setup_per_line, bool reversal,
@@ -212,8 +213,7 @@ void bind_options(py::module_& m) {
                          const std::string& slips, bool scale_uncertainty, bool full_covariance,
                          const PlausibleLimits& plausible, const std::optional<KnownExpansion>& expansion,
                          const std::optional<MachineDrift>& machine_drift, bool reliability, bool search_faults,
-                         double distance_scale_uncertainty, double air_index_uncertainty,
-                         bool variance_components) {
+                         double distance_scale_uncertainty, double air_index_uncertainty, bool variance_components) {
                  AdjustmentOptions options{uncertainty,
                                            setup.value,
                                            {},
@@ -246,7 +246,8 @@ void bind_options(py::module_& m) {
              py::arg("machine_drift") = std::nullopt, py::arg("reliability") = usual.reliability,
              py::arg("search_faults") = usual.search_faults,
              py::arg("distance_scale_uncertainty") = usual.distance_scale_uncertainty,
-             py::arg("air_index_uncertainty") = usual.air_index_uncertainty, py::arg("variance_components") = usual.variance_components, "adjust() checks them.")
+             py::arg("air_index_uncertainty") = usual.air_index_uncertainty,
+             py::arg("variance_components") = usual.variance_components, "adjust() checks them.")
         .def_readonly("uncertainty", &AdjustmentOptions::uncertainty)
         .def_property_readonly("setup", [](const AdjustmentOptions& o) { return Priors{o.setup}; })
         .def_property_readonly("setup_by_line",

@@ -9,8 +9,8 @@
 namespace stepdiag {
 
 // A reason for each family (positioning, straightness, angle, squareness) of which the largest standard uncertainty is
-// more than `thresholds.fault_cost` times what it was, and one where values are not determined any more. `without`: with
-// the same weights.
+// more than `thresholds.fault_cost` times what it was, and one where values are not determined any more. `without`:
+// with the same weights.
 std::vector<FitReason> costs_of_faults(const Calibration& with, const Calibration& without);
 
 }  // namespace stepdiag

@@ -146,8 +146,7 @@ bool Search::is_too_much(const FaultState& state, const std::optional<FaultCandi
     const TestedFaults& tests = *state.tests;
     if (!worst)
         return (!state.found.empty() && context_.are_too_many(state.found)) ||
-               (int(state.found.size()) > few &&
-                !(tests.noise_beside(0.0) <= thresholds.largest_variance_factor()));
+               (int(state.found.size()) > few && !(tests.noise_beside(0.0) <= thresholds.largest_variance_factor()));
     const int on_the_way = context_.left_of(context_.channel(*worst), state.found) + more_on_the_way;
     return on_the_way <= 0 ||
            tests.is_hopeless(worst->score.gain, std::max(on_the_way, context_.left_of_all(state.found)));

@@ -4,15 +4,16 @@
 //     more where that leads. It has one minimum whatever the readings are; all of each class are free there.
 //  3. Try each large fault as what second order may tell from it, with one of the other faults less.
 //  4. Test all hypotheses. The worst is the one that takes most off chi-square, as long as that is significant.
-//  5. Give up where there are too many for their channel, or where as many more as there may be leave a scatter that nobody believes.
+//  5. Give up where there are too many for their channel, or where as many more as there may be leave a scatter that
+//  nobody believes.
 //  6. Adjust with the worst as one more free unknown, or with the best of its class where that fails.
 //  7. Drop what is none beside the others, exchange what another one explains better; from 3 until no worst is left.
 //  8. Find the class of each (fault_class.hpp). One that is not significant beside the others is dropped: back to 3.
 //  9. Treat the classes (FaultTreatment), adjust, test. What is significant then is one more fault: back to 3.
 // 10. Where it gave up, all readings stay. What is still significant gets its class, and nothing is done about it.
 // What it takes is that a fault is controlled: N faults of which each is seen beside the others need as many redundant
-// directions, and a channel may have a tenth as many faults, and at least one. The standard plan has one a step among the distances of the body diagonals, five among the tilts, and one
-// among the scale lines.
+// directions, and a channel may have a tenth as many faults, and at least one. The standard plan has one a step among
+// the distances of the body diagonals, five among the tilts, and one among the scale lines.
 #pragma once
 
 #include <memory>

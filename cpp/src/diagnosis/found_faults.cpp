@@ -16,8 +16,7 @@ std::map<std::string, int> most_faults(const AdjustmentProblem& problem, Solutio
     solution.linearise(solution.x());
     std::map<std::string, double> redundancy;
     for (std::size_t r = 0; r < problem.readings().size(); ++r)
-        redundancy[problem.noise_channel(problem.readings()[r])] +=
-            1.0 - solution.reading_variances()[Eigen::Index(r)];
+        redundancy[problem.noise_channel(problem.readings()[r])] += 1.0 - solution.reading_variances()[Eigen::Index(r)];
     std::map<std::string, int> most;
     for (const auto& [channel, sum] : redundancy) most[channel] = std::max(1, int(thresholds.most_faults * sum));
     return most;

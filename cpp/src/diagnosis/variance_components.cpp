@@ -2,8 +2,8 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
 #include <array>
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <tuple>
@@ -16,12 +16,13 @@
 namespace stepdiag {
 namespace {
 
-constexpr int draws = 16;                // a multiple of BorderedFactor::sides, whatever that is
+constexpr int draws = 16;                  // a multiple of BorderedFactor::sides, whatever that is
 constexpr double least_redundancy = 0.02;  // of two readings whose difference counts
 constexpr int fewest_differences = 8;
 constexpr double fewest_freedom = 2.0;  // sum of redundancies
 constexpr double clear_of_noise = 4.0;  // standard deviations of the draws
-// Standard uncertainties by which the factor of a line is clearly larger than that of its channel: there are many lines.
+// Standard uncertainties by which the factor of a line is clearly larger than that of its channel: there are many
+// lines.
 constexpr double clear_of_lines = 5.0;
 
 using Draws = Eigen::Matrix<double, Eigen::Dynamic, draws, Eigen::RowMajor>;
@@ -276,7 +277,8 @@ std::vector<ScatterOfChannel> scatter_of_channels(Solution& solution, const std:
             of.is_noise = comparison.is_noise();
             if (!of.is_noise) {
                 factor = comparison.robust();
-                for (double* each : {&factor.value, &factor.standard_uncertainty}) *each *= std::max(1.0, factors[g].value);
+                for (double* each : {&factor.value, &factor.standard_uncertainty})
+                    *each *= std::max(1.0, factors[g].value);
             }
         }
         const double before = weighed_with(solution.problem(), groups[g]);

@@ -74,9 +74,7 @@ def test_smaller_noise_is_measured_and_said() -> None:
         (lambda name, run: np.where(on(run, "pnp") & (name == "alpha"), 5.0, 1.0), {("alpha", "pnp")}),
     ],
 )
-def test_what_scatters_more_is_named_and_weighed_with_that(
-    where: Change, named: set[tuple[str, str]]
-) -> None:
+def test_what_scatters_more_is_named_and_weighed_with_that(where: Change, named: set[tuple[str, str]]) -> None:
     found = adjust(noisy(TWICE, factor=where))
     assert found.verdict.fit == ("rejected" if any(c.factor > 3.0 for c in found.variance_components) else "doubtful")
     used = {(c.channel, c.line) for c in found.variance_components if c.used}

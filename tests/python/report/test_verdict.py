@@ -99,9 +99,7 @@ def test_one_common_factor_on_the_noise_is_doubtful_and_not_rejected(folder: Pat
     assert sd.read_calibration("calibration.csv").fit == "doubtful"
 
 
-def test_a_common_factor_above_three_is_rejected_as_noise(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_common_factor_above_three_is_rejected_as_noise(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_run(change=noisy(5.0))
     assert evaluate() == 3
     assert capsys.readouterr().out.startswith("fit: REJECTED: noise: alpha scatters ")
@@ -178,7 +176,6 @@ def test_scaled_uncertainties_are_said_in_reports_and_files(folder: Path, capsys
         assert calibration.uncertainty_scaled == factor
         assert main(["report", name]) == 0
         assert f"all standard uncertainties were multiplied by {factor:.3g}" in capsys.readouterr().out
-
 
 
 def test_false_alarms_are_as_rare_as_the_limits_say(folder: Path) -> None:

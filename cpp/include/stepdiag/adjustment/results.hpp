@@ -162,8 +162,8 @@ struct FitReason {
     double standard_uncertainty = 0.0;  // of the value of noise, a trend, scaled
     int run = -1;                       // of an uneven misfit: this run alone; -1: all
     FitAspect aspect = FitAspect::whole;
-    bool alternative = false;    // of a trend: instead of the one before; the readings do not tell which
-    int fault = 0;               // of a fault and of alternatives: number of the class, from 1
+    bool alternative = false;  // of a trend: instead of the one before; the readings do not tell which
+    int fault = 0;             // of a fault and of alternatives: number of the class, from 1
     // Of alternatives, fault_cost, undetermined: "EXX", ...; of a mistake, an implausible_input what it is.
     std::string parameter = {};
 };
